@@ -1,0 +1,2 @@
+//! The desk side of Flockmate: maps, planning, simulated autopilots and swarm simulation.
+#![forbid(unsafe_code)]

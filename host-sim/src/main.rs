@@ -1,0 +1,2 @@
+//! Command line of `host-sim`.
+fn main() {}

@@ -1,0 +1,157 @@
+//! Coordinate frames: WGS84, the mission's ENU tangent plane, and each autopilot's own NED projection.
+//!
+//! The mission frame is ENU metres on the plane tangent to the WGS84 ellipsoid at the mission origin. An autopilot's
+//! local frame is NED metres about its own EKF origin, but *not* a tangent plane: PX4 projects azimuthally on a sphere,
+//! ArduPilot scales degrees. Two kilometres from the origin they differ from WGS84 by metres, so every conversion goes
+//! through latitude and longitude with the projection of the autopilot at hand. f64 throughout: degrees at 1e-9.
+
+use libm::{asin, atan2, cos, fabs, sin, sqrt};
+use nalgebra::Vector3;
+
+use crate::Point;
+
+const WGS84_A: f64 = 6_378_137.0;
+const WGS84_F: f64 = 1.0 / 298.257_223_563;
+const WGS84_E2: f64 = WGS84_F * (2.0 - WGS84_F);
+/// Radius of the sphere PX4 projects on (`CONSTANTS_RADIUS_OF_EARTH`), metres.
+pub const PX4_EARTH_RADIUS_M: f64 = 6_371_000.0;
+/// ArduPilot's `LOCATION_SCALING_FACTOR`: metres of latitude for each 1e-7 degree.
+pub const ARDUPILOT_M_PER_1E7_DEG: f64 = 0.011_131_884_502_145_034;
+
+/// A geodetic position on WGS84.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Geodetic {
+    /// Latitude, degrees, north positive.
+    pub lat_deg: f64,
+    /// Longitude, degrees, east positive.
+    pub lon_deg: f64,
+    /// Altitude, metres above mean sea level (the geoid is taken as the ellipsoid, as autopilots do for differences).
+    pub alt_m: f64,
+}
+
+impl Geodetic {
+    /// Whether every field is finite and inside its range.
+    pub fn is_valid(&self) -> bool {
+        fabs(self.lat_deg) <= 90.0 && fabs(self.lon_deg) <= 180.0 && self.alt_m.is_finite()
+    }
+
+    fn ecef(&self) -> Vector3<f64> {
+        let (lat, lon) = (self.lat_deg.to_radians(), self.lon_deg.to_radians());
+        let n = WGS84_A / sqrt(1.0 - WGS84_E2 * sin(lat) * sin(lat));
+        Vector3::new(
+            (n + self.alt_m) * cos(lat) * cos(lon),
+            (n + self.alt_m) * cos(lat) * sin(lon),
+            (n * (1.0 - WGS84_E2) + self.alt_m) * sin(lat),
+        )
+    }
+}
+
+/// ENU metres of `position` on the plane tangent at `origin`.
+pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
+    let d = position.ecef() - origin.ecef();
+    let (lat, lon) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
+    let east = -sin(lon) * d.x + cos(lon) * d.y;
+    let north = -sin(lat) * cos(lon) * d.x - sin(lat) * sin(lon) * d.y + cos(lat) * d.z;
+    let up = cos(lat) * cos(lon) * d.x + cos(lat) * sin(lon) * d.y + sin(lat) * d.z;
+    Point::new(east as f32, north as f32, up as f32)
+}
+
+/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to better than a millimetre
+/// within 100 km.
+pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
+    let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
+    let (lat, lon) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
+    let o = origin.ecef();
+    let x = o.x - sin(lon) * e - sin(lat) * cos(lon) * n + cos(lat) * cos(lon) * u;
+    let y = o.y + cos(lon) * e - sin(lat) * sin(lon) * n + cos(lat) * sin(lon) * u;
+    let z = o.z + cos(lat) * n + sin(lat) * u;
+    ecef_to_geodetic(x, y, z)
+}
+
+/// Five fixed-point rounds of the latitude equation: converged below 1e-12 rad for altitudes within ±100 km.
+fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
+    let p = sqrt(x * x + y * y);
+    let mut lat = atan2(z, p * (1.0 - WGS84_E2));
+    let mut alt = 0.0;
+    for _ in 0..5 {
+        let n = WGS84_A / sqrt(1.0 - WGS84_E2 * sin(lat) * sin(lat));
+        alt = if fabs(lat) < core::f64::consts::FRAC_PI_4 {
+            p / cos(lat) - n
+        } else {
+            z / sin(lat) - n * (1.0 - WGS84_E2)
+        };
+        lat = atan2(z, p * (1.0 - WGS84_E2 * n / (n + alt)));
+    }
+    Geodetic { lat_deg: lat.to_degrees(), lon_deg: atan2(y, x).to_degrees(), alt_m: alt }
+}
+
+/// Great-circle distance in metres by the haversine formula (CPP eq. 9), on a sphere of 6 371 000 m; altitudes are
+/// ignored. Against WGS84 it errs by up to 0.56 % (along meridians near the poles and equator).
+pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
+    let (lat_a, lat_b) = (a.lat_deg.to_radians(), b.lat_deg.to_radians());
+    let half_dlat = sin((lat_b - lat_a) / 2.0);
+    let half_dlon = sin((b.lon_deg - a.lon_deg).to_radians() / 2.0);
+    let h = half_dlat * half_dlat + cos(lat_a) * cos(lat_b) * half_dlon * half_dlon;
+    2.0 * PX4_EARTH_RADIUS_M * asin(sqrt(h.clamp(0.0, 1.0)))
+}
+
+/// How an autopilot flattens the earth about its EKF origin.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Projection {
+    /// PX4 `MapProjection`: azimuthal equidistant on a sphere of 6 371 000 m.
+    Px4,
+    /// ArduPilot `Location::get_distance_NE`: scaled degrees and the cosine of the middle latitude.
+    ArduPilot,
+}
+
+/// NED metres of `position` about an autopilot's EKF `origin`, as that autopilot computes them.
+pub fn geodetic_to_ned(projection: Projection, origin: &Geodetic, position: &Geodetic) -> Vector3<f64> {
+    let down = origin.alt_m - position.alt_m;
+    match projection {
+        Projection::Px4 => {
+            let (lat0, lat) = (origin.lat_deg.to_radians(), position.lat_deg.to_radians());
+            let dlon = (position.lon_deg - origin.lon_deg).to_radians();
+            let cos_c = (sin(lat0) * sin(lat) + cos(lat0) * cos(lat) * cos(dlon)).clamp(-1.0, 1.0);
+            let c = libm::acos(cos_c);
+            let k = if c > 1e-12 { c / sin(c) } else { 1.0 } * PX4_EARTH_RADIUS_M;
+            let north = k * (cos(lat0) * sin(lat) - sin(lat0) * cos(lat) * cos(dlon));
+            Vector3::new(north, k * cos(lat) * sin(dlon), down)
+        }
+        Projection::ArduPilot => {
+            let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
+            let middle = ((origin.lat_deg + position.lat_deg) / 2.0).to_radians();
+            let east = (position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
+            Vector3::new((position.lat_deg - origin.lat_deg) * scale, east, down)
+        }
+    }
+}
+
+/// The geodetic position an autopilot means by NED metres about its EKF `origin`. Inverse of [`geodetic_to_ned`].
+pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<f64>) -> Geodetic {
+    let alt_m = origin.alt_m - ned.z;
+    match projection {
+        Projection::Px4 => {
+            let (north, east) = (ned.x / PX4_EARTH_RADIUS_M, ned.y / PX4_EARTH_RADIUS_M);
+            let c = sqrt(north * north + east * east);
+            if c < 1e-15 {
+                return Geodetic { alt_m, ..*origin };
+            }
+            let (lat0, lon0) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
+            let lat = asin((cos(c) * sin(lat0) + north * sin(c) * cos(lat0) / c).clamp(-1.0, 1.0));
+            let lon =
+                lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
+            Geodetic { lat_deg: lat.to_degrees(), lon_deg: lon.to_degrees(), alt_m }
+        }
+        Projection::ArduPilot => {
+            let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
+            let lat_deg = origin.lat_deg + ned.x / scale;
+            let middle = ((origin.lat_deg + lat_deg) / 2.0).to_radians();
+            Geodetic { lat_deg, lon_deg: origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)), alt_m }
+        }
+    }
+}
+
+/// ENU from NED and NED from ENU: the same exchange of axes.
+pub fn swap_enu_ned<T: nalgebra::RealField + Copy>(v: &Vector3<T>) -> Vector3<T> {
+    Vector3::new(v.y, v.x, -v.z)
+}

@@ -1,0 +1,12 @@
+//! Planning for a swarm of UAVs: maths over borrowed memory.
+//!
+//! No allocation, no I/O, no clock, no MAVLink. Lengths are metres, times seconds, angles degrees where a name says
+//! `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission frame.
+#![no_std]
+#![forbid(unsafe_code)]
+
+pub mod frames;
+pub mod voxel;
+
+/// A point or vector in the mission frame: east, north, up, in metres.
+pub type Point = nalgebra::Vector3<f32>;

@@ -1,0 +1,143 @@
+//! Bit-packed voxel map: one bit a cell, stored as bricks of 4 × 4 × 4 cells in one 64-bit word.
+//!
+//! A brick answers "is anything here?" with one load, so a query over empty space steps four cells at a time. The
+//! building at 0.5 m (82 × 48 × 98 cells) takes 50.4 kB. Cell `(i, j, k)` covers the closed cube from
+//! `min + (i, j, k) · resolution` to `min + (i + 1, j + 1, k + 1) · resolution`.
+
+use crate::Point;
+
+/// Cells along one edge of a brick.
+pub const BRICK_CELLS: u32 = 4;
+
+/// Why a grid was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum GridError {
+    /// A dimension is zero or beyond [`MAX_DIM`].
+    Dimensions,
+    /// The word slice is not [`brick_count`] long.
+    WordCount,
+    /// The corner or the resolution is not finite, or the resolution is not positive.
+    NotFinite,
+}
+
+/// The longest side of a grid, in cells.
+pub const MAX_DIM: u32 = 1 << 15;
+
+/// Shape and place of a grid.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GridShape {
+    /// Cells along east, north, up.
+    pub dims: [u32; 3],
+    /// Minimum corner of cell (0, 0, 0), metres.
+    pub min: Point,
+    /// Edge of a cell, metres.
+    pub resolution_m: f32,
+}
+
+impl GridShape {
+    /// Bricks along each axis.
+    pub fn bricks(&self) -> [u32; 3] {
+        self.dims.map(|d| d.div_ceil(BRICK_CELLS))
+    }
+
+    /// Words the grid needs.
+    pub fn brick_count(&self) -> usize {
+        self.bricks().iter().map(|&b| b as usize).product()
+    }
+
+    /// Maximum corner, metres.
+    pub fn max(&self) -> Point {
+        self.min + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32) * self.resolution_m
+    }
+
+    /// The cell that holds `p` (its lower faces included), or `None` outside the grid or for NaN.
+    pub fn cell_of(&self, p: &Point) -> Option<[u32; 3]> {
+        let mut cell = [0; 3];
+        for axis in 0..3 {
+            let c = libm::floorf((p[axis] - self.min[axis]) / self.resolution_m);
+            if !(c >= 0.0 && c < self.dims[axis] as f32) {
+                return None;
+            }
+            cell[axis] = c as u32;
+        }
+        Some(cell)
+    }
+
+    /// Centre of a cell, metres.
+    pub fn center(&self, cell: [u32; 3]) -> Point {
+        let half = |c: u32| (c as f32 + 0.5) * self.resolution_m;
+        self.min + Point::new(half(cell[0]), half(cell[1]), half(cell[2]))
+    }
+
+    /// Word index and bit mask of a cell inside the grid.
+    pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
+        let [bx, by, _] = self.bricks();
+        let word = ((k / 4 * by + j / 4) * bx + i / 4) as usize;
+        (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
+    }
+
+    fn check(&self) -> Result<(), GridError> {
+        if self.dims.iter().any(|&d| d == 0 || d > MAX_DIM) {
+            return Err(GridError::Dimensions);
+        }
+        let finite = self.min.iter().all(|c| c.is_finite()) && self.resolution_m.is_finite();
+        if finite && self.resolution_m > 0.0 { Ok(()) } else { Err(GridError::NotFinite) }
+    }
+}
+
+/// What lies beyond the grid's faces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outside {
+    /// Space beyond the grid is an obstacle: the faces count for clearance.
+    Blocked,
+    /// Space beyond the grid is passable.
+    Free,
+}
+
+/// A voxel map over borrowed words; set bits are obstacles.
+#[derive(Clone, Copy, Debug)]
+pub struct VoxelGrid<'a> {
+    shape: GridShape,
+    outside: Outside,
+    words: &'a [u64],
+}
+
+impl<'a> VoxelGrid<'a> {
+    /// Checks the shape against the words.
+    pub fn new(shape: GridShape, outside: Outside, words: &'a [u64]) -> Result<Self, GridError> {
+        shape.check()?;
+        if words.len() != shape.brick_count() {
+            return Err(GridError::WordCount);
+        }
+        Ok(Self { shape, outside, words })
+    }
+
+    /// Shape and place.
+    pub fn shape(&self) -> &GridShape {
+        &self.shape
+    }
+
+    /// What lies beyond the faces.
+    pub fn outside(&self) -> Outside {
+        self.outside
+    }
+
+    /// The bricks, x fastest, then y, then z.
+    pub fn words(&self) -> &'a [u64] {
+        self.words
+    }
+
+    /// Whether a cell is an obstacle. Panics outside the grid.
+    pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
+        let (word, mask) = self.shape.address(cell);
+        self.words[word] & mask != 0
+    }
+
+    /// Whether the cell holding `p` is an obstacle; outside the grid as [`Outside`] says.
+    pub fn is_blocked_at(&self, p: &Point) -> bool {
+        match self.shape.cell_of(p) {
+            Some(cell) => self.is_occupied(cell),
+            None => self.outside == Outside::Blocked,
+        }
+    }
+}
