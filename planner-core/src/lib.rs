@@ -6,6 +6,8 @@
 #![forbid(unsafe_code)]
 
 pub mod frames;
+pub mod roadmap;
+pub mod search;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.
