@@ -5,7 +5,12 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod deconflict;
 pub mod frames;
+pub mod path;
+pub mod roadmap;
+pub mod schedule;
+pub mod search;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.
