@@ -138,8 +138,7 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
             }
             let (lat0, lon0) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
             let lat = asin((cos(c) * sin(lat0) + north * sin(c) * cos(lat0) / c).clamp(-1.0, 1.0));
-            let lon =
-                lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
+            let lon = lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
             Geodetic { lat_deg: lat.to_degrees(), lon_deg: lon.to_degrees(), alt_m }
         }
         Projection::ArduPilot => {

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod frames;
+pub mod segment;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.
