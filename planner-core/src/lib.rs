@@ -12,6 +12,7 @@ pub mod path;
 pub mod roadmap;
 pub mod schedule;
 pub mod search;
+pub mod segment;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.
