@@ -9,6 +9,7 @@ pub mod assignment;
 pub mod deconflict;
 pub mod frames;
 pub mod path;
+pub mod plan;
 pub mod roadmap;
 pub mod schedule;
 pub mod search;

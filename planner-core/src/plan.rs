@@ -151,8 +151,14 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
         let descent_m = assigned[i].map_or(0.0, |goal| request.descents_m[usize::from(goal)]);
-        let flight =
-            Flight { id: vehicle.id, goal: assigned[i], path, climb_m: vehicle.climb_m, descent_m, depart_s: 0.0 };
+        let flight = Flight {
+            id: vehicle.id,
+            goal: assigned[i],
+            path,
+            climb_m: vehicle.climb_m,
+            descent_m,
+            depart_s: 0.0,
+        };
         // Cannot overflow: `starts` is at most `V`.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
@@ -212,7 +218,7 @@ fn assign<const N: usize, const V: usize>(
     }
     let costs = &costs[..starts * goals];
     let solve = match objective {
-        Objective::TotalDistance => assignment::solve,
+        Objective::TotalDistance => assignment::assign,
         Objective::Makespan => assignment::bottleneck,
     };
     solve(costs, starts, goals, &mut ws.assignment, assigned).map_err(PlanError::Assignment)?;
@@ -326,7 +332,8 @@ impl<const V: usize> Parked<V> {
     ) -> Self {
         let mut parked = Self { pads: Vec::new(), landed: Vec::new() };
         let below = |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
-        for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing) {
+        for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
+        {
             // Cannot overflow: at most one entry of each kind per flight.
             if avoid == Avoid::AllPlaces || flight.goal.is_none() || waiting.contains(&(j as u16)) {
                 let _ = parked.pads.push(below(j, flight.climb_m));
@@ -361,11 +368,7 @@ fn find_path<const N: usize, const V: usize, const W: usize>(
     let vehicle = &request.vehicles[index];
     let passable = |from: u16, edge: &HalfEdge| {
         view.clears(edge, vehicle.required_clearance_m)
-            && parked.clears(
-                &view.node(from),
-                &view.node(edge.target),
-                request.schedule.parked_separation_m,
-            )
+            && parked.clears(&view.node(from), &view.node(edge.target), request.schedule.parked_separation_m)
     };
     let target = request.vehicles.len() as u16 + goal;
     match search::astar(view, index as u16, target, passable, search, nodes) {
@@ -399,3 +402,6 @@ fn crc<const V: usize, const W: usize>(plan: &SwarmPlan<V, W>) -> u32 {
     }
     digest.finalize()
 }
+
+#[cfg(test)]
+mod tests;
