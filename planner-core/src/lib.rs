@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod frames;
+pub mod prm;
 pub mod segment;
 pub mod voxel;
 
