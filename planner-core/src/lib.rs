@@ -10,6 +10,7 @@ pub mod deconflict;
 pub mod frames;
 pub mod path;
 pub mod plan;
+pub mod prm;
 pub mod roadmap;
 pub mod schedule;
 pub mod search;
