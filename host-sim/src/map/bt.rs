@@ -273,27 +273,27 @@ mod tests {
                 "byte 0: expected `# Octomap OcTree binary file`, found bytes that are no text",
             ),
             (vec![b'#'; 5000], "byte 0: expected `# Octomap OcTree binary file`, found no end of line"),
-            (file(HEADER, b""), "byte 40: expected `size N`, found the end of the file"),
+            (file(HEADER, b""), "byte 39: expected `size N`, found the end of the file"),
             (
                 file("# Octomap OcTree binary file\nid ColorOcTree\n", b""),
                 "byte 32: expected the id `OcTree`, found `ColorOcTree`",
             ),
-            (file(HEADER, b"size -1\n"), "byte 45: expected a number of nodes, found `-1`"),
+            (file(HEADER, b"size -1\n"), "byte 44: expected a number of nodes, found `-1`"),
             (
                 file(HEADER, b"size 1\nres nan\n"),
-                "byte 51: expected a resolution from 0.000001 to 1000000 metres, found `nan`",
+                "byte 50: expected a resolution from 0.000001 to 1000000 metres, found `nan`",
             ),
-            (file(HEADER, b"size 1\ndata\n"), "byte 47: expected `res METRES`, found `data`"),
+            (file(HEADER, b"size 1\ndata\n"), "byte 46: expected `res METRES`, found `data`"),
             (
                 body(&[2]),
-                "byte 60: expected the two bytes of an inner node at depth 0, found the end of the file (61 bytes)",
+                "byte 59: expected the two bytes of an inner node at depth 0, found the end of the file (60 bytes)",
             ),
-            (body(&[2, 0, 9]), "byte 62: expected the end of the file, found 1 more bytes"),
-            (body(&[0, 0]), "byte 60: expected an inner node with children, found one without"),
-            (body(&[0x0A, 0]), "byte 45: expected as many nodes as the data holds, 3, found 2"),
+            (body(&[2, 0, 9]), "byte 61: expected the end of the file, found 1 more bytes"),
+            (body(&[0, 0]), "byte 59: expected an inner node with children, found one without"),
+            (body(&[0x0A, 0]), "byte 44: expected as many nodes as the data holds, 3, found 2"),
             (
                 body(&chain(16, 2)),
-                "byte 90: expected leaves at depth 16, found a child that is an inner node",
+                "byte 89: expected leaves at depth 16, found a child that is an inner node",
             ),
         ];
         for (bytes, want) in cases {

@@ -2,12 +2,17 @@
 
 pub mod bt;
 pub mod building;
+pub mod command;
+pub mod edt;
 mod error;
 pub mod occupancy;
 pub mod octree;
+#[cfg(test)]
+mod reference_test;
 
 use std::path::Path;
 
+pub use edt::ClearanceField;
 pub use error::MapError;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
