@@ -4,5 +4,4 @@
 pub mod capacity;
 pub mod map;
 pub mod result;
-pub mod roadmap;
-pub mod swarm;
+
