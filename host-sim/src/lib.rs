@@ -3,5 +3,5 @@
 
 pub mod capacity;
 pub mod map;
+pub mod report;
 pub mod result;
-
