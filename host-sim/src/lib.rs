@@ -3,5 +3,6 @@
 
 pub mod capacity;
 pub mod map;
+pub mod autopilot;
 pub mod report;
 pub mod result;
