@@ -114,14 +114,14 @@ impl Plan {
             (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
         ] {
             self.solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
-            // Three or four rooms a side: partitions near even shares, moved by up to 0.8 m.
-            let rooms = 3 + (self.rng.next_u32() % 2) as usize;
+            // Four or five rooms a side: partitions near even shares, moved by up to 0.6 m.
+            let rooms = 4 + (self.rng.next_u32() % 2) as usize;
             let mut west = WALL_M;
             for room in 1..=rooms {
                 let east = if room == rooms {
                     length - WALL_M
                 } else {
-                    length * room as f32 / rooms as f32 + self.uniform(-0.8, 0.8)
+                    length * room as f32 / rooms as f32 + self.uniform(-0.6, 0.6)
                 };
                 if room < rooms {
                     self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
