@@ -6,3 +6,4 @@ pub mod map;
 pub mod autopilot;
 pub mod report;
 pub mod result;
+pub mod scenario;
