@@ -26,9 +26,11 @@ function niceStep(span, parts) {
   return decade * [5, 2, 1].find((m) => m * decade <= raw);
 }
 
-function scaleLabel(text, x, y, z) {
+// A label of the scale along `axis`, hidden where one looks along that axis.
+function scaleLabel(axis, text, x, y, z) {
   const label = new THREE.CSS2DObject(element("div", text, { class: "scale" }));
   label.position.set(x, y, z);
+  label.userData.axis = axis;
   return label;
 }
 
@@ -46,27 +48,28 @@ function buildGrid() {
   for (const [kind, opacity] of [["minor", 0.3], ["major", 0.75]]) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(lines[kind]), 3));
-    const mesh = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x4a545e, transparent: true, opacity, depthWrite: false }));
+    const mesh = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x4a545e, transparent: true, opacity, depthWrite: false, fog: false }));
     mesh.renderOrder = -1;
     group.add(mesh);
   }
   const digits = major < 1 ? 1 : 0;
   const off = span * 0.02;
-  for (let x = x0; x <= x1 + 1e-6; x += major) group.add(scaleLabel(x.toFixed(digits), x, y0 - off, z));
-  for (let y = y0; y <= y1 + 1e-6; y += major) group.add(scaleLabel(y.toFixed(digits), x0 - off, y, z));
-  group.add(scaleLabel("E [m]", (x0 + x1) / 2, y0 - 3.2 * off, z), scaleLabel("N [m]", x0 - 3.2 * off, (y0 + y1) / 2, z));
+  for (let x = x0; x <= x1 + 1e-6; x += major) group.add(scaleLabel("x", x.toFixed(digits), x, y0 - off, z));
+  for (let y = y0; y <= y1 + 1e-6; y += major) group.add(scaleLabel("y", y.toFixed(digits), x1 + off, y, z));
+  group.add(scaleLabel("x", "E [m]", (x0 + x1) / 2, y0 - 4 * off, z), scaleLabel("y", "N [m]", x1 + 4 * off, (y0 + y1) / 2, z));
   const height = extent.max[2] - z;
   if (height > 0) {
     const step = niceStep(height, 4);
-    const pole = [x0, y1, z, x0, y1, extent.max[2]];
+    const [px, py] = [extent.min[0] - off, extent.min[1] - off];
+    const pole = [px, py, z, px, py, extent.max[2]];
     for (let u = Math.ceil(z / step) * step; u <= extent.max[2] + 1e-6; u += step) {
-      pole.push(x0 - off / 2, y1, u, x0, y1, u);
-      if (u > z + step / 2) group.add(scaleLabel(u.toFixed(step < 1 ? 1 : 0), x0 - off, y1 + off, u));
+      pole.push(px - off / 2, py, u, px, py, u);
+      if (u > z + step / 2) group.add(scaleLabel("z", u.toFixed(step < 1 ? 1 : 0), px - 1.5 * off, py, u));
     }
-    group.add(scaleLabel("U [m]", x0, y1, extent.max[2] + 2 * off));
+    group.add(scaleLabel("z", "U [m]", px, py, extent.max[2] + 1.5 * off));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(pole), 3));
-    group.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x5b6671 })));
+    group.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x5b6671, fog: false })));
   }
   return group;
 }
@@ -91,7 +94,7 @@ function buildRoadmap() {
 function fatLine(xyz, color, width, opacity) {
   const geometry = new THREE.LineGeometry();
   geometry.setPositions(xyz);
-  const line = new THREE.Line2(geometry, new THREE.LineMaterial({ color, linewidth: width, transparent: true, opacity, depthWrite: false }));
+  const line = new THREE.Line2(geometry, new THREE.LineMaterial({ color, linewidth: width, transparent: true, opacity, depthWrite: false, fog: false }));
   line.frustumCulled = false;
   return line;
 }
@@ -102,7 +105,7 @@ function marker(pixels, paint) {
   paint(canvas.getContext("2d"));
   const map = new THREE.CanvasTexture(canvas);
   map.colorSpace = THREE.SRGBColorSpace;
-  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, sizeAttenuation: false, depthWrite: false }));
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, sizeAttenuation: false, depthWrite: false, fog: false }));
   sprite.userData.pixels = pixels;
   return sprite;
 }
@@ -161,6 +164,8 @@ function buildVehicle(v, safetyDistance) {
   parts.quadrotor = quadrotor(v.radius_m, color);
   parts.dot = marker(15, disc(css));
   parts.dot.renderOrder = 6;
+  // Seen through walls: where the vehicles are matters more than what stands before them.
+  parts.dot.material.depthTest = false;
   parts.labelText = element("div", v.id, { class: "label", style: `border-color: ${css}` });
   parts.label = new THREE.CSS2DObject(parts.labelText);
   parts.body.add(parts.quadrotor, parts.dot, parts.label);
