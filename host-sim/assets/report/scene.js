@@ -38,13 +38,15 @@ function buildGrid() {
   const group = new THREE.Group();
   const span = Math.max(extent.max[0] - extent.min[0], extent.max[1] - extent.min[1], 1);
   const major = niceStep(span, 4);
-  const [x0, y0] = [0, 1].map((a) => Math.floor(extent.min[a] / major - 0.001) * major);
-  const [x1, y1] = [0, 1].map((a) => Math.ceil(extent.max[a] / major + 0.001) * major);
-  const z = extent.min[2];
-  const lines = { minor: [], major: [] };
   const minor = major / 5;
-  for (let i = 0; i <= Math.round((x1 - x0) / minor); i++) lines[i % 5 ? "minor" : "major"].push(x0 + i * minor, y0, z, x0 + i * minor, y1, z);
-  for (let i = 0; i <= Math.round((y1 - y0) / minor); i++) lines[i % 5 ? "minor" : "major"].push(x0, y0 + i * minor, z, x1, y0 + i * minor, z);
+  const z = extent.min[2];
+  // Lines in whole minor steps, one step wider than the box; every fifth, counted from 0, is a major one.
+  const [i0, j0] = [0, 1].map((a) => Math.floor(extent.min[a] / minor + 1e-3) - 1);
+  const [i1, j1] = [0, 1].map((a) => Math.ceil(extent.max[a] / minor - 1e-3) + 1);
+  const [x0, y0, x1, y1] = [i0, j0, i1, j1].map((i) => i * minor);
+  const lines = { minor: [], major: [] };
+  for (let i = i0; i <= i1; i++) lines[i % 5 ? "minor" : "major"].push(i * minor, y0, z, i * minor, y1, z);
+  for (let j = j0; j <= j1; j++) lines[j % 5 ? "minor" : "major"].push(x0, j * minor, z, x1, j * minor, z);
   for (const [kind, opacity] of [["minor", 0.3], ["major", 0.75]]) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(lines[kind]), 3));
@@ -54,8 +56,9 @@ function buildGrid() {
   }
   const digits = major < 1 ? 1 : 0;
   const off = span * 0.02;
-  for (let x = x0; x <= x1 + 1e-6; x += major) group.add(scaleLabel("x", x.toFixed(digits), x, y0 - off, z));
-  for (let y = y0; y <= y1 + 1e-6; y += major) group.add(scaleLabel("y", y.toFixed(digits), x1 + off, y, z));
+  const first = (from) => Math.ceil(from / major - 1e-6) * major;
+  for (let x = first(x0); x <= x1 + 1e-6; x += major) group.add(scaleLabel("x", x.toFixed(digits), x, y0 - off, z));
+  for (let y = first(y0); y <= y1 + 1e-6; y += major) group.add(scaleLabel("y", y.toFixed(digits), x1 + off, y, z));
   group.add(scaleLabel("x", "E [m]", (x0 + x1) / 2, y0 - 4 * off, z), scaleLabel("y", "N [m]", x1 + 4 * off, (y0 + y1) / 2, z));
   const height = extent.max[2] - z;
   if (height > 0) {
