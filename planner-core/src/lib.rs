@@ -5,7 +5,16 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod assignment;
+pub mod deconflict;
 pub mod frames;
+pub mod path;
+pub mod plan;
+pub mod prm;
+pub mod roadmap;
+pub mod schedule;
+pub mod search;
+pub mod segment;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.

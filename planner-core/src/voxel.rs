@@ -47,7 +47,8 @@ impl GridShape {
 
     /// Maximum corner, metres.
     pub fn max(&self) -> Point {
-        self.min + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32) * self.resolution_m
+        self.min
+            + Point::new(self.dims[0] as f32, self.dims[1] as f32, self.dims[2] as f32) * self.resolution_m
     }
 
     /// The cell that holds `p` (its lower faces included), or `None` outside the grid or for NaN.

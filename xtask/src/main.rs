@@ -1,2 +1,31 @@
-//! Developer commands.
-fn main() {}
+//! The developer's one entry: `cargo xtask test`, `cargo xtask bench`.
+#![forbid(unsafe_code)]
+
+mod bare_metal;
+mod install;
+mod shell;
+mod test;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+#[derive(Parser)]
+#[command(about = "Flockmate developer commands")]
+enum Command {
+    /// Everything CI runs; installs what is missing, or says in one line what to install.
+    Test(test::Args),
+}
+
+fn main() -> ExitCode {
+    let done = match Command::parse() {
+        Command::Test(args) => test::run(&args),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -1,0 +1,322 @@
+//! OctoMap's binary octree file, `.bt`: occupied, free and unknown, without probabilities.
+//!
+//! A text header (`# Octomap OcTree binary file`, then `id`, `size`, `res` and `data`, one a line), then the inner
+//! nodes depth first, each one little-endian 16-bit word of eight children, two bits a child from the lowest up:
+//! 0 unknown, 1 free leaf, 2 occupied leaf, 3 inner node, whose word follows. Source: OctoMap 1.9,
+//! `OccupancyOcTreeBase::readBinaryNode`. Every inner node read has taken two bytes of the file, so memory is
+//! bounded by four times its length whatever the header claims.
+
+use std::fmt::Write as _;
+use std::io::Read as _;
+use std::path::Path;
+
+use super::error::MapError;
+use super::octree::{DEPTH, INNER, Inner, Octree};
+
+const MAGIC: &str = "# Octomap OcTree binary file";
+/// Longest file read: a guard against devices that never end.
+const MAX_BYTES: u64 = 1 << 30;
+/// Longest header line; OctoMap's own comment takes 75 bytes.
+const MAX_LINE: usize = 1024;
+
+/// Reads a `.bt` file.
+pub fn read(path: &Path) -> Result<Octree, MapError> {
+    let io = |source| MapError::io("read", path, source);
+    let file = std::fs::File::open(path).map_err(io)?;
+    if !file.metadata().map_err(io)?.is_file() {
+        return Err(io(std::io::Error::other("not a regular file")));
+    }
+    let mut bytes = Vec::new();
+    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
+    if bytes.len() as u64 > MAX_BYTES {
+        return Err(MapError::Malformed {
+            file: path.into(),
+            offset: MAX_BYTES,
+            expected: "the end of the file within 1 GiB".into(),
+            found: "more data".into(),
+        });
+    }
+    parse(&bytes, path)
+}
+
+/// Parses a `.bt` file's bytes; `path` only names it in errors.
+pub fn parse(bytes: &[u8], path: &Path) -> Result<Octree, MapError> {
+    let mut reader = Reader { bytes, at: 0, path, inner: Vec::new(), nodes: 0 };
+    let header = reader.header()?;
+    if header.nodes > 0 {
+        reader.nodes = 1;
+        let root = reader.node(0)?;
+        reader.inner.push(root);
+    }
+    if reader.nodes != header.nodes {
+        let expected = format!("as many nodes as the data holds, {}", reader.nodes);
+        return Err(reader.fail(header.nodes_at, expected, header.nodes.to_string()));
+    }
+    if reader.at < bytes.len() {
+        let found = format!("{} more bytes", bytes.len() - reader.at);
+        return Err(reader.fail(reader.at, "the end of the file", found));
+    }
+    Ok(Octree::from_parts(header.resolution_m, reader.inner))
+}
+
+struct Header {
+    nodes: u64,
+    nodes_at: usize,
+    resolution_m: f64,
+}
+
+struct Reader<'a> {
+    bytes: &'a [u8],
+    at: usize,
+    path: &'a Path,
+    inner: Vec<Inner>,
+    nodes: u64,
+}
+
+impl<'a> Reader<'a> {
+    fn fail(&self, offset: usize, expected: impl Into<String>, found: impl Into<String>) -> MapError {
+        MapError::Malformed {
+            file: self.path.into(),
+            offset: offset as u64,
+            expected: expected.into(),
+            found: found.into(),
+        }
+    }
+
+    /// The next header line and where it began; the newline is taken too.
+    fn line(&mut self, expected: &str) -> Result<(&'a str, usize), MapError> {
+        let begin = self.at;
+        let rest = &self.bytes[begin..self.bytes.len().min(begin + MAX_LINE)];
+        let Some(length) = rest.iter().position(|&b| b == b'\n') else {
+            let found = if begin == self.bytes.len() { "the end of the file" } else { "no end of line" };
+            return Err(self.fail(begin, expected, found));
+        };
+        self.at = begin + length + 1;
+        match std::str::from_utf8(&rest[..length]) {
+            Ok(text) => Ok((text.trim_end_matches('\r'), begin)),
+            Err(_) => Err(self.fail(begin, expected, "bytes that are no text")),
+        }
+    }
+
+    fn header(&mut self) -> Result<Header, MapError> {
+        let expected = format!("`{MAGIC}`");
+        let (first, at) = self.line(&expected)?;
+        if !first.starts_with(MAGIC) {
+            return Err(self.fail(at, expected, quoted(first)));
+        }
+        let (mut id, mut nodes, mut resolution_m) = (false, None, None);
+        let after_header;
+        loop {
+            let missing = if !id {
+                "`id OcTree`"
+            } else if nodes.is_none() {
+                "`size N`"
+            } else if resolution_m.is_none() {
+                "`res METRES`"
+            } else {
+                "`data`"
+            };
+            let (line, at) = self.line(missing)?;
+            let (word, value) = line.split_once(' ').unwrap_or((line, ""));
+            let (value_at, value) = (at + word.len() + 1, value.trim());
+            match word {
+                "" => {}
+                _ if line.starts_with('#') => {}
+                "id" if value == "OcTree" => id = true,
+                "id" => return Err(self.fail(value_at, "the id `OcTree`", quoted(value))),
+                "size" => match value.parse::<u64>() {
+                    Ok(n) => nodes = Some((n, value_at)),
+                    Err(_) => return Err(self.fail(value_at, "a number of nodes", quoted(value))),
+                },
+                "res" => match value.parse::<f64>() {
+                    Ok(r) if r.is_finite() && (1e-6..=1e6).contains(&r) => resolution_m = Some(r),
+                    _ => {
+                        let expected = "a resolution from 0.000001 to 1000000 metres";
+                        return Err(self.fail(value_at, expected, quoted(value)));
+                    }
+                },
+                "data" => {
+                    after_header = at;
+                    break;
+                }
+                _ => return Err(self.fail(at, missing, quoted(line))),
+            }
+        }
+        match (id, nodes, resolution_m) {
+            (true, Some((nodes, nodes_at)), Some(resolution_m)) => {
+                Ok(Header { nodes, nodes_at, resolution_m })
+            }
+            (false, ..) => Err(self.fail(after_header, "`id OcTree`", "`data`")),
+            (_, None, _) => Err(self.fail(after_header, "`size N`", "`data`")),
+            _ => Err(self.fail(after_header, "`res METRES`", "`data`")),
+        }
+    }
+
+    /// Reads the inner node at `depth`, whose word comes next. Recursion ends at [`DEPTH`].
+    fn node(&mut self, depth: u32) -> Result<Inner, MapError> {
+        let begin = self.at;
+        let Some(&[low, high]) = self.bytes.get(begin..begin + 2) else {
+            let found = format!("the end of the file ({} bytes)", self.bytes.len());
+            return Err(self.fail(begin, format!("the two bytes of an inner node at depth {depth}"), found));
+        };
+        self.at += 2;
+        let mut node = Inner { children: u16::from_le_bytes([low, high]), first: 0 };
+        if node.children == 0 {
+            return Err(self.fail(begin, "an inner node with children", "one without"));
+        }
+        let mut inner = heapless::Vec::<Inner, 8>::new();
+        for index in 0..8 {
+            let child = node.child(index);
+            self.nodes += u64::from(child != 0);
+            if child != INNER {
+                continue;
+            }
+            if depth + 1 == DEPTH {
+                return Err(self.fail(
+                    begin,
+                    format!("leaves at depth {DEPTH}"),
+                    "a child that is an inner node",
+                ));
+            }
+            inner.push(self.node(depth + 1)?).expect("a node has eight children");
+        }
+        node.first = self.inner.len() as u32;
+        self.inner.extend_from_slice(&inner);
+        Ok(node)
+    }
+}
+
+/// Header text as it may be shown: short and printable.
+fn quoted(text: &str) -> String {
+    format!("`{}`", text.chars().take(40).flat_map(char::escape_default).collect::<String>())
+}
+
+/// The bytes of a `.bt` file.
+pub fn to_bytes(tree: &Octree) -> Vec<u8> {
+    let mut header = String::new();
+    let (nodes, res) = (tree.counts().nodes, tree.resolution_m());
+    writeln!(header, "{MAGIC}\nid OcTree\nsize {nodes}\nres {res}\ndata").expect("a String takes any text");
+    let mut bytes = header.into_bytes();
+    if let Some(root) = tree.root() {
+        push_node(tree, root, &mut bytes);
+    }
+    bytes
+}
+
+fn push_node(tree: &Octree, node: Inner, bytes: &mut Vec<u8>) {
+    bytes.extend_from_slice(&node.children.to_le_bytes());
+    for index in (0..8).filter(|&i| node.child(i) == INNER) {
+        push_node(tree, tree.inner[node.inner_index(index)], bytes);
+    }
+}
+
+/// Writes a `.bt` file.
+pub fn write(tree: &Octree, path: &Path) -> Result<(), MapError> {
+    std::fs::write(path, to_bytes(tree)).map_err(|source| MapError::io("write", path, source))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::building;
+    use crate::map::occupancy::OccupancyMap;
+    use crate::map::octree::Occupancy;
+    use proptest::prelude::*;
+
+    const HEADER: &str = "# Octomap OcTree binary file\nid OcTree\n";
+
+    fn file(header: &str, data: &[u8]) -> Vec<u8> {
+        [header.as_bytes(), data].concat()
+    }
+
+    #[test]
+    fn the_building_written_and_read_is_the_same_grid() {
+        let map = building::building(building::DEFAULT_SEED, 0.25).unwrap();
+        let bytes = to_bytes(&map.to_octree("building").unwrap());
+        let tree = parse(&bytes, Path::new("building.bt")).unwrap();
+        assert_eq!(OccupancyMap::from_octree(&tree, 0.25, "building.bt").unwrap(), map);
+        assert_eq!(to_bytes(&tree), bytes);
+    }
+
+    #[test]
+    fn an_empty_tree_is_read_and_written() {
+        let bytes = file(HEADER, b"size 0\nres 0.1\ndata\n");
+        let tree = parse(&bytes, Path::new("empty.bt")).unwrap();
+        assert_eq!((tree.counts().nodes, tree.metric_bounds()), (0, None));
+        assert_eq!(to_bytes(&tree), bytes);
+    }
+
+    /// Sixteen times the same first child: a chain down to a leaf at depth 16.
+    fn chain(levels: usize, last: u16) -> Vec<u8> {
+        let mut data = [3u8, 0].repeat(levels);
+        data.extend(last.to_le_bytes());
+        data
+    }
+
+    #[test]
+    fn the_deepest_leaf_is_read() {
+        let bytes = file(HEADER, &[b"size 17\nres 0.1\ndata\n".as_slice(), &chain(15, 2)].concat());
+        assert_eq!(parse(&bytes, Path::new("deep.bt")).unwrap().at_key([0, 0, 0]), Occupancy::Occupied);
+    }
+
+    #[test]
+    fn malformed_files_are_named_with_offset_and_expectation() {
+        let body = |data: &[u8]| file(HEADER, &[b"size 2\nres 0.1\ndata\n".as_slice(), data].concat());
+        let cases: [(Vec<u8>, &str); 14] = [
+            (b"".to_vec(), "byte 0: expected `# Octomap OcTree binary file`, found the end of the file"),
+            (
+                b"PK\x03\x04\n".to_vec(),
+                "byte 0: expected `# Octomap OcTree binary file`, found `PK\\u{3}\\u{4}`",
+            ),
+            (
+                b"\xff\xfe\n".to_vec(),
+                "byte 0: expected `# Octomap OcTree binary file`, found bytes that are no text",
+            ),
+            (vec![b'#'; 5000], "byte 0: expected `# Octomap OcTree binary file`, found no end of line"),
+            (file(HEADER, b""), "byte 39: expected `size N`, found the end of the file"),
+            (
+                file("# Octomap OcTree binary file\nid ColorOcTree\n", b""),
+                "byte 32: expected the id `OcTree`, found `ColorOcTree`",
+            ),
+            (file(HEADER, b"size -1\n"), "byte 44: expected a number of nodes, found `-1`"),
+            (
+                file(HEADER, b"size 1\nres nan\n"),
+                "byte 50: expected a resolution from 0.000001 to 1000000 metres, found `nan`",
+            ),
+            (file(HEADER, b"size 1\ndata\n"), "byte 46: expected `res METRES`, found `data`"),
+            (
+                body(&[2]),
+                "byte 59: expected the two bytes of an inner node at depth 0, found the end of the file (60 bytes)",
+            ),
+            (body(&[2, 0, 9]), "byte 61: expected the end of the file, found 1 more bytes"),
+            (body(&[0, 0]), "byte 59: expected an inner node with children, found one without"),
+            (body(&[0x0A, 0]), "byte 44: expected as many nodes as the data holds, 3, found 2"),
+            (
+                body(&chain(16, 2)),
+                "byte 89: expected leaves at depth 16, found a child that is an inner node",
+            ),
+        ];
+        for (bytes, want) in cases {
+            let error = parse(&bytes, Path::new("bad.bt")).unwrap_err().to_string();
+            assert_eq!(error, format!("malformed map: bad.bt: {want}"));
+        }
+    }
+
+    #[test]
+    fn claims_beyond_the_data_cost_nothing() {
+        let bytes = file(HEADER, b"size 18446744073709551615\nres 0.1\ndata\n\xff\xff");
+        let error = parse(&bytes, Path::new("huge.bt")).unwrap_err().to_string();
+        assert!(error.contains("depth 1"), "{error}");
+    }
+
+    proptest! {
+        /// Whatever the bytes: a tree or an error, and a tree that is written as it was read.
+        #[test]
+        fn any_bytes_are_read_or_refused(data in proptest::collection::vec(any::<u8>(), 0..400), size in 0u64..3000) {
+            let header = format!("{HEADER}size {size}\nres 0.1\ndata\n");
+            if let Ok(tree) = parse(&file(&header, &data), Path::new("any.bt")) {
+                prop_assert_eq!(to_bytes(&tree), file(&header, &data));
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! `builtin:building`: the nine-floor building of P3D §4, 41 × 24 × 49 m, generated from a seed.
+//!
+//! The paper gives the outer size (its Fig. 8) and that there are many rooms, doors, windows and a stairwell, no plan.
+//! Ours: a corridor along the middle of every floor with rooms on both sides, a stairwell at the west end, an atrium
+//! in the middle and a lift shaft at the east end, all three open through every slab between the floors; the ground
+//! floor is a lobby. The seed places partitions and doors. Doors and shafts are as wide as they are so that a uniform
+//! roadmap of the paper's 2300 nodes reaches every room with 0.8 m of clearance, as the paper's does, and no longer
+//! with far fewer. The interior is known to be free; nothing is unknown. Corner of the outer walls at (0, 0, 0), metres.
+
+use planner_core::Point;
+use planner_core::voxel::GridShape;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::error::MapError;
+use super::occupancy::OccupancyMap;
+use super::octree::Occupancy;
+
+/// Outer size along x, y, z, metres.
+pub const SIZE_M: [f32; 3] = [41.0, 24.0, 49.0];
+/// Floors.
+pub const FLOORS: u32 = 9;
+/// From one floor's slab to the next, metres.
+pub const FLOOR_HEIGHT_M: f32 = 5.44;
+/// The seed of the building that has no `?seed=`.
+pub const DEFAULT_SEED: u64 = 1;
+
+const WALL_M: f32 = 0.25;
+/// The corridor between y = 9.5 and y = 14.5, walls excluded.
+const CORRIDOR_M: [f32; 2] = [9.5, 14.5];
+/// Shafts through the slabs: (x from, x to, y from, y to).
+const SHAFTS_M: [[f32; 4]; 3] = [[0.75, 6.75, 9.0, 15.0], [17.5, 23.5, 9.0, 15.0], [34.75, 40.25, 9.0, 15.0]];
+/// The lobby's partition-free part of the ground floor, along x.
+const LOBBY_M: [f32; 2] = [7.5, 33.5];
+
+/// An axis-parallel box to fill or to carve, metres.
+struct Block {
+    min: [f32; 3],
+    max: [f32; 3],
+    state: Occupancy,
+}
+
+/// The building at `resolution_m`; walls are never thinner than one cell.
+pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> {
+    let name = "builtin:building";
+    if !(0.05..=1.0).contains(&resolution_m) {
+        let why = format!("resolution_m of {resolution_m}, its walls and doors ask for 0.05 to 1");
+        return Err(MapError::Grid { file: name.into(), why });
+    }
+    let cells = |metres: f32| (metres / resolution_m).round() as u32;
+    let shape = GridShape { dims: SIZE_M.map(cells), min: Point::zeros(), resolution_m };
+    let mut map = OccupancyMap::unknown(shape, name)?;
+    for Block { min, max, state } in blocks(seed) {
+        let from = [0, 1, 2].map(|a| cells(min[a]).min(shape.dims[a] - 1));
+        let to = [0, 1, 2].map(|a| cells(max[a]).clamp(from[a] + 1, shape.dims[a]));
+        for k in from[2]..to[2] {
+            for j in from[1]..to[1] {
+                for i in from[0]..to[0] {
+                    map.set([i, j, k], state);
+                }
+            }
+        }
+    }
+    Ok(map)
+}
+
+/// Later blocks overwrite earlier ones.
+fn blocks(seed: u64) -> Vec<Block> {
+    let mut plan = Plan { blocks: Vec::new(), rng: Pcg32::seed_from_u64(seed) };
+    let [length, width, height] = SIZE_M;
+    plan.solid([0.0; 3], SIZE_M);
+    plan.carve([WALL_M; 3], [length - WALL_M, width - WALL_M, height - WALL_M]);
+    for floor in 0..FLOORS {
+        plan.floor(floor);
+    }
+    for [x0, x1, y0, y1] in SHAFTS_M {
+        for floor in 1..FLOORS {
+            let z = floor as f32 * FLOOR_HEIGHT_M;
+            plan.carve([x0, y0, z - 0.5], [x1, y1, z + 0.5]);
+        }
+    }
+    plan.blocks
+}
+
+struct Plan {
+    blocks: Vec<Block>,
+    rng: Pcg32,
+}
+
+impl Plan {
+    fn solid(&mut self, min: [f32; 3], max: [f32; 3]) {
+        self.blocks.push(Block { min, max, state: Occupancy::Occupied });
+    }
+
+    fn carve(&mut self, min: [f32; 3], max: [f32; 3]) {
+        self.blocks.push(Block { min, max, state: Occupancy::Free });
+    }
+
+    /// Uniform in `[from, to)`.
+    fn uniform(&mut self, from: f32, to: f32) -> f32 {
+        from + (to - from) * (self.rng.next_u32() >> 8) as f32 / 16_777_216.0
+    }
+
+    fn floor(&mut self, floor: u32) {
+        let [length, width, _] = SIZE_M;
+        let slab = floor as f32 * FLOOR_HEIGHT_M;
+        let z = slab + WALL_M;
+        let ceiling = if floor + 1 == FLOORS { SIZE_M[2] - WALL_M } else { slab + FLOOR_HEIGHT_M };
+        if floor > 0 {
+            self.solid([0.0, 0.0, slab], [length, width, z]);
+        }
+        for (y0, y1, wall) in [
+            (WALL_M, CORRIDOR_M[0] - WALL_M, CORRIDOR_M[0] - WALL_M),
+            (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
+        ] {
+            self.solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
+            // Four or five rooms a side: partitions near even shares, moved by up to 0.6 m.
+            let rooms = 4 + (self.rng.next_u32() % 2) as usize;
+            let mut west = WALL_M;
+            for room in 1..=rooms {
+                let east = if room == rooms {
+                    length - WALL_M
+                } else {
+                    length * room as f32 / rooms as f32 + self.uniform(-0.6, 0.6)
+                };
+                if room < rooms {
+                    self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
+                }
+                self.door(west, east, wall, z);
+                if room < rooms && self.rng.next_u32() % 2 == 0 {
+                    let at = self.uniform(y0 + 1.0, y1 - 4.5);
+                    self.carve([east, at, z], [east + WALL_M, at + 3.25, z + 3.5]);
+                }
+                self.window(west, east, if y0 < 1.0 { 0.0 } else { width - WALL_M }, z);
+                west = east + WALL_M;
+            }
+        }
+        if floor == 0 {
+            let [x0, x1] = LOBBY_M;
+            self.carve([x0, WALL_M, z], [x1, CORRIDOR_M[1], ceiling]);
+        }
+    }
+
+    /// A door from the corridor into the room between `west` and `east`.
+    fn door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
+        let width = self.uniform(3.0, 4.0);
+        let at = self.uniform(west + 1.0, east - 1.0 - width);
+        let height = self.uniform(3.25, 4.0);
+        self.carve([at, wall, z], [at + width, wall + WALL_M, z + height]);
+    }
+
+    fn window(&mut self, west: f32, east: f32, wall: f32, z: f32) {
+        let at = self.uniform(west + 1.0, (west + east) / 2.0);
+        self.carve([at, wall, z + 1.0], [(at + 2.5).min(east - 0.5), wall + WALL_M, z + 2.5]);
+    }
+}

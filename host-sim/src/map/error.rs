@@ -1,0 +1,52 @@
+//! What can be wrong with a map, said so that the user can mend it.
+
+use std::path::{Path, PathBuf};
+
+/// Why a map could not be read, made or written.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The file system said no.
+    #[error("cannot {action} the map: {}: {source}", file.display())]
+    Io {
+        /// What was tried: "read", "write".
+        action: &'static str,
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The bytes are not what the format asks for.
+    #[error("malformed map: {}: byte {offset}: expected {expected}, found {found}", file.display())]
+    Malformed {
+        /// The file.
+        file: PathBuf,
+        /// Where, in bytes from its beginning.
+        offset: u64,
+        /// What the format asks for there.
+        expected: String,
+        /// What is there.
+        found: String,
+    },
+    /// No reader for such a name.
+    #[error("unknown kind of map: {file}: expected {expected}")]
+    UnknownKind {
+        /// The name as given.
+        file: String,
+        /// What can be read.
+        expected: &'static str,
+    },
+    /// The map cannot be laid on the grid that was asked for.
+    #[error("map does not fit: {file}: {why}")]
+    Grid {
+        /// The name as given.
+        file: String,
+        /// Why, with the numbers.
+        why: String,
+    },
+}
+
+impl MapError {
+    pub(super) fn io(action: &'static str, file: &Path, source: std::io::Error) -> Self {
+        Self::Io { action, file: file.into(), source }
+    }
+}

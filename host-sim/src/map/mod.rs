@@ -1,0 +1,57 @@
+//! Maps: read, made and written here, queried by planner-core as bit-packed voxel grids.
+
+pub mod bt;
+pub mod building;
+pub mod command;
+pub mod edt;
+mod error;
+pub mod occupancy;
+pub mod octree;
+#[cfg(test)]
+mod reference_test;
+
+use std::path::Path;
+
+pub use edt::ClearanceField;
+pub use error::MapError;
+pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
+pub use octree::{Occupancy, Octree};
+
+/// The maps that can be given.
+pub const READS: &str = "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
+
+/// What a map's name stands for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Source<'a> {
+    /// The nine-floor building with this seed.
+    Building(u64),
+    /// An OctoMap binary file.
+    Bt(&'a Path),
+}
+
+impl<'a> Source<'a> {
+    /// Tells by the name alone.
+    pub fn parse(file: &'a str) -> Result<Self, MapError> {
+        let unknown = || MapError::UnknownKind { file: file.into(), expected: READS };
+        if let Some(builtin) = file.strip_prefix("builtin:") {
+            let (name, seed) = match builtin.split_once("?seed=") {
+                Some((name, seed)) => (name, seed.parse().map_err(|_| unknown())?),
+                None => (builtin, building::DEFAULT_SEED),
+            };
+            return if name == "building" { Ok(Self::Building(seed)) } else { Err(unknown()) };
+        }
+        let path = Path::new(file);
+        match path.extension().and_then(|e| e.to_str()) {
+            Some(e) if e.eq_ignore_ascii_case("bt") => Ok(Self::Bt(path)),
+            _ => Err(unknown()),
+        }
+    }
+}
+
+/// Loads a map at the planning resolution. `file` is a builtin's name, or a path (relative to the working directory).
+pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
+    match Source::parse(file)? {
+        Source::Building(seed) => building::building(seed, resolution_m),
+        Source::Bt(path) => OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file),
+    }
+}

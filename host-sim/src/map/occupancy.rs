@@ -1,0 +1,374 @@
+//! Dense occupancy at the planning resolution, and the bit grids that planner-core queries.
+//!
+//! A map's leaves are laid on the planning grid so that nothing known is lost on the unsafe side: a planning cell is
+//! occupied if any occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Leaves that
+//! reach in by less than [`HAIR`] of a cell (rounding of the resolution) do not count. With the map's own resolution,
+//! or a multiple of it, the grid begins at a cell boundary of the map, and the map's own resolution is kept exactly.
+
+use planner_core::Point;
+use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
+
+use super::error::MapError;
+use super::octree::{KEY_ORIGIN, Occupancy, Octree};
+
+/// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over [`MAX_DIM`] cells.
+pub const HAIR: f64 = 2e-3;
+/// Most cells of a planning grid; 4 bytes each while a map is laid on it.
+pub const MAX_CELLS: u64 = 1 << 27;
+
+/// Whether unknown space may be flown through.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Unknown {
+    /// Unknown space is an obstacle, and so is everything beyond the map.
+    #[default]
+    Blocked,
+    /// Unknown space is passable but never sampled (P3D's `castRay(…, ignoreUnknown = true)`).
+    Free,
+}
+
+/// A tri-state map: two bits a cell, in the bricks of [`GridShape::address`].
+#[derive(Clone, Debug, PartialEq)]
+pub struct OccupancyMap {
+    shape: GridShape,
+    occupied: Vec<u64>,
+    free: Vec<u64>,
+}
+
+/// Cells of each state.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CellCounts {
+    /// Obstacles.
+    pub occupied: u64,
+    /// Known to be empty.
+    pub free: u64,
+    /// Neither.
+    pub unknown: u64,
+}
+
+impl OccupancyMap {
+    /// A map of unknown cells. `name` is the map's, for the error when the grid is too large.
+    pub fn unknown(shape: GridShape, name: &str) -> Result<Self, MapError> {
+        let cells = shape.dims.iter().map(|&d| u64::from(d)).product::<u64>();
+        if shape.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || cells > MAX_CELLS {
+            let [x, y, z] = shape.dims;
+            let resolution = shape.resolution_m;
+            let why = format!(
+                "{x} × {y} × {z} cells of {resolution} m, at most {MAX_CELLS} in all and {MAX_DIM} a side: \
+                 choose another resolution_m"
+            );
+            return Err(MapError::Grid { file: name.into(), why });
+        }
+        let words = vec![0; shape.brick_count()];
+        Ok(Self { shape, occupied: words.clone(), free: words })
+    }
+
+    /// Lays an octree on a grid of `resolution_m`, conservatively. Cost: the leaves and the cells they cover.
+    pub fn from_octree(tree: &Octree, resolution_m: f32, name: &str) -> Result<Self, MapError> {
+        let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
+        if !(resolution_m.is_finite() && resolution_m > 0.0) {
+            return Err(refuse("resolution_m must be positive"));
+        }
+        let (lo, hi) = tree.key_bounds().ok_or_else(|| refuse("it holds no known space"))?;
+        // Planning cells to one smallest cell. A ratio that is whole but for f32 rounding is meant to be whole.
+        let cells_per_metre = 1.0 / f64::from(resolution_m);
+        let exact = tree.resolution_m() * cells_per_metre;
+        let (multiple, fraction) = ((1.0 / exact).round(), exact.round());
+        let scale = if multiple >= 1.0 && (exact * multiple - 1.0).abs() < 1e-6 {
+            1.0 / multiple
+        } else if fraction >= 1.0 && (exact / fraction - 1.0).abs() < 1e-6 {
+            fraction
+        } else {
+            exact
+        };
+        let span = [0, 1, 2].map(|a| (f64::from(hi[a] - lo[a]) * scale - HAIR).ceil().max(1.0));
+        let dims = span.map(|s| s.min(f64::from(u32::MAX)) as u32);
+        let corner = lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
+        let shape = GridShape { dims, min: Point::from(corner), resolution_m };
+        let mut map = Self::unknown(shape, name)?;
+        // Share of each cell that is known to be free, by volume.
+        let mut free_share = vec![0f32; dims.iter().map(|&d| d as usize).product()];
+        tree.for_each_leaf(|leaf| {
+            let from = [0, 1, 2].map(|a| f64::from(leaf.min[a] - lo[a]) * scale);
+            let to = from.map(|f| f + f64::from(leaf.size) * scale);
+            // An obstacle reaching in by a hair is rounding; free space is summed to the last sliver.
+            let hair = if leaf.occupied { HAIR } else { 0.0 };
+            let first = from.map(|f| (f + hair).floor() as u32);
+            let last = [0, 1, 2].map(|a| ((to[a] - hair).ceil() as u32).max(first[a] + 1).min(dims[a]));
+            let overlap = |axis: usize, c: u32| {
+                (to[axis].min(f64::from(c) + 1.0) - from[axis].max(f64::from(c))).max(0.0)
+            };
+            for k in first[2]..last[2] {
+                for j in first[1]..last[1] {
+                    for i in first[0]..last[0] {
+                        if leaf.occupied {
+                            map.set([i, j, k], Occupancy::Occupied);
+                        } else {
+                            let at =
+                                (k as usize * dims[1] as usize + j as usize) * dims[0] as usize + i as usize;
+                            free_share[at] += (overlap(0, i) * overlap(1, j) * overlap(2, k)) as f32;
+                        }
+                    }
+                }
+            }
+        });
+        // Far above the rounding of the sum, and an unknown cube of a twentieth of the cell's edge still counts.
+        let whole = 1.0 - 1e-4;
+        let mut at = 0;
+        for k in 0..dims[2] {
+            for j in 0..dims[1] {
+                for i in 0..dims[0] {
+                    if free_share[at] >= whole && map.at([i, j, k]) == Occupancy::Unknown {
+                        map.set([i, j, k], Occupancy::Free);
+                    }
+                    at += 1;
+                }
+            }
+        }
+        Ok(map)
+    }
+
+    /// The same cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner lies on a
+    /// multiple of the resolution (an error otherwise, or beyond ±32768 cells).
+    pub fn to_octree(&self, name: &str) -> Result<Octree, MapError> {
+        let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
+        // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
+        let resolution: f64 = self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
+        let mut min = [0; 3];
+        for axis in 0..3 {
+            let cells = f64::from(self.shape.min[axis]) / resolution;
+            if (cells - cells.round()).abs() > HAIR {
+                return Err(refuse("its corner does not lie on a multiple of the resolution"));
+            }
+            let key = cells.round() + f64::from(KEY_ORIGIN);
+            min[axis] = if key >= 0.0 { key as u32 } else { u32::MAX };
+        }
+        Octree::from_cells(resolution, min, self.shape.dims, |cell| self.at(cell))
+            .ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side"))
+    }
+
+    /// Shape and place.
+    pub fn shape(&self) -> &GridShape {
+        &self.shape
+    }
+
+    /// State of a cell. Panics outside the grid.
+    pub fn at(&self, cell: [u32; 3]) -> Occupancy {
+        let (word, mask) = self.shape.address(cell);
+        if self.occupied[word] & mask != 0 {
+            Occupancy::Occupied
+        } else if self.free[word] & mask != 0 {
+            Occupancy::Free
+        } else {
+            Occupancy::Unknown
+        }
+    }
+
+    /// Sets the state of a cell. Panics outside the grid.
+    pub fn set(&mut self, cell: [u32; 3], state: Occupancy) {
+        let (word, mask) = self.shape.address(cell);
+        self.occupied[word] &= !mask;
+        self.free[word] &= !mask;
+        match state {
+            Occupancy::Unknown => {}
+            Occupancy::Free => self.free[word] |= mask,
+            Occupancy::Occupied => self.occupied[word] |= mask,
+        }
+    }
+
+    /// Cells of each state.
+    pub fn counts(&self) -> CellCounts {
+        let ones = |words: &[u64]| words.iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
+        let (occupied, free) = (ones(&self.occupied), ones(&self.free));
+        let all = self.shape.dims.iter().map(|&d| u64::from(d)).product::<u64>();
+        CellCounts { occupied, free, unknown: all - occupied - free }
+    }
+
+    /// The bit grids to plan on.
+    pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
+        let inside = self.inside();
+        let not_free: Vec<u64> = self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
+        let (words, never_sample, outside) = match unknown {
+            Unknown::Blocked => (not_free, None, Outside::Blocked),
+            Unknown::Free => (self.occupied.clone(), Some(not_free), Outside::Free),
+        };
+        VoxelMap { shape: self.shape, words, never_sample, outside }
+    }
+
+    /// Bits of the cells inside the dimensions; the last brick of a row may be wider.
+    fn inside(&self) -> Vec<u64> {
+        let [bx, by, bz] = self.shape.bricks();
+        let mut words = Vec::with_capacity(self.free.len());
+        let axis_bits = |axis: usize, brick: u32, pattern: [u64; 4]| {
+            (0..4)
+                .filter(|c| brick * 4 + c < self.shape.dims[axis])
+                .fold(0, |bits, c| bits | pattern[c as usize])
+        };
+        let x =
+            [0x1111_1111_1111_1111u64, 0x2222_2222_2222_2222, 0x4444_4444_4444_4444, 0x8888_8888_8888_8888];
+        let y =
+            [0x000F_000F_000F_000Fu64, 0x00F0_00F0_00F0_00F0, 0x0F00_0F00_0F00_0F00, 0xF000_F000_F000_F000];
+        let z = [0xFFFFu64, 0xFFFF_0000, 0xFFFF_0000_0000, 0xFFFF_0000_0000_0000];
+        for k in 0..bz {
+            for j in 0..by {
+                for i in 0..bx {
+                    words.push(axis_bits(0, i, x) & axis_bits(1, j, y) & axis_bits(2, k, z));
+                }
+            }
+        }
+        words
+    }
+}
+
+/// Bit grids to plan on, owned.
+#[derive(Clone, Debug)]
+pub struct VoxelMap {
+    /// Shape and place.
+    pub shape: GridShape,
+    /// Obstacles.
+    pub words: Vec<u64>,
+    /// Where nothing is sampled, if that is more than the obstacles.
+    pub never_sample: Option<Vec<u64>>,
+    /// What lies beyond the faces.
+    pub outside: Outside,
+}
+
+impl VoxelMap {
+    /// The obstacles.
+    pub fn grid(&self) -> VoxelGrid<'_> {
+        VoxelGrid::new(self.shape, self.outside, &self.words).expect("the words were made for the shape")
+    }
+
+    /// Where no sample may lie; beyond its faces neither.
+    pub fn never_sample(&self) -> VoxelGrid<'_> {
+        let words = self.never_sample.as_deref().unwrap_or(&self.words);
+        VoxelGrid::new(self.shape, Outside::Blocked, words).expect("the words were made for the shape")
+    }
+
+    /// Height of the top of the first obstacle below `point`, metres: where a vehicle sinking from there comes to
+    /// stand. An obstacle around the point itself counts up to the point. Without one it is the bottom of a map
+    /// beyond which all is blocked. `None` beside the map, or over nothing.
+    pub fn ground_below(&self, point: &Point) -> Option<f32> {
+        let mut inside = *point;
+        inside.z = inside.z.clamp(self.shape.min.z, self.shape.max().z - self.shape.resolution_m / 2.0);
+        let [i, j, top] = self.shape.cell_of(&inside)?;
+        if point.z < self.shape.min.z {
+            return None;
+        }
+        let grid = self.grid();
+        let cell = (0..=top).rev().find(|&k| grid.is_occupied([i, j, k]));
+        let height = |k: u32| self.shape.min.z + k as f32 * self.shape.resolution_m;
+        match cell {
+            Some(k) => Some(height(k + 1).min(point.z)),
+            None => (self.outside == Outside::Blocked).then_some(self.shape.min.z),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::octree::Leaf;
+
+    /// A few leaves of each kind at odd places: 0.3 m cells, keys about the origin.
+    fn sample_tree() -> Octree {
+        Octree::from_cells(
+            0.3,
+            [KEY_ORIGIN - 3, KEY_ORIGIN + 2, KEY_ORIGIN],
+            [13, 9, 7],
+            |[x, y, z]| match (x * 7 + y * 5 + z * 3) % 11 {
+                0 => Occupancy::Unknown,
+                1 | 2 if x > 4 => Occupancy::Occupied,
+                _ => Occupancy::Free,
+            },
+        )
+        .unwrap()
+    }
+
+    /// The definition, cell by cell over all leaves: occupied if one reaches in, free if free leaves fill it.
+    fn expected(tree: &Octree, shape: &GridShape, cell: [u32; 3]) -> Occupancy {
+        let (r, res) = (f64::from(shape.resolution_m), tree.resolution_m());
+        let lo = [0, 1, 2].map(|a| f64::from(shape.min[a]) + f64::from(cell[a]) * r);
+        let (mut occupied, mut free) = (false, 0.0);
+        tree.for_each_leaf(|Leaf { min, size, occupied: obstacle }| {
+            let volume = (0..3)
+                .map(|a| {
+                    let from = (f64::from(min[a]) - f64::from(KEY_ORIGIN)) * res;
+                    let share = ((from + f64::from(size) * res).min(lo[a] + r) - from.max(lo[a])) / r;
+                    if share > 1e-4 { share } else { 0.0 }
+                })
+                .product::<f64>();
+            if obstacle { occupied |= volume > 0.0 } else { free += volume }
+        });
+        match (occupied, free >= 1.0 - 1e-4) {
+            (true, _) => Occupancy::Occupied,
+            (false, true) => Occupancy::Free,
+            (false, false) => Occupancy::Unknown,
+        }
+    }
+
+    #[test]
+    fn resampling_is_conservative_at_any_resolution() {
+        let tree = sample_tree();
+        for resolution in [0.3, 0.6, 0.15, 0.1, 0.25, 0.43, 1.0] {
+            let map = OccupancyMap::from_octree(&tree, resolution, "sample").unwrap();
+            let [nx, ny, nz] = map.shape().dims;
+            for (i, j, k) in (0..nx).flat_map(|i| (0..ny).flat_map(move |j| (0..nz).map(move |k| (i, j, k))))
+            {
+                let want = expected(&tree, map.shape(), [i, j, k]);
+                assert_eq!(map.at([i, j, k]), want, "resolution {resolution}, cell {:?}", (i, j, k));
+            }
+        }
+    }
+
+    #[test]
+    fn own_resolution_is_exact() {
+        let tree = sample_tree();
+        let map = OccupancyMap::from_octree(&tree, 0.3, "sample").unwrap();
+        let counts = map.counts();
+        let tree_counts = tree.counts();
+        assert!((counts.occupied as f64 * 0.027 - tree_counts.occupied_m3).abs() < 1e-9);
+        assert!((counts.free as f64 * 0.027 - tree_counts.free_m3).abs() < 1e-9);
+        let again = OccupancyMap::from_octree(&map.to_octree("sample").unwrap(), 0.3, "sample").unwrap();
+        assert_eq!(map, again);
+    }
+
+    #[test]
+    fn unknown_is_what_the_user_chose() {
+        let map = OccupancyMap::from_octree(&sample_tree(), 0.3, "sample").unwrap();
+        let counts = map.counts();
+        let ones = |grid: &VoxelGrid<'_>| grid.words().iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
+        let blocked = map.voxel_map(Unknown::Blocked);
+        assert_eq!(ones(&blocked.grid()), counts.occupied + counts.unknown);
+        assert_eq!(ones(&blocked.never_sample()), counts.occupied + counts.unknown);
+        let free = map.voxel_map(Unknown::Free);
+        assert_eq!(ones(&free.grid()), counts.occupied);
+        assert_eq!(ones(&free.never_sample()), counts.occupied + counts.unknown);
+        assert_eq!((blocked.outside, free.outside), (Outside::Blocked, Outside::Free));
+    }
+
+    #[test]
+    fn a_grid_too_large_is_refused_before_it_is_made() {
+        let error = OccupancyMap::from_octree(&sample_tree(), 1e-4, "sample").unwrap_err().to_string();
+        assert!(error.contains("choose another resolution_m"), "{error}");
+        assert!(OccupancyMap::from_octree(&sample_tree(), f32::NAN, "sample").is_err());
+    }
+
+    #[test]
+    fn the_ground_is_the_first_obstacle_below() {
+        let shape = GridShape { dims: [3, 1, 8], min: Point::new(0.0, 0.0, -1.0), resolution_m: 0.5 };
+        let mut map = OccupancyMap::unknown(shape, "column").unwrap();
+        for (i, k) in (0..3).flat_map(|i| (0..8).map(move |k| (i, k))) {
+            let solid = (i == 0 && (k == 0 || k == 4)) || (i == 1 && k == 7);
+            map.set([i, 0, k], if solid { Occupancy::Occupied } else { Occupancy::Free });
+        }
+        let blocked = map.voxel_map(Unknown::Blocked);
+        assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 2.4)), Some(1.5));
+        assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 0.9)), Some(-0.5));
+        assert_eq!(blocked.ground_below(&Point::new(0.2, 0.2, 1.2)), Some(1.2), "inside an obstacle");
+        assert_eq!(blocked.ground_below(&Point::new(0.7, 0.2, 9.0)), Some(3.0), "above the map");
+        assert_eq!(blocked.ground_below(&Point::new(1.2, 0.2, 2.0)), Some(-1.0), "the map's floor");
+        assert_eq!(blocked.ground_below(&Point::new(9.0, 0.2, 2.0)), None);
+        assert_eq!(map.voxel_map(Unknown::Free).ground_below(&Point::new(1.2, 0.2, 2.0)), None);
+    }
+}

@@ -1,0 +1,291 @@
+//! Occupancy octree with OctoMap's shape: depth 16, every leaf free or occupied, a missing leaf unknown.
+//!
+//! OctoMap (Hornung et al. 2013) addresses the smallest cells by 16-bit keys, key 32768 beginning at coordinate 0.
+//! Only inner nodes are stored, eight bytes each: two bits a child as in the `.bt` file, and where the inner
+//! children of that node begin. A lookup walks at most 16 nodes; a walk over all leaves touches each inner node once.
+
+/// Levels below the root; the smallest cell has depth 16.
+pub const DEPTH: u32 = 16;
+/// Smallest cells along one edge of the root.
+pub const KEYS: u32 = 1 << DEPTH;
+/// Key of the cell whose lower faces pass through coordinate 0.
+pub const KEY_ORIGIN: u32 = KEYS / 2;
+
+/// What is known of a place.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Occupancy {
+    /// Never seen.
+    Unknown,
+    /// Seen to be empty.
+    Free,
+    /// Seen to be an obstacle.
+    Occupied,
+}
+
+/// A child as the `.bt` file codes it.
+pub(super) const UNKNOWN: u16 = 0;
+pub(super) const FREE: u16 = 1;
+pub(super) const OCCUPIED: u16 = 2;
+pub(super) const INNER: u16 = 3;
+
+/// An inner node: two bits a child, and the index of its first inner child (the others follow it).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Inner {
+    pub(super) children: u16,
+    pub(super) first: u32,
+}
+
+impl Inner {
+    pub(super) fn child(self, index: u32) -> u16 {
+        self.children >> (2 * index) & 3
+    }
+
+    /// Where the inner child `index` is stored.
+    pub(super) fn inner_index(self, index: u32) -> usize {
+        let before = self.children & ((1 << (2 * index)) - 1);
+        let inner = before & before >> 1 & 0x5555;
+        self.first as usize + inner.count_ones() as usize
+    }
+}
+
+/// A leaf: a cube of `size` smallest cells along each edge, from the key `min` on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Leaf {
+    /// Keys of the cube's lowest corner along x, y, z.
+    pub min: [u32; 3],
+    /// Edge in smallest cells, a power of two.
+    pub size: u32,
+    /// Whether it is an obstacle; free if not.
+    pub occupied: bool,
+}
+
+/// What a tree holds.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Counts {
+    /// All nodes, root and leaves included (OctoMap's `size()`).
+    pub nodes: usize,
+    /// Occupied leaves of any size.
+    pub occupied_leaves: usize,
+    /// Free leaves of any size.
+    pub free_leaves: usize,
+    /// Volume of the occupied leaves, cubic metres.
+    pub occupied_m3: f64,
+    /// Volume of the free leaves, cubic metres.
+    pub free_m3: f64,
+}
+
+/// An occupancy octree in one arena.
+#[derive(Clone, Debug)]
+pub struct Octree {
+    resolution_m: f64,
+    /// The root is the last; an empty tree has none.
+    pub(super) inner: Vec<Inner>,
+}
+
+impl Octree {
+    pub(super) fn from_parts(resolution_m: f64, inner: Vec<Inner>) -> Self {
+        Self { resolution_m, inner }
+    }
+
+    /// Builds the pruned tree of a box of smallest cells: `dims` cells from the key `min` on, `cell` giving each by its
+    /// index in the box. Cost: one call a cell. `None` if the box leaves the key space.
+    pub fn from_cells(
+        resolution_m: f64,
+        min: [u32; 3],
+        dims: [u32; 3],
+        mut cell: impl FnMut([u32; 3]) -> Occupancy,
+    ) -> Option<Self> {
+        let end = [0, 1, 2].map(|a| u64::from(min[a]) + u64::from(dims[a]));
+        if end.iter().any(|&e| e > u64::from(KEYS)) {
+            return None;
+        }
+        let mut builder = Builder { inner: Vec::new(), min, end: end.map(|e| e as u32), cell: &mut cell };
+        match builder.build([0; 3], KEYS) {
+            Child::Leaf(UNKNOWN) => {}
+            // A root without children has no code in the file; only a box of all 65536³ cells comes here.
+            Child::Leaf(_) => return None,
+            Child::Inner(root) => builder.inner.push(root),
+        }
+        Some(Self { resolution_m, inner: builder.inner })
+    }
+
+    /// Edge of the smallest cell, metres.
+    pub fn resolution_m(&self) -> f64 {
+        self.resolution_m
+    }
+
+    pub(super) fn root(&self) -> Option<Inner> {
+        self.inner.last().copied()
+    }
+
+    /// Calls `visit` for every leaf, in the file's order.
+    pub fn for_each_leaf(&self, mut visit: impl FnMut(Leaf)) {
+        if let Some(root) = self.root() {
+            self.walk(root, [0; 3], KEYS / 2, &mut visit);
+        }
+    }
+
+    fn walk(&self, node: Inner, min: [u32; 3], size: u32, visit: &mut impl FnMut(Leaf)) {
+        for index in 0..8 {
+            let child_min = octant(min, size, index);
+            match node.child(index) {
+                UNKNOWN => {}
+                INNER => self.walk(self.inner[node.inner_index(index)], child_min, size / 2, visit),
+                kind => visit(Leaf { min: child_min, size, occupied: kind == OCCUPIED }),
+            }
+        }
+    }
+
+    /// What is known of the smallest cell with these keys; beyond the key space, nothing.
+    pub fn at_key(&self, key: [u32; 3]) -> Occupancy {
+        let Some(mut node) = self.root() else { return Occupancy::Unknown };
+        if key.iter().any(|&k| k >= KEYS) {
+            return Occupancy::Unknown;
+        }
+        for bit in (0..DEPTH).rev() {
+            let index = (key[0] >> bit & 1) | (key[1] >> bit & 1) << 1 | (key[2] >> bit & 1) << 2;
+            match node.child(index) {
+                FREE => return Occupancy::Free,
+                OCCUPIED => return Occupancy::Occupied,
+                INNER => node = self.inner[node.inner_index(index)],
+                _ => return Occupancy::Unknown,
+            }
+        }
+        Occupancy::Unknown
+    }
+
+    /// What is known of a point, metres in the map's frame.
+    pub fn at(&self, point: [f64; 3]) -> Occupancy {
+        let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
+        if key.iter().all(|k| (0.0..f64::from(KEYS)).contains(k)) {
+            self.at_key(key.map(|k| k as u32))
+        } else {
+            Occupancy::Unknown
+        }
+    }
+
+    /// Nodes, leaves and volumes.
+    pub fn counts(&self) -> Counts {
+        let mut counts = Counts { nodes: usize::from(!self.inner.is_empty()), ..Counts::default() };
+        for node in &self.inner {
+            counts.nodes += (0..8).filter(|&i| node.child(i) != UNKNOWN).count();
+        }
+        self.for_each_leaf(|leaf| {
+            let volume = (f64::from(leaf.size) * self.resolution_m).powi(3);
+            if leaf.occupied {
+                counts.occupied_leaves += 1;
+                counts.occupied_m3 += volume;
+            } else {
+                counts.free_leaves += 1;
+                counts.free_m3 += volume;
+            }
+        });
+        counts
+    }
+
+    /// Lowest and highest key (exclusive) of the known space along each axis, or `None` for an empty tree.
+    pub fn key_bounds(&self) -> Option<([u32; 3], [u32; 3])> {
+        let (mut lo, mut hi) = ([KEYS; 3], [0; 3]);
+        self.for_each_leaf(|leaf| {
+            for axis in 0..3 {
+                lo[axis] = lo[axis].min(leaf.min[axis]);
+                hi[axis] = hi[axis].max(leaf.min[axis] + leaf.size);
+            }
+        });
+        (hi[0] > 0).then_some((lo, hi))
+    }
+
+    /// Corners of the known space, metres, or `None` for an empty tree.
+    pub fn metric_bounds(&self) -> Option<([f64; 3], [f64; 3])> {
+        let metres = |key: [u32; 3]| key.map(|k| (f64::from(k) - f64::from(KEY_ORIGIN)) * self.resolution_m);
+        self.key_bounds().map(|(lo, hi)| (metres(lo), metres(hi)))
+    }
+}
+
+/// Lowest corner of the octant `index` (x in bit 0, y in bit 1, z in bit 2) with edge `size`.
+fn octant(min: [u32; 3], size: u32, index: u32) -> [u32; 3] {
+    [0, 1, 2].map(|axis| min[axis] + (index >> axis & 1) * size)
+}
+
+enum Child {
+    Leaf(u16),
+    Inner(Inner),
+}
+
+struct Builder<'a, F> {
+    inner: Vec<Inner>,
+    min: [u32; 3],
+    end: [u32; 3],
+    cell: &'a mut F,
+}
+
+impl<F: FnMut([u32; 3]) -> Occupancy> Builder<'_, F> {
+    fn build(&mut self, corner: [u32; 3], size: u32) -> Child {
+        let misses = |a: usize| corner[a] >= self.end[a] || corner[a] + size <= self.min[a];
+        if (0..3).any(misses) {
+            return Child::Leaf(UNKNOWN);
+        }
+        if size == 1 {
+            let index = [0, 1, 2].map(|a| corner[a] - self.min[a]);
+            return Child::Leaf(match (self.cell)(index) {
+                Occupancy::Unknown => UNKNOWN,
+                Occupancy::Free => FREE,
+                Occupancy::Occupied => OCCUPIED,
+            });
+        }
+        let mut children = 0;
+        let mut inner = heapless::Vec::<Inner, 8>::new();
+        for index in 0..8 {
+            let code = match self.build(octant(corner, size / 2, index), size / 2) {
+                Child::Leaf(kind) => kind,
+                Child::Inner(node) => {
+                    inner.push(node).expect("a node has eight children");
+                    INNER
+                }
+            };
+            children |= code << (2 * index);
+        }
+        // Eight like leaves are one, as OctoMap prunes; eight unknown ones are nothing.
+        match children {
+            0x0000 => Child::Leaf(UNKNOWN),
+            0x5555 => Child::Leaf(FREE),
+            0xAAAA => Child::Leaf(OCCUPIED),
+            _ => {
+                let first = self.inner.len() as u32;
+                self.inner.extend_from_slice(&inner);
+                Child::Inner(Inner { children, first })
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_box_is_pruned_and_found_again() {
+        // 4³ free cells aligned to a power of two prune to one leaf; one occupied cell beside them stays alone.
+        let min = [KEY_ORIGIN; 3];
+        let tree = Octree::from_cells(0.5, min, [5, 4, 4], |[x, y, z]| match x {
+            4 if (y, z) == (0, 0) => Occupancy::Occupied,
+            4 => Occupancy::Unknown,
+            _ => Occupancy::Free,
+        })
+        .unwrap();
+        let counts = tree.counts();
+        assert_eq!((counts.free_leaves, counts.occupied_leaves), (1, 1));
+        assert_eq!((counts.free_m3, counts.occupied_m3), (8.0, 0.125));
+        assert_eq!(tree.metric_bounds(), Some(([0.0; 3], [2.5, 2.0, 2.0])));
+        assert_eq!(tree.at([1.99, 0.0, 1.0]), Occupancy::Free);
+        assert_eq!(tree.at([2.0, 0.0, 0.0]), Occupancy::Occupied);
+        assert_eq!(tree.at([2.0, 0.6, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.at([f64::NAN, 0.0, 0.0]), Occupancy::Unknown);
+        assert_eq!(tree.at([1e30, 0.0, 0.0]), Occupancy::Unknown);
+    }
+
+    #[test]
+    fn a_box_beyond_the_key_space_is_refused() {
+        assert!(Octree::from_cells(1.0, [KEYS - 1, 0, 0], [2, 1, 1], |_| Occupancy::Free).is_none());
+    }
+}

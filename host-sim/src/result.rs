@@ -1,0 +1,118 @@
+//! `result.json` and `timing.json`: what a command found, and what the clock said. Units are in the keys.
+//!
+//! `result.json` is the same for the same scenario and seed, whatever the machine or the build; nothing timed goes in it.
+
+use std::path::Path;
+
+use anyhow::Context;
+use serde::Serialize;
+
+/// `result.json`.
+#[derive(Clone, Debug, Serialize)]
+pub struct MissionResult {
+    /// The command that wrote it.
+    pub command: &'static str,
+    /// The scenario's name.
+    pub scenario: String,
+    /// The seed used.
+    pub seed: u64,
+    /// Whether every vehicle that no fault took out did its task and landed clean.
+    pub complete: bool,
+    /// One entry per vehicle.
+    pub vehicles: Vec<VehicleResult>,
+    /// The swarm as a whole.
+    pub totals: Totals,
+    /// What kept, or failed to keep, apart.
+    pub safety: Safety,
+    /// The roadmap planned on.
+    pub roadmap: RoadmapSize,
+}
+
+/// One vehicle.
+#[derive(Clone, Debug, Serialize)]
+pub struct VehicleResult {
+    /// MAVLink system id.
+    pub id: u8,
+    /// Index of its goal, if it got one.
+    pub goal: Option<u16>,
+    /// Whether it came to its goal.
+    pub reached: bool,
+    /// Whether it stands on the ground, disarmed, after its flight.
+    pub landed: bool,
+    /// Length of its path, metres.
+    pub path_m: f64,
+    /// Way flown, metres.
+    pub flown_m: f64,
+    /// Time from take-off to landing, seconds.
+    pub flight_time_s: f64,
+    /// How it ended: a state of the companion's mission.
+    pub end: String,
+}
+
+/// The swarm as a whole.
+#[derive(Clone, Debug, Serialize)]
+pub struct Totals {
+    /// Sum of all path lengths, metres.
+    pub path_m: f64,
+    /// From the start command to the last landing, seconds; in a plan, the longest nominal flight.
+    pub makespan_s: f64,
+}
+
+/// Distances kept.
+#[derive(Clone, Debug, Serialize)]
+pub struct Safety {
+    /// Times a body touched an obstacle; the floor while taking off or landing is none.
+    pub wall_contacts: u32,
+    /// Smallest distance from a vehicle's centre to an obstacle between take-off and landing, metres.
+    pub min_clearance_m: Option<f64>,
+    /// Smallest distance between two centres, one of them flying, metres.
+    pub min_separation_m: Option<f64>,
+    /// What the scenario asks for, metres.
+    pub safety_distance_m: f64,
+    /// Times a pair came closer than that.
+    pub violations: u32,
+    /// Times a flying vehicle made no progress for 20 s though a way was left.
+    pub deadlocks: u32,
+}
+
+/// The roadmap planned on.
+#[derive(Clone, Debug, Serialize)]
+pub struct RoadmapSize {
+    /// Nodes, terminals among them.
+    pub nodes: usize,
+    /// Edges, each counted once.
+    pub edges: usize,
+    /// Length of the roadmap file.
+    pub bytes: usize,
+}
+
+/// `timing.json`, seconds of this machine's clock.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Timing {
+    /// Reading or making the map.
+    pub map_s: f64,
+    /// Sampling, edges and their clearances.
+    pub roadmap_s: f64,
+    /// Paths.
+    pub search_s: f64,
+    /// Cost matrix and assignment.
+    pub assignment_s: f64,
+    /// The whole plan, schedule included.
+    pub plan_s: f64,
+    /// Time that passed in the simulation.
+    pub simulated_s: f64,
+    /// The whole command.
+    pub wall_s: f64,
+}
+
+/// Rounds to a tenth of a millimetre (or of a millisecond): what `result.json` states, it means.
+pub fn rounded(value: f32) -> f64 {
+    (f64::from(value) * 1e4).round() / 1e4
+}
+
+/// Writes a value as indented JSON.
+pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+    let mut text = serde_json::to_string_pretty(value)?;
+    text.push('\n');
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}

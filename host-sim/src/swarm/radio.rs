@@ -1,0 +1,86 @@
+//! An emulated broadcast radio: range, loss and delay, packet by packet.
+
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+use planner_core::Point;
+use rand_pcg::Pcg32;
+
+use super::serial::unit;
+
+/// Properties of the radio.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RadioConfig {
+    /// Distance beyond which nothing is heard, metres.
+    pub range_m: f32,
+    /// Probability that one receiver misses a packet.
+    pub loss: f64,
+    /// Time from sending to hearing, seconds.
+    pub delay_s: f64,
+}
+
+/// A radio shared by a number of stations; time in microseconds since the start of the simulation.
+#[derive(Debug)]
+pub struct Radio {
+    config: RadioConfig,
+    rng: Pcg32,
+    under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
+}
+
+impl Radio {
+    /// A silent radio with `stations` receivers.
+    pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
+        let under_way = (0..stations).map(|_| VecDeque::new()).collect();
+        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), under_way }
+    }
+
+    /// Sends a packet from a place to every other station; `from` is `None` for one that only sends (the ground).
+    pub fn broadcast(&mut self, now_us: u64, from: Option<usize>, places: &[Point], packet: &[u8]) {
+        let packet: Rc<[u8]> = packet.into();
+        let hears_us = now_us + (self.config.delay_s * 1e6) as u64;
+        for (to, queue) in self.under_way.iter_mut().enumerate() {
+            let in_range = |from: usize| (places[from] - places[to]).norm() <= self.config.range_m;
+            let lost = self.config.loss > 0.0 && unit(&mut self.rng) < self.config.loss;
+            if from != Some(to) && from.is_none_or(in_range) && !lost {
+                queue.push_back((hears_us, Rc::clone(&packet)));
+            }
+        }
+    }
+
+    /// The next packet a station has heard by now.
+    pub fn receive(&mut self, now_us: u64, station: usize) -> Option<Rc<[u8]>> {
+        let queue = &mut self.under_way[station];
+        let heard = queue.front().is_some_and(|&(hears_us, _)| hears_us <= now_us);
+        if heard { queue.pop_front().map(|(_, packet)| packet) } else { None }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: RadioConfig = RadioConfig { range_m: 10.0, loss: 0.0, delay_s: 0.05 };
+
+    #[test]
+    fn reaches_those_in_range_after_the_delay_and_not_the_sender() {
+        let places = [Point::zeros(), Point::new(9.0, 0.0, 0.0), Point::new(11.0, 0.0, 0.0)];
+        let mut radio = Radio::new(CONFIG, 3, 1);
+        radio.broadcast(0, Some(0), &places, b"hello");
+        assert!(radio.receive(49_999, 1).is_none());
+        assert_eq!(radio.receive(50_000, 1).as_deref(), Some(&b"hello"[..]));
+        assert!(radio.receive(50_000, 0).is_none() && radio.receive(50_000, 2).is_none());
+    }
+
+    #[test]
+    fn loses_the_share_it_says() {
+        let places = [Point::zeros(); 2];
+        let mut radio = Radio::new(RadioConfig { loss: 0.3, ..CONFIG }, 2, 1);
+        let heard = (0..10_000)
+            .filter(|&i| {
+                radio.broadcast(i, Some(0), &places, &[0]);
+                radio.receive(i + 50_000, 1).is_some()
+            })
+            .count();
+        assert!((6_700..7_300).contains(&heard), "{heard}");
+    }
+}

@@ -1,0 +1,149 @@
+//! An emulated serial link, one direction: baud rate, latency, corruption and stalls.
+//!
+//! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART without flow control.
+
+use std::collections::VecDeque;
+
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
+/// Properties of a link.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SerialConfig {
+    /// Bits per second.
+    pub baud: u32,
+    /// Time from the last bit sent to its byte being read, seconds.
+    pub latency_s: f64,
+    /// Probability that a byte arrives changed.
+    pub corruption: f64,
+    /// Transmit buffer, bytes.
+    pub buffer: usize,
+}
+
+/// One direction of a serial link; time in microseconds since the start of the simulation.
+#[derive(Debug)]
+pub struct SerialLink {
+    config: SerialConfig,
+    rng: Pcg32,
+    busy_until_us: u64,
+    bytes: VecDeque<u8>,
+    /// Arrival time and length of each write still under way.
+    writes: VecDeque<(u64, usize)>,
+    stalled_until_us: u64,
+    /// Bytes lost to a full buffer.
+    pub overrun: u64,
+}
+
+impl SerialLink {
+    /// An idle link; `seed` and `stream` choose its corruption.
+    pub fn new(config: SerialConfig, seed: u64, stream: u64) -> Self {
+        Self {
+            config,
+            rng: Pcg32::new(seed, stream),
+            busy_until_us: 0,
+            bytes: VecDeque::new(),
+            writes: VecDeque::new(),
+            stalled_until_us: 0,
+            overrun: 0,
+        }
+    }
+
+    /// Sends bytes.
+    pub fn write(&mut self, now_us: u64, data: &[u8]) {
+        if self.bytes.len() + data.len() > self.config.buffer {
+            self.overrun += data.len() as u64;
+            return;
+        }
+        let took_us = data.len() as u64 * 10_000_000 / u64::from(self.config.baud);
+        self.busy_until_us = self.busy_until_us.max(now_us) + took_us;
+        let arrives_us = self.busy_until_us + (self.config.latency_s * 1e6) as u64;
+        self.writes.push_back((arrives_us, data.len()));
+        self.bytes.extend(data);
+        if self.config.corruption > 0.0 {
+            let sent = self.bytes.len() - data.len();
+            for byte in self.bytes.range_mut(sent..) {
+                if unit(&mut self.rng) < self.config.corruption {
+                    *byte ^= 1 << (self.rng.next_u32() % 8);
+                }
+            }
+        }
+    }
+
+    /// Moves what has arrived by now into `out` (cleared first).
+    pub fn read(&mut self, now_us: u64, out: &mut Vec<u8>) {
+        out.clear();
+        if now_us < self.stalled_until_us {
+            return;
+        }
+        while let Some(&(arrives_us, length)) = self.writes.front() {
+            if arrives_us > now_us {
+                break;
+            }
+            self.writes.pop_front();
+            out.extend(self.bytes.drain(..length));
+        }
+    }
+
+    /// Delivers nothing until `until_us`.
+    pub fn stall(&mut self, until_us: u64) {
+        self.stalled_until_us = until_us;
+    }
+}
+
+/// A uniform number in 0…1.
+pub fn unit(rng: &mut Pcg32) -> f64 {
+    f64::from(rng.next_u32()) / (f64::from(u32::MAX) + 1.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CONFIG: SerialConfig =
+        SerialConfig { baud: 100_000, latency_s: 0.001, corruption: 0.0, buffer: 100 };
+
+    #[test]
+    fn bytes_arrive_after_their_bit_times_and_in_order() {
+        let mut link = SerialLink::new(CONFIG, 1, 0);
+        let mut got = Vec::new();
+        link.write(0, &[1; 10]); // 10 bytes at 10 kB/s: 1 ms, then 1 ms latency
+        link.write(0, &[2; 10]);
+        link.read(1_999, &mut got);
+        assert!(got.is_empty());
+        link.read(2_000, &mut got);
+        assert_eq!(got, [1; 10]);
+        link.read(3_000, &mut got);
+        assert_eq!(got, [2; 10]);
+    }
+
+    #[test]
+    fn a_full_buffer_loses_and_counts() {
+        let mut link = SerialLink::new(CONFIG, 1, 0);
+        link.write(0, &[0; 90]);
+        link.write(0, &[0; 20]);
+        assert_eq!(link.overrun, 20);
+    }
+
+    #[test]
+    fn corruption_changes_the_share_of_bytes_it_says() {
+        let config = SerialConfig { corruption: 0.1, buffer: 1 << 20, ..CONFIG };
+        let mut link = SerialLink::new(config, 1, 0);
+        let mut got = Vec::new();
+        link.write(0, &[0; 100_000]);
+        link.read(u64::MAX, &mut got);
+        let changed = got.iter().filter(|&&b| b != 0).count();
+        assert!((9_000..11_000).contains(&changed), "{changed}");
+    }
+
+    #[test]
+    fn a_stall_holds_everything_back_and_loses_nothing() {
+        let mut link = SerialLink::new(CONFIG, 1, 0);
+        let mut got = Vec::new();
+        link.write(0, &[7; 10]);
+        link.stall(5_000);
+        link.read(4_999, &mut got);
+        assert!(got.is_empty());
+        link.read(5_000, &mut got);
+        assert_eq!(got, [7; 10]);
+    }
+}

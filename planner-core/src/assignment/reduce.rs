@@ -1,0 +1,174 @@
+//! The cheap first phases of Jonker–Volgenant: most rows find their column here.
+
+use super::augment::{LANES, Paths};
+use super::{Costs, NONE, State};
+
+/// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left over), then two
+/// rounds of augmenting row reduction. Returns how many rows are left in `state.free`, or `None` if some row or, in a
+/// square matrix, some column has no finite cost, so that not every row can be served.
+pub(super) fn free_rows(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
+    let mut left = if costs.rows == costs.cols {
+        reduce_columns(costs, state, paths)?
+    } else {
+        for (row, free) in state.free.iter_mut().enumerate() {
+            *free = row as u16;
+        }
+        costs.rows
+    };
+    for _ in 0..2 {
+        if left > 0 {
+            left = reduce_rows(costs, state, left)?;
+        }
+    }
+    Some(left)
+}
+
+/// Each column is priced at its least cost and given to that row, if the row has none; then a row that is the least of
+/// one column only moves its slack into that column's price.
+fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
+    let least_row = &mut *paths.previous;
+    state.price.fill(f64::INFINITY);
+    for row in 0..costs.rows as u16 {
+        let line = costs.row(row, state.row);
+        for ((price, least_row), &cost) in state.price.iter_mut().zip(least_row.iter_mut()).zip(line) {
+            if f64::from(cost) < *price {
+                (*price, *least_row) = (f64::from(cost), row);
+            }
+        }
+    }
+    if state.price.contains(&f64::INFINITY) {
+        return None;
+    }
+    // `settled` counts here for how many columns a row is the least.
+    paths.settled.fill(0);
+    for col in (0..costs.cols as u16).rev() {
+        let row = paths.previous[usize::from(col)];
+        paths.settled[usize::from(row)] += 1;
+        if state.col_of[usize::from(row)] == NONE {
+            state.join(row, col);
+        }
+    }
+    let mut left = 0;
+    for row in 0..costs.rows as u16 {
+        match paths.settled[usize::from(row)] {
+            0 => {
+                state.free[left] = row;
+                left += 1;
+            }
+            1 => {
+                let own = usize::from(state.col_of[usize::from(row)]);
+                // At minus infinity the own column cannot be the least of the others.
+                let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
+                let slack = least_reduced(costs.row(row, state.row), state.price);
+                state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
+            }
+            _ => {}
+        }
+    }
+    Some(left)
+}
+
+fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
+    let (lines, line_rest) = line.as_chunks::<LANES>();
+    let (prices, price_rest) = price.as_chunks::<LANES>();
+    let mut least = [f64::INFINITY; LANES];
+    for (line, price) in lines.iter().zip(prices) {
+        for lane in 0..LANES {
+            let reduced = f64::from(line[lane]) - price[lane];
+            least[lane] = if reduced < least[lane] { reduced } else { least[lane] };
+        }
+    }
+    let rest = line_rest.iter().zip(price_rest).map(|(&cost, &price)| f64::from(cost) - price);
+    rest.chain(least).fold(f64::INFINITY, |a, b| if b < a { b } else { a })
+}
+
+/// Every free row takes its cheapest column, whose price falls until the second cheapest is as good; the row that held
+/// it is served next, or is left for an augmenting path where no price moved. Returns the rows left free.
+fn reduce_rows(costs: &Costs<'_>, state: &mut State<'_>, rows_in: usize) -> Option<usize> {
+    let (mut at, mut left) = (0, 0);
+    // Rows chase one another for as long as prices fall; the bound of the crate-wide rule on bounded work.
+    let mut budget = rows_in * costs.cols;
+    while at < rows_in {
+        let row = state.free[at];
+        at += 1;
+        let two = Two::cheapest(costs.row(row, state.row), state.price);
+        if two.least == f64::INFINITY {
+            return None;
+        }
+        if two.second == f64::INFINITY {
+            // The row's only column: no second price bounds its fall, so an augmenting path decides.
+            state.free[left] = row;
+            left += 1;
+            continue;
+        }
+        let mut col = two.col;
+        let price = state.price[usize::from(col)] - (two.second - two.least);
+        // Compared after rounding: a fall too small to show would repeat for ever.
+        let falls = price < state.price[usize::from(col)] && budget > 0;
+        if falls {
+            state.price[usize::from(col)] = price;
+        } else if state.row_of[usize::from(col)] != NONE && two.second == two.least {
+            col = two.second_col;
+        }
+        let evicted = state.row_of[usize::from(col)];
+        if evicted != NONE {
+            state.col_of[usize::from(evicted)] = NONE;
+            if falls {
+                at -= 1;
+                budget -= 1;
+                state.free[at] = evicted;
+            } else {
+                state.free[left] = evicted;
+                left += 1;
+            }
+        }
+        state.join(row, col);
+    }
+    Some(left)
+}
+
+/// The two cheapest columns of a row by reduced cost.
+struct Two {
+    least: f64,
+    second: f64,
+    col: u16,
+    second_col: u16,
+}
+
+impl Two {
+    fn cheapest(line: &[f32], price: &[f64]) -> Self {
+        let mut two = Self { least: f64::INFINITY, second: f64::INFINITY, col: NONE, second_col: NONE };
+        // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight
+        // subtractions and compares tell without a branch within.
+        let head = line.len().min(2 * LANES);
+        two.offer(0, &line[..head], &price[..head]);
+        let (lines, line_rest) = line[head..].as_chunks::<LANES>();
+        let (prices, price_rest) = price[head..].as_chunks::<LANES>();
+        for (chunk, (line, price)) in lines.iter().zip(prices).enumerate() {
+            let mut below = 0;
+            for lane in 0..LANES {
+                below |= u64::from(f64::from(line[lane]) - price[lane] < two.second);
+            }
+            if below != 0 {
+                two.offer(head + chunk * LANES, line, price);
+            }
+        }
+        two.offer(line.len() - line_rest.len(), line_rest, price_rest);
+        two
+    }
+
+    #[inline]
+    fn offer(&mut self, first: usize, line: &[f32], price: &[f64]) {
+        for (k, (&cost, &price)) in line.iter().zip(price).enumerate() {
+            let (value, col) = (f64::from(cost) - price, (first + k) as u16);
+            if value < self.second {
+                if value < self.least {
+                    (self.second, self.second_col) = (self.least, self.col);
+                    (self.least, self.col) = (value, col);
+                } else {
+                    (self.second, self.second_col) = (value, col);
+                }
+            }
+        }
+    }
+}

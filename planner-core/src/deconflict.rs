@@ -1,0 +1,246 @@
+//! Keeping apart in flight: how fast, and how far, a vehicle may go given its neighbours.
+//!
+//! [`Method::Algorithm2`] is P3D §3.4 as printed, kept for comparison. [`Method::Priority`] keeps the order of the swarm's
+//! schedule: before each stretch that conflicts with one an earlier-labelled vehicle has yet to leave, it stops (the
+//! gates of [`crate::schedule`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
+
+use libm::{fmaxf, fminf, sqrtf};
+
+use crate::Point;
+use crate::path::Path;
+use crate::schedule::Gate;
+
+/// Which rule keeps vehicles apart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// None.
+    Off,
+    /// P3D Algorithm 2.
+    Algorithm2,
+    /// Right of way by the schedule.
+    Priority,
+}
+
+/// Tunables of [`advise`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DeconflictConfig {
+    /// The rule.
+    pub method: Method,
+    /// Smallest distance between two vehicles' centres, metres.
+    pub safety_distance_m: f32,
+    /// Nominal speed, m/s.
+    pub cruise_mps: f32,
+    /// Braking that is counted on, m/s².
+    pub accel_mps2: f32,
+}
+
+/// A vehicle as last heard.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Neighbour {
+    /// MAVLink system id.
+    pub id: u8,
+    /// Place in the roster sorted by id, from 0: the `h` of Algorithm 2.
+    pub rank: u16,
+    /// ENU metres.
+    pub position: Point,
+    /// ENU m/s.
+    pub velocity: Point,
+    /// Seconds since this was heard.
+    pub age_s: f32,
+    /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it flies another plan.
+    pub progress_m: Option<f32>,
+    /// Whether it stands on the ground.
+    pub grounded: bool,
+}
+
+/// The vehicle that asks.
+#[derive(Clone, Copy, Debug)]
+pub struct Own<'a, const W: usize> {
+    /// Place in the roster sorted by id, from 0.
+    pub rank: u16,
+    /// ENU metres.
+    pub position: Point,
+    /// Arc length of its reference, metres (minus the climb before take-off).
+    pub along_m: f32,
+    /// Its path.
+    pub path: &'a Path<W>,
+}
+
+/// What the neighbours leave.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Advice {
+    /// Share of the nominal speed, 0…1.
+    pub speed_scale: f32,
+    /// Distance along the path within which to stop, metres; infinite when free.
+    pub stop_within_m: f32,
+    /// System id of the vehicle to stop for; 0 when free.
+    pub waiting_for: u8,
+}
+
+impl Advice {
+    /// Nobody near.
+    pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
+}
+
+/// How far ahead a neighbour without a known plan is looked for, in seconds of flight at the nominal speed.
+const LOOK_AHEAD_S: f32 = 4.0;
+/// Spacing of the looks along the own path, metres.
+const LOOK_STEP_M: f32 = 0.5;
+
+/// A reference this little beyond a gate still stands at it: rounding must not carry it through.
+const AT_GATE_M: f32 = 0.01;
+
+/// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
+/// each gate within reach, and for each neighbour without a plan [`LOOK_AHEAD_S`] · cruise / [`LOOK_STEP_M`] points of the
+/// own path.
+pub fn advise<const W: usize>(
+    cfg: &DeconflictConfig,
+    own: &Own<'_, W>,
+    gates: &[Gate],
+    neighbours: &[Neighbour],
+) -> Advice {
+    match cfg.method {
+        Method::Off => Advice::FREE,
+        Method::Algorithm2 => algorithm2(cfg, own.rank, &own.position, neighbours),
+        Method::Priority => priority(cfg, own, gates, neighbours),
+    }
+}
+
+/// P3D Algorithm 2, lines 12–17: within the safety distance of a higher-ranked vehicle `h` the nominal speed is divided
+/// by `(h + 1) · 1.5`; of several the last (highest) counts, as the loop overwrites. Restored when the neighbour leaves.
+fn algorithm2(cfg: &DeconflictConfig, rank: u16, position: &Point, neighbours: &[Neighbour]) -> Advice {
+    let near = |n: &&Neighbour| n.rank > rank && (n.position - position).norm() < cfg.safety_distance_m;
+    match neighbours.iter().filter(near).max_by_key(|n| n.rank) {
+        Some(n) => Advice {
+            speed_scale: 1.0 / ((f32::from(n.rank) + 1.0) * 1.5),
+            stop_within_m: f32::INFINITY,
+            waiting_for: n.id,
+        },
+        None => Advice::FREE,
+    }
+}
+
+fn priority<const W: usize>(
+    cfg: &DeconflictConfig,
+    own: &Own<'_, W>,
+    gates: &[Gate],
+    neighbours: &[Neighbour],
+) -> Advice {
+    let mut advice = Advice::FREE;
+    let mut stop = |within_m: f32, id: u8| {
+        if within_m < advice.stop_within_m {
+            advice.stop_within_m = within_m;
+            advice.waiting_for = id;
+        }
+    };
+    // A gate beyond twice the braking distance asks for nothing yet.
+    let horizon_m = own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + LOOK_STEP_M;
+    let ahead = gates.iter().skip_while(|gate| gate.at_m < own.along_m - AT_GATE_M);
+    for gate in ahead.take_while(|gate| gate.at_m <= horizon_m) {
+        let passed = neighbours
+            .iter()
+            .find(|n| n.id == gate.id)
+            .and_then(|n| n.progress_m)
+            .is_some_and(|progress_m| progress_m >= gate.until_m);
+        if !passed {
+            stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
+        }
+    }
+    for n in neighbours.iter().filter(|n| n.progress_m.is_none() && !n.grounded) {
+        if let Some(distance) = first_contact(cfg, own, n) {
+            stop(distance, n.id);
+        }
+    }
+    let allowed_mps = sqrtf(2.0 * cfg.accel_mps2 * fmaxf(advice.stop_within_m, 0.0));
+    advice.speed_scale = fminf(allowed_mps / cfg.cruise_mps, 1.0);
+    advice
+}
+
+/// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
+/// heard; `None` if not within the look-ahead, or if flying on only takes us further apart.
+fn first_contact<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>, n: &Neighbour) -> Option<f32> {
+    let now = (n.position + n.velocity * n.age_s - own.position).norm();
+    let looks = (cfg.cruise_mps * LOOK_AHEAD_S / LOOK_STEP_M) as u32;
+    (1..=looks).map(|look| look as f32 * LOOK_STEP_M).find_map(|distance| {
+        let there = own.path.point_at(fmaxf(own.along_m, 0.0) + distance)?;
+        let at = n.position + n.velocity * (n.age_s + distance / cfg.cruise_mps);
+        let apart = (at - there).norm();
+        (apart < cfg.safety_distance_m && apart < now).then_some(fmaxf(distance - LOOK_STEP_M, 0.0))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn cfg(method: Method) -> DeconflictConfig {
+        DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 }
+    }
+
+    fn neighbour(id: u8, rank: u16, position: Point) -> Neighbour {
+        Neighbour {
+            id,
+            rank,
+            position,
+            velocity: Point::zeros(),
+            age_s: 0.0,
+            progress_m: None,
+            grounded: false,
+        }
+    }
+
+    fn straight() -> Path<4> {
+        let mut path = Path::new();
+        path.push(Point::zeros(), 1.0).unwrap();
+        path.push(Point::new(20.0, 0.0, 0.0), 1.0).unwrap();
+        path
+    }
+
+    fn own(path: &Path<4>) -> Own<'_, 4> {
+        Own { rank: 1, position: Point::zeros(), along_m: 0.0, path }
+    }
+
+    #[test]
+    fn algorithm2_divides_by_the_highest_ranked_vehicle_in_range() {
+        let path = straight();
+        let near = [
+            neighbour(1, 0, Point::new(0.5, 0.0, 0.0)),
+            neighbour(3, 2, Point::new(1.0, 0.0, 0.0)),
+            neighbour(4, 3, Point::new(0.0, 1.0, 0.0)),
+            neighbour(5, 4, Point::new(0.0, 1.5, 0.0)),
+        ];
+        let advice = advise(&cfg(Method::Algorithm2), &own(&path), &[], &near);
+        assert_eq!((advice.speed_scale, advice.waiting_for), (1.0 / 6.0, 4));
+        let advice = advise(&cfg(Method::Algorithm2), &own(&path), &[], &near[..1]);
+        assert_eq!(advice, Advice::FREE, "a lower id has no priority");
+    }
+
+    #[test]
+    fn priority_stops_at_the_first_gate_that_is_not_passed() {
+        let path = straight();
+        let gates = [
+            Gate { at_m: 1.0, id: 2, until_m: 5.0 },
+            Gate { at_m: 2.0, id: 2, until_m: 9.0 },
+            Gate { at_m: 2.5, id: 7, until_m: 1.0 },
+            Gate { at_m: 9.0, id: 8, until_m: 1.0 },
+        ];
+        let mut heard = [neighbour(2, 0, Point::new(9.0, 9.0, 9.0))];
+        heard[0].progress_m = Some(5.5);
+        let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
+        assert_eq!((advice.stop_within_m, advice.waiting_for), (2.0, 2));
+        heard[0].progress_m = Some(9.0);
+        let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
+        assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
+    }
+
+    #[test]
+    fn priority_stops_before_a_vehicle_without_a_plan() {
+        let path = straight();
+        let ahead = [neighbour(9, 5, Point::new(5.0, 0.2, 0.0))];
+        let advice = advise(&cfg(Method::Priority), &own(&path), &[], &ahead);
+        assert_eq!(advice.waiting_for, 9);
+        assert!(advice.stop_within_m <= 3.5 && advice.stop_within_m > 2.5, "{}", advice.stop_within_m);
+        let behind = [neighbour(9, 5, Point::new(-1.0, 0.0, 0.0))];
+        assert_eq!(advise(&cfg(Method::Priority), &own(&path), &[], &behind), Advice::FREE);
+    }
+}

@@ -1,0 +1,315 @@
+//! A timed polyline and the reference point that moves along it.
+//!
+//! The reference is what the autopilot is sent: it runs along the path no faster than corners, walls and other vehicles
+//! allow, and waits for a vehicle that lags. A corner of angle θ taken at speed v asks the vehicle for a change of
+//! velocity 2·v·sin(θ/2); braking it away at acceleration a sweeps at most Δv²/(2a) beside the path, so
+//! v = √(2·a·e) / (2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs leaves.
+//! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
+
+use heapless::Vec;
+use libm::{fmaxf, fminf, sqrtf};
+
+use crate::Point;
+use crate::deconflict::Advice;
+
+/// A corner of a path.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Waypoint {
+    /// Place, ENU metres.
+    pub position: Point,
+    /// Clearance of the leg that ends here, metres from its line to the nearest obstacle.
+    pub clearance_m: f32,
+    /// Arc length from the first waypoint, metres.
+    pub along_m: f32,
+    /// Label of the swarm's schedule: seconds after the start at nominal speed. Only its order matters in flight.
+    pub at_s: f32,
+}
+
+/// Why a path was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PathError {
+    /// More than `W` waypoints.
+    PathFull,
+    /// A coordinate or a clearance is NaN or infinite.
+    NotFinite,
+}
+
+/// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0 at the first
+/// waypoint; take-off lies before 0, landing beyond [`Path::length_m`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Path<const W: usize> {
+    waypoints: Vec<Waypoint, W>,
+}
+
+impl<const W: usize> Path<W> {
+    /// A path without waypoints.
+    pub const fn new() -> Self {
+        Self { waypoints: Vec::new() }
+    }
+
+    /// Appends a waypoint; a zero-length leg is dropped, keeping the smaller clearance of the two.
+    pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
+        if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
+            return Err(PathError::NotFinite);
+        }
+        let along_m = match self.waypoints.last_mut() {
+            Some(last) => {
+                let leg = (position - last.position).norm();
+                if leg == 0.0 {
+                    last.clearance_m = fminf(last.clearance_m, clearance_m);
+                    return Ok(());
+                }
+                last.along_m + leg
+            }
+            None => 0.0,
+        };
+        let waypoint = Waypoint { position, clearance_m, along_m, at_s: 0.0 };
+        self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
+    }
+
+    /// Labels every waypoint: the first at `depart_s`, the others after their arc length at `speed_mps`.
+    pub fn label(&mut self, depart_s: f32, speed_mps: f32) {
+        for waypoint in &mut self.waypoints {
+            waypoint.at_s = depart_s + waypoint.along_m / speed_mps;
+        }
+    }
+
+    /// The waypoints in order.
+    pub fn waypoints(&self) -> &[Waypoint] {
+        &self.waypoints
+    }
+
+    /// Arc length of the whole path, metres; 0 for an empty path.
+    pub fn length_m(&self) -> f32 {
+        self.waypoints.last().map_or(0.0, |w| w.along_m)
+    }
+
+    /// The point at an arc length, clamped to the path; `None` on an empty path.
+    pub fn point_at(&self, along_m: f32) -> Option<Point> {
+        let first = self.waypoints.first()?;
+        let legs = self.waypoints.windows(2);
+        let leg = legs.into_iter().find(|leg| along_m <= leg[1].along_m);
+        Some(match leg {
+            _ if along_m <= 0.0 => first.position,
+            Some(leg) => {
+                let share = (along_m - leg[0].along_m) / (leg[1].along_m - leg[0].along_m);
+                leg[0].position + (leg[1].position - leg[0].position) * share
+            }
+            None => self.waypoints[self.waypoints.len() - 1].position,
+        })
+    }
+
+    /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how far a vehicle has
+    /// come, without jumping to another stretch that passes close by.
+    pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
+        let (low, high) = (near_m - window_m, near_m + window_m);
+        let mut best = (f32::INFINITY, near_m);
+        for leg in self.waypoints.windows(2) {
+            if leg[1].along_m < low || leg[0].along_m > high {
+                continue;
+            }
+            let direction = leg[1].position - leg[0].position;
+            let share = (position - leg[0].position).dot(&direction) / direction.norm_squared();
+            let length = leg[1].along_m - leg[0].along_m;
+            let along_m = (leg[0].along_m + share.clamp(0.0, 1.0) * length).clamp(low, high);
+            let share = ((along_m - leg[0].along_m) / length).clamp(0.0, 1.0);
+            let distance = (leg[0].position + direction * share - position).norm_squared();
+            if distance < best.0 {
+                best = (distance, along_m);
+            }
+        }
+        best.1
+    }
+}
+
+/// Tunables of [`advance`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackConfig {
+    /// Nominal speed, m/s.
+    pub cruise_mps: f32,
+    /// Acceleration and braking along the path and in corners, m/s².
+    pub accel_mps2: f32,
+    /// Body radius, metres: what of an edge's clearance is already taken.
+    pub radius_m: f32,
+    /// Smallest deviation to allow for where the clearance leaves less, metres: what the autopilot achieves at a crawl.
+    pub deviation_min_m: f32,
+    /// Largest deviation to allow for in the open, metres.
+    pub deviation_max_m: f32,
+    /// The reference slows from half this distance ahead of the vehicle and stops at it, metres.
+    pub lead_max_m: f32,
+}
+
+impl Default for TrackConfig {
+    /// A 2 m/s indoor vehicle of 0.3 m radius.
+    fn default() -> Self {
+        Self {
+            cruise_mps: 2.0,
+            accel_mps2: 1.5,
+            radius_m: 0.3,
+            deviation_min_m: 0.03,
+            deviation_max_m: 0.25,
+            lead_max_m: 1.2,
+        }
+    }
+}
+
+/// Where the reference is. All zero before the first waypoint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tracker {
+    /// Arc length of the reference, metres.
+    pub along_m: f32,
+    /// Speed of the reference along the path, m/s.
+    pub speed_mps: f32,
+}
+
+/// The moving reference: what the autopilot is asked to be at.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reference {
+    /// Place, ENU metres.
+    pub position: Point,
+    /// Velocity, ENU m/s.
+    pub velocity: Point,
+    /// Arc length, metres.
+    pub along_m: f32,
+    /// Whether the end of the path is reached.
+    pub finished: bool,
+}
+
+/// Half of the clearance a leg leaves beyond the body, within the configured bounds.
+fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
+    fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
+}
+
+/// Greatest speed through waypoint `i`.
+fn corner_speed<const W: usize>(cfg: &TrackConfig, path: &Path<W>, i: usize) -> f32 {
+    let points = path.waypoints();
+    let (Some(before), Some(after)) = (i.checked_sub(1).and_then(|b| points.get(b)), points.get(i + 1))
+    else {
+        return 0.0;
+    };
+    let incoming = (points[i].position - before.position).normalize();
+    let outgoing = (after.position - points[i].position).normalize();
+    let change = (outgoing - incoming).norm();
+    let e = deviation(cfg, fminf(points[i].clearance_m, after.clearance_m));
+    fminf(cfg.cruise_mps, sqrtf(2.0 * cfg.accel_mps2 * e) / fmaxf(change, 1e-3))
+}
+
+/// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
+///
+/// `vehicle` is where the vehicle was last seen, `advice` what the neighbours leave. Work: one pass over the waypoints.
+pub fn advance<const W: usize>(
+    cfg: &TrackConfig,
+    path: &Path<W>,
+    tracker: &mut Tracker,
+    vehicle: &Point,
+    advice: &Advice,
+    dt_s: f32,
+) -> Option<Reference> {
+    let points = path.waypoints();
+    let here = path.point_at(tracker.along_m)?;
+    let length_m = path.length_m();
+    let lead = (vehicle - here).norm();
+    let waiting = fminf(fmaxf((cfg.lead_max_m - lead) / (0.5 * cfg.lead_max_m), 0.0), 1.0);
+    let mut speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
+    let brake = |distance: f32, end: f32| sqrtf(end * end + 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0));
+    speed = fminf(speed, brake(advice.stop_within_m, 0.0));
+    for (i, waypoint) in points.iter().enumerate() {
+        let distance = waypoint.along_m - tracker.along_m;
+        if distance > 0.0 {
+            speed = fminf(speed, brake(distance, corner_speed(cfg, path, i)));
+        }
+    }
+    let step = cfg.accel_mps2 * dt_s;
+    // Speeding up is limited; a bound from ahead is met at once, it already holds the braking distance.
+    tracker.speed_mps = fminf(speed, tracker.speed_mps + step);
+    let move_m = fminf(tracker.speed_mps * dt_s, fmaxf(advice.stop_within_m, 0.0));
+    tracker.along_m = fminf(tracker.along_m + move_m, length_m);
+    // The last centimetres of braking take many steps; within one the end counts as reached.
+    if length_m - tracker.along_m < 0.01 && advice.stop_within_m >= length_m - tracker.along_m {
+        tracker.along_m = length_m;
+        tracker.speed_mps = 0.0;
+    }
+    let position = path.point_at(tracker.along_m)?;
+    let ahead = path.point_at(tracker.along_m + 0.01)?;
+    let velocity = match (ahead - position).try_normalize(1e-6) {
+        Some(direction) => direction * tracker.speed_mps,
+        None => Point::zeros(),
+    };
+    Some(Reference { position, velocity, along_m: tracker.along_m, finished: tracker.along_m >= length_m })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corner_path(clearance_m: f32) -> Path<8> {
+        let mut path = Path::new();
+        for (x, y) in [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)] {
+            path.push(Point::new(x, y, 1.0), clearance_m).unwrap();
+        }
+        path
+    }
+
+    #[test]
+    fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
+        let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
+        let mut tracker = Tracker::default();
+        let mut vehicle = Point::new(0.0, 0.0, 1.0);
+        let (mut at_corner, mut fastest, mut steps) = (f32::INFINITY, 0.0_f32, 0);
+        loop {
+            let reference = advance(&cfg, &path, &mut tracker, &vehicle, &Advice::FREE, 0.05).unwrap();
+            vehicle = reference.position;
+            fastest = fastest.max(tracker.speed_mps);
+            if (tracker.along_m - 6.0).abs() < 0.1 {
+                at_corner = at_corner.min(tracker.speed_mps);
+            }
+            steps += 1;
+            if reference.finished || steps > 1000 {
+                break;
+            }
+        }
+        assert_eq!(vehicle, Point::new(6.0, 6.0, 1.0));
+        assert!(fastest > 1.9 && at_corner < 0.75, "fastest {fastest}, corner {at_corner}");
+    }
+
+    #[test]
+    fn stops_before_the_distance_advised_and_goes_on_when_freed() {
+        let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
+        let mut tracker = Tracker::default();
+        for _ in 0..400 {
+            let advice = Advice { stop_within_m: 4.0 - tracker.along_m, ..Advice::FREE };
+            let vehicle = path.point_at(tracker.along_m).unwrap();
+            advance(&cfg, &path, &mut tracker, &vehicle, &advice, 0.05).unwrap();
+            assert!(tracker.along_m <= 4.0);
+        }
+        assert!(tracker.along_m > 3.9, "{}", tracker.along_m);
+    }
+
+    #[test]
+    fn waits_for_a_vehicle_that_lags() {
+        let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
+        let mut tracker = Tracker::default();
+        for _ in 0..200 {
+            advance(&cfg, &path, &mut tracker, &Point::new(0.0, 0.0, 1.0), &Advice::FREE, 0.05);
+        }
+        assert!(tracker.along_m <= cfg.lead_max_m + 0.1, "{}", tracker.along_m);
+    }
+
+    #[test]
+    fn projection_stays_on_the_stretch_at_hand() {
+        let mut path = Path::<8>::new();
+        for (x, y) in [(0.0, 0.0), (5.0, 0.0), (5.0, 0.5), (0.0, 0.5)] {
+            path.push(Point::new(x, y, 1.0), 1.0).unwrap();
+        }
+        let along = path.project(&Point::new(2.0, 0.4, 1.0), 1.5, 2.0);
+        assert!((along - 2.0).abs() < 1e-4, "{along}");
+    }
+
+    #[test]
+    fn refuses_nan_and_overflow_by_name() {
+        let mut path = Path::<1>::new();
+        assert_eq!(path.push(Point::new(f32::NAN, 0.0, 0.0), 1.0), Err(PathError::NotFinite));
+        path.push(Point::zeros(), 1.0).unwrap();
+        assert_eq!(path.push(Point::new(1.0, 0.0, 0.0), 1.0), Err(PathError::PathFull));
+    }
+}

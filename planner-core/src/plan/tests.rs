@@ -1,0 +1,152 @@
+extern crate std;
+
+use std::boxed::Box;
+use std::vec::Vec as StdVec;
+
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::*;
+use crate::frames::Geodetic;
+use crate::roadmap::{self, Edge, RoadmapHeader};
+use crate::schedule::checker;
+
+const SCHEDULE: ScheduleConfig =
+    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+/// The building's starts hover this high over their pads.
+const HEIGHT_M: f32 = 1.5;
+
+/// A roadmap over open ground: terminals first, then random nodes, edges up to 8 m.
+fn open_roadmap(terminals: &[Point], starts: usize, nodes: usize, seed: u64) -> StdVec<u8> {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut uniform = |scale: f32| rng.next_u32() as f32 / u32::MAX as f32 * scale;
+    let mut points = terminals.to_vec();
+    while points.len() < terminals.len() + nodes {
+        points.push(Point::new(uniform(40.0), uniform(40.0), HEIGHT_M + uniform(10.0)));
+    }
+    let mut edges = StdVec::new();
+    for a in 0..points.len() {
+        for b in a + 1..points.len() {
+            if (0.5..8.0).contains(&(points[a] - points[b]).norm()) {
+                edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
+            }
+        }
+    }
+    let header = RoadmapHeader {
+        origin: Geodetic::default(),
+        edge_min_m: 0.5,
+        edge_max_m: 8.0,
+        tested_clearance_m: 0.0,
+        max_clearance_m: 4.0,
+        starts: starts as u16,
+        goals: (terminals.len() - starts) as u16,
+    };
+    let mut bytes = std::vec![0; roadmap::encoded_len(points.len(), edges.len()).unwrap()];
+    roadmap::write(&header, &points, &edges, &mut bytes).unwrap();
+    bytes
+}
+
+fn tasks(count: usize, labelled: bool) -> StdVec<VehicleTask> {
+    (0..count)
+        .map(|i| VehicleTask {
+            id: i as u8 + 1,
+            required_clearance_m: 0.8,
+            climb_m: HEIGHT_M,
+            goal: labelled.then_some(i as u16),
+        })
+        .collect()
+}
+
+fn plan(
+    bytes: &[u8],
+    vehicles: &[VehicleTask],
+    goals: usize,
+    mode: Mode,
+) -> Result<SwarmPlan<16, 64>, PlanError> {
+    let view = RoadmapView::parse(bytes).unwrap();
+    let mut ws = Box::new(PlanWorkspace::<1024, 16>::new());
+    let mut out = SwarmPlan::new();
+    let descents = std::vec![HEIGHT_M; goals];
+    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE };
+    plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
+}
+
+/// `count` points at least 4 m apart.
+fn spread(count: usize, seed: u64) -> StdVec<Point> {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut uniform = |scale: f32| rng.next_u32() as f32 / u32::MAX as f32 * scale;
+    let mut points: StdVec<Point> = StdVec::new();
+    while points.len() < count {
+        let p = Point::new(uniform(40.0), uniform(40.0), HEIGHT_M);
+        if points.iter().all(|q| (p - q).norm() > 4.0) {
+            points.push(p);
+        }
+    }
+    points
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+    /// Ten vehicles over open ground, at any speeds: all arrive, none comes near another.
+    #[test]
+    fn swarms_arrive_apart_at_any_speeds(
+        seed in any::<u64>(),
+        labelled in any::<bool>(),
+        speeds in proptest::collection::vec(0.3f32..3.0, 10),
+    ) {
+        let terminals = spread(20, seed);
+        let bytes = open_roadmap(&terminals, 10, 300, seed);
+        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
+        let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
+        prop_assert!(plan.flights.iter().all(|f| f.goal.is_some()));
+        let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
+        prop_assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{apart:?}");
+    }
+}
+
+#[test]
+fn unlabelled_is_no_longer_than_labelled_and_makespan_no_later() {
+    for seed in 0..10 {
+        let bytes = open_roadmap(&spread(16, seed), 8, 300, seed);
+        let longest = |p: &SwarmPlan<16, 64>| p.flights.iter().map(|f| f.path.length_m()).fold(0.0, f32::max);
+        let labelled = plan(&bytes, &tasks(8, true), 8, Mode::Labelled).unwrap();
+        let total = plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+        let makespan = plan(&bytes, &tasks(8, false), 8, Mode::Unlabelled(Objective::Makespan)).unwrap();
+        // Detours around pads and landing places may lengthen a path a little.
+        assert!(total.total_m() <= labelled.total_m() * 1.05, "seed {seed}");
+        assert!(longest(&makespan) <= longest(&total) * 1.05, "seed {seed}");
+    }
+}
+
+#[test]
+fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
+    let mut terminals = spread(5, 3);
+    terminals.push(Point::new(500.0, 500.0, HEIGHT_M)); // out of reach
+    let bytes = open_roadmap(&terminals, 4, 300, 3);
+    let plan = plan(&bytes, &tasks(4, false), 2, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
+    let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.goal).collect();
+    assert_eq!(flying, [0], "one goal in reach, one vehicle flies to it");
+    checker::fly(&SCHEDULE, &plan.flights, &[1.0; 4], 10_000).unwrap();
+}
+
+#[test]
+fn the_same_request_gives_the_same_plan_and_another_gives_another_crc() {
+    let terminals = spread(8, 5);
+    let bytes = open_roadmap(&terminals, 4, 200, 5);
+    let mode = Mode::Unlabelled(Objective::TotalDistance);
+    let first = plan(&bytes, &tasks(4, false), 4, mode).unwrap();
+    assert_eq!(first, plan(&bytes, &tasks(4, false), 4, mode).unwrap());
+    let other = plan(&open_roadmap(&terminals, 4, 200, 6), &tasks(4, false), 4, mode).unwrap();
+    assert_ne!(first.crc, other.crc);
+}
+
+#[test]
+fn wrong_requests_are_refused_by_name() {
+    let bytes = open_roadmap(&spread(4, 7), 2, 50, 7);
+    let unlabelled = Mode::Unlabelled(Objective::TotalDistance);
+    assert_eq!(plan(&bytes, &tasks(3, false), 2, unlabelled).unwrap_err(), PlanError::Terminals);
+    let mut labelled = tasks(2, true);
+    labelled[1].goal = Some(9);
+    assert_eq!(plan(&bytes, &labelled, 2, Mode::Labelled).unwrap_err(), PlanError::BadGoal(2));
+}

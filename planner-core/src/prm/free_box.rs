@@ -1,0 +1,247 @@
+//! What a node sees at once: an empty box of cells around it, and the walls that close it.
+//!
+//! Boxes are convex, so a segment with both ends strictly inside is clear; and a segment that leaves one goes through
+//! the cell behind that face, mostly a wall. One box answers for all rays of a node, and for the nodes beside it. Both
+//! answers are given only where no rounding can turn them: ends at least [`GUARD`] cells inside, and a point of the ray
+//! at least [`GUARD`] cells inside an occupied cell. All other rays go to the exact check.
+
+use super::{Config, Workspace};
+use crate::Point;
+use crate::segment::{lane_mask, segment_is_clear};
+use crate::voxel::VoxelGrid;
+
+/// Cells. Places below are computed to within 2⁻¹¹ cell as long as the grid has at most [`MAX_CELLS`] cells a side:
+/// two roundings of a coordinate make 2 · 4096 · 2⁻²⁴ = 2⁻¹¹ at worst, and snapping in the exact check 2⁻¹⁵.
+const GUARD: f32 = 1.0 / 512.0;
+const MAX_CELLS: u32 = 4096;
+/// How deep behind a face the cell is probed, cells.
+const DEPTH: f32 = 1.0 / 64.0;
+/// Boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
+const BOXES: usize = 8;
+
+/// Cells `low..high` on each axis, all free.
+#[derive(Clone, Copy, Default)]
+struct FreeBox {
+    low: [i32; 3],
+    high: [i32; 3],
+}
+
+/// The view from one node.
+pub(super) struct Sight<'g, 'a> {
+    grid: &'g VoxelGrid<'a>,
+    clearance_m: f32,
+    clearance_cells: f32,
+    cells_per_m: f32,
+    /// How far a box may reach from the node it is made for, cells.
+    reach: i32,
+    boxes: [FreeBox; BOXES],
+    newest: usize,
+    here: [f32; 3],
+    /// `here` in cells.
+    at: [f32; 3],
+    /// The box around `here` relative to it, cells; `None` where it cannot be used.
+    view: Option<View>,
+}
+
+#[derive(Clone, Copy)]
+struct View {
+    /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the clearance.
+    clear_low: [f32; 3],
+    clear_high: [f32; 3],
+    /// The faces, [`DEPTH`] farther out.
+    face_low: [f32; 3],
+    face_high: [f32; 3],
+}
+
+impl<'g, 'a> Sight<'g, 'a> {
+    pub(super) fn new(grid: &'g VoxelGrid<'a>, config: &Config) -> Self {
+        let resolution = grid.shape().resolution_m;
+        Self {
+            grid,
+            clearance_m: config.clearance_m,
+            clearance_cells: config.clearance_m / resolution,
+            cells_per_m: 1.0 / resolution,
+            reach: (config.edge_max_m / resolution).min(MAX_CELLS as f32) as i32 + 1,
+            boxes: [FreeBox::default(); BOXES],
+            newest: 0,
+            here: [0.0; 3],
+            at: [0.0; 3],
+            view: None,
+        }
+    }
+
+    /// Moves to a node.
+    pub(super) fn stand_at(&mut self, here: [f32; 3]) {
+        let shape = self.grid.shape();
+        self.here = here;
+        self.view = None;
+        if shape.dims.iter().any(|&d| d > MAX_CELLS) {
+            return;
+        }
+        self.at = [0, 1, 2].map(|axis| (here[axis] - shape.min[axis]) * self.cells_per_m);
+        let Some(cell) = shape.cell_of(&Point::from(here)) else {
+            return;
+        };
+        let cell = cell.map(|c| c as i32);
+        let around = match self.boxes.iter().find(|b| b.holds(cell)) {
+            Some(around) => *around,
+            None => {
+                let Some(around) = FreeBox::grow(self.grid, cell, self.reach) else {
+                    return;
+                };
+                self.newest = (self.newest + 1) % BOXES;
+                self.boxes[self.newest] = around;
+                around
+            }
+        };
+        let low = [0, 1, 2].map(|axis| around.low[axis] as f32 - self.at[axis]);
+        let high = [0, 1, 2].map(|axis| around.high[axis] as f32 - self.at[axis]);
+        if (0..3).any(|axis| low[axis] > -GUARD || high[axis] < GUARD) {
+            return;
+        }
+        let inset = self.clearance_cells + self.clearance_cells * 1e-6 + GUARD;
+        let mut view = View {
+            clear_low: low.map(|x| x + inset),
+            clear_high: high.map(|x| x - inset),
+            face_low: low.map(|x| x - DEPTH),
+            face_high: high.map(|x| x + DEPTH),
+        };
+        if (0..3).any(|axis| view.clear_low[axis] >= 0.0 || view.clear_high[axis] <= 0.0) {
+            view.clear_high = [f32::NEG_INFINITY; 3];
+        }
+        self.view = Some(view);
+    }
+
+    /// Calls `found` with those of `places` to which the segment from here is clear.
+    #[inline(always)]
+    pub(super) fn each_clear<E, const NODES: usize, const CUBES: usize>(
+        &self,
+        workspace: &Workspace<NODES, CUBES>,
+        places: &[u16],
+        mut found: impl FnMut(usize) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let here = Point::from(self.here);
+        for &place in places {
+            let place = usize::from(place);
+            let there = workspace.point(place);
+            let clear = match self.view.as_ref().and_then(|view| self.judge(view, there)) {
+                Some(clear) => clear,
+                None => segment_is_clear(self.grid, &here, &Point::from(there), self.clearance_m),
+            };
+            if clear {
+                found(place)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the segment from here is clear, where that can be told for certain.
+    #[inline(always)]
+    fn judge(&self, view: &View, there: [f32; 3]) -> Option<bool> {
+        let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);
+        let inside = (d[0] > view.clear_low[0])
+            & (d[0] < view.clear_high[0])
+            & (d[1] > view.clear_low[1])
+            & (d[1] < view.clear_high[1])
+            & (d[2] > view.clear_low[2])
+            & (d[2] < view.clear_high[2]);
+        if inside {
+            return Some(true);
+        }
+        // A component of zero never leaves: the quotient is infinite.
+        let leave = [0, 1, 2].map(|axis| {
+            let face = if d[axis] < 0.0 { view.face_low[axis] } else { view.face_high[axis] };
+            face / d[axis]
+        });
+        let t = leave[0].min(leave[1]).min(leave[2]);
+        let mut cell = [0; 3];
+        let mut certain = t < 0.999;
+        for axis in 0..3 {
+            let q = self.at[axis] + d[axis] * t;
+            cell[axis] = q as i32;
+            let part = q - cell[axis] as f32;
+            certain &= part > GUARD && part < 1.0 - GUARD && cell[axis] < self.grid.shape().dims[axis] as i32;
+        }
+        let hit = certain && self.grid.is_occupied(cell.map(|c| c as u32));
+        hit.then_some(false)
+    }
+}
+
+impl FreeBox {
+    fn holds(&self, cell: [i32; 3]) -> bool {
+        (0..3).all(|axis| cell[axis] >= self.low[axis] && cell[axis] < self.high[axis])
+    }
+
+    /// Grows up and down to floor and ceiling, then along x and y to the walls; `None` if the cell is an obstacle.
+    fn grow(grid: &VoxelGrid<'_>, cell: [i32; 3], reach: i32) -> Option<Self> {
+        if grid.is_occupied(cell.map(|c| c as u32)) {
+            return None;
+        }
+        let mut grown = Self { low: cell, high: cell.map(|c| c + 1) };
+        for axis in [2, 0, 1] {
+            let dim = grid.shape().dims[axis] as i32;
+            grown.high[axis] = grown.free_up_to(grid, axis, (cell[axis] + 1 + reach).min(dim));
+            grown.low[axis] = grown.free_down_to(grid, axis, (cell[axis] - reach).max(0));
+        }
+        Some(grown)
+    }
+
+    /// How far up the box could be extended along `axis`.
+    fn free_up_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
+        let start = self.high[axis];
+        let mut brick = start >> 2;
+        while brick * 4 < limit {
+            let mut layers = self.layers(grid, axis, brick);
+            if brick == start >> 2 {
+                layers &= 0b1111 << (start & 3);
+            }
+            if layers != 0 {
+                return (brick * 4 + layers.trailing_zeros() as i32).min(limit);
+            }
+            brick += 1;
+        }
+        limit.max(start)
+    }
+
+    /// How far down the box could be extended along `axis`.
+    fn free_down_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
+        let start = self.low[axis];
+        let mut brick = (start - 1) >> 2;
+        while brick >= 0 && brick * 4 + 3 >= limit {
+            let mut layers = self.layers(grid, axis, brick);
+            if brick == (start - 1) >> 2 {
+                layers &= 0b1111 >> (3 - ((start - 1) & 3));
+            }
+            if layers != 0 {
+                return (brick * 4 + 32 - layers.leading_zeros() as i32).max(limit);
+            }
+            brick -= 1;
+        }
+        limit.min(start)
+    }
+
+    /// Which of the four layers of cells of brick layer `brick` along `axis` hold an obstacle within the box's extent on the
+    /// other two axes.
+    fn layers(&self, grid: &VoxelGrid<'_>, axis: usize, brick: i32) -> u32 {
+        let [v, w] = [[1, 2], [0, 2], [0, 1]][axis];
+        let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
+        let strides = [1, bx, bx * by];
+        let lanes = |axis: usize, brick: i32| {
+            let low = (self.low[axis] - brick * 4).max(0);
+            let high = (self.high[axis] - 1 - brick * 4).min(3);
+            (0b1111 << low) & (0b1111 >> (3 - high))
+        };
+        let mut all = 0;
+        for brick_w in self.low[w] >> 2..=(self.high[w] - 1) >> 2 {
+            let mut row = 0;
+            for brick_v in self.low[v] >> 2..=(self.high[v] - 1) >> 2 {
+                let at = brick * strides[axis] + brick_v * strides[v] + brick_w * strides[w];
+                row |= grid.words()[at as usize] & lane_mask(v, lanes(v, brick_v));
+            }
+            all |= row & lane_mask(w, lanes(w, brick_w));
+        }
+        (0..4)
+            .filter(|&layer| all & lane_mask(axis, 1 << layer) != 0)
+            .fold(0, |bits, layer| bits | 1 << layer)
+    }
+}

@@ -1,0 +1,194 @@
+//! The builder against the all-pairs loop, and its refusals.
+
+extern crate std;
+
+use std::vec;
+use std::vec::Vec;
+
+use super::*;
+use crate::voxel::{GridShape, Outside};
+
+fn config(seed: u64) -> Config {
+    Config {
+        nodes: 300,
+        edge_min_m: 0.5,
+        edge_max_m: 4.0,
+        clearance_m: 0.0,
+        seed,
+        sampling: Sampling::Uniform,
+    }
+}
+
+/// Walls with openings and some clutter, 12 × 10 × 6 m at `resolution_m`.
+fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
+    let dims = [12.0, 10.0, 6.0].map(|m: f32| (m / resolution_m) as u32);
+    let shape = GridShape { dims, min: Point::new(-3.0, 1.0, 0.5), resolution_m };
+    let mut words = vec![0; shape.brick_count()];
+    let walls: Vec<(usize, u32, [u32; 3])> = (0..4)
+        .map(|i| {
+            let axis = i % 3;
+            let door = [0, 1, 2].map(|a| rng.next_u32() % (dims[a] * 2 / 3));
+            (axis, rng.next_u32() % dims[axis], door)
+        })
+        .collect();
+    for i in 0..dims[0] {
+        for j in 0..dims[1] {
+            for k in 0..dims[2] {
+                let cell = [i, j, k];
+                let wall = walls.iter().any(|(axis, at, door)| {
+                    let open =
+                        (0..3).all(|a| a == *axis || (door[a]..door[a] + dims[a] / 3).contains(&cell[a]));
+                    cell[*axis] == *at && !open
+                });
+                if wall || rng.next_u32() % 500 == 0 {
+                    let (word, mask) = shape.address(cell);
+                    words[word] |= mask;
+                }
+            }
+        }
+    }
+    (shape, words)
+}
+
+/// The one checker of edges: the same set as all pairs give, none twice.
+fn check_edges(grid: &VoxelGrid<'_>, nodes: &[Point], config: &Config) -> usize {
+    let mut workspace = Workspace::<400, 600>::new();
+    let mut edges = vec![Edge::default(); 50_000];
+    let count = connect(grid, nodes, config, &mut workspace, &mut edges).unwrap();
+    let mut split = Vec::new();
+    for range in [0..97, 97..98, 98..nodes.len()] {
+        connect_range(grid, &workspace, config, range, |e| {
+            split.push(e);
+            Ok(())
+        })
+        .unwrap();
+    }
+    assert_eq!(split, edges[..count], "ranges give the same edges in the same order");
+    let mut all = Vec::new();
+    connect_all_pairs(grid, nodes, config, |e| all.push(e)).unwrap();
+    edges.truncate(count);
+    edges.sort_unstable();
+    assert_eq!(edges, all);
+    count
+}
+
+#[test]
+fn edges_are_those_of_all_pairs() {
+    let mut total = 0;
+    for seed in 0..20 {
+        let mut rng = Pcg32::seed_from_u64(seed);
+        let (shape, words) = rooms(&mut rng, [0.25, 0.2][seed as usize % 2]);
+        for outside in [Outside::Blocked, Outside::Free] {
+            let grid = VoxelGrid::new(shape, outside, &words).unwrap();
+            for clearance_m in [0.0, 0.3] {
+                let config = Config { clearance_m, ..config(seed) };
+                let mut nodes = vec![Point::zeros(); 400];
+                let count = sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
+                // Some on cell corners, and two in one place.
+                for node in &mut nodes[..20] {
+                    *node = ((*node - shape.min) / shape.resolution_m).map(f32::round) * shape.resolution_m
+                        + shape.min;
+                }
+                nodes[21] = nodes[22];
+                total += check_edges(&grid, &nodes[..count], &config);
+            }
+        }
+    }
+    assert!(total > 50_000, "{total} edges are too few to mean much");
+}
+
+#[test]
+fn nodes_are_free_and_repeat_with_the_seed() {
+    let (shape, words) = rooms(&mut Pcg32::seed_from_u64(3), 0.25);
+    let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
+    let terminals = [Point::new(0.1, 2.0, 1.1), Point::new(2.0, 3.0, 1.0)];
+    for sampling in [Sampling::Uniform, Sampling::Halton] {
+        let config = Config { clearance_m: 0.2, sampling, ..config(5) };
+        let mut nodes = vec![Point::zeros(); 302];
+        assert_eq!(sample_nodes(&grid, None, &terminals, &config, &mut nodes), Ok(302));
+        assert_eq!(nodes[..2], terminals);
+        for node in &nodes[2..] {
+            assert!(point_clearance(&grid, node, 1.0) > 0.2, "{node:?}");
+        }
+        let mut again = vec![Point::zeros(); 302];
+        sample_nodes(&grid, None, &terminals, &config, &mut again).unwrap();
+        assert_eq!(nodes, again);
+        sample_nodes(&grid, None, &terminals, &Config { seed: 6, ..config }, &mut again).unwrap();
+        assert_ne!(nodes, again);
+        // Even: each eighth of the map holds its share within what 300 draws allow.
+        let middle = (shape.min + shape.max()) / 2.0;
+        let low = nodes[2..].iter().filter(|p| p.x < middle.x).count();
+        assert!((100..200).contains(&low), "{low} of 300 in one half");
+    }
+}
+
+#[test]
+fn never_sampled_space_stays_empty() {
+    let (shape, words) = rooms(&mut Pcg32::seed_from_u64(4), 0.25);
+    let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
+    // All but the lowest bricks.
+    let [bx, by, _] = shape.bricks();
+    let never: Vec<u64> =
+        (0..words.len()).map(|i| if i < (bx * by) as usize { 0 } else { u64::MAX }).collect();
+    let never = VoxelGrid::new(shape, Outside::Blocked, &never).unwrap();
+    let mut nodes = vec![Point::zeros(); 300];
+    sample_nodes(&grid, Some(&never), &[], &config(1), &mut nodes).unwrap();
+    assert!(nodes.iter().all(|p| p.z < shape.min.z + 1.0));
+}
+
+#[test]
+fn refusals_are_named() {
+    let shape = GridShape { dims: [8, 8, 8], min: Point::zeros(), resolution_m: 0.5 };
+    let (full, empty) = (vec![u64::MAX; 8], vec![0; 8]);
+    let full = VoxelGrid::new(shape, Outside::Blocked, &full).unwrap();
+    let empty = VoxelGrid::new(shape, Outside::Blocked, &empty).unwrap();
+    let mut nodes = vec![Point::zeros(); 300];
+    let good = config(1);
+    assert_eq!(sample_nodes(&full, None, &[], &good, &mut nodes), Err(PrmError::NoFreeSpace(0)));
+    let inside = Point::new(1.0, 1.0, 1.0);
+    assert_eq!(sample_nodes(&full, None, &[inside], &good, &mut nodes), Err(PrmError::TooManyNodes));
+    let few = Config { nodes: 10, ..good };
+    assert_eq!(sample_nodes(&full, None, &[inside], &few, &mut nodes), Err(PrmError::TerminalBlocked(0)));
+    for bad in
+        [Point::new(f32::NAN, 1.0, 1.0), Point::new(-0.1, 1.0, 1.0), Point::new(1.0, f32::INFINITY, 1.0)]
+    {
+        assert_eq!(
+            sample_nodes(&empty, None, &[inside, bad], &few, &mut nodes),
+            Err(PrmError::TerminalBlocked(1))
+        );
+    }
+    for (bad, name) in [
+        (Config { edge_min_m: f32::NAN, ..few }, "edge_min_m"),
+        (Config { edge_max_m: 0.4, ..few }, "edge_max_m"),
+        (Config { edge_max_m: f32::INFINITY, ..few }, "edge_max_m"),
+        (Config { clearance_m: -1.0, ..few }, "clearance_m"),
+        (Config { nodes: 70_000, ..few }, "nodes"),
+    ] {
+        assert_eq!(sample_nodes(&empty, None, &[], &bad, &mut nodes), Err(PrmError::Config(name)));
+    }
+    let mut workspace = Workspace::<20, 8>::new();
+    let count = sample_nodes(&empty, None, &[inside], &few, &mut nodes).unwrap();
+    let mut edges = [Edge::default(); 5];
+    assert_eq!(
+        connect(&empty, &nodes[..count], &few, &mut workspace, &mut edges),
+        Err(PrmError::RoadmapFull)
+    );
+    assert_eq!(connect(&empty, &nodes[..21], &few, &mut workspace, &mut edges), Err(PrmError::TooManyNodes));
+    nodes[3].y = f32::NAN;
+    assert_eq!(
+        connect(&empty, &nodes[..count], &few, &mut workspace, &mut edges),
+        Err(PrmError::NotFinite(3))
+    );
+    assert_eq!(connect(&empty, &[], &few, &mut workspace, &mut edges), Ok(0));
+}
+
+#[test]
+fn an_edge_knows_its_clearance() {
+    let shape = GridShape { dims: [16, 16, 16], min: Point::zeros(), resolution_m: 0.5 };
+    let words = vec![0; shape.brick_count()];
+    let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
+    let nodes = [Point::new(1.0, 2.0, 3.0), Point::new(4.0, 2.0, 3.0)];
+    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 1 }, 4.0), Some(1.0));
+    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 1 }, 0.5), Some(0.5));
+    assert_eq!(edge_clearance(&grid, &nodes, Edge { a: 0, b: 2 }, 0.5), None);
+}

@@ -1,0 +1,346 @@
+//! The roadmap file: a graph of free nodes and clear edges, read in place from flash.
+//!
+//! Little-endian, versioned, closed by a CRC-32; byte by byte in `planner-core/README.md`. Nodes are mission-frame
+//! points, edges are stored from both ends (half-edges) in compressed sparse rows, neighbours in ascending order. A
+//! half-edge takes four bytes: its length follows from the nodes, its clearance is kept in whole millimetres rounded
+//! down, so that 4096 nodes and 65536 half-edges take 320 kB. One roadmap built at a small margin serves vehicles of any
+//! size, because each edge carries the clearance it really has (P3D Table 1 from a single build).
+//!
+//! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards no accessor can meet
+//! an offset or a target out of range, whatever the bytes were.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Table};
+
+use crate::Point;
+use crate::frames::Geodetic;
+
+mod write;
+pub use write::{Edge, encoded_len, write};
+
+/// First eight bytes of the file.
+pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
+/// Version this code writes and reads.
+pub const VERSION: u16 = 1;
+/// Bytes before the first node.
+pub const HEADER_LEN: usize = 72;
+/// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
+pub const MAX_NODES: usize = u16::MAX as usize;
+/// Largest coordinate magnitude, metres: squared lengths stay far inside f32.
+pub const MAX_COORDINATE_M: f32 = 1.0e6;
+/// Largest clearance a half-edge can carry, metres.
+pub const MAX_CLEARANCE_M: f32 = 65.535;
+
+const NODE_LEN: usize = 12;
+const WORD_LEN: usize = 4;
+/// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFFFFFF.
+const CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
+
+/// Why a roadmap was refused, on reading or writing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RoadmapError {
+    /// The bytes end before the header, or before the length the header gives.
+    Truncated,
+    /// The first eight bytes are not [`MAGIC`].
+    Magic,
+    /// A version this code does not know.
+    Version(u16),
+    /// The lengths and counts in the header contradict one another.
+    Length,
+    /// The CRC-32 over the file does not match.
+    Crc,
+    /// The named header field is not a finite number inside its range.
+    Header(&'static str),
+    /// This node is NaN, infinite or beyond [`MAX_COORDINATE_M`].
+    Node(u16),
+    /// The row of this node is out of order or beyond the half-edges.
+    Offset(u16),
+    /// A half-edge of this node leads to itself or to no node, or its row is not in ascending order.
+    Target(u16),
+    /// A half-edge of this node has no opposite with the same clearance.
+    OneWay(u16),
+    /// An edge of this node has no length: its two nodes coincide.
+    ZeroLength(u16),
+    /// More than [`MAX_NODES`] nodes.
+    TooManyNodes,
+    /// The output buffer is smaller than the roadmap; `needed` bytes would do.
+    RoadmapFull {
+        /// Bytes the roadmap takes.
+        needed: usize,
+    },
+    /// The edge at this index names a node that does not exist.
+    EdgeNode(usize),
+    /// The edge at this index joins a node to itself.
+    SelfLoop(usize),
+    /// The edge at this index has a clearance that is NaN, infinite or negative.
+    Clearance(usize),
+    /// The same two nodes are joined twice.
+    Duplicate(u16, u16),
+}
+
+/// What a roadmap says about itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RoadmapHeader {
+    /// The mission origin: zero of the nodes' frame.
+    pub origin: Geodetic,
+    /// Shortest edge the builder allowed (P3D `Dmin`), metres.
+    pub edge_min_m: f32,
+    /// Longest edge the builder allowed (P3D `Dmax`), metres.
+    pub edge_max_m: f32,
+    /// Clearance every edge was tested to exceed, metres: no vehicle that needs more than this may skip
+    /// [`HalfEdge::clearance_m`].
+    pub tested_clearance_m: f32,
+    /// Where stored clearances saturate, metres: an edge with this value has at least that much.
+    pub max_clearance_m: f32,
+    /// Start nodes; they are nodes `0..starts`.
+    pub starts: u16,
+    /// Goal nodes; they are nodes `starts..starts + goals`.
+    pub goals: u16,
+}
+
+impl RoadmapHeader {
+    fn check(&self, node_count: usize) -> Result<(), RoadmapError> {
+        let refuse = |name| Err(RoadmapError::Header(name));
+        if !self.origin.is_valid() {
+            return refuse("origin");
+        }
+        if !(self.edge_min_m >= 0.0 && self.edge_min_m <= MAX_COORDINATE_M) {
+            return refuse("edge_min_m");
+        }
+        if !(self.edge_max_m >= self.edge_min_m && self.edge_max_m <= 4.0 * MAX_COORDINATE_M) {
+            return refuse("edge_max_m");
+        }
+        if !(self.tested_clearance_m >= 0.0 && self.tested_clearance_m <= MAX_COORDINATE_M) {
+            return refuse("tested_clearance_m");
+        }
+        if !(self.max_clearance_m >= 0.0 && self.max_clearance_m <= MAX_CLEARANCE_M) {
+            return refuse("max_clearance_m");
+        }
+        if usize::from(self.starts) + usize::from(self.goals) > node_count {
+            return refuse("terminals");
+        }
+        Ok(())
+    }
+}
+
+/// One direction of an edge.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HalfEdge {
+    /// The node it leads to.
+    pub target: u16,
+    /// Distance from the segment to the nearest obstacle, metres, rounded down to a millimetre; at least this much if it
+    /// equals [`RoadmapHeader::max_clearance_m`].
+    pub clearance_m: f32,
+}
+
+impl HalfEdge {
+    fn from_bytes(bytes: &[u8; WORD_LEN]) -> Self {
+        let millimetres = u16::from_le_bytes([bytes[2], bytes[3]]);
+        Self { target: target_of(bytes), clearance_m: f32::from(millimetres) / 1000.0 }
+    }
+}
+
+/// False for NaN too.
+fn in_range(node: &Point) -> bool {
+    node.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
+}
+
+fn target_of(bytes: &[u8; WORD_LEN]) -> u16 {
+    u16::from_le_bytes([bytes[0], bytes[1]])
+}
+
+fn node_of(b: &[u8; NODE_LEN]) -> Point {
+    let at = |i: usize| f32::from_le_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
+    Point::new(at(0), at(4), at(8))
+}
+
+/// A checked roadmap over borrowed bytes. Copying it copies three slices, not the roadmap.
+#[derive(Clone, Copy, Debug)]
+pub struct RoadmapView<'a> {
+    header: RoadmapHeader,
+    crc: u32,
+    nodes: &'a [[u8; NODE_LEN]],
+    offsets: &'a [[u8; WORD_LEN]],
+    half_edges: &'a [[u8; WORD_LEN]],
+}
+
+impl<'a> RoadmapView<'a> {
+    /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole flash slot can be given.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
+        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(RoadmapError::Truncated)?;
+        if head[..8] != MAGIC {
+            return Err(RoadmapError::Magic);
+        }
+        let version = u16_at(head, 8);
+        if version != VERSION {
+            return Err(RoadmapError::Version(version));
+        }
+        let total = u32_at(head, 12) as usize;
+        let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
+        if usize::from(u16_at(head, 10)) != HEADER_LEN || u32_at(head, 68) != 0 || half_edge_count % 2 != 0 {
+            return Err(RoadmapError::Length);
+        }
+        if node_count > MAX_NODES {
+            return Err(RoadmapError::TooManyNodes);
+        }
+        if encoded_len(node_count, half_edge_count / 2) != Some(total) {
+            return Err(RoadmapError::Length);
+        }
+        let body = bytes.get(..total).ok_or(RoadmapError::Truncated)?;
+        let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(RoadmapError::Truncated)?;
+        let crc = u32::from_le_bytes(*stored);
+        if CRC.checksum(covered) != crc {
+            return Err(RoadmapError::Crc);
+        }
+        let header = RoadmapHeader {
+            origin: Geodetic {
+                lat_deg: f64_at(head, 16),
+                lon_deg: f64_at(head, 24),
+                alt_m: f64_at(head, 32),
+            },
+            edge_min_m: f32_at(head, 40),
+            edge_max_m: f32_at(head, 44),
+            tested_clearance_m: f32_at(head, 48),
+            max_clearance_m: f32_at(head, 52),
+            starts: u16_at(head, 56),
+            goals: u16_at(head, 58),
+        };
+        header.check(node_count)?;
+        let (node_bytes, rest) = covered[HEADER_LEN..].split_at(node_count * NODE_LEN);
+        let (offsets, half_edges) = rest.as_chunks::<WORD_LEN>().0.split_at(node_count + 1);
+        let view = Self { header, crc, nodes: node_bytes.as_chunks::<NODE_LEN>().0, offsets, half_edges };
+        view.check_graph()?;
+        Ok(view)
+    }
+
+    fn check_graph(&self) -> Result<(), RoadmapError> {
+        // Ranges first: the opposite of a half-edge is looked up in a row that must already be known to be sound.
+        let mut end = 0;
+        for (i, raw) in self.offsets.iter().enumerate() {
+            let node = i.min(MAX_NODES) as u16;
+            let offset = u32::from_le_bytes(*raw) as usize;
+            if offset < end || offset > self.half_edges.len() || (i == 0 && offset != 0) {
+                return Err(RoadmapError::Offset(node));
+            }
+            end = offset;
+        }
+        if end != self.half_edges.len() {
+            return Err(RoadmapError::Offset(self.nodes.len() as u16));
+        }
+        for node in 0..self.nodes.len() as u16 {
+            if !in_range(&self.node(node)) {
+                return Err(RoadmapError::Node(node));
+            }
+            let mut previous = None;
+            for edge in self.half_edges(node) {
+                let sound = usize::from(edge.target) < self.nodes.len() && edge.target != node;
+                if !sound || previous.is_some_and(|p| p >= edge.target) {
+                    return Err(RoadmapError::Target(node));
+                }
+                previous = Some(edge.target);
+            }
+        }
+        for node in 0..self.nodes.len() as u16 {
+            let here = self.node(node);
+            for edge in self.half_edges(node) {
+                if self.edge_between(edge.target, node).map(|e| e.clearance_m) != Some(edge.clearance_m) {
+                    return Err(RoadmapError::OneWay(node));
+                }
+                if (self.node(edge.target) - here).norm_squared() == 0.0 {
+                    return Err(RoadmapError::ZeroLength(node));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Number of nodes; node indices are below it.
+    pub fn node_count(&self) -> usize {
+        self.nodes.len()
+    }
+
+    /// Number of half-edges: twice the number of edges.
+    pub fn half_edge_count(&self) -> usize {
+        self.half_edges.len()
+    }
+
+    /// Bytes the roadmap takes, CRC included.
+    pub fn byte_len(&self) -> usize {
+        HEADER_LEN + self.nodes.len() * NODE_LEN + (self.offsets.len() + self.half_edges.len() + 1) * WORD_LEN
+    }
+
+    /// The header.
+    pub fn header(&self) -> &RoadmapHeader {
+        &self.header
+    }
+
+    /// The mission origin.
+    pub fn origin(&self) -> &Geodetic {
+        &self.header.origin
+    }
+
+    /// The CRC-32 at the end of the file: its identity on the radio.
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// Position of a node, metres. Panics if `node` is not below [`Self::node_count`].
+    #[inline]
+    pub fn node(&self, node: u16) -> Point {
+        node_of(&self.nodes[usize::from(node)])
+    }
+
+    /// The edges out of a node, targets ascending; none for a node that does not exist.
+    #[inline]
+    pub fn half_edges(&self, node: u16) -> impl ExactSizeIterator<Item = HalfEdge> + use<'a> {
+        self.row(node).iter().map(HalfEdge::from_bytes)
+    }
+
+    /// The edge from `a` to `b`, if there is one. O(log degree).
+    pub fn edge_between(&self, a: u16, b: u16) -> Option<HalfEdge> {
+        let row = self.row(a);
+        row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
+    }
+
+    /// Straight distance between two nodes, metres. Panics if either does not exist.
+    #[inline]
+    pub fn distance_m(&self, a: u16, b: u16) -> f32 {
+        libm::sqrtf((self.node(b) - self.node(a)).norm_squared())
+    }
+
+    /// Whether a vehicle that needs `required_m` (radius + margin) may fly `edge`. An edge with exactly the required
+    /// clearance is blocked, as touching is; up to the tested clearance every edge of the roadmap is clear.
+    #[inline]
+    pub fn clears(&self, edge: &HalfEdge, required_m: f32) -> bool {
+        edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m
+    }
+
+    fn row(&self, node: u16) -> &'a [[u8; WORD_LEN]] {
+        let at = usize::from(node);
+        match self.offsets.get(at..at + 2) {
+            Some([from, to]) => {
+                let range = u32::from_le_bytes(*from) as usize..u32::from_le_bytes(*to) as usize;
+                self.half_edges.get(range).unwrap_or(&[])
+            }
+            _ => &[],
+        }
+    }
+}
+
+fn u16_at(head: &[u8; HEADER_LEN], at: usize) -> u16 {
+    u16::from_le_bytes([head[at], head[at + 1]])
+}
+
+fn u32_at(head: &[u8; HEADER_LEN], at: usize) -> u32 {
+    u32::from(u16_at(head, at)) | u32::from(u16_at(head, at + 2)) << 16
+}
+
+fn f32_at(head: &[u8; HEADER_LEN], at: usize) -> f32 {
+    f32::from_bits(u32_at(head, at))
+}
+
+fn f64_at(head: &[u8; HEADER_LEN], at: usize) -> f64 {
+    f64::from_bits(u64::from(u32_at(head, at)) | u64::from(u32_at(head, at + 4)) << 32)
+}
+
+#[cfg(test)]
+pub(crate) mod tests;

@@ -1,0 +1,150 @@
+//! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
+
+use super::{
+    CRC, HEADER_LEN, MAGIC, MAX_NODES, NODE_LEN, RoadmapError, RoadmapHeader, VERSION, WORD_LEN, in_range,
+    target_of,
+};
+use crate::Point;
+
+/// An undirected edge to be written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Edge {
+    /// One node.
+    pub a: u16,
+    /// The other node.
+    pub b: u16,
+    /// Distance from the segment to the nearest obstacle, metres; stored rounded down to a millimetre and saturated at
+    /// [`RoadmapHeader::max_clearance_m`].
+    pub clearance_m: f32,
+}
+
+/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length.
+pub fn encoded_len(nodes: usize, edges: usize) -> Option<usize> {
+    let words = nodes.checked_mul(4)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
+    let bytes = words.checked_mul(WORD_LEN)?.checked_add(HEADER_LEN)?;
+    u32::try_from(bytes).ok().map(|_| bytes)
+}
+
+/// Writes a roadmap and returns its length in bytes. O(nodes + edges · log degree), no memory but `out`.
+///
+/// Terminals come first in `nodes`: starts, then goals. The order of `edges` and of their ends does not change the
+/// bytes. On an error `out` holds nothing of use.
+pub fn write(
+    header: &RoadmapHeader,
+    nodes: &[Point],
+    edges: &[Edge],
+    out: &mut [u8],
+) -> Result<usize, RoadmapError> {
+    if nodes.len() > MAX_NODES {
+        return Err(RoadmapError::TooManyNodes);
+    }
+    let needed = encoded_len(nodes.len(), edges.len()).ok_or(RoadmapError::Length)?;
+    let out = out.get_mut(..needed).ok_or(RoadmapError::RoadmapFull { needed })?;
+    header.check(nodes.len())?;
+    check_edges(nodes, edges)?;
+
+    let (body, stored_crc) = out.split_at_mut(needed - WORD_LEN);
+    let (head, rest) = body.split_at_mut(HEADER_LEN);
+    write_header(header, nodes.len(), edges.len(), needed, head);
+    let (node_bytes, rest) = rest.split_at_mut(nodes.len() * NODE_LEN);
+    let scalars = nodes.iter().flat_map(|p| [p.x, p.y, p.z]);
+    for (bytes, value) in node_bytes.as_chunks_mut::<4>().0.iter_mut().zip(scalars) {
+        *bytes = value.to_le_bytes();
+    }
+    let (offsets, half_edges) = rest.as_chunks_mut::<WORD_LEN>().0.split_at_mut(nodes.len() + 1);
+    write_rows(header, edges, offsets, half_edges)?;
+    stored_crc.copy_from_slice(&CRC.checksum(body).to_le_bytes());
+    Ok(needed)
+}
+
+fn check_edges(nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
+    for (i, node) in nodes.iter().enumerate() {
+        if !in_range(node) {
+            return Err(RoadmapError::Node(i as u16));
+        }
+    }
+    for (i, edge) in edges.iter().enumerate() {
+        let (Some(a), Some(b)) = (nodes.get(usize::from(edge.a)), nodes.get(usize::from(edge.b))) else {
+            return Err(RoadmapError::EdgeNode(i));
+        };
+        if edge.a == edge.b {
+            return Err(RoadmapError::SelfLoop(i));
+        }
+        if !(edge.clearance_m >= 0.0 && edge.clearance_m.is_finite()) {
+            return Err(RoadmapError::Clearance(i));
+        }
+        if (b - a).norm_squared() == 0.0 {
+            return Err(RoadmapError::ZeroLength(edge.a));
+        }
+    }
+    Ok(())
+}
+
+fn write_header(header: &RoadmapHeader, nodes: usize, edges: usize, total: usize, head: &mut [u8]) {
+    let mut at = 0;
+    let mut put = |bytes: &[u8]| {
+        head[at..at + bytes.len()].copy_from_slice(bytes);
+        at += bytes.len();
+    };
+    put(&MAGIC);
+    put(&VERSION.to_le_bytes());
+    put(&(HEADER_LEN as u16).to_le_bytes());
+    put(&(total as u32).to_le_bytes());
+    for value in [header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m] {
+        put(&value.to_le_bytes());
+    }
+    for value in [header.edge_min_m, header.edge_max_m, header.tested_clearance_m, header.max_clearance_m] {
+        put(&value.to_le_bytes());
+    }
+    put(&header.starts.to_le_bytes());
+    put(&header.goals.to_le_bytes());
+    put(&(nodes as u32).to_le_bytes());
+    put(&(2 * edges as u32).to_le_bytes());
+    put(&[0; 4]);
+}
+
+/// Fills the compressed rows: the offsets first count the degrees, then serve as cursors, then are moved back by one.
+fn write_rows(
+    header: &RoadmapHeader,
+    edges: &[Edge],
+    offsets: &mut [[u8; WORD_LEN]],
+    half_edges: &mut [[u8; WORD_LEN]],
+) -> Result<(), RoadmapError> {
+    let get = |offsets: &[[u8; WORD_LEN]], node: u16| u32::from_le_bytes(offsets[usize::from(node)]);
+    offsets.fill([0; WORD_LEN]);
+    for node in edges.iter().flat_map(|e| [e.a, e.b]) {
+        offsets[usize::from(node)] = (get(offsets, node) + 1).to_le_bytes();
+    }
+    let mut start = 0u32;
+    for offset in offsets.iter_mut() {
+        let degree = u32::from_le_bytes(*offset);
+        *offset = start.to_le_bytes();
+        start += degree;
+    }
+    let limit = millimetres_down(header.max_clearance_m);
+    for edge in edges {
+        let [c0, c1] = millimetres_down(edge.clearance_m).min(limit).to_le_bytes();
+        for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
+            let cursor = get(offsets, from);
+            let [t0, t1] = to.to_le_bytes();
+            half_edges[cursor as usize] = [t0, t1, c0, c1];
+            offsets[usize::from(from)] = (cursor + 1).to_le_bytes();
+        }
+    }
+    let last = offsets.len() - 1;
+    offsets.copy_within(..last, 1);
+    offsets[0] = [0; WORD_LEN];
+    for node in 0..last as u16 {
+        let row = &mut half_edges[get(offsets, node) as usize..get(offsets, node + 1) as usize];
+        row.sort_unstable_by_key(target_of);
+        if let Some(pair) = row.windows(2).find(|pair| target_of(&pair[0]) == target_of(&pair[1])) {
+            return Err(RoadmapError::Duplicate(node, target_of(&pair[0])));
+        }
+    }
+    Ok(())
+}
+
+/// In f64, where the product is exact, so that rounding can only go down. The cast saturates.
+fn millimetres_down(metres: f32) -> u16 {
+    (f64::from(metres) * 1000.0) as u16
+}

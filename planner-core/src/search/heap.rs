@@ -1,0 +1,100 @@
+//! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries always suffice.
+
+/// The node was not reached yet.
+pub(super) const UNSEEN: u16 = 0;
+/// The node has left the heap: its distance is final.
+pub(super) const SETTLED: u16 = u16::MAX;
+
+const ARITY: usize = 4;
+
+pub(super) struct Heap<const N: usize> {
+    len: usize,
+    /// Cost in the upper bits (non-negative f32, ordered as its bits), node in the lower sixteen: one comparison orders
+    /// by cost, then by node.
+    entries: [u64; N],
+    /// Index into `entries` plus one, [`UNSEEN`] or [`SETTLED`].
+    places: [u16; N],
+}
+
+fn node_of(entry: u64) -> usize {
+    (entry & 0xffff) as usize
+}
+
+impl<const N: usize> Heap<N> {
+    pub(super) const fn new() -> Self {
+        Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+        self.places.fill(UNSEEN);
+    }
+
+    #[inline]
+    pub(super) fn place(&self, node: u16) -> u16 {
+        self.places[usize::from(node)]
+    }
+
+    /// Puts a node in, or lowers its cost if it is in. `cost` is finite and not negative.
+    #[inline]
+    pub(super) fn push(&mut self, node: u16, cost: f32) {
+        let mut at = match self.places[usize::from(node)] {
+            UNSEEN => {
+                self.len += 1;
+                self.len - 1
+            }
+            place => usize::from(place) - 1,
+        };
+        let entry = u64::from(cost.to_bits()) << 16 | u64::from(node);
+        while at > 0 {
+            let above = (at - 1) / ARITY;
+            if self.entries[above] <= entry {
+                break;
+            }
+            self.put(at, self.entries[above]);
+            at = above;
+        }
+        self.put(at, entry);
+    }
+
+    /// Takes out the node of least cost and settles it.
+    #[inline]
+    pub(super) fn pop(&mut self) -> Option<u16> {
+        let top = *self.entries[..self.len].first()?;
+        self.places[node_of(top)] = SETTLED;
+        self.len -= 1;
+        let entry = self.entries[self.len];
+        if self.len > 0 {
+            self.sift_down(entry);
+        }
+        Some(node_of(top) as u16)
+    }
+
+    fn sift_down(&mut self, entry: u64) {
+        let mut at = 0;
+        loop {
+            let first = at * ARITY + 1;
+            if first >= self.len {
+                break;
+            }
+            let mut least = first;
+            for child in first + 1..(first + ARITY).min(self.len) {
+                if self.entries[child] < self.entries[least] {
+                    least = child;
+                }
+            }
+            if self.entries[least] >= entry {
+                break;
+            }
+            self.put(at, self.entries[least]);
+            at = least;
+        }
+        self.put(at, entry);
+    }
+
+    #[inline]
+    fn put(&mut self, at: usize, entry: u64) {
+        self.entries[at] = entry;
+        self.places[node_of(entry)] = at as u16 + 1;
+    }
+}

@@ -1,0 +1,165 @@
+extern crate std;
+use std::boxed::Box;
+use std::vec;
+use std::vec::Vec as StdVec;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::Point;
+use crate::roadmap::tests::{encode, header};
+use crate::roadmap::{Edge, RoadmapView};
+
+const CAPACITY: usize = 32;
+const REQUIRED_M: f32 = 1.0;
+
+/// Sparse random graphs, often in several pieces; about half the edges are too narrow for [`REQUIRED_M`].
+fn graphs() -> impl Strategy<Value = (StdVec<Point>, StdVec<Edge>)> {
+    (2u16..CAPACITY as u16).prop_flat_map(|n| {
+        let points = proptest::collection::vec((-9.0f32..9.0, -9.0f32..9.0, 0.0f32..9.0), usize::from(n));
+        let edges = proptest::collection::btree_map((0..n, 0..n), 0.5f32..2.0, 0..3 * usize::from(n));
+        (points, edges).prop_map(|(points, edges)| {
+            let nodes: StdVec<_> = points.iter().map(|&(x, y, z)| Point::new(x, y, z)).collect();
+            let edges = edges
+                .into_iter()
+                .filter(|&((a, b), _)| a < b && nodes[usize::from(a)] != nodes[usize::from(b)]);
+            let edges = edges.map(|((a, b), clearance_m)| Edge { a, b, clearance_m }).collect();
+            (nodes, edges)
+        })
+    })
+}
+
+/// All pairs by Floyd and Warshall, f64.
+fn brute_force(view: &RoadmapView<'_>, passable: impl Fn(&HalfEdge) -> bool) -> StdVec<StdVec<f64>> {
+    let n = view.node_count();
+    let mut d = vec![vec![f64::INFINITY; n]; n];
+    for (a, row) in d.iter_mut().enumerate() {
+        row[a] = 0.0;
+        for edge in view.half_edges(a as u16).filter(&passable) {
+            let along = view.node(edge.target).cast::<f64>() - view.node(a as u16).cast::<f64>();
+            row[usize::from(edge.target)] = along.norm();
+        }
+    }
+    for k in 0..n {
+        for i in 0..n {
+            for j in 0..n {
+                d[i][j] = d[i][j].min(d[i][k] + d[k][j]);
+            }
+        }
+    }
+    d
+}
+
+/// The checker of paths: joins its ends over passable edges, visits no node twice, is as long as it says.
+fn check_path(view: &RoadmapView<'_>, path: &[u16], ends: (u16, u16), length: f32) {
+    assert_eq!((path[0], path[path.len() - 1]), ends);
+    let mut sum = 0.0f64;
+    for pair in path.windows(2) {
+        let edge = view.edge_between(pair[0], pair[1]).expect("consecutive nodes are joined");
+        assert!(view.clears(&edge, REQUIRED_M));
+        sum += f64::from(view.distance_m(pair[0], pair[1]));
+    }
+    assert!(close(f64::from(length), sum), "says {length}, is {sum}");
+    let mut nodes = path.to_vec();
+    nodes.sort_unstable();
+    nodes.dedup();
+    assert_eq!(nodes.len(), path.len());
+}
+
+fn close(a: f64, b: f64) -> bool {
+    a == b || (a - b).abs() <= 1e-5 * b.abs().max(1.0)
+}
+
+proptest! {
+    #[test]
+    fn astar_and_dijkstra_equal_brute_force((nodes, edges) in graphs()) {
+        let bytes = encode(&header(1, 1), &nodes, &edges);
+        let view = RoadmapView::parse(&bytes).unwrap();
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, REQUIRED_M);
+        let expected = brute_force(&view, |edge| view.clears(edge, REQUIRED_M));
+        let all: StdVec<u16> = (0..nodes.len() as u16).collect();
+        let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
+        let mut path = Vec::<u16, CAPACITY>::new();
+        for &from in &all {
+            let mut row = vec![f32::NAN; nodes.len()];
+            dijkstra_row(&view, from, &all, passable, &mut ws, &mut row).unwrap();
+            for &to in &all {
+                let best = expected[usize::from(from)][usize::from(to)];
+                prop_assert!(close(f64::from(row[usize::from(to)]), best));
+                match ws.path_to(to, &mut path) {
+                    Ok(()) => check_path(&view, &path, (from, to), row[usize::from(to)]),
+                    Err(e) => prop_assert_eq!((e, best), (SearchError::NoPath, f64::INFINITY)),
+                }
+            }
+            for &to in &all {
+                let best = expected[usize::from(from)][usize::from(to)];
+                match astar(&view, from, to, passable, &mut ws, &mut path) {
+                    Ok(length) => {
+                        prop_assert!(close(f64::from(length), best));
+                        check_path(&view, &path, (from, to), length);
+                    }
+                    Err(e) => prop_assert_eq!((e, best), (SearchError::NoPath, f64::INFINITY)),
+                }
+            }
+        }
+    }
+}
+
+/// A square 0 1 2 3 with nodes 4 (apart) and a diagonal 0–2.
+fn square() -> StdVec<u8> {
+    let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (9.0, 9.0)];
+    let nodes: StdVec<_> = corners.iter().map(|&(x, y)| Point::new(x, y, 0.0)).collect();
+    let edge = |a, b| Edge { a, b, clearance_m: 2.0 };
+    encode(&header(0, 0), &nodes, &[edge(0, 1), edge(1, 2), edge(2, 3), edge(3, 0), edge(0, 2)])
+}
+
+#[test]
+fn blocked_nodes_and_edges_are_avoided_and_ties_go_to_the_lower_node() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    let mut path = Vec::<u16, 8>::new();
+    assert_eq!(astar(&view, 0, 2, |_, _| true, &mut ws, &mut path), Ok(5.0));
+    assert_eq!(path, [0, 2]);
+    let no_diagonal = |from: u16, edge: &HalfEdge| !matches!((from, edge.target), (0, 2) | (2, 0));
+    assert_eq!(astar(&view, 0, 2, no_diagonal, &mut ws, &mut path), Ok(7.0));
+    assert_eq!(path, [0, 1, 2]);
+    let not_past_1 = |from: u16, edge: &HalfEdge| no_diagonal(from, edge) && edge.target != 1;
+    assert_eq!(astar(&view, 0, 2, not_past_1, &mut ws, &mut path), Ok(7.0));
+    assert_eq!(path, [0, 3, 2]);
+    assert_eq!(astar(&view, 3, 3, |_, _| true, &mut ws, &mut path), Ok(0.0));
+    assert_eq!(path, [3]);
+}
+
+#[test]
+fn a_search_that_cannot_answer_says_why() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    let mut path = Vec::<u16, 1>::new();
+    let mut find = |from, to| astar(&view, from, to, |_, _| true, &mut ws, &mut path);
+    assert_eq!(find(0, 4), Err(SearchError::NoPath));
+    assert_eq!(find(0, 2), Err(SearchError::PathTooLong));
+    assert_eq!(find(5, 2), Err(SearchError::BadNode(5)));
+    assert_eq!(find(0, 5), Err(SearchError::BadNode(5)));
+    let mut row = [0.0; 2];
+    let mut fill = |targets: &[u16]| dijkstra_row(&view, 0, targets, |_, _| true, &mut ws, &mut row);
+    assert_eq!(fill(&[1, 5]), Err(SearchError::BadNode(5)));
+    assert_eq!(fill(&[1]), Err(SearchError::OutputLength));
+    assert_eq!(fill(&[4, 1]), Ok(()));
+    assert_eq!(row, [f32::INFINITY, 4.0]);
+    let mut small = SearchWorkspace::<4>::new();
+    let too_small = astar(&view, 0, 2, |_, _| true, &mut small, &mut path);
+    assert_eq!(too_small, Err(SearchError::WorkspaceTooSmall));
+}
+
+#[test]
+fn a_row_without_targets_searches_nothing_and_repeated_targets_are_all_filled() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    assert_eq!(dijkstra_row(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []), Ok(()));
+    let mut row = [0.0; 3];
+    assert_eq!(dijkstra_row(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
+    assert_eq!(row, [4.0, 0.0, 4.0]);
+}

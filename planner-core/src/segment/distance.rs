@@ -1,0 +1,257 @@
+//! Distances from a segment to the obstacles of a map, in f32.
+//!
+//! All here is in cells relative to the grid's corner. The distance from a segment to a cube is the least of a convex,
+//! piecewise quadratic function of the place along the segment; its derivative is piecewise linear with breaks
+//! where the segment crosses one of the six face planes, so its zero is found by bisection over at most six
+//! breaks and one division: no iteration to convergence.
+//!
+//! Rounding: coordinates of up to n cells carry n · 2⁻²³, the distance a few times that; at 256 cells and 0.25 m under 0.1 mm.
+
+use core::ops::ControlFlow;
+
+use super::lane_mask;
+use crate::Point;
+use crate::voxel::{Outside, VoxelGrid};
+
+/// Half the diagonal of a cell.
+const CELL_RADIUS: f32 = 0.866_025_5;
+/// Half the diagonal of a brick.
+const BRICK_RADIUS: f32 = 4.0 * CELL_RADIUS;
+
+/// A segment in cells.
+struct Segment {
+    a: Point,
+    d: Point,
+    /// 1 / |d|², 0 for a point.
+    inv_square: f32,
+}
+
+impl Segment {
+    fn new(grid: &VoxelGrid<'_>, a: &Point, b: &Point) -> Self {
+        let cells = |p: &Point| (p - grid.shape().min) / grid.shape().resolution_m;
+        let (a, d) = (cells(a), cells(b) - cells(a));
+        let square = d.norm_squared();
+        // Below the smallest normal number the segment is a point as far as f32 can tell.
+        Self { a, d, inv_square: if square > f32::MIN_POSITIVE { 1.0 / square } else { 0.0 } }
+    }
+
+    /// Squared distance to a point.
+    fn square_to_point(&self, p: &Point) -> f32 {
+        let to = p - self.a;
+        let t = (to.dot(&self.d) * self.inv_square).clamp(0.0, 1.0);
+        (to - self.d * t).norm_squared()
+    }
+
+    /// Squared distance to the closed cell whose minimum corner is `low`.
+    fn square_to_cell(&self, low: &Point) -> f32 {
+        // Relative to the cell's centre: |x| ≤ 0.5 is inside.
+        let start = self.a - low - Point::new(0.5, 0.5, 0.5);
+        let excess = |t: f32| {
+            let p = start + self.d * t;
+            p.map(|x| x - x.clamp(-0.5, 0.5))
+        };
+        let rate = |t: f32| excess(t).dot(&self.d);
+        let (mut from, mut to) = (0.0, 1.0);
+        let (mut rate_from, mut rate_to) = (rate(0.0), rate(1.0));
+        if rate_from >= 0.0 {
+            return excess(0.0).norm_squared();
+        }
+        if rate_to <= 0.0 {
+            return excess(1.0).norm_squared();
+        }
+        for axis in 0..3 {
+            if self.d[axis] == 0.0 {
+                continue;
+            }
+            for face in [-0.5, 0.5] {
+                let t = (face - start[axis]) / self.d[axis];
+                if t > from && t < to {
+                    let r = rate(t);
+                    if r < 0.0 {
+                        (from, rate_from) = (t, r);
+                    } else {
+                        (to, rate_to) = (t, r);
+                    }
+                }
+            }
+        }
+        // rate_from < 0 ≤ rate_to, and linear between.
+        excess(from + (to - from) * (rate_from / (rate_from - rate_to))).norm_squared()
+    }
+
+    /// Distance to the nearest face of the grid, negative outside.
+    fn to_outside(&self, dims: [u32; 3]) -> f32 {
+        let end = self.a + self.d;
+        (0..3)
+            .map(|axis| self.a[axis].min(end[axis]).min(dims[axis] as f32 - self.a[axis].max(end[axis])))
+            .fold(f32::INFINITY, f32::min)
+    }
+
+    /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells cleared as far as
+    /// bounding boxes of the swept volume tell, and the minimum corner of its brick. `visit` may lower the reach.
+    fn walk(
+        &self,
+        grid: &VoxelGrid<'_>,
+        mut reach: f32,
+        mut visit: impl FnMut(u64, &Point) -> ControlFlow<(), f32>,
+    ) -> ControlFlow<()> {
+        let shape = grid.shape();
+        let axis_u = self.d.map(f32::abs).imax();
+        let [axis_v, axis_w] = [[1, 2], [0, 2], [0, 1]][axis_u];
+        let [bx, by, _] = shape.bricks().map(|n| n as usize);
+        let strides = [1, bx, bx * by];
+        let (mut from, mut to) = (0.0, 1.0);
+        let Some((first, last)) =
+            cells(self.a[axis_u], self.a[axis_u] + self.d[axis_u], reach, shape.dims[axis_u])
+        else {
+            return ControlFlow::Continue(());
+        };
+        for brick_u in first >> 2..=last >> 2 {
+            let low = (brick_u * 4) as f32;
+            if self.d[axis_u] != 0.0 {
+                // The part of the segment within reach of this layer of bricks.
+                let t0 = (low - reach - self.a[axis_u]) / self.d[axis_u];
+                let t1 = (low + 4.0 + reach - self.a[axis_u]) / self.d[axis_u];
+                (from, to) = (t0.min(t1).clamp(0.0, 1.0), t0.max(t1).clamp(0.0, 1.0));
+            }
+            let span = |axis: usize| {
+                let at = |t: f32| self.a[axis] + self.d[axis] * t;
+                cells(at(from), at(to), reach, shape.dims[axis])
+            };
+            let (Some(v), Some(w)) = (span(axis_v), span(axis_w)) else {
+                continue;
+            };
+            let lanes_u = lanes(first, last, brick_u);
+            for brick_w in w.0 >> 2..=w.1 >> 2 {
+                let mask_w = lane_mask(axis_w, lanes(w.0, w.1, brick_w)) & lane_mask(axis_u, lanes_u);
+                for brick_v in v.0 >> 2..=v.1 >> 2 {
+                    let at = brick_u as usize * strides[axis_u]
+                        + brick_v as usize * strides[axis_v]
+                        + brick_w as usize * strides[axis_w];
+                    let word = grid.words()[at] & mask_w & lane_mask(axis_v, lanes(v.0, v.1, brick_v));
+                    if word == 0 {
+                        continue;
+                    }
+                    let mut corner = Point::zeros();
+                    corner[axis_u] = low;
+                    corner[axis_v] = (brick_v * 4) as f32;
+                    corner[axis_w] = (brick_w * 4) as f32;
+                    let bound = reach + BRICK_RADIUS;
+                    if self.square_to_point(&corner.add_scalar(2.0)) > bound * bound * (1.0 + 1e-5) {
+                        continue;
+                    }
+                    reach = visit(word, &corner)?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+}
+
+/// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None` beyond the grid.
+/// A thousandth of a cell and the rounding of large coordinates more, so that none is lost.
+fn cells(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
+    let margin = reach + 1e-3 + (from.abs() + to.abs()) * (4.0 * f32::EPSILON);
+    let low = libm::floorf(from.min(to) - margin);
+    let high = libm::floorf(from.max(to) + margin);
+    if high < 0.0 || low >= dim as f32 {
+        return None;
+    }
+    Some((low.max(0.0) as i32, (high as i32).min(dim as i32 - 1)))
+}
+
+/// Lanes of brick `brick` among the cells `first..=last`, which it must meet.
+fn lanes(first: i32, last: i32, brick: i32) -> u32 {
+    let low = (first - brick * 4).max(0);
+    let high = (last - brick * 4).min(3);
+    (0b1111 << low) & (0b1111 >> (3 - high))
+}
+
+/// The minimum corners of the occupied cells of a word.
+fn corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
+    core::iter::from_fn(move || {
+        if word == 0 {
+            return None;
+        }
+        let bit = word.trailing_zeros();
+        word &= word - 1;
+        Some(brick + Point::new((bit & 3) as f32, (bit >> 2 & 3) as f32, (bit >> 4) as f32))
+    })
+}
+
+/// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive and finite. The
+/// caller has checked that the ends are finite and near the grid, and that nothing is touched.
+pub(super) fn is_farther_than(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m: f32) -> bool {
+    let segment = Segment::new(grid, a, b);
+    let reach = clearance_m / grid.shape().resolution_m;
+    if grid.outside() == Outside::Blocked && segment.to_outside(grid.shape().dims) <= reach {
+        return false;
+    }
+    let square = reach * reach;
+    // Beyond the sphere around a cell nothing of it is in reach; inside the sphere within it something is.
+    let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
+    let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
+    segment
+        .walk(grid, reach, |word, brick| {
+            for low in corners(word, brick) {
+                let to_center = segment.square_to_point(&low.add_scalar(0.5));
+                if to_center <= always || to_center <= never && segment.square_to_cell(&low) <= square {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(reach)
+        })
+        .is_continue()
+}
+
+/// Euclidean distance from the segment to the nearest obstacle, metres, at most `max_m`; 0 where it touches one, where an
+/// end is not finite or more than [`crate::voxel::MAX_DIM`] cells beyond the grid, and where `max_m` is NaN or not positive.
+///
+/// The reach is doubled from one cell up to `max_m`, so that a segment near a wall costs little: work grows with
+/// the cube of what is returned, not of `max_m`.
+pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32) -> f32 {
+    let shape = grid.shape();
+    let (Some(from), Some(to)) = (super::snap(shape, a), super::snap(shape, b)) else {
+        return 0.0;
+    };
+    if !(max_m > 0.0) || super::snapped_segment_touches(grid, &from, &to) {
+        return 0.0;
+    }
+    let segment = Segment::new(grid, a, b);
+    let mut limit = max_m / shape.resolution_m;
+    if grid.outside() == Outside::Blocked {
+        limit = limit.min(segment.to_outside(shape.dims)).max(0.0);
+    }
+    // No obstacle is farther than the grid is long.
+    let longest = (shape.dims.iter().max().copied().unwrap_or(0) * 4) as f32;
+    let mut reach = 1.0_f32;
+    loop {
+        let tried = reach.min(limit);
+        let mut nearest = tried * tried;
+        let mut found = false;
+        let _ = segment.walk(grid, tried, |word, brick| {
+            for low in corners(word, brick) {
+                let bound = libm::sqrtf(nearest) + CELL_RADIUS;
+                if segment.square_to_point(&low.add_scalar(0.5)) <= bound * bound * (1.0 + 1e-5) {
+                    let square = segment.square_to_cell(&low);
+                    if square <= nearest {
+                        (nearest, found) = (square, true);
+                    }
+                }
+            }
+            ControlFlow::Continue(libm::sqrtf(nearest))
+        });
+        if found {
+            return (libm::sqrtf(nearest) * shape.resolution_m).min(max_m);
+        }
+        if tried >= limit || reach > longest {
+            return (limit * shape.resolution_m).min(max_m);
+        }
+        reach *= 2.0;
+    }
+}
+
+/// Euclidean distance from a point to the nearest obstacle, metres, at most `max_m`; 0 as in [`segment_clearance`].
+pub fn point_clearance(grid: &VoxelGrid<'_>, p: &Point, max_m: f32) -> f32 {
+    segment_clearance(grid, p, p, max_m)
+}

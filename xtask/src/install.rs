@@ -1,0 +1,72 @@
+//! What the tests need beyond Rust: Debian packages when root, a venv for the Python clients.
+
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+use anyhow::{Result, bail};
+
+use crate::shell::{command, find, run, target_dir};
+
+/// A Debian package and the file that shows it is there.
+pub struct Package {
+    /// Its name.
+    pub name: &'static str,
+    /// A file it brings.
+    pub file: &'static str,
+}
+
+/// Debian's own Rust with the sources of `core`, for boards where rustup has no target.
+pub const BARE_METAL: &[Package] = &[
+    Package { name: "rustc-web", file: "/usr/bin/rustc" },
+    Package { name: "cargo-web", file: "/usr/bin/cargo" },
+    Package { name: "rust-web-src", file: "/usr/share/doc/rust-web-src/copyright" },
+    Package { name: "lld", file: "/usr/bin/ld.lld" },
+];
+/// The browser that opens reports.
+pub const BROWSER: &[Package] = &[Package { name: "chromium", file: "/usr/bin/chromium" }];
+/// The program the roadmap bench is measured beside.
+pub const PEER: &[Package] = &[
+    Package { name: "liboctomap-dev", file: "/usr/include/octomap/octomap.h" },
+    Package { name: "g++", file: "/usr/bin/g++" },
+];
+const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink"];
+
+/// Installs what is missing of `packages`, as root on Debian; else says in one line what to install.
+pub fn debian(packages: &[Package]) -> Result<()> {
+    let missing: Vec<_> = packages.iter().filter(|p| !Path::new(p.file).exists()).map(|p| p.name).collect();
+    if missing.is_empty() {
+        return Ok(());
+    }
+    let list = missing.join(" ");
+    if find("apt-get").is_none() || !is_root() {
+        bail!("missing Debian packages: apt-get install {list}");
+    }
+    println!("installing {list}");
+    let apt = |args: &[&str]| {
+        run(command("apt-get").args(args).env("DEBIAN_FRONTEND", "noninteractive").stdout(Stdio::null()))
+    };
+    apt(&["update", "-qq"])?;
+    apt(&[&["install", "-y", "-qq", "--no-install-recommends"], missing.as_slice()].concat())
+}
+
+fn is_root() -> bool {
+    let id = command("id").arg("-u").output();
+    id.is_ok_and(|out| out.stdout.trim_ascii() == b"0")
+}
+
+/// The Python of a venv with MAVSDK and pymavlink, made in the target directory at the first call.
+pub fn python_clients() -> Result<PathBuf> {
+    let venv = target_dir().join("venv");
+    let python = venv.join("bin/python");
+    let ready = venv.join("flockmate-ready");
+    if !ready.exists() {
+        println!("making a venv for {}", PYTHON_CLIENTS.join(", "));
+        if run(command("python3").args(["-m", "venv"]).arg(&venv)).is_err() {
+            debian(&[Package { name: "python3-venv", file: "/usr/share/doc/python3-venv" }])?;
+            run(command("python3").args(["-m", "venv", "--clear"]).arg(&venv))?;
+        }
+        run(command(&python).args(["-m", "pip", "install", "--quiet"]).args(PYTHON_CLIENTS))?;
+        std::fs::write(ready, "")?;
+    }
+    Ok(python)
+}

@@ -1,0 +1,68 @@
+//! `cargo xtask test`: everything CI runs.
+
+use std::time::Instant;
+
+use anyhow::Result;
+
+use crate::shell::{self, cargo};
+use crate::{bare_metal, install};
+
+/// Which steps to run.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Only formatting, lints and the host's tests: no browser, no Python clients, no boards.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Runs every step; the first failure ends it.
+fn steps(args: &Args) -> Result<()> {
+    step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
+    step("lints", || {
+        shell::run(cargo().args([
+            "clippy",
+            "--workspace",
+            "--all-targets",
+            "--locked",
+            "--",
+            "-D",
+            "warnings",
+        ]))
+    })?;
+    if args.quick {
+        return step("host tests", || shell::run(cargo().args(["test", "--workspace", "--locked"])));
+    }
+    step("bare metal", bare_metal::build)?;
+    step("browser", || install::debian(install::BROWSER))?;
+    let mut python = None;
+    step("Python clients", || {
+        python = Some(install::python_clients()?);
+        Ok(())
+    })?;
+    // Release once, so that tests can hold it beside debug.
+    step("release build", || shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"])))?;
+    step("host tests", || {
+        let mut tests = cargo();
+        tests.args(["test", "--workspace", "--locked"]);
+        if let Some(python) = &python {
+            tests.env("FLOCKMATE_PYTHON", python);
+        }
+        shell::run(&mut tests)
+    })
+}
+
+/// Runs the steps and says how long each took.
+pub fn run(args: &Args) -> Result<()> {
+    let begun = Instant::now();
+    steps(args)?;
+    println!("== all passed in {:.0} s", begun.elapsed().as_secs_f32());
+    Ok(())
+}
+
+fn step(name: &str, work: impl FnOnce() -> Result<()>) -> Result<()> {
+    println!("== {name}");
+    let begun = Instant::now();
+    work()?;
+    println!("== {name}: passed in {:.0} s", begun.elapsed().as_secs_f32());
+    Ok(())
+}
