@@ -111,7 +111,9 @@ function buildMap(map) {
   for (const [i, geometry] of creaseGeometries(map).entries()) {
     const lines = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ transparent: true, depthWrite: false, ...clip }));
     lines.renderOrder = 1;
-    lines.userData.opacity = i === 0 ? 0.34 : 0.08;
+    // A scan has a hundred times as many small ones: together they shall weigh no more.
+    const count = geometry.attributes.position.count / 2;
+    lines.userData.opacity = i === 0 ? 0.34 : Math.max(0.015, 0.08 * Math.min(1, 6000 / count));
     creases.add(lines);
   }
   for (const object of [front, back, ...creases.children]) object.frustumCulled = false;

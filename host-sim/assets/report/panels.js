@@ -48,7 +48,7 @@ function rows(list, section, figures) {
   if (section === "safety") keys.sort((a, b) => SAFETY_ORDER.indexOf(a) - SAFETY_ORDER.indexOf(b));
   for (const key of keys) {
     const [name, unit] = nameAndUnit(key);
-    const style = section === "safety" ? verdict(key, figures) : "";
+    const style = section === "safety" && flown ? verdict(key, figures) : "";
     const note = key === "min_separation_m" && isNumber(figures.safety_distance_m) ? `(limit ${valueText(figures.safety_distance_m)} m)` : "";
     row(list, name, figures[key], { unit: key === "bytes" ? "B" : unit, style, note });
   }
@@ -69,7 +69,11 @@ function buildSummary() {
   const host = byId("summary");
   const result = report.result ?? {};
   const ends = Array.isArray(result.vehicles) ? result.vehicles : [];
-  if (ends.length > 0) {
+  if (!flown && ends.length > 0) {
+    const assigned = ends.filter((v) => isNumber(v.goal)).length;
+    row(host.appendChild(element("dl")), "Given a goal", `${assigned} of ${ends.length}`);
+  }
+  if (flown && ends.length > 0) {
     const top = host.appendChild(element("dl"));
     for (const [key, name] of [["reached", "Reached their goal"], ["landed", "Landed"]]) {
       if (!ends.some((v) => typeof v[key] === "boolean")) continue;
@@ -103,9 +107,9 @@ function buildVehicleTable(onSelect) {
     const tr = element("tr", null, { tabindex: 0 });
     const id = element("td");
     id.append(element("span", null, { class: "swatch", style: `background: ${cssColor(v.color)}` }), v.id);
-    const landed = typeof result.landed === "boolean" ? element("td", result.landed ? "yes" : "no", { class: result.landed ? "ok" : "bad" }) : element("td", "–");
+    const landed = flown && typeof result.landed === "boolean" ? element("td", result.landed ? "yes" : "no", { class: result.landed ? "ok" : "bad" }) : element("td", "–");
     const end = element("td", result.end ?? "–", { title: result.end ?? "" });
-    tr.append(id, element("td", result.goal ?? v.goal_index ?? "–"), landed, element("td", fixed(result.path_m, 1)), element("td", fixed(result.flown_m, 1)), element("td", fixed(result.flight_time_s, 1)), end);
+    tr.append(id, element("td", result.goal ?? v.goal_index ?? "–"), landed, element("td", fixed(result.path_m, 1)), element("td", fixed(flown ? result.flown_m : null, 1)), element("td", fixed(flown ? result.flight_time_s : null, 1)), end);
     tr.addEventListener("click", () => onSelect(v.id));
     tr.addEventListener("keydown", (e) => { if (e.key === "Enter") onSelect(v.id); });
     rows.set(v.id, tr);
@@ -198,8 +202,9 @@ function buildLayers(view, asked) {
   if (view.safetyDistance > 0) check("Safety distance", false, view.setRings, "Rings of half the safety distance: two that touch are at the limit");
   layer("Obstacles", "obstacles", true);
   layer("Grid", "grid", true);
-  if (report.map && report.map.drawn_m > report.map.resolution_m) {
-    byId("notice").hidden = false;
-    byId("notice").textContent = `Map drawn at ${report.map.drawn_m} m, planned at ${report.map.resolution_m} m`;
-  }
+  const notices = [];
+  if (vehicles.length > 0 && !flown) notices.push("Planned only: nothing was flown");
+  if (report.map && report.map.drawn_m > report.map.resolution_m) notices.push(`Map drawn at ${report.map.drawn_m} m, planned at ${report.map.resolution_m} m`);
+  byId("notice").hidden = notices.length === 0;
+  byId("notice").textContent = notices.join(". ");
 }
