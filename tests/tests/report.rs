@@ -36,7 +36,7 @@ fn chromium() -> Option<PathBuf> {
 fn building() -> MapSurface {
     let shape = GridShape { dims: [48, 32, 24], min: Point::zeros(), resolution_m: 0.25 };
     let filled = |i: u32, j: u32, k: u32| {
-        let slab = k % 12 == 0 || k == 23;
+        let slab = k.is_multiple_of(12) || k == 23;
         let shaft = (36..42).contains(&i) && (4..10).contains(&j) && k == 12;
         let hull = i == 0 || j == 0 || i == 47 || j == 31;
         let window = (14..20).contains(&i) && (4..9).contains(&(k % 12));
@@ -198,14 +198,14 @@ impl Opened {
             .unwrap_or_else(|| panic!("data-{name} is no number"))
     }
 
-    /// Places in the scene (left of the side panel, above the plots) of exactly this colour.
-    fn places(&self, color: [u8; 3]) -> Vec<(u32, u32)> {
+    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance` steps a channel.
+    fn places(&self, color: [u8; 3], tolerance: u8) -> Vec<(u32, u32)> {
         let at = |i: usize| (i as u32 % WINDOW.0, i as u32 / WINDOW.0);
         let matches = self
             .pixels
             .iter()
             .enumerate()
-            .filter(|&(_, &p)| p.iter().zip(color).all(|(&a, b)| a.abs_diff(b) <= 3));
+            .filter(|&(_, &p)| p.iter().zip(color).all(|(&a, b)| a.abs_diff(b) <= tolerance));
         matches
             .map(|(i, _)| at(i))
             .filter(|&(x, y)| x < WINDOW.0 - 400 && y > 50 && y < WINDOW.1 - 230)
@@ -238,12 +238,16 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
     assert_eq!(later.count("t"), 8.0);
     for index in 0..2 {
         let color = vehicle_color(index);
-        let (before, after) = (start.places(color), later.places(color));
+        let (before, after) = (start.places(color, 3), later.places(color, 3));
         // Before the start only the disc and the markers are full colour; later the flown track is.
         assert!(before.len() > 60, "{color:?}: {} pixels at the start", before.len());
         assert!(after.len() > before.len() + 100, "{color:?}: {} then {}", before.len(), after.len());
         let appeared = after.iter().filter(|place| !before.contains(place)).count();
         let left = before.iter().filter(|place| !after.contains(place)).count();
+        // Planned paths cover 85 % of the ground behind them.
+        let planned = color.map(|c| ((u16::from(c) * 85 + 24 * 15) / 100) as u8);
+        let planned = start.places(planned, 10).len();
+        assert!(planned > 100, "{color:?}: {planned} pixels of planned path");
         assert!(appeared > 100 && left > 20, "{color:?}: {appeared} appeared, {left} left");
     }
 }
