@@ -130,21 +130,24 @@ struct Opened {
 
 /// Opens `page` once for its document and once for its picture, with `hash` after the address.
 fn open(chromium: &Path, page: &Path, hash: &str) -> Opened {
-    let dir = page.parent().expect("the page is in a directory");
-    let picture = dir.join("picture.png");
-    let dom = browse(chromium, page, hash, &["--dump-dom".to_owned()]);
-    browse(chromium, page, hash, &[format!("--screenshot={}", picture.display())]);
-    let decoder = png::Decoder::new(BufReader::new(File::open(&picture).expect("a screenshot")));
+    let dom = browse(chromium, page, hash, "--dump-dom");
+    Opened { dom, pixels: picture(chromium, page, hash) }
+}
+
+/// The window's pixels, row by row from the top.
+fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
+    let file = page.with_extension("png");
+    browse(chromium, page, hash, &format!("--screenshot={}", file.display()));
+    let decoder = png::Decoder::new(BufReader::new(File::open(&file).expect("a screenshot")));
     let mut reader = decoder.read_info().expect("a PNG header");
     let mut bytes = vec![0; reader.output_buffer_size().expect("a size that fits memory")];
     let info = reader.next_frame(&mut bytes).expect("a PNG frame");
     assert_eq!((info.width, info.height), WINDOW);
-    let pixels = bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect();
-    Opened { dom, pixels }
+    bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
 /// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its standard output.
-fn browse(chromium: &Path, page: &Path, hash: &str, action: &[String]) -> String {
+fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
     let profile = tempfile::tempdir().expect("a profile directory");
     let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
     let mut child = Command::new(chromium)
@@ -159,7 +162,7 @@ fn browse(chromium: &Path, page: &Path, hash: &str, action: &[String]) -> String
         .args(["--virtual-time-budget=4000", "--force-device-scale-factor=1", "--hide-scrollbars"])
         .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))
         .arg(format!("--window-size={},{}", WINDOW.0, WINDOW.1))
-        .args(action)
+        .arg(action)
         .arg(format!("file://{}{hash}", page.display()))
         .stdin(Stdio::null())
         .stdout(File::create(&out).expect("a file for stdout"))
@@ -265,8 +268,8 @@ fn map_style_and_roadmap_change_the_picture() {
     write(&bare, &ReportData { roadmap: None, ..report() }).expect("the page is written");
     let pictures =
         [(&whole, "#map=x-ray"), (&whole, "#map=off"), (&whole, "#map=solid&cut=2.5"), (&bare, "#map=off")];
-    let [glass, none, solid, bare] = pictures.map(|(page, hash)| open(&chromium, page, hash));
-    let changed = |a: &Opened, b: &Opened| a.pixels.iter().zip(&b.pixels).filter(|(p, q)| p != q).count();
+    let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
+    let changed = |a: &[[u8; 3]], b: &[[u8; 3]]| a.iter().zip(b).filter(|(p, q)| p != q).count();
     assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
     assert!(changed(&solid, &none) > 20_000, "solid: {}", changed(&solid, &none));
     assert!(changed(&solid, &glass) > 20_000, "solid against x-ray: {}", changed(&solid, &glass));
