@@ -172,6 +172,7 @@ impl<'a> Costs<'a> {
         Ok(Self { data, rows, cols, transposed, limit: f32::INFINITY })
     }
 
+    #[inline]
     fn at(&self, row: u16, col: u16) -> f32 {
         let (row, col) = (usize::from(row), usize::from(col));
         let cost = self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
@@ -179,11 +180,17 @@ impl<'a> Costs<'a> {
     }
 
     /// One row, in place where it lies so in memory, else copied into `buffer`.
+    #[inline]
     fn row<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
         let row = usize::from(row);
         if !self.transposed && self.limit == f32::INFINITY {
             return &self.data[row * self.cols..][..self.cols];
         }
+        self.copy_row(row, buffer)
+    }
+
+    #[cold]
+    fn copy_row<'b>(&self, row: usize, buffer: &'b mut [f32]) -> &'b [f32] {
         let (first, stride) = if self.transposed { (row, self.rows) } else { (row * self.cols, 1) };
         for (copy, &cost) in buffer.iter_mut().zip(self.data[first..].iter().step_by(stride)) {
             *copy = if cost <= self.limit { cost } else { f32::INFINITY };

@@ -90,8 +90,9 @@ const LOOK_STEP_M: f32 = 0.5;
 /// A reference this little beyond a gate still stands at it: rounding must not carry it through.
 const AT_GATE_M: f32 = 0.01;
 
-/// What the neighbours leave `own`. Work: gates + neighbours for the two rules, and for each neighbour without a plan
-/// [`LOOK_AHEAD_S`] · cruise / [`LOOK_STEP_M`] points of the own path.
+/// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
+/// each gate within reach, and for each neighbour without a plan [`LOOK_AHEAD_S`] · cruise / [`LOOK_STEP_M`] points of the
+/// own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &Own<'_, W>,
@@ -132,7 +133,10 @@ fn priority<const W: usize>(
             advice.waiting_for = id;
         }
     };
-    for gate in gates.iter().filter(|gate| gate.at_m >= own.along_m - AT_GATE_M) {
+    // A gate beyond twice the braking distance asks for nothing yet.
+    let horizon_m = own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + LOOK_STEP_M;
+    let ahead = gates.iter().skip_while(|gate| gate.at_m < own.along_m - AT_GATE_M);
+    for gate in ahead.take_while(|gate| gate.at_m <= horizon_m) {
         let passed = neighbours
             .iter()
             .find(|n| n.id == gate.id)
@@ -215,17 +219,18 @@ mod tests {
     fn priority_stops_at_the_first_gate_that_is_not_passed() {
         let path = straight();
         let gates = [
-            Gate { at_m: 3.0, id: 2, until_m: 5.0 },
-            Gate { at_m: 6.0, id: 2, until_m: 9.0 },
-            Gate { at_m: 8.0, id: 7, until_m: 1.0 },
+            Gate { at_m: 1.0, id: 2, until_m: 5.0 },
+            Gate { at_m: 2.0, id: 2, until_m: 9.0 },
+            Gate { at_m: 2.5, id: 7, until_m: 1.0 },
+            Gate { at_m: 9.0, id: 8, until_m: 1.0 },
         ];
         let mut heard = [neighbour(2, 0, Point::new(9.0, 9.0, 9.0))];
         heard[0].progress_m = Some(5.5);
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
-        assert_eq!((advice.stop_within_m, advice.waiting_for), (6.0, 2));
+        assert_eq!((advice.stop_within_m, advice.waiting_for), (2.0, 2));
         heard[0].progress_m = Some(9.0);
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
-        assert_eq!((advice.stop_within_m, advice.waiting_for), (8.0, 7), "an unheard vehicle has not passed");
+        assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
     }
 
     #[test]

@@ -56,8 +56,8 @@ pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
     Point::new(east as f32, north as f32, up as f32)
 }
 
-/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to better than a millimetre
-/// within 100 km.
+/// The geodetic position of ENU metres about `origin`. Inverse of [`geodetic_to_enu`] to the rounding of f32: half a
+/// millimetre within 8 km, 4 mm at 100 km.
 pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
     let (lat, lon) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
@@ -86,7 +86,8 @@ fn ecef_to_geodetic(x: f64, y: f64, z: f64) -> Geodetic {
 }
 
 /// Great-circle distance in metres by the haversine formula (CPP eq. 9), on a sphere of 6 371 000 m; altitudes are
-/// ignored. Against WGS84 it errs by up to 0.56 % (along meridians near the poles and equator).
+/// ignored. Against WGS84 it is up to 0.56 % too long (along a meridian at the equator) and up to 0.45 % too short (near
+/// the poles).
 pub fn haversine_m(a: &Geodetic, b: &Geodetic) -> f64 {
     let (lat_a, lat_b) = (a.lat_deg.to_radians(), b.lat_deg.to_radians());
     let half_dlat = sin((lat_b - lat_a) / 2.0);
@@ -120,7 +121,7 @@ pub fn geodetic_to_ned(projection: Projection, origin: &Geodetic, position: &Geo
         Projection::ArduPilot => {
             let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
             let middle = ((origin.lat_deg + position.lat_deg) / 2.0).to_radians();
-            let east = (position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
+            let east = wrap_deg(position.lon_deg - origin.lon_deg) * scale * cos(middle).max(0.01);
             Vector3::new((position.lat_deg - origin.lat_deg) * scale, east, down)
         }
     }
@@ -139,18 +140,28 @@ pub fn ned_to_geodetic(projection: Projection, origin: &Geodetic, ned: &Vector3<
             let (lat0, lon0) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
             let lat = asin((cos(c) * sin(lat0) + north * sin(c) * cos(lat0) / c).clamp(-1.0, 1.0));
             let lon = lon0 + atan2(east * sin(c), c * cos(lat0) * cos(c) - north * sin(lat0) * sin(c));
-            Geodetic { lat_deg: lat.to_degrees(), lon_deg: lon.to_degrees(), alt_m }
+            Geodetic { lat_deg: lat.to_degrees(), lon_deg: wrap_deg(lon.to_degrees()), alt_m }
         }
         Projection::ArduPilot => {
             let scale = ARDUPILOT_M_PER_1E7_DEG * 1e7;
             let lat_deg = origin.lat_deg + ned.x / scale;
             let middle = ((origin.lat_deg + lat_deg) / 2.0).to_radians();
-            Geodetic { lat_deg, lon_deg: origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)), alt_m }
+            let lon_deg = wrap_deg(origin.lon_deg + ned.y / (scale * cos(middle).max(0.01)));
+            Geodetic { lat_deg, lon_deg, alt_m }
         }
     }
+}
+
+/// A longitude or a difference of two, brought into [-180, 180]: the antimeridian runs through nobody's building, but a
+/// difference of 359.9999 degrees would send a vehicle around the world.
+fn wrap_deg(degrees: f64) -> f64 {
+    if fabs(degrees) <= 180.0 { degrees } else { libm::remainder(degrees, 360.0) }
 }
 
 /// ENU from NED and NED from ENU: the same exchange of axes.
 pub fn swap_enu_ned<T: nalgebra::RealField + Copy>(v: &Vector3<T>) -> Vector3<T> {
     Vector3::new(v.y, v.x, -v.z)
 }
+
+#[cfg(test)]
+mod tests;

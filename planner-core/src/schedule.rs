@@ -249,7 +249,7 @@ pub fn earliest_departure<'a, const W: usize>(
     Err(ScheduleError::Blocked)
 }
 
-/// Where `flight` waits for the `others`, in the order of the schedule. Gates that a later one implies are left out.
+/// Where `flight` waits for the `others`, in the order along its path. A gate that an earlier one implies is left out.
 pub fn gates<'a, const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -275,6 +275,7 @@ pub fn gates<'a, const W: usize, const G: usize>(
             }
         }
     }
+    out.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
     Ok(())
 }
 

@@ -26,10 +26,13 @@ pub const FLOOR_HEIGHT_M: f32 = 5.44;
 pub const DEFAULT_SEED: u64 = 1;
 
 const WALL_M: f32 = 0.25;
-/// The corridor between y = 9.5 and y = 14.5, walls excluded.
-const CORRIDOR_M: [f32; 2] = [9.5, 14.5];
+/// The corridor between y = 9.75 and y = 14.25, walls excluded.
+const CORRIDOR_M: [f32; 2] = [9.75, 14.25];
 /// Shafts through the slabs: (x from, x to, y from, y to).
-const SHAFTS_M: [[f32; 4]; 3] = [[0.75, 6.75, 9.0, 15.0], [17.5, 23.5, 9.0, 15.0], [34.75, 40.25, 9.0, 15.0]];
+const SHAFTS_M: [[f32; 4]; 3] =
+    [[0.75, 6.25, 9.25, 14.75], [17.5, 23.0, 9.25, 14.75], [34.75, 40.25, 9.25, 14.75]];
+/// Walls across the corridor, between the shafts: x of their west faces.
+const CROSS_WALLS_M: [f32; 2] = [12.0, 29.0];
 /// The lobby's partition-free part of the ground floor, along x.
 const LOBBY_M: [f32; 2] = [7.5, 33.5];
 
@@ -114,14 +117,14 @@ impl Plan {
             (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
         ] {
             self.solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
-            // Three or four rooms a side: partitions near even shares, moved by up to 0.8 m.
-            let rooms = 3 + (self.rng.next_u32() % 2) as usize;
+            // Five or six rooms a side: partitions near even shares, moved by up to 0.4 m.
+            let rooms = 5 + (self.rng.next_u32() % 2) as usize;
             let mut west = WALL_M;
             for room in 1..=rooms {
                 let east = if room == rooms {
                     length - WALL_M
                 } else {
-                    length * room as f32 / rooms as f32 + self.uniform(-0.8, 0.8)
+                    length * room as f32 / rooms as f32 + self.uniform(-0.4, 0.4)
                 };
                 if room < rooms {
                     self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
@@ -129,11 +132,16 @@ impl Plan {
                 self.door(west, east, wall, z);
                 if room < rooms && self.rng.next_u32() % 2 == 0 {
                     let at = self.uniform(y0 + 1.0, y1 - 4.5);
-                    self.carve([east, at, z], [east + WALL_M, at + 3.25, z + 3.5]);
+                    self.carve([east, at, z], [east + WALL_M, at + 3.0, z + 3.5]);
                 }
                 self.window(west, east, if y0 < 1.0 { 0.0 } else { width - WALL_M }, z);
                 west = east + WALL_M;
             }
+        }
+        // Two walls across the corridor, each with a wide opening.
+        for x in CROSS_WALLS_M {
+            self.solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
+            self.carve([x, CORRIDOR_M[0] + 0.5, z], [x + WALL_M, CORRIDOR_M[1] - 0.5, z + 4.0]);
         }
         if floor == 0 {
             let [x0, x1] = LOBBY_M;
@@ -143,9 +151,9 @@ impl Plan {
 
     /// A door from the corridor into the room between `west` and `east`.
     fn door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
-        let width = self.uniform(3.0, 4.0);
-        let at = self.uniform(west + 1.0, east - 1.0 - width);
-        let height = self.uniform(3.25, 4.0);
+        let width = self.uniform(3.0, 3.75);
+        let at = self.uniform(west + 0.75, east - 0.75 - width);
+        let height = self.uniform(3.5, 4.0);
         self.carve([at, wall, z], [at + width, wall + WALL_M, z + height]);
     }
 

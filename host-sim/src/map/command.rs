@@ -1,7 +1,9 @@
 //! `host-sim map info|convert`.
 
+use std::io::Write as _;
 use std::path::{Path, PathBuf};
 
+use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
@@ -94,17 +96,20 @@ impl Info {
         }
     }
 
-    fn print(&self) {
+    fn text(&self) -> String {
         let [x, y, z] = self.dims;
-        println!("kind        {}", self.kind);
-        println!("resolution  {} m", self.resolution_m);
-        println!("cells       {x} × {y} × {z}");
         let ([x0, y0, z0], [x1, y1, z1]) = (self.min_m, self.max_m);
-        println!("extent      x {x0:.3} … {x1:.3}, y {y0:.3} … {y1:.3}, z {z0:.3} … {z1:.3} m");
-        println!("nodes       {}", self.nodes);
-        println!("occupied    {} leaves, {:.3} m³", self.occupied_leaves, self.occupied_m3);
-        println!("free        {} leaves, {:.3} m³", self.free_leaves, self.free_m3);
-        println!("unknown     {:.3} m³", self.unknown_m3);
+        [
+            format!("kind        {}", self.kind),
+            format!("resolution  {} m", self.resolution_m),
+            format!("cells       {x} × {y} × {z}"),
+            format!("extent      x {x0:.3} … {x1:.3}, y {y0:.3} … {y1:.3}, z {z0:.3} … {z1:.3} m"),
+            format!("nodes       {}", self.nodes),
+            format!("occupied    {} leaves, {:.3} m³", self.occupied_leaves, self.occupied_m3),
+            format!("free        {} leaves, {:.3} m³", self.free_leaves, self.free_m3),
+            format!("unknown     {:.3} m³", self.unknown_m3),
+        ]
+        .join("\n")
     }
 }
 
@@ -114,11 +119,8 @@ pub fn run(args: &MapArgs) -> anyhow::Result<()> {
         Action::Info { file, resolution, json } => {
             let (kind, tree) = tree(file, *resolution)?;
             let info = Info::of(kind, &tree);
-            if *json {
-                println!("{}", serde_json::to_string_pretty(&info)?);
-            } else {
-                info.print();
-            }
+            let text = if *json { serde_json::to_string_pretty(&info)? } else { info.text() };
+            writeln!(std::io::stdout(), "{text}").context("cannot print")?;
         }
         Action::Convert { file, out, resolution } => {
             if !matches!(Source::parse(&out.to_string_lossy()), Ok(Source::Bt(_))) {

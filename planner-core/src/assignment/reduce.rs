@@ -57,12 +57,10 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
             }
             1 => {
                 let own = usize::from(state.col_of[usize::from(row)]);
-                let line = costs.row(row, state.row);
-                let (before, after) = (least_reduced(line, state.price, 0..own), own + 1..costs.cols);
-                let slack = before.min(least_reduced(line, state.price, after));
-                if slack < f64::INFINITY {
-                    state.price[own] -= slack;
-                }
+                // At minus infinity the own column cannot be the least of the others.
+                let price = core::mem::replace(&mut state.price[own], f64::NEG_INFINITY);
+                let slack = least_reduced(costs.row(row, state.row), state.price);
+                state.price[own] = if slack < f64::INFINITY { price - slack } else { price };
             }
             _ => {}
         }
@@ -70,8 +68,7 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
     Some(left)
 }
 
-fn least_reduced(line: &[f32], price: &[f64], range: core::ops::Range<usize>) -> f64 {
-    let (line, price) = (&line[range.clone()], &price[range]);
+fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
     let (lines, line_rest) = line.as_chunks::<LANES>();
     let (prices, price_rest) = price.as_chunks::<LANES>();
     let mut least = [f64::INFINITY; LANES];
@@ -82,7 +79,7 @@ fn least_reduced(line: &[f32], price: &[f64], range: core::ops::Range<usize>) ->
         }
     }
     let rest = line_rest.iter().zip(price_rest).map(|(&cost, &price)| f64::from(cost) - price);
-    rest.chain(least).fold(f64::INFINITY, f64::min)
+    rest.chain(least).fold(f64::INFINITY, |a, b| if b < a { b } else { a })
 }
 
 /// Every free row takes its cheapest column, whose price falls until the second cheapest is as good; the row that held
@@ -141,34 +138,36 @@ struct Two {
 impl Two {
     fn cheapest(line: &[f32], price: &[f64]) -> Self {
         let mut two = Self { least: f64::INFINITY, second: f64::INFINITY, col: NONE, second_col: NONE };
-        let (lines, line_rest) = line.as_chunks::<LANES>();
-        let (prices, price_rest) = price.as_chunks::<LANES>();
+        // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight
+        // subtractions and compares tell without a branch within.
+        let head = line.len().min(2 * LANES);
+        two.offer(0, &line[..head], &price[..head]);
+        let (lines, line_rest) = line[head..].as_chunks::<LANES>();
+        let (prices, price_rest) = price[head..].as_chunks::<LANES>();
         for (chunk, (line, price)) in lines.iter().zip(prices).enumerate() {
-            // Most chunks hold nothing below the second cheapest: eight subtractions and compares, no branch within.
-            let mut reduced = [0.0; LANES];
-            let mut below = false;
+            let mut below = 0;
             for lane in 0..LANES {
-                reduced[lane] = f64::from(line[lane]) - price[lane];
-                below |= reduced[lane] < two.second;
+                below |= u64::from(f64::from(line[lane]) - price[lane] < two.second);
             }
-            if below {
-                two.offer(chunk * LANES, &reduced);
+            if below != 0 {
+                two.offer(head + chunk * LANES, line, price);
             }
         }
-        for (k, (&cost, &price)) in line_rest.iter().zip(price_rest).enumerate() {
-            two.offer(lines.len() * LANES + k, &[f64::from(cost) - price]);
-        }
+        two.offer(line.len() - line_rest.len(), line_rest, price_rest);
         two
     }
 
-    fn offer(&mut self, first: usize, reduced: &[f64]) {
-        for (k, &value) in reduced.iter().enumerate() {
-            let col = (first + k) as u16;
-            if value < self.least {
-                (self.second, self.second_col) = (self.least, self.col);
-                (self.least, self.col) = (value, col);
-            } else if value < self.second {
-                (self.second, self.second_col) = (value, col);
+    #[inline]
+    fn offer(&mut self, first: usize, line: &[f32], price: &[f64]) {
+        for (k, (&cost, &price)) in line.iter().zip(price).enumerate() {
+            let (value, col) = (f64::from(cost) - price, (first + k) as u16);
+            if value < self.second {
+                if value < self.least {
+                    (self.second, self.second_col) = (self.least, self.col);
+                    (self.least, self.col) = (value, col);
+                } else {
+                    (self.second, self.second_col) = (value, col);
+                }
             }
         }
     }

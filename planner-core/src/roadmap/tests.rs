@@ -60,3 +60,138 @@ proptest! {
         }
     }
 }
+
+fn small() -> (Vec<Point>, Vec<Edge>) {
+    let nodes = vec![Point::new(0.0, 0.0, 1.0), Point::new(3.0, 4.0, 1.0), Point::new(-1.0, 0.0, 2.0)];
+    (nodes, vec![Edge { a: 0, b: 1, clearance_m: 0.7 }, Edge { a: 2, b: 0, clearance_m: 0.0 }])
+}
+
+/// Bytes of a file with its CRC made good again: what only the other checks can catch.
+fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
+    let end = bytes.len() - 4;
+    let crc = CRC.checksum(&bytes[..end]).to_le_bytes();
+    bytes[end..].copy_from_slice(&crc);
+    bytes
+}
+
+/// Whatever was accepted can be read everywhere.
+fn read_all(view: &RoadmapView<'_>) {
+    for node in 0..view.node_count() as u16 {
+        assert!(view.node(node).iter().all(|c| c.is_finite()));
+        for edge in view.half_edges(node) {
+            assert!(view.distance_m(node, edge.target) > 0.0);
+            assert_eq!(view.edge_between(edge.target, node).unwrap().clearance_m, edge.clearance_m);
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn a_changed_byte_or_a_cut_is_refused((nodes, edges) in graphs(), flip in 1u8..) {
+        let bytes = encode(&header(1, 1), &nodes, &edges);
+        for at in 0..bytes.len() {
+            let mut changed = bytes.clone();
+            changed[at] ^= flip;
+            prop_assert!(RoadmapView::parse(&changed).is_err(), "byte {at}");
+            prop_assert!(RoadmapView::parse(&bytes[..at]).is_err(), "cut at {at}");
+            if let Ok(view) = RoadmapView::parse(&sealed(changed)) {
+                read_all(&view);
+            }
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_refused_or_sound(tail in proptest::collection::vec(any::<u8>(), 0..200), nodes in 0u32..9) {
+        let (some_nodes, some_edges) = small();
+        let mut bytes = encode(&header(1, 1), &some_nodes, &some_edges)[..HEADER_LEN].to_vec();
+        bytes.extend(tail);
+        let total = bytes.len() as u32;
+        bytes[12..16].copy_from_slice(&total.to_le_bytes());
+        bytes[60..64].copy_from_slice(&nodes.to_le_bytes());
+        let half_edges = total.saturating_sub(HEADER_LEN as u32 + 16 * nodes + 8) / 4;
+        bytes[64..68].copy_from_slice(&half_edges.to_le_bytes());
+        if let Ok(view) = RoadmapView::parse(&sealed(bytes)) {
+            read_all(&view);
+        }
+    }
+}
+
+#[test]
+fn the_bytes_are_where_the_readme_says() {
+    let (nodes, edges) = small();
+    let bytes = encode(&header(1, 1), &nodes, &edges);
+    assert_eq!(&bytes[..8], b"FLKROAD\n");
+    assert_eq!(bytes[8..16], [1, 0, 72, 0, 144, 0, 0, 0]);
+    assert_eq!(bytes[16..24], 40.3327f64.to_le_bytes());
+    assert_eq!(bytes[40..44], 0.5f32.to_le_bytes());
+    assert_eq!(bytes[52..72], [0, 0, 0x20, 0x41, 1, 0, 1, 0, 3, 0, 0, 0, 4, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(bytes[84..88], 3.0f32.to_le_bytes());
+    assert_eq!(bytes[108..124], [0, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0]);
+    // 0.7 in f32 lies below seven tenths, so 699 mm.
+    assert_eq!(bytes[124..140], [1, 0, 0xbb, 2, 2, 0, 0, 0, 0, 0, 0xbb, 2, 0, 0, 0, 0]);
+    // The CRC-32 that zlib gives for these 140 bytes.
+    assert_eq!(bytes[140..], 0x0853_ae6au32.to_le_bytes());
+}
+
+#[test]
+fn a_vehicle_passes_where_it_fits() {
+    let (nodes, edges) = small();
+    let bytes = encode(&header(1, 1), &nodes, &edges);
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let (wide, narrow) = (view.edge_between(0, 1).unwrap(), view.edge_between(0, 2).unwrap());
+    assert!(view.clears(&wide, 0.698) && !view.clears(&wide, 0.699) && !view.clears(&wide, f32::NAN));
+    // Tested at 0.25 m, so clear at 0.25 m whatever the stored figure.
+    assert!(view.clears(&narrow, 0.25) && !view.clears(&narrow, 0.251));
+    assert_eq!(view.edge_between(1, 2), None);
+    assert_eq!(view.edge_between(7, 0), None);
+    assert_eq!(view.half_edges(7).len(), 0);
+}
+
+#[test]
+fn what_follows_the_roadmap_in_its_slot_is_ignored() {
+    let (nodes, edges) = small();
+    let mut bytes = encode(&header(1, 1), &nodes, &edges);
+    bytes.resize(1000, 0xff);
+    assert_eq!(RoadmapView::parse(&bytes).unwrap().byte_len(), 144);
+}
+
+#[test]
+fn the_default_board_fits_its_slot() {
+    assert!(encoded_len(4096, 65536 / 2).unwrap() <= 384 * 1024);
+}
+
+#[test]
+fn bad_input_is_refused_by_name() {
+    fn refuse(change: impl Fn(&mut RoadmapHeader, &mut [Point], &mut Vec<Edge>)) -> RoadmapError {
+        let (mut header, (mut nodes, mut edges)) = (header(1, 1), small());
+        change(&mut header, &mut nodes, &mut edges);
+        write(&header, &nodes, &edges, &mut [0; 1000]).unwrap_err()
+    }
+    assert_eq!(refuse(|_, nodes, _| nodes[1].y = f32::NAN), RoadmapError::Node(1));
+    assert_eq!(refuse(|_, nodes, _| nodes[2].x = 1.1e6), RoadmapError::Node(2));
+    assert_eq!(refuse(|_, nodes, _| nodes[2] = nodes[0]), RoadmapError::ZeroLength(2));
+    assert_eq!(refuse(|_, _, edges| edges[1].b = 3), RoadmapError::EdgeNode(1));
+    assert_eq!(refuse(|_, _, edges| edges[1].b = 2), RoadmapError::SelfLoop(1));
+    assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = f32::NAN), RoadmapError::Clearance(0));
+    assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = -0.1), RoadmapError::Clearance(0));
+    assert_eq!(
+        refuse(|_, _, edges| edges.push(Edge { a: 1, b: 0, clearance_m: 0.7 })),
+        RoadmapError::Duplicate(0, 1)
+    );
+    assert_eq!(refuse(|header, _, _| header.goals = 3), RoadmapError::Header("terminals"));
+    assert_eq!(refuse(|header, _, _| header.origin.lat_deg = f64::NAN), RoadmapError::Header("origin"));
+    assert_eq!(refuse(|header, _, _| header.edge_max_m = 0.4), RoadmapError::Header("edge_max_m"));
+    let (nodes, edges) = small();
+    let full = write(&header(1, 1), &nodes, &edges, &mut [0; 143]);
+    assert_eq!(full, Err(RoadmapError::RoadmapFull { needed: 144 }));
+    let many = vec![Point::zeros(); MAX_NODES + 1];
+    assert_eq!(write(&header(0, 0), &many, &[], &mut [0; 1000]), Err(RoadmapError::TooManyNodes));
+}
+
+#[test]
+fn the_order_of_edges_does_not_change_the_bytes() {
+    let (nodes, edges) = small();
+    let turned: Vec<_> = edges.iter().rev().map(|e| Edge { a: e.b, b: e.a, ..*e }).collect();
+    assert_eq!(encode(&header(1, 1), &nodes, &edges), encode(&header(1, 1), &nodes, &turned));
+}

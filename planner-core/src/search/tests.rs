@@ -104,3 +104,62 @@ proptest! {
         }
     }
 }
+
+/// A square 0 1 2 3 with nodes 4 (apart) and a diagonal 0–2.
+fn square() -> StdVec<u8> {
+    let corners = [(0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (0.0, 3.0), (9.0, 9.0)];
+    let nodes: StdVec<_> = corners.iter().map(|&(x, y)| Point::new(x, y, 0.0)).collect();
+    let edge = |a, b| Edge { a, b, clearance_m: 2.0 };
+    encode(&header(0, 0), &nodes, &[edge(0, 1), edge(1, 2), edge(2, 3), edge(3, 0), edge(0, 2)])
+}
+
+#[test]
+fn blocked_nodes_and_edges_are_avoided_and_ties_go_to_the_lower_node() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    let mut path = Vec::<u16, 8>::new();
+    assert_eq!(astar(&view, 0, 2, |_, _| true, &mut ws, &mut path), Ok(5.0));
+    assert_eq!(path, [0, 2]);
+    let no_diagonal = |from: u16, edge: &HalfEdge| !matches!((from, edge.target), (0, 2) | (2, 0));
+    assert_eq!(astar(&view, 0, 2, no_diagonal, &mut ws, &mut path), Ok(7.0));
+    assert_eq!(path, [0, 1, 2]);
+    let not_past_1 = |from: u16, edge: &HalfEdge| no_diagonal(from, edge) && edge.target != 1;
+    assert_eq!(astar(&view, 0, 2, not_past_1, &mut ws, &mut path), Ok(7.0));
+    assert_eq!(path, [0, 3, 2]);
+    assert_eq!(astar(&view, 3, 3, |_, _| true, &mut ws, &mut path), Ok(0.0));
+    assert_eq!(path, [3]);
+}
+
+#[test]
+fn a_search_that_cannot_answer_says_why() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    let mut path = Vec::<u16, 1>::new();
+    let mut find = |from, to| astar(&view, from, to, |_, _| true, &mut ws, &mut path);
+    assert_eq!(find(0, 4), Err(SearchError::NoPath));
+    assert_eq!(find(0, 2), Err(SearchError::PathTooLong));
+    assert_eq!(find(5, 2), Err(SearchError::BadNode(5)));
+    assert_eq!(find(0, 5), Err(SearchError::BadNode(5)));
+    let mut row = [0.0; 2];
+    let mut fill = |targets: &[u16]| dijkstra_row(&view, 0, targets, |_, _| true, &mut ws, &mut row);
+    assert_eq!(fill(&[1, 5]), Err(SearchError::BadNode(5)));
+    assert_eq!(fill(&[1]), Err(SearchError::OutputLength));
+    assert_eq!(fill(&[4, 1]), Ok(()));
+    assert_eq!(row, [f32::INFINITY, 4.0]);
+    let mut small = SearchWorkspace::<4>::new();
+    let too_small = astar(&view, 0, 2, |_, _| true, &mut small, &mut path);
+    assert_eq!(too_small, Err(SearchError::WorkspaceTooSmall));
+}
+
+#[test]
+fn a_row_without_targets_searches_nothing_and_repeated_targets_are_all_filled() {
+    let bytes = square();
+    let view = RoadmapView::parse(&bytes).unwrap();
+    let mut ws = SearchWorkspace::<8>::new();
+    assert_eq!(dijkstra_row(&view, 0, &[], |_, _| panic!("an edge was asked"), &mut ws, &mut []), Ok(()));
+    let mut row = [0.0; 3];
+    assert_eq!(dijkstra_row(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
+    assert_eq!(row, [4.0, 0.0, 4.0]);
+}

@@ -1,0 +1,193 @@
+//! From the mission's ENU to what the autopilot believes and says, and back, without trigonometry in every step.
+//!
+//! The exact way goes through latitude and longitude with the autopilot's own projection (`planner_core::frames`). It is
+//! smooth: within 100 m its best linear map errs by d² / 2R < 1 mm. So the map is linearised about a point near the
+//! vehicle, renewed when the vehicle has moved 50 m away, and setpoints farther than 100 m take the exact way.
+
+use nalgebra::{Matrix3, Vector3};
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic, Projection};
+
+/// The linear map is renewed at this distance from its centre, metres.
+const RENEW_M: f64 = 50.0;
+/// Beyond this distance from the centre conversions are exact, metres.
+const LINEAR_M: f64 = 100.0;
+/// Half the span the slopes are taken over, metres: a power of two, so that the points are exact in f32.
+const SPAN_M: f64 = 64.0;
+
+/// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen from.
+#[derive(Clone, Debug)]
+pub struct LocalFrame {
+    projection: Projection,
+    world_origin: Geodetic,
+    ekf_origin: Geodetic,
+    centre: Vector3<f64>,
+    centre_ned: Vector3<f64>,
+    centre_geodetic: Geodetic,
+    ned_slope: Matrix3<f64>,
+    enu_slope: Matrix3<f64>,
+    /// Degrees (and metres of altitude) for each metre of ENU.
+    geodetic_slope: Matrix3<f64>,
+}
+
+impl LocalFrame {
+    /// A frame whose linear map is centred at `near` (ENU).
+    pub fn new(
+        projection: Projection,
+        world_origin: Geodetic,
+        ekf_origin: Geodetic,
+        near: Vector3<f64>,
+    ) -> Self {
+        let mut frame = Self {
+            projection,
+            world_origin,
+            ekf_origin,
+            centre: Vector3::zeros(),
+            centre_ned: Vector3::zeros(),
+            centre_geodetic: world_origin,
+            ned_slope: Matrix3::identity(),
+            enu_slope: Matrix3::identity(),
+            geodetic_slope: Matrix3::zeros(),
+        };
+        frame.linearise(near);
+        frame
+    }
+
+    /// The EKF origin.
+    pub fn ekf_origin(&self) -> &Geodetic {
+        &self.ekf_origin
+    }
+
+    /// Moves the EKF origin, as an estimator that resets does.
+    pub fn set_ekf_origin(&mut self, origin: Geodetic) {
+        self.ekf_origin = origin;
+        self.linearise(self.centre);
+    }
+
+    /// Keeps the linear map near the vehicle; cheap when it is.
+    pub fn follow(&mut self, enu: &Vector3<f64>) {
+        if (enu - self.centre).norm_squared() > RENEW_M * RENEW_M {
+            self.linearise(*enu);
+        }
+    }
+
+    /// NED about the EKF origin of an ENU point.
+    pub fn ned(&self, enu: &Vector3<f64>) -> Vector3<f64> {
+        let d = enu - self.centre;
+        if d.norm_squared() < LINEAR_M * LINEAR_M {
+            return self.centre_ned + self.ned_slope * d;
+        }
+        self.exact_ned(enu)
+    }
+
+    /// ENU of NED about the EKF origin.
+    pub fn enu(&self, ned: &Vector3<f64>) -> Vector3<f64> {
+        let d = ned - self.centre_ned;
+        if d.norm_squared() < LINEAR_M * LINEAR_M {
+            return self.centre + self.enu_slope * d;
+        }
+        self.enu_of_geodetic(&frames::ned_to_geodetic(self.projection, &self.ekf_origin, ned))
+    }
+
+    /// NED velocity of an ENU velocity.
+    pub fn ned_rate(&self, enu: &Point) -> Vector3<f64> {
+        self.ned_slope * enu.cast::<f64>()
+    }
+
+    /// ENU velocity of a NED velocity.
+    pub fn enu_rate(&self, ned: &Vector3<f64>) -> Vector3<f64> {
+        self.enu_slope * ned
+    }
+
+    /// Latitude, longitude and altitude of an ENU point.
+    pub fn geodetic(&self, enu: &Vector3<f64>) -> Geodetic {
+        let d = enu - self.centre;
+        if d.norm_squared() >= LINEAR_M * LINEAR_M {
+            return frames::enu_to_geodetic(&self.world_origin, &enu.cast::<f32>());
+        }
+        let step = self.geodetic_slope * d;
+        Geodetic {
+            lat_deg: self.centre_geodetic.lat_deg + step.x,
+            lon_deg: self.centre_geodetic.lon_deg + step.y,
+            alt_m: self.centre_geodetic.alt_m + step.z,
+        }
+    }
+
+    /// ENU of a geodetic position.
+    pub fn enu_of_geodetic(&self, position: &Geodetic) -> Vector3<f64> {
+        frames::geodetic_to_enu(&self.world_origin, position).cast::<f64>()
+    }
+
+    fn exact_ned(&self, enu: &Vector3<f64>) -> Vector3<f64> {
+        let geodetic = frames::enu_to_geodetic(&self.world_origin, &enu.cast::<f32>());
+        frames::geodetic_to_ned(self.projection, &self.ekf_origin, &geodetic)
+    }
+
+    fn linearise(&mut self, near: Vector3<f64>) {
+        // Whole metres are exact in f32, which the conversions take.
+        self.centre = near.map(libm::round);
+        self.centre_ned = self.exact_ned(&self.centre);
+        self.centre_geodetic = frames::enu_to_geodetic(&self.world_origin, &self.centre.cast::<f32>());
+        for axis in 0..3 {
+            let mut offset = Vector3::zeros();
+            offset[axis] = SPAN_M;
+            let (ahead, behind) = (self.centre + offset, self.centre - offset);
+            self.ned_slope
+                .set_column(axis, &((self.exact_ned(&ahead) - self.exact_ned(&behind)) / (2.0 * SPAN_M)));
+            let a = frames::enu_to_geodetic(&self.world_origin, &ahead.cast::<f32>());
+            let b = frames::enu_to_geodetic(&self.world_origin, &behind.cast::<f32>());
+            let slope = Vector3::new(a.lat_deg - b.lat_deg, a.lon_deg - b.lon_deg, a.alt_m - b.alt_m);
+            self.geodetic_slope.set_column(axis, &(slope / (2.0 * SPAN_M)));
+        }
+        // The map is a rotation by far less than a degree and a scale near 1: it has an inverse wherever it is finite.
+        self.enu_slope = self.ned_slope.try_inverse().unwrap_or_else(Matrix3::identity);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WORLD: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+    const EKF: Geodetic = Geodetic { lat_deg: 40.3401, lon_deg: -3.7511, alt_m: 688.5 };
+
+    #[test]
+    fn the_linear_map_keeps_within_two_millimetres_of_the_exact_one() {
+        for at in [Vector3::new(0.0, 0.0, 0.0), Vector3::new(1500.0, -900.0, 60.0)] {
+            let frame = LocalFrame::new(Projection::Px4, WORLD, EKF, at);
+            for offset in [
+                Vector3::new(49.0, 3.0, 12.0),
+                Vector3::new(-40.0, 80.0, -10.0),
+                Vector3::new(0.5, 0.25, 0.0),
+            ] {
+                let enu = at + offset;
+                let error = (frame.ned(&enu) - frame.exact_ned(&enu)).norm();
+                assert!(error < 2e-3, "{error} m at {enu}");
+                assert!((frame.enu(&frame.ned(&enu)) - enu).norm() < 1e-6);
+                let exact = frames::enu_to_geodetic(&WORLD, &enu.cast::<f32>());
+                let linear = frame.geodetic(&enu);
+                assert!(
+                    (exact.lat_deg - linear.lat_deg).abs() < 2e-8
+                        && (exact.lon_deg - linear.lon_deg).abs() < 2e-8
+                );
+                assert!((exact.alt_m - linear.alt_m).abs() < 2e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn a_far_setpoint_takes_the_exact_way() {
+        let frame = LocalFrame::new(Projection::Px4, WORLD, EKF, Vector3::zeros());
+        let ned = Vector3::new(2500.0, 1800.0, -40.0);
+        let exact = frames::geodetic_to_enu(&WORLD, &frames::ned_to_geodetic(Projection::Px4, &EKF, &ned));
+        assert!((frame.enu(&ned) - exact.cast::<f64>()).norm() < 1e-6);
+    }
+
+    #[test]
+    fn a_moved_origin_moves_what_the_autopilot_says() {
+        let mut frame = LocalFrame::new(Projection::Px4, WORLD, WORLD, Vector3::zeros());
+        assert!(frame.ned(&Vector3::zeros()).norm() < 1e-3);
+        frame.set_ekf_origin(EKF);
+        assert!(frame.ned(&Vector3::zeros()).norm() > 1000.0);
+    }
+}

@@ -1,0 +1,191 @@
+//! Seeded disturbances: gusts of wind and the errors of the estimator.
+//!
+//! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these along each axis with
+//! τ = L / V). They advance in slots of 20 ms and are held between: nothing they model moves faster.
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+use planner_core::Point;
+
+/// Slot of the disturbance processes, seconds.
+pub const SLOT_S: f32 = 0.02;
+/// Time constant of gusts: a turbulence length of 20 m met at 8 m/s.
+const GUST_TAU_S: f32 = 2.5;
+/// Slow wander of the position estimate, seconds: GPS multipath and ionosphere.
+const BIAS_TAU_S: f32 = 60.0;
+/// Quick wander of the position estimate, seconds: what the filter lets through of GPS noise.
+const JITTER_TAU_S: f32 = 1.0;
+/// Velocity error for each metre of position error, 1/s: PX4's estimate drifts 0.1 m/s where it is 0.5 m off.
+const VELOCITY_SHARE: f32 = 0.2;
+
+/// Gaussian numbers from a seed. Four 16-bit uniforms are summed (Irwin–Hall): mean 0, variance 1, no tail past 3.5 σ,
+/// and no transcendental function that could differ between machines.
+#[derive(Clone, Debug)]
+pub struct Gaussian(Pcg64Mcg);
+
+impl Gaussian {
+    /// A generator that depends on nothing but the seed.
+    pub fn new(seed: u64) -> Self {
+        Self(Pcg64Mcg::seed_from_u64(seed))
+    }
+
+    /// One sample of N(0, 1).
+    pub fn sample(&mut self) -> f32 {
+        let bits = self.0.next_u64();
+        let sum = (0..4).map(|k| (bits >> (16 * k)) & 0xffff).sum::<u64>();
+        // The sum has mean 2 · 65535 and standard deviation 65536 / √3.
+        (sum as f32 - 131_070.0) * (1.732_050_8 / 65_536.0)
+    }
+
+    fn vector(&mut self) -> Point {
+        Point::new(self.sample(), self.sample(), self.sample())
+    }
+}
+
+/// One Ornstein–Uhlenbeck process on three axes, stationary from the first sample on.
+#[derive(Clone, Debug)]
+struct Wander {
+    value: Point,
+    keep: f32,
+    kick: Point,
+}
+
+impl Wander {
+    fn new(sigma: Point, tau_s: f32, random: &mut Gaussian) -> Self {
+        let keep = libm::expf(-SLOT_S / tau_s);
+        let kick = sigma * libm::sqrtf(1.0 - keep * keep);
+        Self { value: random.vector().component_mul(&sigma), keep, kick }
+    }
+
+    fn advance(&mut self, random: &mut Gaussian) {
+        self.value = self.value * self.keep + random.vector().component_mul(&self.kick);
+    }
+}
+
+/// Everything random about one vehicle.
+#[derive(Clone, Debug)]
+pub struct Disturbance {
+    random: Gaussian,
+    gust: Option<Wander>,
+    errors: Option<[Wander; 3]>,
+    mean_wind: Point,
+    /// Wind, m/s, ENU.
+    pub wind: Point,
+    /// Estimated minus true position, metres, ENU.
+    pub position_error: Point,
+    /// Estimated minus true velocity, m/s, ENU.
+    pub velocity_error: Point,
+}
+
+impl Disturbance {
+    /// Mean wind (m/s, ENU), standard deviation of gusts (m/s) and of the position estimate (m); 0 switches one off.
+    pub fn new(mean_wind: Point, gust_mps: f32, position_noise_m: f32, seed: u64) -> Self {
+        let mut random = Gaussian::new(seed);
+        // Vertical gusts are half the horizontal ones near the ground (MIL-F-8785C, low altitude).
+        let gust = (gust_mps > 0.0)
+            .then(|| Wander::new(Point::new(gust_mps, gust_mps, 0.5 * gust_mps), GUST_TAU_S, &mut random));
+        let errors = (position_noise_m > 0.0).then(|| {
+            let half = position_noise_m * core::f32::consts::FRAC_1_SQRT_2;
+            let all = |s: f32| Point::new(s, s, s);
+            [
+                Wander::new(all(half), BIAS_TAU_S, &mut random),
+                Wander::new(all(half), JITTER_TAU_S, &mut random),
+                Wander::new(all(VELOCITY_SHARE * position_noise_m), JITTER_TAU_S, &mut random),
+            ]
+        });
+        let mut new = Self {
+            random,
+            gust,
+            errors,
+            mean_wind,
+            wind: mean_wind,
+            position_error: Point::zeros(),
+            velocity_error: Point::zeros(),
+        };
+        new.publish();
+        new
+    }
+
+    /// Advances every process by one slot of [`SLOT_S`].
+    pub fn advance(&mut self) {
+        if let Some(gust) = &mut self.gust {
+            gust.advance(&mut self.random);
+        }
+        for wander in self.errors.iter_mut().flatten() {
+            wander.advance(&mut self.random);
+        }
+        self.publish();
+    }
+
+    fn publish(&mut self) {
+        if let Some(gust) = &self.gust {
+            self.wind = self.mean_wind + gust.value;
+        }
+        if let Some([bias, jitter, velocity]) = &self.errors {
+            self.position_error = bias.value + jitter.value;
+            self.velocity_error = velocity.value;
+        }
+    }
+
+    /// Gaussian noise of a sensor, standard deviation 1.
+    pub fn sensor(&mut self) -> f32 {
+        self.random.sample()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn samples_have_mean_zero_and_variance_one() {
+        let mut random = Gaussian::new(7);
+        let n = 100_000;
+        let (mut sum, mut squares) = (0.0_f64, 0.0_f64);
+        for _ in 0..n {
+            let x = f64::from(random.sample());
+            sum += x;
+            squares += x * x;
+        }
+        assert!((sum / f64::from(n)).abs() < 0.02, "mean {}", sum / f64::from(n));
+        assert!((squares / f64::from(n) - 1.0).abs() < 0.02, "variance {}", squares / f64::from(n));
+    }
+
+    #[test]
+    fn position_error_keeps_the_deviation_asked_for() {
+        let mut squares = 0.0_f64;
+        let n = 400;
+        for seed in 0..n {
+            let mut d = Disturbance::new(Point::zeros(), 0.0, 0.5, seed);
+            for _ in 0..50 {
+                d.advance();
+            }
+            squares += f64::from(d.position_error.x).powi(2);
+        }
+        let sigma = (squares / n as f64).sqrt();
+        assert!((0.42..0.58).contains(&sigma), "standard deviation {sigma}");
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_gusts_and_another_does_not() {
+        let run = |seed| {
+            let mut d = Disturbance::new(Point::new(3.0, 0.0, 0.0), 1.0, 0.0, seed);
+            for _ in 0..100 {
+                d.advance();
+            }
+            d.wind
+        };
+        assert_eq!(run(1), run(1));
+        assert_ne!(run(1), run(2));
+        assert_ne!(run(1), Point::new(3.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn switched_off_there_is_neither_gust_nor_error() {
+        let mut d = Disturbance::new(Point::new(2.0, 1.0, 0.0), 0.0, 0.0, 3);
+        d.advance();
+        assert_eq!(d.wind, Point::new(2.0, 1.0, 0.0));
+        assert_eq!(d.position_error, Point::zeros());
+    }
+}

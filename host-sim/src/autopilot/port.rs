@@ -1,0 +1,195 @@
+//! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings and send queue.
+
+use companion::frame::{self, Frame, Framer, Header};
+use companion::time::Instant;
+use mavlink::MessageData;
+
+/// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
+pub const AUTOPILOT_COMPONENT: u8 = 1;
+/// Telemetry is dropped while more than this waits to be sent, as PX4 drops it when its buffer is full; bytes.
+const TELEMETRY_QUEUE: usize = 4096;
+/// Nothing is queued beyond this, bytes: a port that nobody drains does not grow.
+const QUEUE: usize = 65_536;
+
+/// One telemetry stream.
+#[derive(Clone, Copy, Debug)]
+pub struct Stream {
+    /// Message id.
+    pub id: u32,
+    /// Microseconds between messages; 0 is off.
+    pub interval_us: u32,
+    /// When the next is due.
+    pub due_us: u64,
+}
+
+/// An answer that goes out one step later.
+#[derive(Clone, Copy, Debug)]
+pub struct Ack {
+    /// MAV_CMD.
+    pub command: u16,
+    /// MAV_RESULT.
+    pub result: u8,
+    /// Whom it answers: system, component.
+    pub to: (u8, u8),
+}
+
+/// A port. Frames in both directions; the transport around it is someone else's.
+#[derive(Clone, Debug)]
+pub struct Port {
+    framer: Framer,
+    system_id: u8,
+    sequence: u8,
+    queue: Vec<u8>,
+    sent: usize,
+    /// Telemetry dropped because nobody drained the queue, messages.
+    pub dropped: u64,
+    /// Streams, fixed in number and order.
+    pub streams: Vec<Stream>,
+    next_due_us: u64,
+    /// Acks for the next step.
+    pub later: Vec<Ack>,
+    /// The next parameter of a list being sent.
+    pub param_cursor: Option<usize>,
+    /// PING messages sent.
+    pub pings: u32,
+}
+
+impl Port {
+    /// A port with the streams a personality starts with: message id and interval in µs.
+    pub fn new(system_id: u8, streams: &[(u32, u32)]) -> Self {
+        // Spread over the first interval, so that not all fall due in the same step.
+        let streams = streams
+            .iter()
+            .enumerate()
+            .map(|(k, &(id, interval_us))| Stream {
+                id,
+                interval_us,
+                due_us: (k as u64 * 12_000) % u64::from(interval_us.max(1)),
+            })
+            .collect();
+        Self {
+            framer: Framer::new(),
+            system_id,
+            sequence: 0,
+            queue: Vec::new(),
+            sent: 0,
+            dropped: 0,
+            streams,
+            next_due_us: 0,
+            later: Vec::new(),
+            param_cursor: None,
+            pings: 0,
+        }
+    }
+
+    /// Frames that came in so far, good and bad.
+    pub fn counters(&self) -> frame::Counters {
+        self.framer.counters()
+    }
+
+    /// The next whole frame of `input`, from which it takes bytes.
+    pub fn next_frame(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
+        self.framer.next(Instant::from_micros(now_us), input)
+    }
+
+    fn header(&mut self) -> Header {
+        let sequence = self.sequence;
+        self.sequence = sequence.wrapping_add(1);
+        Header { system: self.system_id, component: AUTOPILOT_COMPONENT, sequence }
+    }
+
+    fn reserve(&mut self) -> Option<usize> {
+        if self.sent == self.queue.len() {
+            self.queue.clear();
+            self.sent = 0;
+        }
+        let start = self.queue.len();
+        if start - self.sent > QUEUE - frame::MAX_SENT {
+            self.dropped += 1;
+            return None;
+        }
+        self.queue.resize(start + frame::MAX_SENT, 0);
+        Some(start)
+    }
+
+    /// Queues a message.
+    pub fn send<M: MessageData>(&mut self, message: &M) {
+        if let Some(start) = self.reserve() {
+            let header = self.header();
+            let len = frame::encode(header, message, &mut self.queue[start..]);
+            self.queue.truncate(start + len);
+        }
+    }
+
+    /// Queues a message whose payload the caller laid out, for what the crate's types cannot hold.
+    pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
+        let Some(extra) = frame::extra_crc(id) else { return };
+        if let Some(start) = self.reserve() {
+            let header = self.header();
+            let len = frame::encode_raw(header, id, extra, payload, &mut self.queue[start..]);
+            self.queue.truncate(start + len);
+        }
+    }
+
+    /// Queues a COMMAND_ACK; the command may be one the crate does not know.
+    pub fn send_ack(&mut self, ack: Ack) {
+        let [low, high] = ack.command.to_le_bytes();
+        self.send_raw(77, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
+    }
+
+    /// Whether telemetry would be dropped now.
+    pub fn is_congested(&self) -> bool {
+        self.queue.len() - self.sent > TELEMETRY_QUEUE
+    }
+
+    /// Whether any stream is due.
+    pub fn is_due(&self, now_us: u64) -> bool {
+        now_us >= self.next_due_us
+    }
+
+    /// Takes the streams that are due, in order, and sets when they are due again.
+    pub fn take_due(&mut self, now_us: u64, due: &mut Vec<u32>) {
+        due.clear();
+        let mut next = u64::MAX;
+        for stream in self.streams.iter_mut().filter(|stream| stream.interval_us > 0) {
+            if now_us >= stream.due_us {
+                due.push(stream.id);
+                stream.due_us += u64::from(stream.interval_us);
+                if stream.due_us <= now_us {
+                    stream.due_us = now_us + u64::from(stream.interval_us);
+                }
+            }
+            next = next.min(stream.due_us);
+        }
+        self.next_due_us = next;
+        if self.is_congested() {
+            self.dropped += due.len() as u64;
+            due.clear();
+        }
+    }
+
+    /// Sets a stream's interval; false where there is no such stream.
+    pub fn set_interval(&mut self, id: u32, interval_us: u32, now_us: u64) -> bool {
+        let Some(stream) = self.streams.iter_mut().find(|stream| stream.id == id) else { return false };
+        stream.interval_us = interval_us;
+        stream.due_us = now_us;
+        self.next_due_us = self.next_due_us.min(now_us);
+        true
+    }
+
+    /// Moves whole frames into `out`, as many as fit; the bytes moved. A buffer of 280 bytes fits any frame.
+    pub fn poll_transmit(&mut self, out: &mut [u8]) -> usize {
+        let waiting = &self.queue[self.sent..];
+        let mut len = 0;
+        while let Some(&[_, payload]) = waiting.get(len..len + 2) {
+            let end = len + 12 + usize::from(payload);
+            if end > out.len() {
+                break;
+            }
+            len = end;
+        }
+        out[..len].copy_from_slice(&waiting[..len]);
+        self.sent += len;
+        len
+    }
+}

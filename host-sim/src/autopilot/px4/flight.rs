@@ -1,0 +1,148 @@
+//! What each flight mode asks of the position controller.
+
+use planner_core::Point;
+
+use super::params::Tuning;
+use super::{Commander, Mode, ReturnLeg, Sense};
+use crate::autopilot::vehicle::Demand;
+
+/// A demand to climb is one that asks for more than this above the present height, metres, or for more than
+/// [`CLIMB_MPS`].
+const CLIMB_M: f32 = 0.15;
+const CLIMB_MPS: f32 = 0.05;
+/// An automatic mode is at its target within this distance, metres.
+const ARRIVED_M: f32 = 0.5;
+/// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
+const BRAKE_MPS2: f32 = 3.0;
+
+const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+
+/// A demand for nothing, within the bounds of manual and Offboard flight.
+pub(super) fn nothing(tuning: &Tuning) -> Demand {
+    Demand {
+        position: NONE,
+        velocity: NONE,
+        acceleration: NONE,
+        heading: f32::NAN,
+        heading_rate: f32::NAN,
+        speed_max: tuning.speed_max,
+        climb_max: tuning.climb_max,
+        descend_max: tuning.descend_max,
+    }
+}
+
+impl Commander {
+    /// Fixes what the mode leans on: where it stops, which leg of the return is next.
+    pub(super) fn enter(&mut self, mode: Mode, sense: &Sense) {
+        let speed = libm::hypotf(sense.velocity.x, sense.velocity.y);
+        self.hold = sense.position;
+        self.hold.x += sense.velocity.x * speed / (2.0 * BRAKE_MPS2);
+        self.hold.y += sense.velocity.y * speed / (2.0 * BRAKE_MPS2);
+        self.hold_heading = sense.heading;
+        self.leg = ReturnLeg::Climb { up: f32::NAN };
+        if mode == Mode::Takeoff {
+            (self.hold.x, self.hold.y) = (sense.position.x, sense.position.y);
+        }
+    }
+
+    /// Whether the demand lifts a vehicle off the ground. Hold, Return and Land never do.
+    pub(super) fn wants_up(&self, sense: &Sense, demand: &Demand) -> bool {
+        match self.mode() {
+            Mode::Takeoff => true,
+            Mode::Offboard => {
+                demand.position.z - sense.position.z > CLIMB_M
+                    || demand.velocity.z > CLIMB_MPS
+                    || demand.acceleration.z > CLIMB_MPS
+            }
+            _ => false,
+        }
+    }
+
+    /// What the mode asks for now.
+    pub(super) fn demand(&mut self, sense: &Sense, tuning: &Tuning) -> Demand {
+        let held = Demand {
+            position: self.hold,
+            heading: self.hold_heading,
+            speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
+            climb_max: tuning.auto_up.min(tuning.climb_max),
+            descend_max: tuning.auto_down.min(tuning.descend_max),
+            ..nothing(tuning)
+        };
+        match self.mode() {
+            Mode::Offboard => match self.setpoint {
+                Some(s) => Demand {
+                    position: s.position,
+                    velocity: s.velocity,
+                    acceleration: s.acceleration,
+                    heading: s.heading,
+                    heading_rate: s.heading_rate,
+                    ..nothing(tuning)
+                },
+                None => held,
+            },
+            Mode::Takeoff => {
+                let up = self.takeoff_up;
+                let up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
+                if !self.landed && sense.position.z > up - ARRIVED_M {
+                    // Reached: PX4 goes on in Hold at the height asked for.
+                    self.intention = Mode::Hold;
+                    self.after_disarm = Mode::Hold;
+                    self.takeoff_up = f32::NAN;
+                    self.hold.z = up;
+                }
+                let position = Point::new(self.hold.x, self.hold.y, up);
+                Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
+            }
+            Mode::Land => self.landing(sense, tuning, held),
+            Mode::Return => self.returning(sense, tuning, held),
+            _ => held,
+        }
+    }
+
+    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`.
+    fn landing(&self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        let [high, low] = tuning.land_slow_below;
+        let share = ((sense.height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
+        let sink = tuning.land_speed + share * (tuning.auto_down - tuning.land_speed);
+        let position = Point::new(self.hold.x, self.hold.y, f32::NAN);
+        let velocity = Point::new(f32::NAN, f32::NAN, -sink);
+        Demand { position, velocity, descend_max: sink.max(0.0), ..held }
+    }
+
+    fn returning(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        let away = libm::hypotf(sense.home.x - sense.position.x, sense.home.y - sense.position.y);
+        if let ReturnLeg::Climb { up } = &mut self.leg
+            && up.is_nan()
+        {
+            let mut height = tuning.return_height;
+            if away <= tuning.return_min_distance {
+                // Near home the climb is cut by the cone `RTL_CONE_ANG`.
+                height = height.min(away / tuning.return_cone_tan.max(0.01));
+            }
+            *up = (sense.home.z + height).max(sense.position.z);
+        }
+        match self.leg {
+            ReturnLeg::Climb { up } => {
+                if sense.position.z > up - ARRIVED_M {
+                    self.leg = ReturnLeg::Cross { up };
+                }
+                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+            }
+            ReturnLeg::Cross { up } => {
+                if away < ARRIVED_M {
+                    self.leg = ReturnLeg::Descend;
+                    (self.hold.x, self.hold.y) = (sense.home.x, sense.home.y);
+                }
+                Demand { position: Point::new(sense.home.x, sense.home.y, up), ..held }
+            }
+            ReturnLeg::Descend => {
+                let up = sense.home.z + tuning.return_descend_height;
+                if sense.position.z < up + ARRIVED_M {
+                    self.leg = ReturnLeg::Land;
+                }
+                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+            }
+            ReturnLeg::Land => self.landing(sense, tuning, held),
+        }
+    }
+}

@@ -1,0 +1,483 @@
+//! PX4's commander: arming, modes, failsafe, take-off and landing, as PX4 1.17 was seen to behave.
+//!
+//! | state | leaves it |
+//! |---|---|
+//! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
+//! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
+//! | ramp | thrust rises over `MPC_TKO_RAMP_T`; it counts as in the air once it carries the weight |
+//! | flying | `LNDMC_TRIG_TIME` on the ground without a demand to climb lands it |
+//! | landed | a demand to climb; `COM_DISARM_LAND` disarms |
+//!
+//! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the first setpoint after that
+//! ends it. Times are microseconds since boot and arguments; nothing here reads a clock.
+
+mod flight;
+pub mod params;
+pub mod setpoint;
+
+use planner_core::Point;
+
+use self::params::Tuning;
+use self::setpoint::Setpoint;
+use crate::autopilot::vehicle::Demand;
+
+pub(crate) mod commands;
+
+/// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
+const LOSS_REACTION_S: f32 = 0.15;
+/// The land detector's own filters beyond `LNDMC_TRIG_TIME`.
+const LAND_FILTER_S: f32 = 0.5;
+/// Disarmed 2.2 to 2.4 s after ON_GROUND with `COM_DISARM_LAND` 2.0.
+const DISARM_REACTION_S: f32 = 0.25;
+
+/// PX4's flight modes, as far as the simulation flies them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Stick to motors; with nobody at the sticks it only holds.
+    Manual,
+    /// Altitude control by sticks; likewise.
+    Altitude,
+    /// Position control by sticks; likewise.
+    Position,
+    /// AUTO.MISSION.
+    Mission,
+    /// AUTO.LOITER.
+    Hold,
+    /// AUTO.RTL.
+    Return,
+    /// AUTO.TAKEOFF.
+    Takeoff,
+    /// AUTO.LAND.
+    Land,
+    /// OFFBOARD.
+    Offboard,
+}
+
+const MODES: [(Mode, u8, u8); 9] = [
+    (Mode::Manual, 1, 0),
+    (Mode::Altitude, 2, 0),
+    (Mode::Position, 3, 0),
+    (Mode::Mission, 4, 4),
+    (Mode::Hold, 4, 3),
+    (Mode::Return, 4, 5),
+    (Mode::Takeoff, 4, 2),
+    (Mode::Land, 4, 6),
+    (Mode::Offboard, 6, 0),
+];
+
+impl Mode {
+    /// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
+    pub fn custom_mode(self) -> u32 {
+        MODES
+            .iter()
+            .find(|(mode, ..)| *mode == self)
+            .map_or(0, |&(_, main, sub)| u32::from(main) << 16 | u32::from(sub) << 24)
+    }
+
+    /// The mode of a main and a sub mode.
+    pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
+        MODES.iter().find(|&&(_, m, s)| m == main && (s == sub || main != 4)).map(|&(mode, ..)| mode)
+    }
+
+    /// Whether a disarmed vehicle leaves the mode for the one before.
+    fn ends_with_flight(self) -> bool {
+        matches!(self, Self::Return | Self::Takeoff | Self::Land)
+    }
+
+    fn is_auto(self) -> bool {
+        matches!(self, Self::Mission | Self::Hold | Self::Return | Self::Takeoff | Self::Land)
+    }
+
+    fn needs_sticks(self) -> bool {
+        matches!(self, Self::Manual | Self::Altitude | Self::Position)
+    }
+}
+
+/// What the commander perceives in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Sense {
+    /// Microseconds since boot.
+    pub now_us: u64,
+    /// Estimated position, ENU metres.
+    pub position: Point,
+    /// Estimated velocity, ENU m/s.
+    pub velocity: Point,
+    /// Heading, radians clockwise from north.
+    pub heading: f32,
+    /// The body touches the ground.
+    pub touching: bool,
+    /// Height of the body over its resting place, metres (the distance sensor).
+    pub height: f32,
+    /// Home, ENU metres.
+    pub home: Point,
+    /// Charge left, 0 to 1.
+    pub battery: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Ground,
+    Ramp { since_us: u64 },
+    Flying,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ReturnLeg {
+    Climb { up: f32 },
+    Cross { up: f32 },
+    Descend,
+    Land,
+}
+
+/// What moves the vehicle in this step.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    /// Motors carry weight.
+    pub lift: bool,
+    /// The controller forgets its integral.
+    pub reset: bool,
+    /// What the mode asks for.
+    pub demand: Demand,
+}
+
+/// The state of the state machine.
+#[derive(Clone, Debug)]
+pub struct Commander {
+    armed: bool,
+    landed: bool,
+    flown: bool,
+    intention: Mode,
+    after_disarm: Mode,
+    failsafe: Option<Mode>,
+    phase: Phase,
+    armed_us: u64,
+    landed_us: u64,
+    touching_us: Option<u64>,
+    setpoint: Option<Setpoint>,
+    setpoint_us: u64,
+    hold: Point,
+    hold_heading: f32,
+    takeoff_up: f32,
+    cruise: Option<f32>,
+    leg: ReturnLeg,
+    position_ok: bool,
+}
+
+impl Default for Commander {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Commander {
+    /// Disarmed on the ground in Hold, as PX4 boots without a remote.
+    pub fn new() -> Self {
+        Self {
+            armed: false,
+            landed: true,
+            flown: false,
+            intention: Mode::Hold,
+            after_disarm: Mode::Hold,
+            failsafe: None,
+            phase: Phase::Ground,
+            armed_us: 0,
+            landed_us: 0,
+            touching_us: None,
+            setpoint: None,
+            setpoint_us: 0,
+            hold: Point::zeros(),
+            hold_heading: 0.0,
+            takeoff_up: f32::NAN,
+            cruise: None,
+            leg: ReturnLeg::Descend,
+            position_ok: true,
+        }
+    }
+
+    /// Motors on.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// The land detector's verdict.
+    pub fn landed(&self) -> bool {
+        self.landed
+    }
+
+    /// The mode that flies, the failsafe's while there is one.
+    pub fn mode(&self) -> Mode {
+        self.failsafe.unwrap_or(self.intention)
+    }
+
+    /// The mode that was asked for, whatever a failsafe flies.
+    pub fn intention(&self) -> Mode {
+        self.intention
+    }
+
+    /// A failsafe flies.
+    pub fn in_failsafe(&self) -> bool {
+        self.failsafe.is_some()
+    }
+
+    /// MAV_LANDED_STATE.
+    pub fn landed_state(&self) -> u8 {
+        match self.mode() {
+            _ if self.landed => 1,
+            Mode::Takeoff => 3,
+            Mode::Land => 4,
+            Mode::Return if self.leg == ReturnLeg::Land => 4,
+            _ => 2,
+        }
+    }
+
+    /// MAV_STATE and MAV_MODE_FLAG of HEARTBEAT.
+    pub fn heartbeat(&self, now_us: u64, tuning: &Tuning) -> (u8, u8) {
+        let mode = self.mode();
+        let status = match (self.armed, self.failsafe) {
+            (true, Some(_)) => 5,
+            (true, None) => 4,
+            // A disarmed vehicle whose mode could not run says 0, not STANDBY.
+            (false, _) if mode == Mode::Offboard && !self.stream_fresh(now_us, tuning) => 0,
+            (false, _) => 3,
+        };
+        let flags = if mode.is_auto() {
+            16 | 8 | 4
+        } else if mode.needs_sticks() {
+            64 | 16
+        } else if self.setpoint.is_some() {
+            16
+        } else {
+            0
+        };
+        (status, 1 | flags | if self.armed { 128 } else { 0 })
+    }
+
+    /// The estimator lost or found its position.
+    pub fn set_position_ok(&mut self, ok: bool) {
+        self.position_ok = ok;
+    }
+
+    /// Takes a setpoint that counts.
+    pub fn handle_setpoint(&mut self, setpoint: Setpoint, now_us: u64) {
+        self.setpoint = Some(setpoint);
+        self.setpoint_us = now_us;
+    }
+
+    /// Whether setpoints keep coming.
+    pub fn stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
+        let limit = seconds(tuning.offboard_loss_s + LOSS_REACTION_S);
+        self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
+    }
+
+    /// Arms, if the mode can run; false is TEMPORARILY_REJECTED.
+    pub fn arm(&mut self, sense: &Sense, tuning: &Tuning, force: bool) -> bool {
+        if self.armed {
+            return true;
+        }
+        if !force && !self.armable(sense, tuning) {
+            return false;
+        }
+        self.armed = true;
+        self.armed_us = sense.now_us;
+        self.flown = !self.landed;
+        self.enter(self.intention, sense);
+        true
+    }
+
+    /// Whether the arming checks pass.
+    pub fn armable(&self, sense: &Sense, tuning: &Tuning) -> bool {
+        let runs = match self.intention {
+            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Hold | Mode::Takeoff => true,
+            Mode::Land | Mode::Return | Mode::Mission => false,
+            Mode::Manual | Mode::Altitude | Mode::Position => false,
+        };
+        runs && self.position_ok && sense.battery >= tuning.battery_low
+    }
+
+    /// Disarms; in the air only by force.
+    pub fn disarm(&mut self, force: bool) -> bool {
+        if self.armed && !self.landed && !force {
+            return false;
+        }
+        self.armed = false;
+        self.failsafe = None;
+        self.phase = Phase::Ground;
+        self.cruise = None;
+        if self.intention.ends_with_flight() {
+            self.intention = self.after_disarm;
+        }
+        true
+    }
+
+    /// Changes the mode if it can run; the second ack of DO_SET_MODE tells.
+    pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
+        let runs = match mode {
+            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Mission => false,
+            mode => !mode.needs_sticks(),
+        };
+        if self.armed && !runs {
+            return false;
+        }
+        self.force_mode(mode, sense);
+        true
+    }
+
+    /// Changes the mode as a pilot's switch does, whom nobody asks whether it can run.
+    pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
+        self.intention = mode;
+        if !mode.ends_with_flight() {
+            self.after_disarm = mode;
+        }
+        if mode != Mode::Takeoff {
+            self.takeoff_up = f32::NAN;
+        }
+        self.failsafe = None;
+        self.enter(mode, sense);
+    }
+
+    /// Take-off to a height in the mission frame; NaN is `MIS_TAKEOFF_ALT` above home.
+    pub fn takeoff(&mut self, up: f32, sense: &Sense, tuning: &Tuning) -> bool {
+        let accepted = self.set_mode(Mode::Takeoff, sense, tuning);
+        if accepted {
+            self.takeoff_up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
+        }
+        accepted
+    }
+
+    /// Holds at a point instead of where it is (DO_REPOSITION); NaN keeps an axis.
+    pub fn reposition(&mut self, to: &Point, heading: f32, sense: &Sense, tuning: &Tuning) -> bool {
+        if !self.armed || !self.set_mode(Mode::Hold, sense, tuning) {
+            return false;
+        }
+        for axis in 0..3 {
+            if to[axis].is_finite() {
+                self.hold[axis] = to[axis];
+            }
+        }
+        if heading.is_finite() {
+            self.hold_heading = heading;
+        }
+        true
+    }
+
+    /// Cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s.
+    pub fn set_cruise(&mut self, speed: f32) {
+        self.cruise = (speed > 0.0).then_some(speed);
+    }
+
+    /// One step: timers, failsafe, phases, and what the mode asks for.
+    pub fn update(&mut self, sense: &Sense, tuning: &Tuning) -> Order {
+        let now = sense.now_us;
+        if self.armed {
+            self.update_failsafe(sense, tuning);
+            self.update_timers(sense, tuning);
+        }
+        if !self.armed {
+            // A vehicle disarmed in the air falls, and has landed when it lies still.
+            if !self.landed && sense.touching {
+                self.landed = true;
+                self.landed_us = now;
+            }
+            return Order { lift: false, reset: true, demand: flight::nothing(tuning) };
+        }
+        let mut demand = self.demand(sense, tuning);
+        let wants_up = self.wants_up(sense, &demand);
+        let mut reset = false;
+        match self.phase {
+            Phase::Ground => {
+                reset = true;
+                if wants_up && now.saturating_sub(self.armed_us) >= seconds(tuning.spool_up_s) {
+                    self.phase = Phase::Ramp { since_us: now };
+                }
+            }
+            Phase::Ramp { since_us } => {
+                let progress = now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
+                // The climb limit starts where it cancels hover thrust (`TakeoffHandling::updateRamp`).
+                let floor = -crate::autopilot::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
+                let limit = floor + progress * (demand.climb_max - floor);
+                if limit >= 0.0 {
+                    self.landed = false;
+                    self.flown = true;
+                }
+                if progress >= 1.0 {
+                    self.phase = Phase::Flying;
+                } else if !wants_up && self.landed {
+                    self.phase = Phase::Ground;
+                } else {
+                    demand.climb_max = limit;
+                }
+            }
+            Phase::Flying => self.detect_landing(sense, wants_up, tuning),
+        }
+        Order { lift: self.phase != Phase::Ground, reset, demand }
+    }
+
+    fn update_failsafe(&mut self, sense: &Sense, tuning: &Tuning) {
+        let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sense.now_us, tuning);
+        let battery_out = sense.battery < tuning.battery_critical && !self.intention.ends_with_flight();
+        let action = if !self.position_ok && self.mode() != Mode::Land {
+            Some(Mode::Land)
+        } else if stream_lost {
+            match tuning.offboard_loss_action {
+                4 => Some(Mode::Land),
+                5 => Some(Mode::Hold),
+                6 | 7 => {
+                    self.disarm(true);
+                    return;
+                }
+                // Position, Altitude and Manual (0 to 2) need sticks nobody holds: Return, as for 3.
+                _ => Some(Mode::Return),
+            }
+        } else if battery_out && tuning.low_battery_action == 2 {
+            Some(Mode::Land)
+        } else if battery_out && tuning.low_battery_action == 3 {
+            Some(Mode::Return)
+        } else {
+            None
+        };
+        if action != self.failsafe && !(action.is_none() && !self.position_ok) {
+            self.failsafe = action;
+            self.enter(self.mode(), sense);
+        }
+    }
+
+    fn update_timers(&mut self, sense: &Sense, tuning: &Tuning) {
+        let since = |start: u64| sense.now_us.saturating_sub(start);
+        let idle = self.landed && self.phase == Phase::Ground;
+        if idle && !self.flown && tuning.disarm_preflight_s > 0.0 {
+            if since(self.armed_us) >= seconds(tuning.disarm_preflight_s) {
+                self.disarm(false);
+            }
+        } else if idle
+            && self.flown
+            && tuning.disarm_land_s > 0.0
+            && since(self.landed_us) >= seconds(tuning.disarm_land_s + DISARM_REACTION_S)
+        {
+            self.disarm(false);
+        }
+        if sense.battery <= 0.0 {
+            self.disarm(true);
+        }
+    }
+
+    fn detect_landing(&mut self, sense: &Sense, wants_up: bool, tuning: &Tuning) {
+        if !sense.touching || wants_up {
+            self.touching_us = None;
+            return;
+        }
+        let since = *self.touching_us.get_or_insert(sense.now_us);
+        if sense.now_us - since >= seconds(tuning.land_trigger_s + LAND_FILTER_S) {
+            self.touching_us = None;
+            self.landed = true;
+            self.landed_us = sense.now_us;
+            self.phase = Phase::Ground;
+        }
+    }
+}
+
+/// Microseconds of a time in seconds; what is negative or not a number is none.
+fn seconds(s: f32) -> u64 {
+    (f64::from(s) * 1e6) as u64
+}

@@ -1,0 +1,65 @@
+//! Reading payloads by field.
+//!
+//! The crate's types refuse a whole message for one enum value they do not know (a COMMAND_LONG with an unknown command,
+//! say), but such a command has to be answered UNSUPPORTED. So what comes in is read at the byte offsets of the wire
+//! order (fields sorted by size, extensions last); what V2 cut from the end reads as zero.
+
+use companion::frame::Frame;
+
+/// A payload with its cut zeros put back.
+pub struct Fields<'a>(&'a [u8; 255]);
+
+impl<'a> Fields<'a> {
+    /// Fields of a frame.
+    pub fn new(frame: &'a Frame) -> Self {
+        Self(frame.padded())
+    }
+
+    fn bytes<const N: usize>(&self, at: usize) -> [u8; N] {
+        let mut bytes = [0; N];
+        bytes.copy_from_slice(&self.0[at..at + N]);
+        bytes
+    }
+
+    /// The byte at an offset.
+    pub fn u8(&self, at: usize) -> u8 {
+        self.0[at]
+    }
+
+    /// Little-endian.
+    pub fn u16(&self, at: usize) -> u16 {
+        u16::from_le_bytes(self.bytes(at))
+    }
+
+    /// Little-endian.
+    pub fn u32(&self, at: usize) -> u32 {
+        u32::from_le_bytes(self.bytes(at))
+    }
+
+    /// Little-endian.
+    pub fn i32(&self, at: usize) -> i32 {
+        i32::from_le_bytes(self.bytes(at))
+    }
+
+    /// Little-endian.
+    pub fn i64(&self, at: usize) -> i64 {
+        i64::from_le_bytes(self.bytes(at))
+    }
+
+    /// Little-endian.
+    pub fn u64(&self, at: usize) -> u64 {
+        u64::from_le_bytes(self.bytes(at))
+    }
+
+    /// Little-endian.
+    pub fn f32(&self, at: usize) -> f32 {
+        f32::from_le_bytes(self.bytes(at))
+    }
+
+    /// A text of at most `N` bytes up to its first zero; `None` if it is not UTF-8.
+    pub fn text<const N: usize>(&self, at: usize) -> Option<&str> {
+        let bytes = &self.0[at..at + N];
+        let end = bytes.iter().position(|&b| b == 0).unwrap_or(N);
+        core::str::from_utf8(&bytes[..end]).ok()
+    }
+}

@@ -1,0 +1,103 @@
+//! Puts the page together: template, styles, libraries, scripts, data.
+
+use serde::Serialize;
+
+use super::{ReportData, vehicle_color};
+
+const TEMPLATE: &str = include_str!("../../assets/report/page.html");
+const STYLE: &str =
+    concat!(include_str!("../../assets/vendor/uPlot.min.css"), include_str!("../../assets/report/style.css"));
+const LIBRARIES: &str = concat!(
+    include_str!("../../assets/vendor/three.iife.min.js"),
+    "\n",
+    include_str!("../../assets/vendor/uPlot.iife.min.js")
+);
+/// One function scope, so that nothing of ours is global.
+const SCRIPT: &str = concat!(
+    "(() => {\n\"use strict\";\n",
+    include_str!("../../assets/report/data.js"),
+    include_str!("../../assets/report/map.js"),
+    include_str!("../../assets/report/scene.js"),
+    include_str!("../../assets/report/view.js"),
+    include_str!("../../assets/report/panels.js"),
+    include_str!("../../assets/report/plots.js"),
+    include_str!("../../assets/report/main.js"),
+    "})();\n"
+);
+
+/// What the scripts read.
+#[derive(Serialize)]
+struct PageData<'a> {
+    #[serde(flatten)]
+    data: &'a ReportData,
+    /// A colour for each vehicle that has none of its own.
+    palette: Vec<[u8; 3]>,
+}
+
+/// The whole page as text.
+pub(super) fn html(data: &ReportData) -> anyhow::Result<String> {
+    let palette = (0..data.vehicles.len()).map(vehicle_color).collect();
+    let json = script_safe(&serde_json::to_string(&PageData { data, palette })?);
+    Ok(fill(TEMPLATE, |name| match name {
+        "title" => escape(&data.title),
+        "style" => STYLE.to_owned(),
+        "libraries" => LIBRARIES.to_owned(),
+        "script" => SCRIPT.to_owned(),
+        "data" => json.clone(),
+        _ => unreachable!("the template names only the parts above"),
+    }))
+}
+
+/// Replaces each `{{name}}` once; what is put in is never searched again.
+fn fill(template: &str, part: impl Fn(&str) -> String) -> String {
+    let mut out = String::new();
+    let mut rest = template;
+    while let Some((before, after)) = rest.split_once("{{") {
+        let (name, tail) = after.split_once("}}").expect("the template closes what it opens");
+        out.push_str(before);
+        out.push_str(&part(name));
+        rest = tail;
+    }
+    out.push_str(rest);
+    out
+}
+
+/// Text as HTML text.
+fn escape(text: &str) -> String {
+    text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+}
+
+/// JSON that no HTML parser can leave: these characters stand only inside its strings, where an escape means the same.
+fn script_safe(json: &str) -> String {
+    json.replace('<', "\\u003c").replace('>', "\\u003e").replace('&', "\\u0026")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hostile_text_stays_text() {
+        let hostile = "</script><script>alert(1)</script><!-- {{script}} & \"";
+        let data = ReportData {
+            title: hostile.to_owned(),
+            scenario_toml: hostile.to_owned(),
+            ..ReportData::default()
+        };
+        let page = html(&data).expect("a page");
+        assert!(!page.contains("alert(1)</script>"));
+        assert_eq!(page.matches("</script>").count(), TEMPLATE.matches("</script>").count());
+        let (_, after) = page.split_once("type=\"application/json\">").expect("the data element");
+        let (json, _) = after.split_once("</script>").expect("its end");
+        let back: serde_json::Value = serde_json::from_str(json).expect("JSON");
+        assert_eq!(back["scenario_toml"], hostile);
+    }
+
+    #[test]
+    fn asks_for_nothing_from_a_network() {
+        let page = html(&ReportData::default()).expect("a page");
+        for forbidden in ["src=\"http", "href=\"http", "@import", "url(http"] {
+            assert!(!page.contains(forbidden), "{forbidden}");
+        }
+    }
+}

@@ -1,0 +1,247 @@
+//! The surface of a voxel map for drawing: exposed faces merged into rectangles, and the creases between them.
+//!
+//! Greedy meshing (M. Lysenko, "Meshing in a Minecraft Game", 2012): layer by layer, each exposed face grows along the
+//! first axis, then along the second. A crease is a lattice edge where the four cells around it are not flat: one or
+//! three of them filled, or two that touch by that edge only. Linear in the number of cells.
+
+use planner_core::Point;
+use planner_core::voxel::VoxelGrid;
+use serde::Serialize;
+
+use super::pack;
+
+/// Most rectangles a page carries: 12 bytes each, so 2.4 MB of base64. A map that has more is drawn from cells twice as
+/// large, again and again, until it fits; the page says so.
+pub const FACE_LIMIT: usize = 150_000;
+/// Most cells that are looked at, for the same reason: time and memory of writing a page stay bounded.
+const CELL_LIMIT: usize = 1 << 25;
+
+/// What is drawn of a map.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct MapSurface {
+    /// Minimum corner, metres.
+    #[serde(serialize_with = "pack::point")]
+    pub min: Point,
+    /// Maximum corner of the map itself, metres.
+    #[serde(serialize_with = "pack::point")]
+    pub max: Point,
+    /// Edge of a cell of the map, metres.
+    pub resolution_m: f32,
+    /// Edge of a cell as drawn, metres: the resolution times a power of two.
+    pub drawn_m: f32,
+    /// Six numbers a rectangle: `2 · axis + (1 if it faces up the axis)`, layer, least `u` and `v`, extent along `u` and
+    /// `v`; in drawn cells, with `u` and `v` the two axes after `axis` in the cycle east, north, up.
+    #[serde(serialize_with = "pack::words")]
+    pub faces: Vec<u16>,
+    /// Five numbers a line: axis it runs along, `u`, `v`, start, length. Empty where there are more than [`FACE_LIMIT`].
+    #[serde(serialize_with = "pack::words")]
+    pub creases: Vec<u16>,
+}
+
+impl MapSurface {
+    /// The surface of what is filled in `grid`. Beyond its faces nothing is drawn, whatever [`VoxelGrid::outside`] says,
+    /// so that an open map stays open to the eye.
+    pub fn of(grid: &VoxelGrid<'_>) -> Self {
+        let shape = grid.shape();
+        let mut scale = 1;
+        loop {
+            let dims = shape.dims.map(|d| d.div_ceil(scale));
+            let fits = dims.iter().map(|&d| d as usize + 2).product::<usize>() <= CELL_LIMIT;
+            let smallest = dims.iter().all(|&d| d == 1);
+            if fits || smallest {
+                let cells = Cells::of(grid, scale);
+                let faces = cells.faces();
+                if faces.len() / 6 <= FACE_LIMIT || smallest {
+                    let mut creases = cells.creases();
+                    if creases.len() / 5 > FACE_LIMIT {
+                        creases = Vec::new();
+                    }
+                    let drawn_m = shape.resolution_m * scale as f32;
+                    let resolution_m = shape.resolution_m;
+                    return Self { min: shape.min, max: shape.max(), resolution_m, drawn_m, faces, creases };
+                }
+            }
+            scale *= 2;
+        }
+    }
+}
+
+/// Occupancy one byte a cell, with one empty layer around it, so that neighbours need no range check.
+struct Cells {
+    dims: [usize; 3],
+    stride: [usize; 3],
+    filled: Vec<bool>,
+}
+
+impl Cells {
+    /// Cells of `scale`³ cells of the grid, filled where any of those is.
+    fn of(grid: &VoxelGrid<'_>, scale: u32) -> Self {
+        let dims = grid.shape().dims.map(|d| d.div_ceil(scale) as usize);
+        let stride = [1, dims[0] + 2, (dims[0] + 2) * (dims[1] + 2)];
+        let mut cells = Self { dims, stride, filled: vec![false; stride[2] * (dims[2] + 2)] };
+        let [nx, ny, nz] = grid.shape().dims;
+        for k in 0..nz {
+            for j in 0..ny {
+                let row = ((k / scale) as usize + 1) * stride[2] + ((j / scale) as usize + 1) * stride[1];
+                for i in 0..nx {
+                    if grid.is_occupied([i, j, k]) {
+                        cells.filled[row + (i / scale) as usize + 1] = true;
+                    }
+                }
+            }
+        }
+        cells
+    }
+
+    fn faces(&self) -> Vec<u16> {
+        let mut out = Vec::new();
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let (nu, nv) = (self.dims[u], self.dims[v]);
+            let mut mask = vec![0; nu * nv];
+            for layer in 0..=self.dims[axis] {
+                for b in 0..nv {
+                    let row = layer * self.stride[axis] + (b + 1) * self.stride[v];
+                    for a in 0..nu {
+                        let below = row + (a + 1) * self.stride[u];
+                        let (low, high) = (self.filled[below], self.filled[below + self.stride[axis]]);
+                        mask[b * nu + a] = if low == high { 0 } else { 1 + u8::from(low) };
+                    }
+                }
+                merge(&mut mask, nu, |kind, a, b, w, h| {
+                    let code = 2 * axis + usize::from(kind == 2);
+                    out.extend([code, layer, a, b, w, h].map(|n| n as u16));
+                });
+            }
+        }
+        out
+    }
+
+    fn creases(&self) -> Vec<u16> {
+        let mut out = Vec::new();
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for b in 0..=self.dims[v] {
+                for a in 0..=self.dims[u] {
+                    let corner = a * self.stride[u] + b * self.stride[v];
+                    let mut start = None;
+                    for c in 0..=self.dims[axis] {
+                        let here = c < self.dims[axis] && {
+                            let at = corner + (c + 1) * self.stride[axis];
+                            let (p, q) = (self.filled[at], self.filled[at + self.stride[u]]);
+                            let at = at + self.stride[v];
+                            let (r, s) = (self.filled[at], self.filled[at + self.stride[u]]);
+                            // flat: all alike, or split along u or along v
+                            !((p == q && r == s) || (p == r && q == s))
+                        };
+                        match (here, start) {
+                            (true, None) => start = Some(c),
+                            (false, Some(from)) => {
+                                out.extend([axis, a, b, from, c - from].map(|n| n as u16));
+                                start = None;
+                            }
+                            _ => {}
+                        }
+                    }
+                }
+            }
+        }
+        out
+    }
+}
+
+/// Covers the non-zero cells of `mask`, `nu` a row, with rectangles of one kind, and clears them.
+fn merge(mask: &mut [u8], nu: usize, mut rectangle: impl FnMut(u8, usize, usize, usize, usize)) {
+    let nv = mask.len() / nu;
+    for b in 0..nv {
+        let mut a = 0;
+        while a < nu {
+            let kind = mask[b * nu + a];
+            if kind == 0 {
+                a += 1;
+                continue;
+            }
+            let w = (a..nu).take_while(|&x| mask[b * nu + x] == kind).count();
+            let whole = |y: &usize| mask[y * nu + a..y * nu + a + w].iter().all(|&m| m == kind);
+            let h = (b..nv).take_while(whole).count();
+            for y in b..b + h {
+                mask[y * nu + a..y * nu + a + w].fill(0);
+            }
+            rectangle(kind, a, b, w, h);
+            a += w;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use planner_core::voxel::{GridShape, Outside};
+
+    use super::*;
+
+    fn surface(dims: [u32; 3], filled: impl Fn([u32; 3]) -> bool) -> MapSurface {
+        let shape = GridShape { dims, min: Point::new(1.0, 2.0, 3.0), resolution_m: 0.5 };
+        let mut words = vec![0; shape.brick_count()];
+        for k in 0..dims[2] {
+            for j in 0..dims[1] {
+                for i in (0..dims[0]).filter(|&i| filled([i, j, k])) {
+                    let (word, mask) = shape.address([i, j, k]);
+                    words[word] |= mask;
+                }
+            }
+        }
+        MapSurface::of(&VoxelGrid::new(shape, Outside::Blocked, &words).expect("a valid grid"))
+    }
+
+    /// Faces of the surface in cells, counted without merging.
+    fn area(surface: &MapSurface) -> usize {
+        surface.faces.chunks(6).map(|f| usize::from(f[4]) * usize::from(f[5])).sum()
+    }
+
+    #[test]
+    fn a_block_has_six_faces_and_twelve_creases() {
+        let block =
+            surface([5, 6, 7], |[i, j, k]| (1..4).contains(&i) && (1..5).contains(&j) && (1..6).contains(&k));
+        assert_eq!(block.faces.len() / 6, 6);
+        assert_eq!(block.creases.len() / 5, 12);
+        assert_eq!(area(&block), 2 * (3 * 4 + 4 * 5 + 5 * 3));
+        let mut lowest: Vec<_> = block.faces.chunks(6).map(|f| (f[0], f[1])).collect();
+        lowest.sort_unstable();
+        assert_eq!(lowest, [(0, 1), (1, 4), (2, 1), (3, 5), (4, 1), (5, 6)]);
+    }
+
+    #[test]
+    fn a_full_map_is_its_hull_and_an_empty_one_nothing() {
+        assert_eq!(surface([4, 4, 4], |_| true).faces.len() / 6, 6);
+        assert_eq!(
+            surface([4, 4, 4], |_| false),
+            MapSurface { faces: vec![], creases: vec![], ..surface([4, 4, 4], |_| true) }
+        );
+    }
+
+    #[test]
+    fn merged_area_is_the_exposed_area_of_noise() {
+        let hash = |[i, j, k]: [u32; 3]| {
+            (i.wrapping_mul(0x9e37) ^ j.wrapping_mul(0x85eb) ^ k.wrapping_mul(0xc2b3)) % 7 < 3
+        };
+        let dims = [9, 10, 11];
+        let filled =
+            |p: [i64; 3]| (0..3).all(|a| p[a] >= 0 && p[a] < i64::from(dims[a])) && hash(p.map(|c| c as u32));
+        let mut exposed = 0;
+        for (i, j, k) in (-1..12).flat_map(|i| (-1..12).flat_map(move |j| (-1..12).map(move |k| (i, j, k)))) {
+            let here = filled([i, j, k]);
+            exposed +=
+                [[i + 1, j, k], [i, j + 1, k], [i, j, k + 1]].iter().filter(|&&n| filled(n) != here).count();
+        }
+        let noise = surface(dims, hash);
+        assert_eq!(area(&noise), exposed);
+        assert!(noise.faces.len() / 6 < exposed);
+    }
+
+    #[test]
+    fn a_map_with_too_many_faces_is_drawn_coarser() {
+        let checkered = surface([80, 80, 80], |[i, j, k]| (i + j + k) % 2 == 0);
+        assert_eq!(checkered.drawn_m, 1.0);
+        assert_eq!(checkered.faces.len() / 6, 6);
+    }
+}

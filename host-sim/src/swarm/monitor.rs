@@ -1,0 +1,311 @@
+//! The referee: looks at the true motion at every physics step and knows nothing of what companions believe.
+//!
+//! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the exact map; one that lasts
+//! counts once. While a vehicle takes off or lands, what lies below its centre is the floor it stands on and no wall.
+
+use planner_core::Point;
+use planner_core::segment::point_clearance;
+use planner_core::voxel::VoxelGrid;
+
+use crate::map::edt::ClearanceField;
+
+/// Rounding of positions that is no contact, metres.
+const TOUCH_M: f32 = 1e-3;
+/// No progress for this long while a way is left is a deadlock (SPEC §4), seconds.
+const DEADLOCK_S: f64 = 20.0;
+/// Progress that counts, metres.
+const PROGRESS_M: f32 = 0.1;
+/// Spacing of recorded points, seconds.
+const RECORD_S: f64 = 0.2;
+
+/// What a vehicle is doing, as the referee needs to know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Phase {
+    /// On the ground before or after its flight.
+    Grounded,
+    /// Between the ground and its path.
+    TakeOffOrLanding,
+    /// On its path.
+    Flying,
+}
+
+/// One vehicle at one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation {
+    /// Centre of the body, ENU metres.
+    pub position: Point,
+    /// What it is doing.
+    pub phase: Phase,
+    /// Arc length along its path, metres.
+    pub progress_m: f32,
+}
+
+/// What was recorded at one time.
+#[derive(Clone, Copy, Debug)]
+pub struct Sample {
+    /// Seconds since the start of the simulation.
+    pub t_s: f32,
+    /// Smallest distance of two centres, one of them off the ground; infinite without.
+    pub separation_m: f32,
+    /// Smallest distance of a flying centre to an obstacle; infinite without.
+    pub clearance_m: f32,
+}
+
+#[derive(Clone, Debug)]
+struct Watched {
+    radius_m: f32,
+    last: Option<Point>,
+    flown_m: f64,
+    in_contact: bool,
+    best_progress_m: f32,
+    progressed_s: f64,
+    stuck: bool,
+    track: Vec<(f32, Point)>,
+}
+
+/// Counts what went wrong and remembers how near it came.
+#[derive(Debug)]
+pub struct Monitor<'a> {
+    grid: VoxelGrid<'a>,
+    field: &'a ClearanceField,
+    safety_distance_m: f32,
+    vehicles: Vec<Watched>,
+    too_near: Vec<bool>,
+    recorded_s: f64,
+    window: Sample,
+    /// Bodies that reached into an obstacle.
+    pub wall_contacts: u32,
+    /// Pairs that came nearer than the safety distance.
+    pub violations: u32,
+    /// Vehicles that stood still in the air for too long.
+    pub deadlocks: u32,
+    /// Smallest distance of a flying centre to an obstacle, metres.
+    pub min_clearance_m: f32,
+    /// Smallest distance of two centres, one of them off the ground, metres.
+    pub min_separation_m: f32,
+    /// Smallest distances over time.
+    pub samples: Vec<Sample>,
+}
+
+impl<'a> Monitor<'a> {
+    /// Watches vehicles of these radii.
+    pub fn new(grid: VoxelGrid<'a>, field: &'a ClearanceField, safety_distance_m: f32, radii_m: &[f32]) -> Self {
+        let watched = |&radius_m: &f32| Watched {
+            radius_m,
+            last: None,
+            flown_m: 0.0,
+            in_contact: false,
+            best_progress_m: f32::NEG_INFINITY,
+            progressed_s: 0.0,
+            stuck: false,
+            track: Vec::new(),
+        };
+        Self {
+            grid,
+            field,
+            safety_distance_m,
+            vehicles: radii_m.iter().map(watched).collect(),
+            too_near: vec![false; radii_m.len() * radii_m.len()],
+            recorded_s: f64::NEG_INFINITY,
+            window: NOTHING,
+            wall_contacts: 0,
+            violations: 0,
+            deadlocks: 0,
+            min_clearance_m: f32::INFINITY,
+            min_separation_m: f32::INFINITY,
+            samples: Vec::new(),
+        }
+    }
+
+    /// Looks at all vehicles at one physics step.
+    pub fn observe(&mut self, t_s: f64, seen: &[Observation]) {
+        for (i, now) in seen.iter().enumerate() {
+            self.watch_walls(i, now);
+            self.watch_progress(i, t_s, now);
+            let vehicle = &mut self.vehicles[i];
+            if let Some(last) = vehicle.last.replace(now.position) {
+                vehicle.flown_m += f64::from((now.position - last).norm());
+            }
+        }
+        self.watch_pairs(seen);
+        if t_s - self.recorded_s >= RECORD_S - 1e-6 {
+            self.recorded_s = t_s;
+            self.samples.push(Sample { t_s: t_s as f32, ..self.window });
+            self.window = NOTHING;
+            for (vehicle, now) in self.vehicles.iter_mut().zip(seen) {
+                vehicle.track.push((t_s as f32, now.position));
+            }
+        }
+    }
+
+    /// Way flown by a vehicle, metres.
+    pub fn flown_m(&self, vehicle: usize) -> f64 {
+        self.vehicles[vehicle].flown_m
+    }
+
+    /// Recorded times and places of a vehicle.
+    pub fn track(&self, vehicle: usize) -> &[(f32, Point)] {
+        &self.vehicles[vehicle].track
+    }
+
+    fn watch_walls(&mut self, i: usize, now: &Observation) {
+        if now.phase == Phase::Grounded {
+            return;
+        }
+        let radius_m = self.vehicles[i].radius_m;
+        let flying = now.phase == Phase::Flying;
+        // Only a distance that is a contact, or the smallest of its time, has to be exact.
+        let wanted = if flying { self.window.clearance_m.max(radius_m) } else { radius_m };
+        let touches = if self.field.lower_bound_m(&now.position) < wanted {
+            let reach = wanted.min(CLEARANCE_LOOK_M);
+            let clearance_m = point_clearance(&self.grid, &now.position, reach);
+            if flying && clearance_m < reach {
+                self.window.clearance_m = self.window.clearance_m.min(clearance_m);
+                self.min_clearance_m = self.min_clearance_m.min(clearance_m);
+            }
+            let touches = clearance_m < radius_m - TOUCH_M;
+            touches && (flying || self.touches_beside(&now.position, radius_m))
+        } else {
+            false
+        };
+        let vehicle = &mut self.vehicles[i];
+        self.wall_contacts += u32::from(touches && !vehicle.in_contact);
+        vehicle.in_contact = touches;
+    }
+
+    /// Whether a body on or near the floor touches something that is not below its centre.
+    fn touches_beside(&self, position: &Point, radius_m: f32) -> bool {
+        let shape = self.grid.shape();
+        let reach = Point::repeat(radius_m);
+        let cell = |p: Point| [0, 1, 2].map(|a| ((p[a] - shape.min[a]) / shape.resolution_m).floor() as i64);
+        let (low, high) = (cell(position - reach), cell(position + reach));
+        let dims = shape.dims.map(i64::from);
+        let inside = |c: [i64; 3]| (0..3).all(|a| c[a] >= 0 && c[a] < dims[a]);
+        (low[2]..=high[2]).any(|k| {
+            (low[1]..=high[1]).any(|j| {
+                (low[0]..=high[0]).any(|i| {
+                    if !inside([i, j, k]) || !self.grid.is_occupied([i, j, k].map(|c| c as u32)) {
+                        return false;
+                    }
+                    let corner = shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
+                    let top = corner.z + shape.resolution_m;
+                    let nearest = position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
+                    top > position.z && (nearest - position).norm() < radius_m - TOUCH_M
+                })
+            })
+        })
+    }
+
+    fn watch_pairs(&mut self, seen: &[Observation]) {
+        let n = seen.len();
+        for i in 0..n {
+            for j in 0..i {
+                if seen[i].phase == Phase::Grounded && seen[j].phase == Phase::Grounded {
+                    continue;
+                }
+                let apart = (seen[i].position - seen[j].position).norm();
+                self.window.separation_m = self.window.separation_m.min(apart);
+                let near = apart < self.safety_distance_m;
+                let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
+                self.violations += u32::from(near && !was_near);
+            }
+        }
+        self.min_separation_m = self.min_separation_m.min(self.window.separation_m);
+    }
+
+    fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
+        let vehicle = &mut self.vehicles[i];
+        let moved = now.progress_m > vehicle.best_progress_m + PROGRESS_M;
+        if now.phase != Phase::Flying || moved {
+            vehicle.best_progress_m = vehicle.best_progress_m.max(now.progress_m);
+            vehicle.progressed_s = t_s;
+            vehicle.stuck = false;
+        } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
+            vehicle.stuck = true;
+            self.deadlocks += 1;
+        }
+    }
+}
+
+/// Clearances beyond this are not measured, metres.
+const CLEARANCE_LOOK_M: f32 = 3.0;
+const NOTHING: Sample = Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use planner_core::voxel::{GridShape, Outside};
+
+    /// A floor at z < 1 and a wall at x > 8 in a 10 m cube of 1 m cells.
+    fn with_monitor(test: impl FnOnce(Monitor<'_>)) {
+        let shape = GridShape { dims: [10; 3], min: Point::zeros(), resolution_m: 1.0 };
+        let mut words = vec![0; shape.brick_count()];
+        for i in 0..10 {
+            for j in 0..10 {
+                for k in 0..10 {
+                    if k == 0 || i >= 8 {
+                        let (word, mask) = shape.address([i, j, k]);
+                        words[word] |= mask;
+                    }
+                }
+            }
+        }
+        let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
+        let field = ClearanceField::new(&grid);
+        test(Monitor::new(grid, &field, 1.5, &[0.5, 0.5]));
+    }
+
+    fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
+        Observation { position: Point::new(x, y, z), phase, progress_m: x }
+    }
+
+    #[test]
+    fn a_body_in_the_wall_is_one_contact_however_long() {
+        with_monitor(|mut monitor| {
+            let far = at(2.0, 8.0, 5.0, Phase::Flying);
+            for (step, x) in [7.0, 7.6, 7.7, 7.0, 7.6].into_iter().enumerate() {
+                monitor.observe(step as f64 * 0.004, &[at(x, 2.0, 5.0, Phase::Flying), far]);
+            }
+            assert_eq!(monitor.wall_contacts, 2);
+            assert!((monitor.min_clearance_m - 0.3).abs() < 1e-5, "{}", monitor.min_clearance_m);
+        });
+    }
+
+    #[test]
+    fn the_floor_is_none_while_landing_but_a_wall_is() {
+        with_monitor(|mut monitor| {
+            let far = at(2.0, 8.0, 5.0, Phase::Flying);
+            monitor.observe(0.0, &[at(4.0, 2.0, 1.4, Phase::TakeOffOrLanding), far]);
+            assert_eq!(monitor.wall_contacts, 0);
+            monitor.observe(0.1, &[at(4.0, 2.0, 1.4, Phase::Flying), far]);
+            assert_eq!(monitor.wall_contacts, 1);
+            monitor.observe(0.2, &[at(4.0, 2.0, 5.0, Phase::Flying), far]);
+            monitor.observe(0.3, &[at(7.7, 2.0, 1.6, Phase::TakeOffOrLanding), far]);
+            assert_eq!(monitor.wall_contacts, 2);
+        });
+    }
+
+    #[test]
+    fn a_near_pair_is_one_violation_unless_both_stand() {
+        with_monitor(|mut monitor| {
+            let pair = |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
+            monitor.observe(0.0, &pair(1.0, Phase::Grounded));
+            assert_eq!(monitor.violations, 0);
+            monitor.observe(0.1, &pair(1.4, Phase::Flying));
+            monitor.observe(0.2, &pair(1.3, Phase::Flying));
+            assert_eq!(monitor.violations, 1);
+            assert!((monitor.min_separation_m - 1.3).abs() < 1e-6);
+        });
+    }
+
+    #[test]
+    fn hovering_on_for_twenty_seconds_is_a_deadlock() {
+        with_monitor(|mut monitor| {
+            let seen = [at(2.0, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+            for step in 0..300 {
+                monitor.observe(f64::from(step) * 0.1, &seen);
+            }
+            assert_eq!(monitor.deadlocks, 1);
+        });
+    }
+}

@@ -1,0 +1,80 @@
+//! Assignment beside the crate `lapjv`, on the same f32 matrices: uniform reals, and small integers full of ties.
+//!
+//! Both are run alternately, so that a slow spell of the machine strikes both, and the medians are compared. Each run of
+//! ours includes the check of the input; each run of theirs the allocation it cannot do without.
+
+use std::hint::black_box;
+use std::time::{Duration, Instant};
+
+use planner_core::assignment::{AssignmentWorkspace, assign};
+
+use crate::Row;
+
+const LARGEST: usize = 1000;
+
+/// One row for N = 10, 100, 1000 and each kind of matrix, microseconds.
+pub fn rows() -> Vec<Row> {
+    let mut ws = Box::new(AssignmentWorkspace::<LARGEST>::new());
+    let mut rows = Vec::new();
+    for (n, instances) in [(10, 500), (100, 60), (LARGEST, 5)] {
+        for kind in [Kind::Real, Kind::Integer] {
+            rows.push(compare(n, instances, kind, &mut ws));
+        }
+    }
+    rows
+}
+
+#[derive(Clone, Copy)]
+pub enum Kind {
+    Real,
+    Integer,
+}
+
+fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LARGEST>) -> Row {
+    let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+    let mut out = vec![None; n];
+    for seed in 1..=instances {
+        let costs = random_costs(n, kind, seed);
+        let matrix = lapjv::Matrix::from_shape_vec((n, n), costs.clone()).expect("n by n costs");
+        for _ in 0..3 {
+            let start = Instant::now();
+            let result = assign(black_box(&costs), n, n, ws, &mut out).expect("finite costs");
+            ours.push(start.elapsed());
+            let start = Instant::now();
+            let (columns, _) = lapjv::lapjv(black_box(&matrix)).expect("a square matrix");
+            theirs.push(start.elapsed());
+            let their_total: f64 = columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
+            // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never be worse.
+            assert!(result.total <= their_total + 1e-9 * their_total, "seed {seed}: not the optimum");
+        }
+    }
+    let (ours, theirs) = (median_us(ours), median_us(theirs));
+    let kind = match kind {
+        Kind::Real => "real",
+        Kind::Integer => "integer",
+    };
+    Row { name: format!("assignment_{kind}_{n}"), ours, theirs, ratio: theirs / ours, unit: "us", n }
+}
+
+/// Uniform in [1, 100), from a seeded SplitMix64.
+pub fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
+    let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    let mut unit = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = state;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 / (1u32 << 24) as f32
+    };
+    (0..n * n)
+        .map(|_| match kind {
+            Kind::Real => 1.0 + 99.0 * unit(),
+            Kind::Integer => (1.0 + 99.0 * unit()).floor(),
+        })
+        .collect()
+}
+
+fn median_us(mut times: Vec<Duration>) -> f64 {
+    times.sort_unstable();
+    times[times.len() / 2].as_secs_f64() * 1e6
+}

@@ -1,0 +1,58 @@
+//! The spatial index finds the same edges as the all-pairs loop of Algorithm 1 with the same segment check.
+
+use flockmate_tests::shared_data;
+use host_sim::map::{self, Unknown, VoxelMap};
+use host_sim::roadmap;
+use planner_core::prm::{self, Config, Sampling};
+
+const SEEDS: u64 = 20;
+
+fn load(file: &str, resolution_m: f32) -> VoxelMap {
+    map::load(file, resolution_m).expect("the map is good").voxel_map(Unknown::Blocked)
+}
+
+fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
+    let mut fewest = usize::MAX;
+    for seed in 1..=SEEDS {
+        let config = Config {
+            nodes,
+            edge_min_m: 0.5,
+            edge_max_m: 8.0,
+            clearance_m,
+            seed,
+            sampling: Sampling::Uniform,
+        };
+        let nodes = roadmap::sample(map, &[], &config).expect("there is free space");
+        let mut indexed = roadmap::connect(map, &nodes, &config).expect("it connects");
+        let mut all_pairs = Vec::new();
+        prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))
+            .expect("it connects");
+        indexed.sort_unstable_by_key(|e| (e.a, e.b));
+        all_pairs.sort_unstable_by_key(|e| (e.a, e.b));
+        assert!(indexed == all_pairs, "{name}, clearance {clearance_m} m, seed {seed}");
+        fewest = fewest.min(indexed.len());
+    }
+    assert!(fewest > 100, "{name}: only {fewest} edges prove little");
+}
+
+#[test]
+fn building_without_a_margin() {
+    same_edges("building", &load("builtin:building", 0.25), 2300, 0.0);
+}
+
+#[test]
+fn building_with_half_a_metre() {
+    same_edges("building", &load("builtin:building", 0.25), 2300, 0.5);
+}
+
+#[test]
+fn corridor_scan() {
+    let Some(file) = shared_data("maps3d/geb079.bt") else { return };
+    same_edges("geb079", &load(&file.to_string_lossy(), 0.08), 600, 0.25);
+}
+
+#[test]
+fn manufacturing_hall() {
+    let Some(file) = shared_data("maps3d/manufacturing.bt") else { return };
+    same_edges("manufacturing", &load(&file.to_string_lossy(), 0.0866422), 600, 0.25);
+}
