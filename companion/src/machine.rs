@@ -392,6 +392,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             position_age: t.position_age(now),
             stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
             neighbour_age: self.neighbours.silence(now, self.entered_at),
+            neighbour_heard: self.neighbours.heard_within(now, HEARTBEAT_EVERY),
             plan_ready: self.plan.is_some(),
             plan_failed: self.plan_failed,
             has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),

@@ -409,8 +409,17 @@ fn every_row_has_its_scene() {
         60.0,
     );
     let lonely = || Bench::following(two_vehicles());
-    scene(lonely(), &|_| {}, Alone, 15.0);
-    scene(lonely(), &|_| {}, Done, 70.0);
+    scene(lonely(), &|b| b.stuck = true, Alone, 15.0);
+    scene(
+        lonely(),
+        &|b| {
+            b.stuck = true;
+            b.run(50.0);
+            b.stuck = false;
+        },
+        Done,
+        30.0,
+    );
     let mut unanswered = Bench::new(config());
     unanswered.answer_plan = None;
     scene(

@@ -182,8 +182,10 @@ pub struct Inputs {
     pub position_age: Duration,
     /// Time without progress along the path.
     pub stalled: Duration,
-    /// Time since a neighbour was heard; zero when none flies.
+    /// Time in the state without any neighbour heard; zero when all have landed.
     pub neighbour_age: Duration,
+    /// A neighbour was heard within the last second.
+    pub neighbour_heard: bool,
     /// A plan is held.
     pub plan_ready: bool,
     /// The shell has none.
@@ -264,7 +266,7 @@ impl Guard {
             Self::BatteryLow => i.battery_low,
             Self::OutsideGeofence => i.outside,
             Self::NeighboursSilent => i.neighbour_age > limit,
-            Self::NeighbourHeard => i.neighbour_age < Duration::from_millis(1000),
+            Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground,
         }
     }

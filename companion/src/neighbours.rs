@@ -151,6 +151,12 @@ impl<const V: usize> Neighbours<V> {
         &self.heard
     }
 
+    /// Whether a neighbour of the roster was heard within `span`.
+    pub fn heard_within(&self, now: Instant, span: Duration) -> bool {
+        let roster = self.contacts.iter().filter(|c| c.rank != u16::MAX);
+        roster.filter_map(|c| c.heard_at).any(|at| now - at < span)
+    }
+
     /// Time since any neighbour of the roster was heard; zero when all of them have landed, or there are none. Where
     /// none was ever heard, the time since `since`.
     pub fn silence(&self, now: Instant, since: Instant) -> Duration {
