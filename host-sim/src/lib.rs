@@ -3,6 +3,7 @@
 
 pub mod autopilot;
 pub mod capacity;
+pub mod link;
 pub mod map;
 pub mod progress;
 pub mod report;
