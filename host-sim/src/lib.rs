@@ -5,6 +5,7 @@ pub mod autopilot;
 pub mod capacity;
 pub mod link;
 pub mod map;
+pub mod prm;
 pub mod progress;
 pub mod report;
 pub mod result;
