@@ -1,7 +1,7 @@
 //! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries always suffice.
 
 /// The node was not reached yet.
-pub(super) const UNSEEN: u16 = 0;
+const UNSEEN: u16 = 0;
 /// The node has left the heap: its distance is final.
 pub(super) const SETTLED: u16 = u16::MAX;
 
@@ -20,14 +20,30 @@ fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
 }
 
+/// Index of the least entry. A full set is compared pairwise: selects, where branches would be mispredicted.
+#[inline(always)]
+fn least_of(entries: &[u64]) -> usize {
+    if let Ok([a, b, c, d]) = <&[u64; ARITY]>::try_from(entries) {
+        let (left, left_at) = if b < a { (b, 1) } else { (a, 0) };
+        let (right, right_at) = if d < c { (d, 3) } else { (c, 2) };
+        return if right < left { right_at } else { left_at };
+    }
+    let mut least = 0;
+    for k in 1..entries.len() {
+        least = if entries[k] < entries[least] { k } else { least };
+    }
+    least
+}
+
 impl<const N: usize> Heap<N> {
     pub(super) const fn new() -> Self {
         Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
     }
 
-    pub(super) fn clear(&mut self) {
+    /// Empties it for nodes below `nodes`.
+    pub(super) fn clear(&mut self, nodes: usize) {
         self.len = 0;
-        self.places.fill(UNSEEN);
+        self.places[..nodes].fill(UNSEEN);
     }
 
     #[inline]
@@ -77,12 +93,7 @@ impl<const N: usize> Heap<N> {
             if first >= self.len {
                 break;
             }
-            let mut least = first;
-            for child in first + 1..(first + ARITY).min(self.len) {
-                if self.entries[child] < self.entries[least] {
-                    least = child;
-                }
-            }
+            let least = first + least_of(&self.entries[first..(first + ARITY).min(self.len)]);
             if self.entries[least] >= entry {
                 break;
             }

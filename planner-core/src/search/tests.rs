@@ -80,12 +80,17 @@ proptest! {
         let all: StdVec<u16> = (0..nodes.len() as u16).collect();
         let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
         let mut path = Vec::<u16, CAPACITY>::new();
+        let mut lengths = vec![0.0; view.half_edge_count()];
+        let with_lengths = WithLengths::new(view, &mut lengths).unwrap();
+        let mut quick = vec![f32::NAN; nodes.len()];
         for &from in &all {
+            dijkstra_row(&with_lengths, from, &all, passable, &mut ws, &mut quick).unwrap();
             let mut row = vec![f32::NAN; nodes.len()];
             dijkstra_row(&view, from, &all, passable, &mut ws, &mut row).unwrap();
             for &to in &all {
                 let best = expected[usize::from(from)][usize::from(to)];
                 prop_assert!(close(f64::from(row[usize::from(to)]), best));
+                prop_assert_eq!(row[usize::from(to)].to_bits(), quick[usize::from(to)].to_bits());
                 match ws.path_to(to, &mut path) {
                     Ok(()) => check_path(&view, &path, (from, to), row[usize::from(to)]),
                     Err(e) => prop_assert_eq!((e, best), (SearchError::NoPath, f64::INFINITY)),
@@ -95,6 +100,9 @@ proptest! {
                 let best = expected[usize::from(from)][usize::from(to)];
                 match astar(&view, from, to, passable, &mut ws, &mut path) {
                     Ok(length) => {
+                        let (same, mut same_path) = (path.clone(), Vec::<u16, CAPACITY>::new());
+                        let again = astar(&with_lengths, from, to, passable, &mut ws, &mut same_path);
+                        prop_assert_eq!((again, same_path), (Ok(length), same));
                         prop_assert!(close(f64::from(length), best));
                         check_path(&view, &path, (from, to), length);
                     }
