@@ -19,6 +19,9 @@ use heap::{Heap, SETTLED};
 /// Half-edges looked at together; a row is seldom longer.
 const CHUNK: usize = 64;
 
+/// Up to so many targets the search is drawn to each in turn: a board's 32 vehicles.
+const FEW_TARGETS: usize = 32;
+
 /// Why a search gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SearchError {
@@ -207,27 +210,16 @@ pub fn astar<const N: usize, const P: usize>(
     out_nodes: &mut Vec<u16, P>,
 ) -> Result<f32, SearchError> {
     out_nodes.clear();
-    let view = graph.view();
-    check_node(view, to)?;
-    let goal = view.node(to);
-    let mut target_left = 1;
-    search(
-        graph,
-        from,
-        passable,
-        |node| libm::sqrtf((view.node(node) - goal).norm_squared()),
-        |node| {
-            target_left -= usize::from(node == to);
-            target_left == 0
-        },
-        ws,
-    )?;
+    search(graph, from, &[to], passable, ws)?;
     ws.path_to(to, out_nodes)?;
     Ok(ws.distance_m(to))
 }
 
 /// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`; infinite where there is
-/// none. Stops when all targets are settled. One row of the cost matrix.
+/// none. One row of the cost matrix; stops when all targets are settled.
+///
+/// For few targets the search is drawn to them one after another: what A* settled for one target stays settled, its
+/// distance is final, and only the waiting nodes are ordered anew for the next. For many it is Dijkstra's.
 pub fn dijkstra_row<const N: usize>(
     graph: &impl Graph,
     from: u16,
@@ -239,21 +231,7 @@ pub fn dijkstra_row<const N: usize>(
     if out.len() != targets.len() {
         return Err(SearchError::OutputLength);
     }
-    for &target in targets {
-        check_node(graph.view(), target)?;
-    }
-    let mut left = targets.len();
-    search(
-        graph,
-        from,
-        passable,
-        |_| 0.0,
-        |node| {
-            left -= targets.iter().filter(|&&t| t == node).count();
-            left == 0
-        },
-        ws,
-    )?;
+    search(graph, from, targets, passable, ws)?;
     for (length, &target) in out.iter_mut().zip(targets) {
         *length = ws.distance_m(target);
     }
@@ -264,13 +242,12 @@ fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }
 
-/// Settles nodes in order of distance + `heuristic` until `done(node)` or none is left.
+/// Settles nodes until all of `targets` are settled or none is left to settle.
 fn search<const N: usize>(
     graph: &impl Graph,
     from: u16,
+    targets: &[u16],
     passable: impl Fn(u16, &HalfEdge) -> bool,
-    heuristic: impl Fn(u16) -> f32,
-    mut done: impl FnMut(u16) -> bool,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
     let view = graph.view();
@@ -278,36 +255,63 @@ fn search<const N: usize>(
         return Err(SearchError::WorkspaceTooSmall);
     }
     check_node(view, from)?;
+    for &target in targets {
+        check_node(view, target)?;
+    }
     ws.heap.clear(view.node_count());
     let distance = &mut ws.distance[..view.node_count()];
     distance.fill(f32::INFINITY);
     distance[usize::from(from)] = 0.0;
     ws.parent[usize::from(from)] = from;
-    ws.heap.push(from, heuristic(from));
-    while let Some(node) = ws.heap.pop() {
-        if done(node) {
-            break;
+    ws.heap.push(from, 0.0);
+    let informed = targets.len() <= FEW_TARGETS;
+    for &target in targets {
+        let goal = view.node(target);
+        let heuristic = |node: u16| match informed {
+            true => libm::sqrtf((view.node(node) - goal).norm_squared()),
+            false => 0.0,
+        };
+        if informed && ws.heap.place(target) != SETTLED {
+            let distance = &ws.distance;
+            ws.heap.reorder(|node| distance[usize::from(node)] + heuristic(node));
         }
-        let here = view.node(node);
-        let reached = distance[usize::from(node)];
-        let (first, row) = view.row(node);
-        for (chunk, half_edges) in row.chunks(CHUNK).enumerate() {
-            let first = first + chunk * CHUNK;
-            let mut gains = [0; CHUNK];
-            let count = graph.gains(first, half_edges, &here, reached, distance, &mut gains);
-            for &k in gains.iter().take(count) {
-                let (k, target) = (first + usize::from(k), target_of(&half_edges[usize::from(k)]));
-                let length = reached + graph.length(k, &here, target);
-                let gain = length < distance[usize::from(target)] && ws.heap.place(target) != SETTLED;
-                if gain && passable(node, &view.half_edge(k)) {
-                    distance[usize::from(target)] = length;
-                    ws.parent[usize::from(target)] = node;
-                    ws.heap.push(target, length + heuristic(target));
-                }
-            }
+        while ws.heap.place(target) != SETTLED
+            && let Some(node) = ws.heap.pop()
+        {
+            relax(graph, node, &passable, heuristic, ws);
         }
     }
     Ok(())
+}
+
+/// Offers the settled `node`'s edges to its neighbours.
+#[inline]
+fn relax<const N: usize>(
+    graph: &impl Graph,
+    node: u16,
+    passable: &impl Fn(u16, &HalfEdge) -> bool,
+    heuristic: impl Fn(u16) -> f32,
+    ws: &mut SearchWorkspace<N>,
+) {
+    let view = graph.view();
+    let distance = &mut ws.distance[..view.node_count()];
+    let (here, reached) = (view.node(node), distance[usize::from(node)]);
+    let (first, row) = view.row(node);
+    for (chunk, half_edges) in row.chunks(CHUNK).enumerate() {
+        let first = first + chunk * CHUNK;
+        let mut gains = [0; CHUNK];
+        let count = graph.gains(first, half_edges, &here, reached, distance, &mut gains);
+        for &place in gains.iter().take(count) {
+            let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
+            let length = reached + graph.length(k, &here, target);
+            let gain = length < distance[usize::from(target)] && ws.heap.place(target) != SETTLED;
+            if gain && passable(node, &view.half_edge(k)) {
+                distance[usize::from(target)] = length;
+                ws.parent[usize::from(target)] = node;
+                ws.heap.push(target, length + heuristic(target));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -16,6 +16,10 @@ pub(super) struct Heap<const N: usize> {
     places: [u16; N],
 }
 
+fn entry_of(node: u16, cost: f32) -> u64 {
+    u64::from(cost.to_bits()) << 16 | u64::from(node)
+}
+
 fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
 }
@@ -61,7 +65,7 @@ impl<const N: usize> Heap<N> {
             }
             place => usize::from(place) - 1,
         };
-        let entry = u64::from(cost.to_bits()) << 16 | u64::from(node);
+        let entry = entry_of(node, cost);
         while at > 0 {
             let above = (at - 1) / ARITY;
             if self.entries[above] <= entry {
@@ -81,13 +85,20 @@ impl<const N: usize> Heap<N> {
         self.len -= 1;
         let entry = self.entries[self.len];
         if self.len > 0 {
-            self.sift_down(entry);
+            self.sift_down(0, entry);
         }
         Some(node_of(top) as u16)
     }
 
-    fn sift_down(&mut self, entry: u64) {
-        let mut at = 0;
+    /// Gives every node in it a new cost. O(length).
+    pub(super) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
+        for at in (0..self.len).rev() {
+            let node = node_of(self.entries[at]) as u16;
+            self.sift_down(at, entry_of(node, cost(node)));
+        }
+    }
+
+    fn sift_down(&mut self, mut at: usize, entry: u64) {
         loop {
             let first = at * ARITY + 1;
             if first >= self.len {
