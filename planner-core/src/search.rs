@@ -238,6 +238,58 @@ pub fn dijkstra_row<const N: usize>(
     Ok(())
 }
 
+/// The cost matrix of an allocation: lengths in metres of the shortest passable paths from each of `starts` to each of
+/// `goals`, row-major into `out`; infinite where there is none.
+///
+/// Searched from the starts or, against the direction of flight, from the goals, whichever is likely less work: a search
+/// drawn to targets that lie close together settles few nodes beside those on the way. `passable` is always asked about
+/// the direction of flight.
+pub fn cost_matrix<const N: usize>(
+    graph: &impl Graph,
+    starts: &[u16],
+    goals: &[u16],
+    passable: impl Fn(u16, &HalfEdge) -> bool,
+    ws: &mut SearchWorkspace<N>,
+    out: &mut [f32],
+) -> Result<(), SearchError> {
+    if starts.len().checked_mul(goals.len()) != Some(out.len()) {
+        return Err(SearchError::OutputLength);
+    }
+    let view = graph.view();
+    for &node in starts.iter().chain(goals) {
+        check_node(view, node)?;
+    }
+    if out.is_empty() {
+        return Ok(());
+    }
+    let ((starts_at, starts_across), (goals_at, goals_across)) = (spread(view, starts), spread(view, goals));
+    let between = libm::sqrtf((goals_at - starts_at).norm_squared());
+    let from_starts = starts.len() as f32 * (between + goals_across);
+    let from_goals = goals.len() as f32 * (between + starts_across);
+    if from_starts <= from_goals {
+        for (&start, row) in starts.iter().zip(out.chunks_mut(goals.len())) {
+            dijkstra_row(graph, start, goals, &passable, ws, row)?;
+        }
+        return Ok(());
+    }
+    let in_flight = |node: u16, edge: &HalfEdge| passable(edge.target, &HalfEdge { target: node, ..*edge });
+    for (column, &goal) in goals.iter().enumerate() {
+        search(graph, goal, starts, in_flight, ws)?;
+        for (row, &start) in starts.iter().enumerate() {
+            out[row * goals.len() + column] = ws.distance_m(start);
+        }
+    }
+    Ok(())
+}
+
+/// Centre and diagonal of the box around some nodes.
+fn spread(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
+    let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
+    let corners = nodes.iter().map(|&node| view.node(node));
+    let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
+    ((low + high) / 2.0, libm::sqrtf((high - low).norm_squared()))
+}
+
 fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }
