@@ -10,6 +10,7 @@ use super::load;
 use crate::mission::Mission;
 use crate::output;
 use crate::progress::Progress;
+use crate::report::Level;
 use crate::scenario::{self, Scenario};
 use crate::swarm;
 
@@ -68,6 +69,10 @@ fn plan_and_fly(scenario: Scenario, command: &'static str, out: &Path, realtime:
     mission.timing.wall_s = began.elapsed().as_secs_f64();
     output::write(out, &flight.result, &mission.timing, page)?;
     output::print_summary(&flight.result, out);
+    for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
+        let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
+        println!("           {:.2} s{id}: {}", incident.t_s, incident.text);
+    }
     println!(
         "           {:.0} s simulated in {:.1} s, {:.0} × real time",
         flight.simulated_s,

@@ -153,6 +153,12 @@ pub fn fly(
         },
         roadmap: mission.roadmap_size(),
     };
+    log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
+        t_s: *t_s as f32,
+        vehicle: Some(scenario.vehicles[*i].id),
+        level: Level::Error,
+        text: text.clone(),
+    }));
     let tracks = (0..members.len()).map(|i| monitor.track(i).to_vec()).collect();
     Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
 }
