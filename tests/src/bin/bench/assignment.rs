@@ -25,7 +25,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 #[derive(Clone, Copy)]
-pub enum Kind {
+enum Kind {
     Real,
     Integer,
 }
@@ -58,7 +58,7 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
 }
 
 /// Uniform in [1, 100), from a seeded SplitMix64.
-pub fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
+fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mut unit = || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
