@@ -116,7 +116,11 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
     let mut bench = Bench::following(config());
     bench.swarm.clear();
     bench.run(1.0);
-    let places: Vec<_> = bench.swarm.iter().filter_map(|f| f.decode::<GLOBAL_POSITION_INT_DATA>()).collect();
+    let places: Vec<_> = bench
+        .swarm
+        .iter()
+        .filter_map(super::super::frame::Frame::decode::<GLOBAL_POSITION_INT_DATA>)
+        .collect();
     let intents: Vec<_> = bench.swarm.iter().filter_map(|f| Intent::decode(f.padded(), SYSTEM)).collect();
     assert_eq!((places.len(), intents.len()), (5, 5));
     let last = &places[4];

@@ -55,7 +55,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.mode = px4::RTL;
             b.status = 5;
-            b.refused.push(176)
+            b.refused.push(176);
         },
         Aborted,
         5.0,
@@ -64,7 +64,7 @@ fn every_row_has_its_scene() {
         to(Streaming),
         &|b| {
             b.mode = px4::RTL;
-            b.refused.push(176)
+            b.refused.push(176);
         },
         Aborted,
         5.0,
@@ -79,7 +79,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.silent = true;
             b.run(6.0);
-            b.silent = false
+            b.silent = false;
         },
         Done,
         60.0,
@@ -94,7 +94,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.no_position = true;
             b.run(2.0);
-            b.no_position = false
+            b.no_position = false;
         },
         Done,
         60.0,
@@ -105,7 +105,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.no_position = true;
             b.run(1.5);
-            land(b)
+            land(b);
         },
         Done,
         30.0,
@@ -124,7 +124,7 @@ fn every_row_has_its_scene() {
             b.run(0.3);
             b.enu.x += 1.5;
             b.run(0.3);
-            b.start()
+            b.start();
         },
         Aborted,
         1.0,
@@ -134,7 +134,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.armed = true;
             b.run(1.5);
-            b.start()
+            b.start();
         },
         Aborted,
         1.0,
@@ -148,7 +148,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.stuck = true;
             b.run(61.0);
-            b.stuck = false
+            b.stuck = false;
         },
         Done,
         30.0,
@@ -159,7 +159,7 @@ fn every_row_has_its_scene() {
         &|b| {
             pause(b);
             b.run(3.0);
-            resume(b)
+            resume(b);
         },
         Done,
         60.0,
@@ -168,7 +168,7 @@ fn every_row_has_its_scene() {
         flying(),
         &|b| {
             pause(b);
-            b.run(601.0)
+            b.run(601.0);
         },
         Done,
         30.0,
@@ -178,7 +178,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.stuck = true;
             b.run(310.0);
-            b.stuck = false
+            b.stuck = false;
         },
         Done,
         30.0,
@@ -188,7 +188,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.stays_armed = true;
             b.refused.push(400);
-            land(b)
+            land(b);
         },
         Aborted,
         60.0,
@@ -211,7 +211,7 @@ fn every_row_has_its_scene() {
         unanswered,
         &|b| {
             b.run(35.0);
-            b.answer_plan = Some(Ok(plan()))
+            b.answer_plan = Some(Ok(plan()));
         },
         Ready,
         40.0,
@@ -222,7 +222,7 @@ fn every_row_has_its_scene() {
         idle,
         &|b| {
             b.until(Ready, 6.0);
-            b.start()
+            b.start();
         },
         Done,
         1.0,
@@ -244,7 +244,7 @@ fn every_row_has_its_scene() {
         &|b| {
             b.mode = px4::OFFBOARD;
             b.run(2.0);
-            resume(b)
+            resume(b);
         },
         Done,
         60.0,
@@ -254,7 +254,7 @@ fn every_row_has_its_scene() {
         &|b| {
             for _ in 0..20 {
                 b.enu.y += 0.1;
-                b.run(0.1)
+                b.run(0.1);
             }
             b.mode = px4::OFFBOARD;
             b.run(2.0);
@@ -269,7 +269,7 @@ fn every_row_has_its_scene() {
         &|b| {
             (b.mode, b.status) = (px4::RTL, 5);
             b.run(302.0);
-            b.armed = false
+            b.armed = false;
         },
         Aborted,
         3.0,
@@ -280,7 +280,7 @@ fn every_row_has_its_scene() {
             b.start();
             b.until(Streaming, 3.0);
             land(b);
-            b.start()
+            b.start();
         },
         Ready,
         6.0,
