@@ -1,9 +1,16 @@
 //! The desk side of Flockmate: maps, planning, simulated autopilots and swarm simulation.
 #![forbid(unsafe_code)]
 
-pub mod capacity;
-pub mod map;
 pub mod autopilot;
+pub mod capacity;
+pub mod commands;
+pub mod link;
+pub mod map;
+pub mod mission;
+pub mod output;
+pub mod progress;
 pub mod report;
 pub mod result;
+pub mod roadmap;
 pub mod scenario;
+pub mod swarm;

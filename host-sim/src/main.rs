@@ -26,7 +26,7 @@ enum Command {
     /// Plan and fly a scenario with simulated autopilots
     Fly(commands::fly::FlyArgs),
     /// Simulate one autopilot for any MAVLink client
-    Autopilot(autopilot::command::Args),
+    Autopilot(autopilot::server::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
     Companion(commands::companion::Args),
 }
@@ -41,7 +41,7 @@ fn main() -> ExitCode {
         Command::Roadmap(args) => commands::roadmap::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Fly(args) => commands::fly::run(&args),
-        Command::Autopilot(args) => autopilot::command::run(&args),
+        Command::Autopilot(args) => autopilot::server::run(&args),
         Command::Companion(args) => commands::companion::run(&args),
     };
     done.unwrap_or_else(|error| {

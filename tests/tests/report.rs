@@ -36,7 +36,7 @@ fn chromium() -> Option<PathBuf> {
 fn building() -> MapSurface {
     let shape = GridShape { dims: [48, 32, 24], min: Point::zeros(), resolution_m: 0.25 };
     let filled = |i: u32, j: u32, k: u32| {
-        let slab = k % 12 == 0 || k == 23;
+        let slab = k.is_multiple_of(12) || k == 23;
         let shaft = (36..42).contains(&i) && (4..10).contains(&j) && k == 12;
         let hull = i == 0 || j == 0 || i == 47 || j == 31;
         let window = (14..20).contains(&i) && (4..9).contains(&(k % 12));
@@ -130,21 +130,24 @@ struct Opened {
 
 /// Opens `page` once for its document and once for its picture, with `hash` after the address.
 fn open(chromium: &Path, page: &Path, hash: &str) -> Opened {
-    let dir = page.parent().expect("the page is in a directory");
-    let picture = dir.join("picture.png");
-    let dom = browse(chromium, page, hash, &["--dump-dom".to_owned()]);
-    browse(chromium, page, hash, &[format!("--screenshot={}", picture.display())]);
-    let decoder = png::Decoder::new(BufReader::new(File::open(&picture).expect("a screenshot")));
+    let dom = browse(chromium, page, hash, "--dump-dom");
+    Opened { dom, pixels: picture(chromium, page, hash) }
+}
+
+/// The window's pixels, row by row from the top.
+fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
+    let file = page.with_extension("png");
+    browse(chromium, page, hash, &format!("--screenshot={}", file.display()));
+    let decoder = png::Decoder::new(BufReader::new(File::open(&file).expect("a screenshot")));
     let mut reader = decoder.read_info().expect("a PNG header");
     let mut bytes = vec![0; reader.output_buffer_size().expect("a size that fits memory")];
     let info = reader.next_frame(&mut bytes).expect("a PNG frame");
     assert_eq!((info.width, info.height), WINDOW);
-    let pixels = bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect();
-    Opened { dom, pixels }
+    bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect()
 }
 
 /// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its standard output.
-fn browse(chromium: &Path, page: &Path, hash: &str, action: &[String]) -> String {
+fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
     let profile = tempfile::tempdir().expect("a profile directory");
     let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
     let mut child = Command::new(chromium)
@@ -159,7 +162,7 @@ fn browse(chromium: &Path, page: &Path, hash: &str, action: &[String]) -> String
         .args(["--virtual-time-budget=4000", "--force-device-scale-factor=1", "--hide-scrollbars"])
         .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))
         .arg(format!("--window-size={},{}", WINDOW.0, WINDOW.1))
-        .args(action)
+        .arg(action)
         .arg(format!("file://{}{hash}", page.display()))
         .stdin(Stdio::null())
         .stdout(File::create(&out).expect("a file for stdout"))
@@ -198,14 +201,14 @@ impl Opened {
             .unwrap_or_else(|| panic!("data-{name} is no number"))
     }
 
-    /// Places in the scene (left of the side panel, above the plots) of exactly this colour.
-    fn places(&self, color: [u8; 3]) -> Vec<(u32, u32)> {
+    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance` steps a channel.
+    fn places(&self, color: [u8; 3], tolerance: u8) -> Vec<(u32, u32)> {
         let at = |i: usize| (i as u32 % WINDOW.0, i as u32 / WINDOW.0);
         let matches = self
             .pixels
             .iter()
             .enumerate()
-            .filter(|&(_, &p)| p.iter().zip(color).all(|(&a, b)| a.abs_diff(b) <= 3));
+            .filter(|&(_, &p)| p.iter().zip(color).all(|(&a, b)| a.abs_diff(b) <= tolerance));
         matches
             .map(|(i, _)| at(i))
             .filter(|&(x, y)| x < WINDOW.0 - 400 && y > 50 && y < WINDOW.1 - 230)
@@ -238,12 +241,16 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
     assert_eq!(later.count("t"), 8.0);
     for index in 0..2 {
         let color = vehicle_color(index);
-        let (before, after) = (start.places(color), later.places(color));
+        let (before, after) = (start.places(color, 3), later.places(color, 3));
         // Before the start only the disc and the markers are full colour; later the flown track is.
         assert!(before.len() > 60, "{color:?}: {} pixels at the start", before.len());
         assert!(after.len() > before.len() + 100, "{color:?}: {} then {}", before.len(), after.len());
         let appeared = after.iter().filter(|place| !before.contains(place)).count();
         let left = before.iter().filter(|place| !after.contains(place)).count();
+        // Planned paths cover 85 % of the ground behind them.
+        let planned = color.map(|c| ((u16::from(c) * 85 + 24 * 15) / 100) as u8);
+        let planned = start.places(planned, 10).len();
+        assert!(planned > 100, "{color:?}: {planned} pixels of planned path");
         assert!(appeared > 100 && left > 20, "{color:?}: {appeared} appeared, {left} left");
     }
 }
@@ -261,8 +268,8 @@ fn map_style_and_roadmap_change_the_picture() {
     write(&bare, &ReportData { roadmap: None, ..report() }).expect("the page is written");
     let pictures =
         [(&whole, "#map=x-ray"), (&whole, "#map=off"), (&whole, "#map=solid&cut=2.5"), (&bare, "#map=off")];
-    let [glass, none, solid, bare] = pictures.map(|(page, hash)| open(&chromium, page, hash));
-    let changed = |a: &Opened, b: &Opened| a.pixels.iter().zip(&b.pixels).filter(|(p, q)| p != q).count();
+    let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
+    let changed = |a: &[[u8; 3]], b: &[[u8; 3]]| a.iter().zip(b).filter(|(p, q)| p != q).count();
     assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
     assert!(changed(&solid, &none) > 20_000, "solid: {}", changed(&solid, &none));
     assert!(changed(&solid, &glass) > 20_000, "solid against x-ray: {}", changed(&solid, &glass));

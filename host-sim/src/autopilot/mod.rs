@@ -31,6 +31,7 @@ mod inbox;
 pub mod noise;
 pub mod port;
 pub mod px4;
+pub mod server;
 pub mod telemetry;
 pub mod vehicle;
 pub mod wire;

@@ -190,3 +190,467 @@ fn it_arms_goes_offboard_follows_setpoints_and_lands() {
     assert!((2.2..=2.4).contains(&to_disarm), "disarmed {to_disarm} s after ON_GROUND");
     assert!((bench.autopilot.truth().position - Point::new(4.0, 10.0, 0.3)).norm() < 0.3);
 }
+
+#[test]
+fn it_floods_at_once_at_px4s_rates() {
+    let mut bench = Bench::new();
+    bench.run(0.1);
+    assert!(bench.of(30).count() >= 9, "ATTITUDE before anything was asked");
+    let known = bench.received.len();
+    assert!(known > 20);
+    bench.run(9.9);
+    for (id, rate) in
+        [(30, 100.0), (105, 50.0), (331, 30.0), (111, 10.0), (4, 1.0), (0, 1.0), (33, 50.0), (245, 5.0)]
+    {
+        let seen = bench.of(id).count() as f64 / 10.0;
+        assert!((seen - rate).abs() <= 0.05 * rate + 0.1, "message {id}: {seen} Hz, not {rate}");
+    }
+    let counters = bench.framer.counters();
+    assert_eq!((counters.bad_crc, counters.unknown, counters.noise_bytes), (0, 0, 0));
+    assert!(bench.of(253).next().is_none(), "no STATUSTEXT on this link");
+}
+
+#[test]
+fn sequence_numbers_have_no_gap() {
+    let mut bench = Bench::new();
+    bench.run(5.0);
+    for pair in bench.received.windows(2) {
+        assert_eq!(pair[1].1.sequence, pair[0].1.sequence.wrapping_add(1));
+    }
+}
+
+#[test]
+fn offboard_is_accepted_disarmed_without_a_stream_but_arming_is_not() {
+    let mut bench = Bench::new();
+    bench.run(1.0);
+    assert_eq!(bench.heartbeat(), (HOLD, 29, 3));
+    assert_eq!(bench.set_mode(6.0, 0.0), [0, 0]);
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat(), (OFFBOARD, 1, 0));
+    assert_eq!(bench.arm(), [1]);
+}
+
+#[test]
+fn offboard_in_the_air_without_a_stream_is_acknowledged_0_then_1_and_does_not_change_the_mode() {
+    let mut bench = Bench::hovering(5.0);
+    assert_eq!(bench.set_mode(4.0, 3.0), [0, 0]);
+    bench.stream = None;
+    bench.run(3.0);
+    assert_eq!(bench.set_mode(6.0, 0.0), [0, 1]);
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat().0, HOLD);
+    // One setpoint later it is accepted.
+    bench.send(84, &setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+    assert_eq!(bench.set_mode(6.0, 0.0), [0, 0]);
+}
+
+#[test]
+fn position_setpoints_alone_lift_it_off_in_px4s_time() {
+    let mut bench = Bench::new();
+    bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+    bench.run(1.0);
+    bench.set_mode(6.0, 0.0);
+    bench.arm();
+    // 6.3 s to within 5 %.
+    let took = bench.until(10.0, |a| a.truth().position.z - 0.3 > 4.6);
+    assert!((5.0..7.5).contains(&took), "{took} s");
+}
+
+#[test]
+fn lost_setpoints_start_the_return_within_1_23_s_and_a_stream_ends_it_by_itself() {
+    let mut bench = Bench::hovering(5.0);
+    bench.stream = None;
+    let took = bench.until(3.0, Autopilot::in_failsafe);
+    assert!((1.0..=1.23).contains(&took), "failsafe after {took} s");
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat(), (RETURN, 157, 5));
+    bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+    let back = bench.until(1.0, |a| !a.in_failsafe());
+    assert!(back < 0.1, "back in Offboard after {back} s");
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat(), (OFFBOARD, 145, 4));
+}
+
+#[test]
+fn the_failsafe_is_what_com_obl_rc_act_says() {
+    for (action, mode) in [(0, RETURN), (3, RETURN), (4, LAND), (5, HOLD)] {
+        let mut bench = Bench::hovering(5.0);
+        bench.set_param("COM_OBL_RC_ACT", f32::from_bits(action), 6);
+        bench.stream = None;
+        bench.run(2.5);
+        assert_eq!(bench.heartbeat(), (mode, 157, 5), "COM_OBL_RC_ACT {action}");
+    }
+}
+
+#[test]
+fn com_of_loss_t_acts() {
+    let mut bench = Bench::hovering(5.0);
+    bench.set_param("COM_OF_LOSS_T", 3.0, 9);
+    bench.stream = None;
+    let took = bench.until(5.0, Autopilot::in_failsafe);
+    assert!((3.0..3.3).contains(&took), "failsafe after {took} s");
+}
+
+#[test]
+fn slow_streams_keep_offboard_down_to_1_2_hz_and_not_at_0_8() {
+    for (rate, keeps) in [(2.5, true), (1.2, true), (0.8, false)] {
+        let mut bench = Bench::hovering(5.0);
+        bench.stream(rate, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+        let mut lost = false;
+        for _ in 0..2000 {
+            bench.run(0.004);
+            lost |= bench.autopilot.in_failsafe();
+        }
+        assert_eq!(lost, !keeps, "{rate} Hz");
+    }
+}
+
+#[test]
+fn a_hold_somebody_commanded_stays_though_setpoints_flow() {
+    let mut bench = Bench::hovering(5.0);
+    assert_eq!(bench.set_mode(4.0, 3.0), [0, 0]);
+    bench.run(3.0);
+    assert_eq!(bench.heartbeat(), (HOLD, 157, 4));
+}
+
+#[test]
+fn what_asks_for_nothing_counts_as_loss() {
+    let at = [0.0, 0.0, -5.0];
+    let mut wrong_component = setpoint(POSITION, 1, at, [0.0; 3], 0.0);
+    wrong_component[51] = 2;
+    for (what, payload) in [
+        ("mask 0xDFF", setpoint(0xDFF, 1, at, [0.0; 3], 0.0)),
+        ("wrong target component", wrong_component),
+        ("frame 7", setpoint(VELOCITY, 7, at, [1.0, 0.0, 0.0], 0.0)),
+        ("NaN", setpoint(POSITION, 1, [f32::NAN; 3], [0.0; 3], 0.0)),
+    ] {
+        let mut bench = Bench::hovering(5.0);
+        bench.stream(20.0, payload);
+        bench.run(1.5);
+        assert!(bench.autopilot.in_failsafe(), "{what}");
+    }
+}
+
+#[test]
+fn velocity_position_with_feed_forward_and_yaw_masks_fly() {
+    let mut bench = Bench::hovering(5.0);
+    bench.stream(20.0, setpoint(VELOCITY, 1, [0.0; 3], [0.0, 2.0, 0.0], 0.0));
+    bench.run(4.0);
+    let v = bench.autopilot.truth().velocity;
+    assert!((1.6..1.95).contains(&v.x) && v.y.abs() < 0.1, "east 2 m/s asked, {v} flown");
+    // Position and velocity together, mask 0xDC0.
+    bench.stream(20.0, setpoint(0xDC0, 1, [3.0, 1.0, -6.0], [0.0; 3], 0.0));
+    bench.run(12.0);
+    let at = bench.autopilot.truth().position;
+    assert!((at - Point::new(1.0, 3.0, 6.0)).norm() < 0.3, "at {at}");
+    // Position and yaw, mask 0x9F8.
+    bench.stream(20.0, setpoint(0x9F8, 1, [3.0, 1.0, -6.0], [0.0; 3], 1.57));
+    bench.run(5.0);
+    assert!((bench.autopilot.truth().heading_rad - 1.57).abs() < 0.02);
+    // Velocity ahead of the body, mask 0x5C7 with a yaw rate of zero: ahead is east now.
+    bench.stream(20.0, setpoint(0x5C7, 8, [0.0; 3], [1.5, 0.0, 0.0], 0.0));
+    bench.run(4.0);
+    let v = bench.autopilot.truth().velocity;
+    assert!(v.x > 1.1 && v.y.abs() < 0.15, "ahead asked, {v} flown");
+}
+
+#[test]
+fn global_setpoints_fly_to_the_same_place() {
+    let mut bench = Bench::hovering(5.0);
+    bench.stream = None;
+    let goal = Point::new(6.0, -4.0, 7.0);
+    let place = frames::enu_to_geodetic(&bench.autopilot.config.world_origin, &goal);
+    let mut payload = setpoint(POSITION, 5, [0.0; 3], [0.0; 3], 0.0);
+    payload[4..8].copy_from_slice(&((place.lat_deg * 1e7).round() as i32).to_le_bytes());
+    payload[8..12].copy_from_slice(&((place.lon_deg * 1e7).round() as i32).to_le_bytes());
+    payload[12..16].copy_from_slice(&(place.alt_m as f32).to_le_bytes());
+    for _ in 0..200 {
+        bench.send(86, &payload);
+        bench.run(0.05);
+    }
+    assert!(
+        (bench.autopilot.truth().position - goal).norm() < 0.3,
+        "at {}",
+        bench.autopilot.truth().position
+    );
+}
+
+#[test]
+fn ned_is_about_its_own_ekf_origin() {
+    let world = Config::default().world_origin;
+    let ekf = frames::enu_to_geodetic(&world, &Point::new(1200.0, -700.0, 12.0));
+    let mut bench = Bench::with(&Config { ekf_origin: ekf, ..Config::default() });
+    bench.run(0.5);
+    let b = *bench.of(32).last().unwrap().1.padded();
+    let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
+    let truth = frames::enu_to_geodetic(&world, &bench.autopilot.truth().position);
+    let expected = frames::geodetic_to_ned(Projection::Px4, &ekf, &truth);
+    for (k, at) in [4, 8, 12].into_iter().enumerate() {
+        assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
+    }
+    assert!(expected.x > 600.0 && expected.y < -1100.0);
+}
+
+#[test]
+fn the_origin_comes_once_on_change_and_on_request() {
+    let mut bench = Bench::new();
+    bench.run(10.0);
+    assert_eq!(bench.of(49).count(), 1);
+    assert_eq!(bench.command(512, [49.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [0]);
+    assert_eq!(bench.of(49).count(), 2);
+    let moved = Geodetic { lat_deg: 47.4, lon_deg: 8.54, alt_m: 480.0 };
+    bench.autopilot.set_ekf_origin(moved);
+    bench.run(5.0);
+    assert_eq!(bench.of(49).count(), 3);
+    let b = bench.of(49).last().unwrap().1.padded();
+    assert_eq!(i32::from_le_bytes([b[0], b[1], b[2], b[3]]), 474_000_000);
+}
+
+#[test]
+fn takeoff_is_to_an_altitude_above_the_sea_and_ends_in_hold() {
+    let mut bench = Bench::new();
+    bench.run(0.5);
+    let up = bench.autopilot.config.world_origin.alt_m as f32 + 8.0;
+    assert_eq!(bench.command(22, [0.0, 0.0, 0.0, f32::NAN, f32::NAN, f32::NAN, up]), [0]);
+    bench.run(1.0);
+    assert_eq!(bench.heartbeat().0, TAKEOFF);
+    assert_eq!(bench.arm(), [0]);
+    bench.until(10.0, |a| a.truth().position.z > 2.0);
+    bench.run(0.3);
+    assert_eq!(bench.landed_state(), 3);
+    bench.run(15.0);
+    assert_eq!(bench.heartbeat(), (HOLD, 157, 4));
+    assert!((bench.autopilot.truth().position.z - 8.0).abs() < 0.1, "{}", bench.autopilot.truth().position);
+}
+
+#[test]
+fn armed_and_left_alone_it_disarms_after_ten_seconds() {
+    let mut bench = Bench::new();
+    bench.run(0.5);
+    assert_eq!(bench.arm(), [0]);
+    let took = bench.until(12.0, |a| !a.truth().armed);
+    assert!((9.9..=11.2).contains(&took), "{took} s");
+}
+
+#[test]
+fn disarming_in_the_air_is_refused_unless_forced() {
+    let mut bench = Bench::hovering(5.0);
+    assert_eq!(bench.command(400, [0.0; 7]), [1]);
+    assert!(bench.autopilot.truth().armed);
+    assert_eq!(bench.command(400, [0.0, 21_196.0, 0.0, 0.0, 0.0, 0.0, 0.0]), [0]);
+    bench.run(2.0);
+    assert!(!bench.autopilot.truth().armed && bench.autopilot.truth().position.z < 0.31, "it fell");
+}
+
+#[test]
+fn after_landing_and_disarming_it_shows_offboard_again() {
+    let mut bench = Bench::hovering(3.0);
+    bench.set_mode(4.0, 6.0);
+    bench.until(30.0, |a| !a.truth().armed);
+    bench.stream = None;
+    bench.run(3.0);
+    assert_eq!(bench.heartbeat(), (OFFBOARD, 17, 0));
+}
+
+#[test]
+fn return_climbs_comes_home_and_lands() {
+    let mut bench = Bench::hovering(3.0);
+    bench.stream(20.0, setpoint(POSITION, 1, [25.0, 0.0, -3.0], [0.0; 3], 0.0));
+    bench.run(12.0);
+    bench.set_param("RTL_RETURN_ALT", 12.0, 9);
+    bench.set_param("RTL_DESCEND_ALT", 6.0, 9);
+    assert_eq!(bench.set_mode(4.0, 5.0), [0, 0]);
+    let mut highest = 0.0_f32;
+    bench.until(90.0, |a| {
+        highest = highest.max(a.truth().position.z);
+        !a.truth().armed
+    });
+    let at = bench.autopilot.truth().position;
+    assert!(at.xy().norm() < 0.7 && highest > 11.5, "landed at {at}, {highest} m at most");
+}
+
+#[test]
+fn commands_are_answered_as_px4_answers_them() {
+    let mut bench = Bench::new();
+    let ask = |bench: &mut Bench, id, a: f32, b: f32| bench.command(id, [a, b, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    assert_eq!(ask(&mut bench, 12_345, 0.0, 0.0), [3], "unknown command");
+    assert_eq!(ask(&mut bench, 511, 9999.0, 1e5), [4], "bad message id");
+    assert_eq!(ask(&mut bench, 511, 30.0, 1e5), [0]);
+    assert_eq!(ask(&mut bench, 510, 30.0, 0.0), [0]);
+    let b = bench.of(244).last().unwrap().1.padded();
+    assert_eq!(
+        (i32::from_le_bytes([b[0], b[1], b[2], b[3]]), u16::from_le_bytes([b[4], b[5]])),
+        (100_000, 30)
+    );
+    let before = bench.of(30).count();
+    bench.run(5.0);
+    assert!((45..=55).contains(&(bench.of(30).count() - before)), "ATTITUDE at 10 Hz");
+    for (id, param, message) in [(512, 148.0, 148), (520, 1.0, 148), (519, 1.0, 300), (512, 242.0, 242)] {
+        let before = bench.of(message).count();
+        assert_eq!(ask(&mut bench, id, param, 0.0), [0], "command {id}");
+        assert!(bench.of(message).count() > before, "message {message}");
+    }
+    // A command for somebody else is not answered.
+    let before = bench.of(77).count();
+    let mut payload = [0; 33];
+    payload[28..32].copy_from_slice(&[144, 1, 1, 154]);
+    bench.send(76, &payload);
+    bench.run(0.1);
+    assert_eq!(bench.of(77).count(), before);
+}
+
+#[test]
+fn parameters_are_listed_read_and_set_bytewise() {
+    let mut bench = Bench::new();
+    bench.send(21, &[1, 1]);
+    bench.run(2.0);
+    let total =
+        usize::from(u16::from_le_bytes(bench.of(22).next().unwrap().1.padded()[4..6].try_into().unwrap()));
+    assert_eq!(bench.of(22).count(), total);
+    bench.set_param("COM_OBL_RC_ACT", f32::from_bits(5), 6);
+    let b = bench.of(22).last().unwrap().1.padded();
+    assert_eq!((u32::from_le_bytes([b[0], b[1], b[2], b[3]]), b[24]), (5, 6));
+    // The wrong type is refused, and answered with the value that stands.
+    bench.set_param("COM_OBL_RC_ACT", 4.0, 9);
+    let b = bench.of(22).last().unwrap().1.padded();
+    assert_eq!(u32::from_le_bytes([b[0], b[1], b[2], b[3]]), 5);
+}
+
+#[test]
+fn mpc_xy_vel_max_acts() {
+    let mut bench = Bench::hovering(5.0);
+    bench.set_param("MPC_XY_VEL_MAX", 2.0, 9);
+    bench.stream(20.0, setpoint(POSITION, 1, [40.0, 0.0, -5.0], [0.0; 3], 0.0));
+    bench.run(8.0);
+    let speed = bench.autopilot.truth().velocity.norm();
+    assert!((1.6..2.2).contains(&speed), "{speed} m/s");
+}
+
+#[test]
+fn an_empty_mission_is_answered() {
+    let mut bench = Bench::new();
+    bench.send(43, &[1, 1, 0]);
+    let b = bench.of(44).last().unwrap().1.padded();
+    assert_eq!(&b[..5], &[0, 0, 1, 191, 0]);
+    bench.send(45, &[1, 1, 0]);
+    assert_eq!(bench.of(47).last().unwrap().1.padded()[2], 0);
+}
+
+#[test]
+fn ping_and_timesync_are_answered() {
+    let mut bench = Bench::new();
+    bench.run(0.5);
+    bench.send(4, &telemetry::ping(123, 9, 0, 0));
+    let b = bench.of(4).last().unwrap().1.padded();
+    assert_eq!((b[0], b[8], b[12], b[13]), (123, 9, 1, 191));
+    let mut payload = [0; 16];
+    payload[8] = 77;
+    bench.send(111, &payload);
+    let b = bench.of(111).last().unwrap().1.padded();
+    assert_eq!(i64::from_le_bytes(b[..8].try_into().unwrap()), bench.autopilot.time_us() as i64 * 1000);
+    assert_eq!(b[8], 77);
+}
+
+#[test]
+fn the_pilots_switch_wins_and_needs_no_stream() {
+    let mut bench = Bench::hovering(5.0);
+    bench.autopilot.set_pilot_mode(Mode::Position);
+    bench.run(3.0);
+    assert_eq!(bench.heartbeat(), (0x0003_0000, 209, 4));
+    assert!((bench.autopilot.truth().position.z - 5.0).abs() < 0.2);
+}
+
+#[test]
+fn every_port_has_its_own_streams() {
+    let mut autopilot = Autopilot::new(&Config { ports: 2, ..Config::default() }).unwrap();
+    let header = Header { system: 1, component: 191, sequence: 0 };
+    let mut payload = [0; 33];
+    payload[..4].copy_from_slice(&30.0_f32.to_le_bytes());
+    payload[4..8].copy_from_slice(&(-1.0_f32).to_le_bytes());
+    payload[28..32].copy_from_slice(&[255, 1, 1, 1]);
+    let mut out = [0; frame::MAX_SENT];
+    let len = frame::encode_raw(header, 76, frame::extra_crc(76).unwrap(), &payload, &mut out);
+    autopilot.handle_bytes_on(1, &out[..len]);
+    let mut attitudes = [0, 0];
+    let mut framers = [Framer::new(), Framer::new()];
+    for _ in 0..250 {
+        autopilot.step(DT, 0.0);
+        for port in 0..2 {
+            let mut buffer = [0; 4096];
+            let len = autopilot.poll_transmit_from(port, &mut buffer);
+            let mut bytes = &buffer[..len];
+            while let Some(frame) = framers[port].next(Instant::from_micros(autopilot.time_us()), &mut bytes)
+            {
+                attitudes[port] += usize::from(frame.message_id == 30);
+            }
+        }
+    }
+    assert!(attitudes[0] > 90 && attitudes[1] == 0, "{attitudes:?}");
+}
+
+#[test]
+fn the_same_seed_flies_the_same_flight_bit_for_bit() {
+    let fly = |seed| {
+        let config = Config {
+            gust_mps: 1.0,
+            wind: Point::new(3.0, 0.0, 0.0),
+            position_noise_m: 0.2,
+            seed,
+            ..Config::default()
+        };
+        let mut bench = Bench::with(&config);
+        bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+        bench.run(1.0);
+        bench.set_mode(6.0, 0.0);
+        bench.arm();
+        bench.run(15.0);
+        (*bench.autopilot.truth(), bench.received.len())
+    };
+    let once = fly(1);
+    assert_eq!(once, fly(1));
+    assert_ne!(once.0.position, fly(2).0.position);
+    assert!((once.0.position - Point::new(0.0, 0.0, 5.0)).norm() < 1.5, "{}", once.0.position);
+}
+
+#[test]
+fn hostile_bytes_neither_panic_nor_move_it() {
+    let mut bench = Bench::new();
+    let mut random = noise::Gaussian::new(5);
+    for id in [4, 11, 20, 21, 23, 43, 44, 45, 75, 76, 84, 86, 111] {
+        for _ in 0..50 {
+            let payload: Vec<u8> = (0..60).map(|_| (random.sample() * 80.0) as i32 as u8).collect();
+            bench.send(id, &payload);
+        }
+    }
+    let noise: Vec<u8> = (0..20_000).map(|_| (random.sample() * 90.0) as i32 as u8).collect();
+    bench.autopilot.handle_bytes(&noise);
+    bench.run(1.0);
+    assert!(!bench.autopilot.truth().armed);
+    assert_eq!(bench.autopilot.truth().position, Config::default().start);
+}
+
+#[test]
+fn a_port_nobody_drains_does_not_grow() {
+    let mut autopilot = Autopilot::new(&Config::default()).unwrap();
+    for _ in 0..25_000 {
+        autopilot.step(DT, 0.0);
+    }
+    let mut waiting = 0;
+    let mut buffer = [0; 1024];
+    while let len @ 1.. = autopilot.poll_transmit(&mut buffer) {
+        waiting += len;
+    }
+    assert!(waiting < 8192, "{waiting} bytes were queued");
+}
+
+#[test]
+fn what_cannot_be_simulated_is_refused_by_name() {
+    let refuse = |config: Config| Autopilot::new(&config).err().unwrap().to_string();
+    assert!(
+        refuse(Config { personality: Personality::Ardupilot, ..Config::default() }).contains("ardupilot")
+    );
+    assert!(refuse(Config { system_id: 0, ..Config::default() }).contains("system id"));
+    let nowhere = Geodetic { lat_deg: 91.0, lon_deg: 0.0, alt_m: 0.0 };
+    assert!(refuse(Config { ekf_origin: nowhere, ..Config::default() }).contains("EKF origin"));
+    assert!(refuse(Config { gust_mps: f32::NAN, ..Config::default() }).contains("gust"));
+}

@@ -15,6 +15,9 @@ pub const GRAVITY: f32 = 9.806_65;
 /// Below this height over its resting place a vehicle touches the ground, metres.
 const TOUCH_M: f32 = 0.002;
 
+/// Vertical drag as a share of the horizontal: rotors meet the air edge-on when it comes from the side.
+const VERTICAL_DRAG: f32 = 0.2;
+
 /// What the airframe can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleLimits {
@@ -278,6 +281,7 @@ impl Vehicle {
 
         let airspeed = self.state.velocity - wind;
         let mut acceleration = self.thrust - airspeed * self.limits.drag_per_s;
+        acceleration.z += (1.0 - VERTICAL_DRAG) * airspeed.z * self.limits.drag_per_s;
         if clearance <= TOUCH_M && acceleration.z <= 0.0 {
             // The ground carries what thrust does not, and friction holds the feet.
             acceleration = Point::zeros();

@@ -26,15 +26,14 @@ pub const FLOOR_HEIGHT_M: f32 = 5.44;
 pub const DEFAULT_SEED: u64 = 1;
 
 const WALL_M: f32 = 0.25;
-/// The corridor between y = 9.75 and y = 14.25, walls excluded.
-const CORRIDOR_M: [f32; 2] = [9.75, 14.25];
-/// Shafts through the slabs: (x from, x to, y from, y to).
-const SHAFTS_M: [[f32; 4]; 3] =
-    [[0.75, 6.25, 9.25, 14.75], [17.5, 23.0, 9.25, 14.75], [34.75, 40.25, 9.25, 14.75]];
-/// Walls across the corridor, between the shafts: x of their west faces.
-const CROSS_WALLS_M: [f32; 2] = [12.0, 29.0];
+/// The corridor between y = 9.5 and y = 14.5, walls excluded.
+const CORRIDOR_M: [f32; 2] = [9.5, 14.5];
+/// Shafts through the slabs, as wide as the corridor: x from and to.
+const SHAFTS_M: [[f32; 2]; 3] = [[0.75, 6.25], [17.5, 23.0], [34.75, 40.25]];
+/// Walls across the corridor, before and behind the shafts: x of their west faces.
+const CROSS_WALLS_M: [f32; 4] = [6.75, 16.75, 23.5, 34.0];
 /// The lobby's partition-free part of the ground floor, along x.
-const LOBBY_M: [f32; 2] = [7.5, 33.5];
+const LOBBY_M: [f32; 2] = [7.5, 31.0];
 
 /// An axis-parallel box to fill or to carve, metres.
 struct Block {
@@ -76,10 +75,10 @@ fn blocks(seed: u64) -> Vec<Block> {
     for floor in 0..FLOORS {
         plan.floor(floor);
     }
-    for [x0, x1, y0, y1] in SHAFTS_M {
+    for [x0, x1] in SHAFTS_M {
         for floor in 1..FLOORS {
             let z = floor as f32 * FLOOR_HEIGHT_M;
-            plan.carve([x0, y0, z - 0.5], [x1, y1, z + 0.5]);
+            plan.carve([x0, CORRIDOR_M[0], z], [x1, CORRIDOR_M[1], z + WALL_M]);
         }
     }
     plan.blocks
@@ -130,7 +129,7 @@ impl Plan {
                     self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
                 }
                 self.door(west, east, wall, z);
-                if room < rooms && self.rng.next_u32() % 2 == 0 {
+                if room < rooms && self.rng.next_u32().is_multiple_of(2) {
                     let at = self.uniform(y0 + 1.0, y1 - 4.5);
                     self.carve([east, at, z], [east + WALL_M, at + 3.0, z + 3.5]);
                 }
@@ -138,10 +137,10 @@ impl Plan {
                 west = east + WALL_M;
             }
         }
-        // Two walls across the corridor, each with a wide opening.
+        // Walls across the corridor, each with a wide opening.
         for x in CROSS_WALLS_M {
             self.solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
-            self.carve([x, CORRIDOR_M[0] + 0.5, z], [x + WALL_M, CORRIDOR_M[1] - 0.5, z + 4.0]);
+            self.carve([x, CORRIDOR_M[0] + 0.75, z], [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0]);
         }
         if floor == 0 {
             let [x0, x1] = LOBBY_M;
@@ -151,9 +150,9 @@ impl Plan {
 
     /// A door from the corridor into the room between `west` and `east`.
     fn door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
-        let width = self.uniform(3.0, 3.75);
+        let width = self.uniform(3.5, 4.25);
         let at = self.uniform(west + 0.75, east - 0.75 - width);
-        let height = self.uniform(3.5, 4.0);
+        let height = self.uniform(3.75, 4.5);
         self.carve([at, wall, z], [at + width, wall + WALL_M, z + height]);
     }
 

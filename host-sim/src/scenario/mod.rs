@@ -18,12 +18,16 @@ use planner_core::frames::Geodetic;
 
 use crate::map::Unknown;
 pub use error::{Place, ScenarioError};
+pub use planner_core::deconflict::Method;
+pub use planner_core::prm::Sampling;
 
 /// A scenario, checked.
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// Its name: the path it was read from.
     pub path: String,
+    /// Its text, as read.
+    pub text: String,
     /// Of everything random.
     pub seed: u64,
     /// `[map]`
@@ -81,15 +85,6 @@ pub struct Roadmap {
     pub safety_margin_m: f32,
     /// How nodes are drawn.
     pub sampling: Sampling,
-}
-
-/// How roadmap nodes are drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sampling {
-    /// Uniformly at random (P3D).
-    Uniform,
-    /// The Halton sequence.
-    Halton,
 }
 
 /// `[mission]`
@@ -194,17 +189,6 @@ pub struct Deconfliction {
     pub method: Method,
     /// What they keep, centre to centre.
     pub safety_distance_m: f32,
-}
-
-/// How vehicles keep apart.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Method {
-    /// Right of way, prediction, replanning.
-    Priority,
-    /// P3D's Algorithm 2.
-    Algorithm2,
-    /// Not at all.
-    Off,
 }
 
 /// `[simulation]`

@@ -78,6 +78,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let path = file.to_owned();
     Ok(Scenario {
         path,
+        text: text.text.to_owned(),
         seed,
         map,
         roadmap,

@@ -251,3 +251,53 @@ fn paths_are_relative_to_the_scenario() {
     let error = load(&folder.path().join("s.toml")).unwrap_err();
     assert!(error.why.ends_with("goals.txt:2: expected `x y z` in metres, found `1 x 3`"), "{error}");
 }
+
+/// Starts and goals clear of everything by more than the required clearance, on a map that can be loaded.
+fn check_places(scenario: &Scenario) {
+    let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
+    let voxels = map.voxel_map(scenario.map.unknown);
+    let grid = voxels.grid();
+    let shape = *grid.shape();
+    let clearance = scenario.required_clearance_m();
+    for point in scenario.vehicles.iter().map(|v| &v.start).chain(&scenario.mission.goals) {
+        let reach = (clearance / shape.resolution_m).ceil() as i64 + 1;
+        let center = shape.cell_of(point).unwrap_or_else(|| panic!("{point} is beyond the map"));
+        let range = |axis: usize| {
+            let c = i64::from(center[axis]);
+            (c - reach).max(0) as u32..(c + reach + 1).min(i64::from(shape.dims[axis])) as u32
+        };
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0).filter(|&i| grid.is_occupied([i, j, k])) {
+                    let half = Point::repeat(shape.resolution_m / 2.0);
+                    let away = ((shape.center([i, j, k]) - point).abs() - half).sup(&Point::zeros()).norm();
+                    assert!(away > clearance, "{point} is {away} m from an obstacle, {clearance} m required");
+                }
+            }
+        }
+        assert!(voxels.ground_below(point).is_some(), "{point} is over nothing");
+    }
+}
+
+#[test]
+fn the_demo_has_room() {
+    let scenario = parse(include_str!("../../scenarios/demo.toml"), "demo.toml").unwrap();
+    scenario.check_supported().unwrap();
+    assert_eq!((scenario.vehicles.len(), scenario.mission.goals.len()), (10, 10));
+    check_places(&scenario);
+}
+
+#[test]
+fn the_scanned_buildings_have_room() {
+    for name in ["geb079", "manufacturing"] {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/scenarios"));
+        let scenario = load(&folder.join(format!("{name}.toml"))).unwrap();
+        scenario.check_supported().unwrap();
+        assert_eq!((scenario.vehicles.len(), scenario.mission.goals.len()), (4, 4));
+        if Path::new(&scenario.map.file).exists() {
+            check_places(&scenario);
+        } else {
+            println!("skipped: no {}", scenario.map.file);
+        }
+    }
+}

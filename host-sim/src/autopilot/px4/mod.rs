@@ -400,6 +400,9 @@ impl Commander {
                 if limit >= 0.0 {
                     self.landed = false;
                     self.flown = true;
+                } else {
+                    // Pressed to the ground the integral would only wind down.
+                    reset = true;
                 }
                 if progress >= 1.0 {
                     self.phase = Phase::Flying;

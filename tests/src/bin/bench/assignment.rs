@@ -43,7 +43,8 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
             let start = Instant::now();
             let (columns, _) = lapjv::lapjv(black_box(&matrix)).expect("a square matrix");
             theirs.push(start.elapsed());
-            let their_total: f64 = columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
+            let their_total: f64 =
+                columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
             // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never be worse.
             assert!(result.total <= their_total + 1e-9 * their_total, "seed {seed}: not the optimum");
         }

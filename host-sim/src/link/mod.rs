@@ -1,0 +1,243 @@
+//! Byte links between processes: URLs, and nonblocking TCP and UDP behind one small trait.
+//!
+//! | URL | is |
+//! |---|---|
+//! | `tcp:HOST:PORT` | a TCP client |
+//! | `tcp-listen:HOST:PORT` | a TCP server of one client at a time; a new client replaces the old |
+//! | `udp:HOST:PORT` | sends to that peer and hears it, as PX4's SITL does |
+//! | `udp-listen:HOST:PORT` | hears everybody and sends to all who spoke in the last minute |
+//! | `serial:PATH:BAUD` | parsed; not opened by this build |
+//!
+//! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream may cut anywhere.
+
+mod tcp;
+mod udp;
+
+use std::fmt;
+use std::io;
+use std::net::{SocketAddr, ToSocketAddrs};
+use std::str::FromStr;
+
+/// A nonblocking link.
+pub trait Link: Send {
+    /// Moves bytes that have arrived into `buffer` (2 kB fit any datagram of ours); 0 where none have.
+    ///
+    /// # Errors
+    /// When the link is gone for good. A server without a client, or a peer that does not listen, is no error.
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
+
+    /// Sends whole frames. What nobody takes in time is dropped.
+    ///
+    /// # Errors
+    /// When the link is gone for good.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// The local address, where there is one: it tells the port when port 0 was asked for.
+    fn local_address(&self) -> Option<SocketAddr>;
+}
+
+/// Where a link leads.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub enum LinkUrl {
+    /// TCP client of HOST:PORT.
+    Tcp(String),
+    /// TCP server on HOST:PORT.
+    TcpListen(String),
+    /// UDP to HOST:PORT.
+    Udp(String),
+    /// UDP bound to HOST:PORT.
+    UdpListen(String),
+    /// A serial port.
+    Serial {
+        /// Path of the device.
+        path: String,
+        /// Bits per second.
+        baud: u32,
+    },
+}
+
+/// Why a link URL or link is no good. Displays as `WHAT: WHERE: WHY`.
+#[derive(Debug, thiserror::Error)]
+pub enum LinkError {
+    /// The text is no link URL.
+    #[error("bad link URL: {0}: {1}")]
+    Url(String, &'static str),
+    /// The link could not be opened.
+    #[error("cannot open link: {0}: {1}")]
+    Open(LinkUrl, io::Error),
+    /// Serial ports are not opened by this build.
+    #[error(
+        "cannot open link: {0}: serial ports are not supported yet; use tcp, tcp-listen, udp or udp-listen"
+    )]
+    Serial(LinkUrl),
+}
+
+impl FromStr for LinkUrl {
+    type Err = LinkError;
+
+    fn from_str(text: &str) -> Result<Self, LinkError> {
+        let bad = |why| LinkError::Url(text.to_owned(), why);
+        let (scheme, rest) = text
+            .split_once(':')
+            .ok_or_else(|| bad("expected tcp:, tcp-listen:, udp:, udp-listen: or serial:"))?;
+        let (head, number) =
+            rest.rsplit_once(':').ok_or_else(|| bad("expected HOST:PORT, or PATH:BAUD for serial"))?;
+        if head.is_empty() {
+            return Err(bad("the host or path is empty"));
+        }
+        if scheme == "serial" {
+            return match number.parse() {
+                Ok(baud) if baud > 0 => Ok(Self::Serial { path: head.to_owned(), baud }),
+                _ => Err(bad("the baud rate must be a positive whole number")),
+            };
+        }
+        if number.parse::<u16>().is_err() {
+            return Err(bad("the port must be a number from 0 to 65535"));
+        }
+        match scheme {
+            "tcp" => Ok(Self::Tcp(rest.to_owned())),
+            "tcp-listen" => Ok(Self::TcpListen(rest.to_owned())),
+            "udp" => Ok(Self::Udp(rest.to_owned())),
+            "udp-listen" => Ok(Self::UdpListen(rest.to_owned())),
+            _ => Err(bad("expected tcp:, tcp-listen:, udp:, udp-listen: or serial:")),
+        }
+    }
+}
+
+impl fmt::Display for LinkUrl {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(at) => write!(f, "tcp:{at}"),
+            Self::TcpListen(at) => write!(f, "tcp-listen:{at}"),
+            Self::Udp(at) => write!(f, "udp:{at}"),
+            Self::UdpListen(at) => write!(f, "udp-listen:{at}"),
+            Self::Serial { path, baud } => write!(f, "serial:{path}:{baud}"),
+        }
+    }
+}
+
+impl LinkUrl {
+    /// Opens the link.
+    ///
+    /// # Errors
+    /// Names the URL and why: an unknown host, a port in use, nobody listening.
+    pub fn open(&self) -> Result<Box<dyn Link>, LinkError> {
+        let failed = |why| LinkError::Open(self.clone(), why);
+        match self {
+            Self::Tcp(at) => {
+                Ok(Box::new(tcp::Client::connect(resolve(at).map_err(failed)?).map_err(failed)?))
+            }
+            Self::TcpListen(at) => {
+                Ok(Box::new(tcp::Server::bind(resolve(at).map_err(failed)?).map_err(failed)?))
+            }
+            Self::Udp(at) => Ok(Box::new(udp::Peer::new(resolve(at).map_err(failed)?).map_err(failed)?)),
+            Self::UdpListen(at) => {
+                Ok(Box::new(udp::Hub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
+            }
+            Self::Serial { .. } => Err(LinkError::Serial(self.clone())),
+        }
+    }
+}
+
+fn resolve(at: &str) -> io::Result<SocketAddr> {
+    at.to_socket_addrs()?
+        .next()
+        .ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "the host has no address"))
+}
+
+/// Whether an error only means that nothing is there now.
+fn is_quiet(error: &io::Error) -> bool {
+    use io::ErrorKind::{ConnectionRefused, Interrupted, WouldBlock};
+    matches!(error.kind(), WouldBlock | Interrupted | ConnectionRefused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::{Duration, Instant};
+
+    fn hear(link: &mut dyn Link) -> Vec<u8> {
+        let mut buffer = [0; 2048];
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(5) {
+            let len = link.receive(&mut buffer).unwrap();
+            if len > 0 {
+                return buffer[..len].to_vec();
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        panic!("nothing heard in five seconds");
+    }
+
+    fn open(text: &str) -> Box<dyn Link> {
+        text.parse::<LinkUrl>().unwrap().open().unwrap()
+    }
+
+    #[test]
+    fn urls_are_read_and_written_alike() {
+        for text in
+            ["tcp:localhost:5760", "tcp-listen:0.0.0.0:0", "udp:[::1]:14540", "serial:/dev/ttyACM0:921600"]
+        {
+            assert_eq!(text.parse::<LinkUrl>().unwrap().to_string(), text);
+        }
+    }
+
+    #[test]
+    fn bad_urls_say_what_is_wrong() {
+        for (text, why) in [
+            ("127.0.0.1", "expected tcp:"),
+            ("tcp:127.0.0.1", "expected HOST:PORT"),
+            ("http:127.0.0.1:80", "expected tcp:"),
+            ("udp:127.0.0.1:65536", "port"),
+            ("udp::14550", "empty"),
+            ("serial:/dev/ttyS0:fast", "baud"),
+        ] {
+            let error = text.parse::<LinkUrl>().unwrap_err().to_string();
+            assert!(error.contains(why) && error.contains(text), "{text}: {error}");
+        }
+        let serial = "serial:/dev/null:9600".parse::<LinkUrl>().unwrap().open();
+        assert!(serial.err().unwrap().to_string().contains("not supported"));
+    }
+
+    #[test]
+    fn a_tcp_server_talks_to_one_client_after_another() {
+        let mut server = open("tcp-listen:127.0.0.1:0");
+        let url = format!("tcp:{}", server.local_address().unwrap());
+        for _ in 0..2 {
+            let mut client = open(&url);
+            client.send(b"ping").unwrap();
+            assert_eq!(hear(&mut *server), b"ping");
+            server.send(b"pong").unwrap();
+            assert_eq!(hear(&mut *client), b"pong");
+        }
+        // The last client has gone: the server carries on without one.
+        std::thread::sleep(Duration::from_millis(20));
+        assert_eq!(server.receive(&mut [0; 16]).unwrap(), 0);
+        server.send(b"to nobody").unwrap();
+    }
+
+    #[test]
+    fn a_udp_hub_answers_everybody_who_spoke() {
+        let mut hub = open("udp-listen:127.0.0.1:0");
+        let url = format!("udp:{}", hub.local_address().unwrap());
+        let (mut a, mut b) = (open(&url), open(&url));
+        a.send(b"a").unwrap();
+        assert_eq!(hear(&mut *hub), b"a");
+        b.send(b"b").unwrap();
+        assert_eq!(hear(&mut *hub), b"b");
+        hub.send(b"all").unwrap();
+        assert_eq!(hear(&mut *a), b"all");
+        assert_eq!(hear(&mut *b), b"all");
+    }
+
+    #[test]
+    fn a_udp_peer_that_does_not_listen_is_no_error() {
+        let closed = std::net::UdpSocket::bind("127.0.0.1:0").unwrap().local_addr().unwrap();
+        let mut peer = open(&format!("udp:{closed}"));
+        for _ in 0..3 {
+            peer.send(b"anyone?").unwrap();
+            std::thread::sleep(Duration::from_millis(5));
+            assert_eq!(peer.receive(&mut [0; 16]).unwrap(), 0);
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! TCP links. What a peer does not take at once waits in a queue; a peer that lags [`QUEUE`] bytes behind is cut off.
+
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::time::Duration;
+
+use super::{Link, is_quiet};
+
+/// About ten seconds of PX4's flood.
+const QUEUE: usize = 256 * 1024;
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
+
+struct Connection {
+    stream: TcpStream,
+    queue: Vec<u8>,
+}
+
+impl Connection {
+    fn new(stream: TcpStream) -> io::Result<Self> {
+        stream.set_nonblocking(true)?;
+        // Setpoints and acks are small and must not wait to be gathered.
+        stream.set_nodelay(true)?;
+        Ok(Self { stream, queue: Vec::new() })
+    }
+
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.stream.read(buffer) {
+            Ok(0) => {
+                Err(io::Error::new(io::ErrorKind::UnexpectedEof, "the other side closed the connection"))
+            }
+            Err(error) if is_quiet(&error) => Ok(0),
+            result => result,
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.queue.extend_from_slice(bytes);
+        let mut sent = 0;
+        while sent < self.queue.len() {
+            match self.stream.write(&self.queue[sent..]) {
+                Ok(0) => break,
+                Ok(count) => sent += count,
+                Err(error) if is_quiet(&error) => break,
+                Err(error) => return Err(error),
+            }
+        }
+        self.queue.drain(..sent);
+        if self.queue.len() > QUEUE {
+            return Err(io::Error::new(io::ErrorKind::TimedOut, "the other side does not read"));
+        }
+        Ok(())
+    }
+}
+
+/// A client.
+pub struct Client(Connection);
+
+impl Client {
+    /// Connects; waits five seconds at most.
+    pub fn connect(to: SocketAddr) -> io::Result<Self> {
+        Ok(Self(Connection::new(TcpStream::connect_timeout(&to, CONNECT_TIMEOUT)?)?))
+    }
+}
+
+impl Link for Client {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.0.receive(buffer)
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.send(bytes)
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        self.0.stream.local_addr().ok()
+    }
+}
+
+/// A server of one client at a time.
+pub struct Server {
+    listener: TcpListener,
+    client: Option<Connection>,
+}
+
+impl Server {
+    /// Listens.
+    pub fn bind(at: SocketAddr) -> io::Result<Self> {
+        let listener = TcpListener::bind(at)?;
+        listener.set_nonblocking(true)?;
+        Ok(Self { listener, client: None })
+    }
+
+    fn accept(&mut self) {
+        // A failed accept (the client gave up already) leaves things as they are.
+        if let Ok((stream, _)) = self.listener.accept()
+            && let Ok(connection) = Connection::new(stream)
+        {
+            self.client = Some(connection);
+        }
+    }
+}
+
+impl Link for Server {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.accept();
+        let Some(client) = &mut self.client else { return Ok(0) };
+        Ok(client.receive(buffer).unwrap_or_else(|_| {
+            self.client = None;
+            0
+        }))
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.accept();
+        if let Some(client) = &mut self.client
+            && client.send(bytes).is_err()
+        {
+            self.client = None;
+        }
+        Ok(())
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        self.listener.local_addr().ok()
+    }
+}

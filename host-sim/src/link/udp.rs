@@ -1,0 +1,114 @@
+//! UDP links. Datagrams nobody takes are lost, as UDP has it.
+
+use std::io;
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
+use std::time::{Duration, Instant};
+
+use super::{Link, is_quiet};
+
+/// A client not heard for this long gets nothing more.
+const FORGET: Duration = Duration::from_secs(60);
+/// The most clients of one hub; the one longest unheard makes room.
+const CLIENTS: usize = 16;
+
+fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
+    match socket.send_to(bytes, to) {
+        Err(error) if !is_quiet(&error) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+/// One peer, known from the start.
+pub struct Peer {
+    socket: UdpSocket,
+    peer: SocketAddr,
+}
+
+impl Peer {
+    /// Binds any free port, on the loopback for a peer there.
+    pub fn new(peer: SocketAddr) -> io::Result<Self> {
+        let local: SocketAddr = match (peer, peer.ip().is_loopback()) {
+            (SocketAddr::V4(_), true) => (Ipv4Addr::LOCALHOST, 0).into(),
+            (SocketAddr::V4(_), false) => (Ipv4Addr::UNSPECIFIED, 0).into(),
+            (SocketAddr::V6(_), true) => (Ipv6Addr::LOCALHOST, 0).into(),
+            (SocketAddr::V6(_), false) => (Ipv6Addr::UNSPECIFIED, 0).into(),
+        };
+        let socket = UdpSocket::bind(local)?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { socket, peer })
+    }
+}
+
+impl Link for Peer {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            match self.socket.recv_from(buffer) {
+                Ok((len, from)) if from == self.peer => return Ok(len),
+                Ok(_) => {}
+                Err(error) if is_quiet(&error) => return Ok(0),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        transmit(&self.socket, bytes, self.peer)
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        self.socket.local_addr().ok()
+    }
+}
+
+/// A bound socket and everybody who spoke to it.
+pub struct Hub {
+    socket: UdpSocket,
+    clients: Vec<(SocketAddr, Instant)>,
+}
+
+impl Hub {
+    /// Binds.
+    pub fn bind(at: SocketAddr) -> io::Result<Self> {
+        let socket = UdpSocket::bind(at)?;
+        socket.set_nonblocking(true)?;
+        Ok(Self { socket, clients: Vec::new() })
+    }
+
+    fn remember(&mut self, from: SocketAddr) {
+        let now = Instant::now();
+        if let Some(client) = self.clients.iter_mut().find(|client| client.0 == from) {
+            client.1 = now;
+            return;
+        }
+        if self.clients.len() == CLIENTS {
+            let oldest = (0..CLIENTS).min_by_key(|&k| self.clients[k].1).unwrap_or(0);
+            self.clients.swap_remove(oldest);
+        }
+        self.clients.push((from, now));
+    }
+}
+
+impl Link for Hub {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.socket.recv_from(buffer) {
+            Ok((len, from)) => {
+                self.remember(from);
+                Ok(len)
+            }
+            Err(error) if is_quiet(&error) => Ok(0),
+            Err(error) => Err(error),
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.clients.retain(|client| client.1.elapsed() < FORGET);
+        for &(to, _) in &self.clients {
+            transmit(&self.socket, bytes, to)?;
+        }
+        Ok(())
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        self.socket.local_addr().ok()
+    }
+}

@@ -1,0 +1,122 @@
+//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK.
+//!
+//! The scripts in `tests/conformance` run with the Python of the virtual environment that `cargo xtask test` makes
+//! (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights are in real time: half a minute each.
+
+use std::io::{BufRead, BufReader};
+use std::net::UdpSocket;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+const TIME_LIMIT: Duration = Duration::from_secs(120);
+
+/// Ended when the test is, however it ends.
+struct Guard(Child);
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// Builds and finds `host-sim`: cargo gives another package's binaries to no test.
+fn host_sim() -> PathBuf {
+    let mut build = Command::new(env!("CARGO"));
+    build.current_dir(workspace()).args(["build", "--quiet", "--package", "host-sim", "--bin", "host-sim"]);
+    let mut directory = std::env::current_exe().expect("a test knows its own path");
+    // target/PROFILE/deps/conformance-HASH
+    directory.pop();
+    directory.pop();
+    if directory.ends_with("release") {
+        build.arg("--release");
+    }
+    assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
+    directory.join("host-sim")
+}
+
+/// Starts the autopilot on `listen`; its first line tells the address it got.
+fn autopilot(listen: &str) -> (Guard, String) {
+    let mut child = Command::new(host_sim())
+        .args(["autopilot", "--listen", listen])
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("host-sim starts");
+    let mut line = String::new();
+    BufReader::new(child.stdout.take().expect("stdout is piped"))
+        .read_line(&mut line)
+        .expect("it prints a line");
+    let guard = Guard(child);
+    let address = line.trim().rsplit_once("127.0.0.1:").map(|(_, port)| format!("127.0.0.1:{port}"));
+    (guard, address.unwrap_or_else(|| panic!("no address in {line:?}")))
+}
+
+fn python() -> Option<String> {
+    let python = std::env::var("FLOCKMATE_PYTHON").ok();
+    if python.is_none() {
+        println!(
+            "skipped: FLOCKMATE_PYTHON names no Python with pymavlink and mavsdk (`cargo xtask test` makes one)"
+        );
+    }
+    python
+}
+
+/// Runs a script to its end and shows what it printed if it fails.
+fn run(python: &str, script: &str, url: &str) {
+    let path = workspace().join("tests/conformance").join(script);
+    let child = Command::new(python)
+        .arg(path)
+        .arg(url)
+        .stdout(Stdio::piped())
+        .spawn()
+        .unwrap_or_else(|why| panic!("{python} does not start: {why}"));
+    let mut child = Guard(child);
+    let output = BufReader::new(child.0.stdout.take().expect("stdout is piped"));
+    let reader = std::thread::spawn(move || output.lines().map_while(Result::ok).collect::<Vec<_>>());
+    let start = Instant::now();
+    let status = loop {
+        if let Some(status) = child.0.try_wait().expect("a child can be waited for") {
+            break Some(status);
+        }
+        if start.elapsed() > TIME_LIMIT {
+            break None;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    drop(child);
+    let lines = reader.join().expect("the reader does not panic").join("\n");
+    assert!(status.is_some_and(|status| status.success()), "{script}: {status:?}\n{lines}");
+    let held = lines.lines().filter(|line| line.starts_with("ok ")).count();
+    assert!(held >= 20, "{script} checked only {held} things\n{lines}");
+    println!("{script}: {held} things held");
+}
+
+#[test]
+fn pymavlink_flies_the_simulated_px4_over_udp() {
+    let Some(python) = python() else { return };
+    let (_autopilot, address) = autopilot("udp-listen:127.0.0.1:0");
+    run(&python, "px4_pymavlink.py", &format!("udpout:{address}"));
+}
+
+#[test]
+fn pymavlink_flies_the_simulated_px4_over_tcp() {
+    let Some(python) = python() else { return };
+    let (_autopilot, address) = autopilot("tcp-listen:127.0.0.1:0");
+    run(&python, "px4_pymavlink.py", &format!("tcp:{address}"));
+}
+
+#[test]
+fn mavsdk_flies_the_simulated_px4_over_udp() {
+    let Some(python) = python() else { return };
+    // MAVSDK listens and the autopilot speaks first, as PX4's SITL does on 14540.
+    let port =
+        UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port").port();
+    let (_autopilot, address) = autopilot(&format!("udp:127.0.0.1:{port}"));
+    run(&python, "px4_mavsdk.py", &format!("udpin://{address}"));
+}
