@@ -263,14 +263,14 @@ impl Bench {
             return;
         }
         let count = self.now.micros() / 50_000;
-        if count % 20 == 0 {
+        if count.is_multiple_of(20) {
             let bytes = self.heartbeat();
             self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
             self.drain();
             let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
             self.tell(&status);
         }
-        if count % 4 == 0 {
+        if count.is_multiple_of(4) {
             let landed_state = if self.on_ground() {
                 MavLandedState::MAV_LANDED_STATE_ON_GROUND
             } else {

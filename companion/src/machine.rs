@@ -378,7 +378,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mode_foreign = match self.state {
             State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
             // Disarming after a landing the autopilot chooses a mode of its own.
-            State::Land => !offboard && t.custom_mode != px4::LAND && t.armed,
+            State::Land | State::Disarm => !offboard && t.custom_mode != px4::LAND && t.armed,
             _ => !offboard,
         };
         let away = t.position - self.start;
@@ -489,3 +489,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 #[cfg(test)]
 #[path = "machine_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "scene_tests.rs"]
+mod scene_tests;
+
+#[cfg(test)]
+#[path = "hostile_tests.rs"]
+mod hostile_tests;

@@ -324,13 +324,13 @@ const LINKED: &[State] = &[Climb, Follow, Paused, Alone, PositionLost];
 
 /// The mission.
 #[rustfmt::skip]
-pub const TABLE: &[Row] = &[
+pub static TABLE: &[Row] = &[
     // The autopilot itself, the pilot and the failsafe: before everything else.
     warn(FLYING,              G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Disarmed in flight: mission over"),
     warn(FLYING,              G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe: setpoints stopped"),
     warn(FLYING,              G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: mission stopped"),
-    warn(&[Land],             G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe while landing"),
-    warn(&[Land],             G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
+    warn(&[Land, Disarm],     G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe while landing"),
+    warn(&[Land, Disarm],     G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
     warn(&[Streaming, Engaging, Arming], G::FailsafeActs, NOW, Aborted,     A::ForgetStart, "Failsafe before take-off: start cancelled"),
     warn(&[Streaming, Engaging, Arming], G::ModeTaken, NOW, Aborted,        A::ForgetStart, "Mode changed by pilot: start cancelled"),
     // Links and position.
@@ -396,3 +396,7 @@ pub const TABLE: &[Row] = &[
     warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
     info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start anew when ready"),
 ];
+
+#[cfg(test)]
+#[path = "mission_tests.rs"]
+mod tests;
