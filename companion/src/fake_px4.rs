@@ -197,7 +197,7 @@ impl Bench {
             let ned = Vector3::new(f64::from(s.x), f64::from(s.y), f64::from(s.z));
             let place = frames::ned_to_geodetic(Projection::Px4, &self.origin, &ned);
             let enu = frames::geodetic_to_enu(&ORIGIN, &place);
-            self.target = (s.type_mask.bits() == px4::MASK_POSITION_VELOCITY).then_some(enu);
+            self.target = (s.type_mask.bits() == px4::MASK_POSITION_VELOCITY_ACCELERATION).then_some(enu);
             self.setpoints.push((self.now, enu, s.type_mask.bits()));
         }
         if let Some(c) = frame.decode::<COMMAND_LONG_DATA>() {

@@ -31,8 +31,8 @@ const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting
 pub enum Setpoint {
     /// Nothing: the state streams no setpoints.
     None,
-    /// Be there, moving so: ENU metres and m/s.
-    Move(Point, Point),
+    /// Be there, with this velocity and acceleration: ENU metres, m/s, m/s².
+    Move(Point, Point, Point),
     /// Stand still wherever that is: no position is known to refer to.
     Stop,
 }
@@ -274,15 +274,16 @@ impl Guidance {
             return Setpoint::Stop;
         }
         match state {
-            State::PilotControl => Setpoint::Move(scene.telemetry.position, still),
+            State::PilotControl => Setpoint::Move(scene.telemetry.position, still, still),
             State::Climb => {
                 let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
                 let rate = if self.climb_z < start.z { self.climb_mps } else { 0.0 };
-                Setpoint::Move(Point::new(start.x, start.y, self.climb_z), Point::new(0.0, 0.0, rate))
+                let place = Point::new(start.x, start.y, self.climb_z);
+                Setpoint::Move(place, Point::new(0.0, 0.0, rate), still)
             }
             _ => match self.reference {
-                Some(reference) if self.on_path => Setpoint::Move(reference.position, reference.velocity),
-                _ => Setpoint::Move(self.hold, still),
+                Some(r) if self.on_path => Setpoint::Move(r.position, r.velocity, r.acceleration),
+                _ => Setpoint::Move(self.hold, still, still),
             },
         }
     }

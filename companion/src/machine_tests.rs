@@ -43,7 +43,7 @@ fn flies_the_mission_and_lands_at_the_goal() {
     assert_eq!(bench.commands[engaged], (176, 1.0, 6.0, 0.0));
     // The setpoints never leave the tube around the way, though the EKF origin is 300 m away.
     for (_, at, mask) in &bench.setpoints {
-        assert_eq!(*mask, px4::MASK_POSITION_VELOCITY);
+        assert_eq!(*mask, px4::MASK_POSITION_VELOCITY_ACCELERATION);
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
     }
 }

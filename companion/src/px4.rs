@@ -10,8 +10,8 @@ pub const HOLD: u32 = 0x0304_0000;
 /// AUTO.RTL.
 pub const RTL: u32 = 0x0504_0000;
 
-/// Position and velocity; acceleration, yaw and yaw rate ignored (the heading stays as it is).
-pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
+/// Position, with velocity and acceleration as feed-forward; yaw and yaw rate ignored (the heading stays as it is).
+pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
 
 /// Velocity alone: with zero, stop wherever that is.
 pub const MASK_VELOCITY: u16 = 0xDC7;

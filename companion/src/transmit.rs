@@ -49,15 +49,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
-        let (position, velocity, mask) = match self.guidance.setpoint(self.state, &self.scene()) {
-            Setpoint::None => return None,
-            Setpoint::Move(position, velocity) => match self.telemetry.to_ned(&self.config.origin, &position)
-            {
-                Some(ned) => (ned, frames::swap_enu_ned(&velocity), px4::MASK_POSITION_VELOCITY),
-                None => (Point::zeros(), Point::zeros(), px4::MASK_VELOCITY),
-            },
-            Setpoint::Stop => (Point::zeros(), Point::zeros(), px4::MASK_VELOCITY),
-        };
+        let still = Point::zeros();
+        let stop = (still, still, still, px4::MASK_VELOCITY);
+        let (position, velocity, acceleration, mask) =
+            match self.guidance.setpoint(self.state, &self.scene()) {
+                Setpoint::None => return None,
+                Setpoint::Stop => stop,
+                Setpoint::Move(position, velocity, acceleration) => {
+                    self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
+                        let (velocity, acceleration) =
+                            (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
+                        (ned, velocity, acceleration, px4::MASK_POSITION_VELOCITY_ACCELERATION)
+                    })
+                }
+            };
         Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.now.boot_ms(),
             x: position.x,
@@ -66,6 +71,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             vx: velocity.x,
             vy: velocity.y,
             vz: velocity.z,
+            afx: acceleration.x,
+            afy: acceleration.y,
+            afz: acceleration.z,
             type_mask: PositionTargetTypemask::from_bits_truncate(mask),
             target_system: self.config.system_id,
             target_component: crate::AUTOPILOT,

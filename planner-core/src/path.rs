@@ -1,9 +1,10 @@
 //! A timed polyline and the reference point that moves along it.
 //!
 //! The reference is what the autopilot is sent: it runs along the path no faster than corners, walls and other vehicles
-//! allow, and waits for a vehicle that lags. A corner of angle θ taken at speed v asks the vehicle for a change of
-//! velocity 2·v·sin(θ/2); braking it away at acceleration a sweeps at most Δv²/(2a) beside the path, so
-//! v = √(2·a·e) / (2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs leaves.
+//! allow, and waits for a vehicle that lags. A corner of angle θ taken at speed v asks the vehicle for a sudden change of
+//! velocity Δv = 2·v·sin(θ/2). A velocity loop that answers within the time τ sweeps Δv·τ beside the path until it has
+//! made up for it, so v = e / (τ·2·sin(θ/2)) keeps the vehicle within the deviation e that the clearance of the two legs
+//! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed without a lag.
 //! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
 
 use heapless::Vec;
@@ -127,8 +128,11 @@ impl<const W: usize> Path<W> {
 pub struct TrackConfig {
     /// Nominal speed, m/s.
     pub cruise_mps: f32,
-    /// Acceleration and braking along the path and in corners, m/s².
+    /// Acceleration and braking along the path, m/s².
     pub accel_mps2: f32,
+    /// Time in which the autopilot answers to a sudden change of velocity, seconds: PX4's velocity loop with its default
+    /// gain `MPC_XY_VEL_P_ACC` = 1.8 1/s.
+    pub response_s: f32,
     /// Body radius, metres: what of an edge's clearance is already taken.
     pub radius_m: f32,
     /// Smallest deviation to allow for where the clearance leaves less, metres: what the autopilot achieves at a crawl.
@@ -145,6 +149,7 @@ impl Default for TrackConfig {
         Self {
             cruise_mps: 2.0,
             accel_mps2: 1.5,
+            response_s: 0.55,
             radius_m: 0.3,
             deviation_min_m: 0.03,
             deviation_max_m: 0.25,
@@ -169,6 +174,8 @@ pub struct Reference {
     pub position: Point,
     /// Velocity, ENU m/s.
     pub velocity: Point,
+    /// Acceleration along the path, ENU m/s².
+    pub acceleration: Point,
     /// Arc length, metres.
     pub along_m: f32,
     /// Whether the end of the path is reached.
@@ -191,7 +198,7 @@ fn corner_speed<const W: usize>(cfg: &TrackConfig, path: &Path<W>, i: usize) -> 
     let outgoing = (after.position - points[i].position).normalize();
     let change = (outgoing - incoming).norm();
     let e = deviation(cfg, fminf(points[i].clearance_m, after.clearance_m));
-    fminf(cfg.cruise_mps, sqrtf(2.0 * cfg.accel_mps2 * e) / fmaxf(change, 1e-3))
+    fminf(cfg.cruise_mps, e / (cfg.response_s * fmaxf(change, 1e-3)))
 }
 
 /// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
@@ -220,6 +227,7 @@ pub fn advance<const W: usize>(
         }
     }
     let step = cfg.accel_mps2 * dt_s;
+    let speed_before = tracker.speed_mps;
     // Speeding up is limited; a bound from ahead is met at once, it already holds the braking distance.
     tracker.speed_mps = fminf(speed, tracker.speed_mps + step);
     let move_m = fminf(tracker.speed_mps * dt_s, fmaxf(advice.stop_within_m, 0.0));
@@ -231,11 +239,15 @@ pub fn advance<const W: usize>(
     }
     let position = path.point_at(tracker.along_m)?;
     let ahead = path.point_at(tracker.along_m + 0.01)?;
-    let velocity = match (ahead - position).try_normalize(1e-6) {
-        Some(direction) => direction * tracker.speed_mps,
-        None => Point::zeros(),
-    };
-    Some(Reference { position, velocity, along_m: tracker.along_m, finished: tracker.along_m >= length_m })
+    let direction = (ahead - position).try_normalize(1e-6).unwrap_or_else(Point::zeros);
+    let change = ((tracker.speed_mps - speed_before) / dt_s).clamp(-2.0 * cfg.accel_mps2, cfg.accel_mps2);
+    Some(Reference {
+        position,
+        velocity: direction * tracker.speed_mps,
+        acceleration: direction * change,
+        along_m: tracker.along_m,
+        finished: tracker.along_m >= length_m,
+    })
 }
 
 #[cfg(test)]
