@@ -45,7 +45,7 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     let mut out = [0; 3];
     for axis in 0..3 {
         let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
-        if !(u >= -REACH && u <= 2.0 * REACH) {
+        if !(-REACH..=2.0 * REACH).contains(&u) {
             return None;
         }
         let v = u * ONE as f32;
