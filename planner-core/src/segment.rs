@@ -45,7 +45,7 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     let mut out = [0; 3];
     for axis in 0..3 {
         let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
-        if !(u >= -REACH && u <= 2.0 * REACH) {
+        if !(-REACH..=2.0 * REACH).contains(&u) {
             return None;
         }
         let v = u * ONE as f32;
@@ -258,10 +258,14 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         for layer in 0..4 {
             let to = (floor + (layer + 1) * ONE).clamp(self.start, self.end);
             let (next_v, next_w) = (self.at(V, to), self.at(W, to));
-            let layer_v = Span::new(v, next_v, self.slack, self.dims[V]).lanes_if_met(brick_v);
-            let layer_w = Span::new(w, next_w, self.slack, self.dims[W]).lanes_if_met(brick_w);
+            let (last_v, last_w) = (v, w);
             (v, w) = (next_v, next_w);
-            let mut cells = near & lane_mask(U, 1 << layer) & lane_mask(V, layer_v) & lane_mask(W, layer_w);
+            let mut cells = near & lane_mask(U, 1 << layer);
+            if cells == 0 {
+                continue;
+            }
+            cells &= lane_mask(V, Span::new(last_v, v, self.slack, self.dims[V]).lanes_if_met(brick_v));
+            cells &= lane_mask(W, Span::new(last_w, w, self.slack, self.dims[W]).lanes_if_met(brick_w));
             while cells != 0 {
                 let bit = cells.trailing_zeros() as i32;
                 cells &= cells - 1;

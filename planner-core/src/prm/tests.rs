@@ -40,7 +40,7 @@ fn rooms(rng: &mut Pcg32, resolution_m: f32) -> (GridShape, Vec<u64>) {
                         (0..3).all(|a| a == *axis || (door[a]..door[a] + dims[a] / 3).contains(&cell[a]));
                     cell[*axis] == *at && !open
                 });
-                if wall || rng.next_u32() % 500 == 0 {
+                if wall || rng.next_u32().is_multiple_of(500) {
                     let (word, mask) = shape.address(cell);
                     words[word] |= mask;
                 }

@@ -214,7 +214,7 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     let (Some(from), Some(to)) = (super::snap(shape, a), super::snap(shape, b)) else {
         return 0.0;
     };
-    if !(max_m > 0.0) || super::snapped_segment_touches(grid, &from, &to) {
+    if max_m.is_nan() || max_m <= 0.0 || super::snapped_segment_touches(grid, &from, &to) {
         return 0.0;
     }
     let segment = Segment::new(grid, a, b);
