@@ -217,7 +217,6 @@ impl Bench {
                         latitude: (self.origin.lat_deg * 1e7).round() as i32,
                         longitude: (self.origin.lon_deg * 1e7).round() as i32,
                         altitude: (self.origin.alt_m * 1e3) as i32,
-                        ..Default::default()
                     };
                     self.tell(&origin);
                 }

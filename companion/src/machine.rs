@@ -97,6 +97,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A companion that has heard nothing yet.
     pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
+        const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
         config.check()?;
         let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
         let start = own.start;
