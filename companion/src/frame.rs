@@ -9,7 +9,7 @@
 //! false and the search goes on one byte later. The same search follows a bad CRC, over bytes that are all still in
 //! the buffer, so no good frame behind a bad one is lost. Each byte costs O(1), and O(280) where starts are false.
 
-use mavlink::dialects::ardupilotmega::{COMPONENT_INFORMATION_DATA, MavMessage};
+use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
 
 use crate::time::{Duration, Instant};
@@ -23,6 +23,8 @@ pub const MAX_SENT: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
+/// A deprecated message; the only one whose CRC seed is 0.
+const COMPONENT_INFORMATION: u32 = 395;
 const SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
 /// One byte more than a frame, to see what follows an unknown one.
@@ -262,7 +264,7 @@ fn is_start(byte: u8) -> bool {
 /// is also the true seed of COMPONENT_INFORMATION.
 pub fn extra_crc(message_id: u32) -> Option<u8> {
     let extra = MavMessage::extra_crc(message_id);
-    (extra != 0 || message_id == COMPONENT_INFORMATION_DATA::ID).then_some(extra)
+    (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
 }
 
 /// Who sends a frame.

@@ -1,6 +1,40 @@
 //! The companion of one UAV, sans-IO: bytes and time in, bytes and events out.
+//!
+//! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with what a link received,
+//! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and [`Companion::handle_plan`] with the answer to
+//! [`Event::PlanRequested`]. After *each* `handle_*` call it drains [`Companion::poll_transmit`] for both links until 0
+//! and [`Companion::poll_event`] until `None`. Times never go back. Every call does bounded work.
+//!
+//! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
+//! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`outbox::DEPTH`]; when it is full
+//! the newest is dropped and counted ([`Companion::dropped`]).
+//!
+//! The mission is the table of [`mission`]. PX4's numbers are in [`px4`]; another autopilot gets a module beside it.
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod commands;
+pub mod config;
+#[cfg(test)]
+mod fake_px4;
 pub mod frame;
+mod guidance;
+pub mod intent;
+mod machine;
+pub mod mission;
+pub mod neighbours;
+pub mod outbox;
+pub mod px4;
+pub mod telemetry;
 pub mod time;
+mod transmit;
+
+pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
+pub use machine::{Companion, Event, Link};
+pub use mission::State;
+pub use time::{Duration, Instant};
+
+/// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
+pub const COMPONENT: u8 = 191;
+/// The autopilot's component id, `MAV_COMP_ID_AUTOPILOT1`.
+pub const AUTOPILOT: u8 = 1;

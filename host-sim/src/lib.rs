@@ -3,7 +3,14 @@
 
 pub mod autopilot;
 pub mod capacity;
+pub mod commands;
 pub mod link;
 pub mod map;
+pub mod mission;
+pub mod output;
+pub mod progress;
 pub mod report;
 pub mod result;
+pub mod roadmap;
+pub mod scenario;
+pub mod swarm;

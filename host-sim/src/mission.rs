@@ -4,18 +4,18 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use planner_core::Point;
-use planner_core::deconflict::{DeconflictConfig, Method};
-use planner_core::plan::{self, Mode, PlanError, PlanRequest, VehicleTask};
-use planner_core::prm::{Config, Sampling};
+use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
+use planner_core::prm::Config;
 use planner_core::roadmap::{RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
+use planner_core::segment::segment_is_clear;
 
 use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
-use crate::scenario::Scenario;
+use crate::scenario::{self, Scenario};
 
 /// The plan of a swarm with the desk's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
@@ -29,6 +29,8 @@ pub const ACCEL_MPS2: f32 = 1.5;
 pub const VERTICAL_MPS: f32 = 1.0;
 /// What two vehicles together may stray from their paths, beyond the safety distance, metres.
 const STRAY_M: f32 = 0.5;
+/// Spacing of the places tried as slots around a single goal, metres.
+const SLOT_GRID_M: f32 = 0.25;
 /// What one vehicle may stray beside another that stands on the ground, metres.
 const STRAY_BESIDE_PARKED_M: f32 = 0.25;
 
@@ -38,6 +40,8 @@ pub struct Mission {
     pub scenario: Scenario,
     /// The map on the planning grid.
     pub map: VoxelMap,
+    /// Where the vehicles go: the scenario's goals, or the slots around its single one.
+    pub goals: Vec<Point>,
     /// The roadmap.
     pub roadmap: Roadmap,
     /// The roadmap as the file on the board.
@@ -54,66 +58,19 @@ pub struct Mission {
 
 impl Mission {
     /// Reads the map and builds the roadmap.
+    ///
+    /// # Errors
+    /// A map that cannot be read; a start or goal in an obstacle or over no floor.
     pub fn prepare(scenario: Scenario, progress: &Progress) -> anyhow::Result<Self> {
         let mut timing = Timing::default();
         let begun = Instant::now();
         let stage = progress.stage("map");
-        let file = scenario.map.file.clone();
-        let map = map::load(&file, scenario.map.resolution_m)?.voxel_map(scenario.map.unknown);
+        let map = map::load(&scenario.map.file, scenario.map.resolution_m)?.voxel_map(scenario.map.unknown);
         timing.map_s = begun.elapsed().as_secs_f64();
         drop(stage);
 
         let begun = Instant::now();
         let stage = progress.stage("roadmap");
-        let starts: Vec<Point> = scenario.vehicles.iter().map(|v| v.start).collect();
-        let terminals: Vec<Point> = starts.iter().chain(&scenario.mission.goals).copied().collect();
-        let required = |radius_m: f32| radius_m + scenario.roadmap.safety_margin_m;
-        let radii = || scenario.vehicles.iter().map(|v| v.radius_m);
-        let config = Config {
-            nodes: scenario.roadmap.nodes,
-            edge_min_m: scenario.roadmap.edge_min_m,
-            edge_max_m: scenario.roadmap.edge_max_m,
-            clearance_m: required(radii().fold(f32::INFINITY, f32::min)),
-            seed: scenario.seed,
-            sampling: scenario.roadmap.sampling,
-        };
-        let roadmap = roadmap::build(&map, &terminals, &config)?;
-        let header = RoadmapHeader {
-            origin: scenario.map.origin,
-            edge_min_m: config.edge_min_m,
-            edge_max_m: config.edge_max_m,
-            tested_clearance_m: config.clearance_m,
-            max_clearance_m: roadmap::CLEARANCE_MAX_M,
-            starts: starts.len() as u16,
-            goals: scenario.mission.goals.len() as u16,
-        };
-        let roadmap_file = roadmap::encode(&roadmap, &header)?;
-        timing.roadmap_s = begun.elapsed().as_secs_f64();
-        drop(stage);
-
-        let height = |name: &str, i: usize, point: &Point, radius_m: f32| {
-            let ground = map
-                .ground_below(point)
-                .ok_or_else(|| anyhow!("{name} {i} has no ground below it to stand on: choose a place over a floor"))?;
-            let height = point.z - ground - radius_m;
-            if height < 0.0 {
-                bail!("{name} {i} is {:.2} m above the ground, less than the vehicle's radius", point.z - ground);
-            }
-            Ok(height)
-        };
-        let mut tasks = Vec::new();
-        for (i, vehicle) in scenario.vehicles.iter().enumerate() {
-            tasks.push(VehicleTask {
-                id: vehicle.id,
-                required_clearance_m: required(vehicle.radius_m),
-                climb_m: height("start of vehicle", i + 1, &vehicle.start, vehicle.radius_m)?,
-                goal: vehicle.goal,
-            });
-        }
-        let largest = radii().fold(0.0, f32::max);
-        let goals = scenario.mission.goals.iter().enumerate();
-        let descents_m: Vec<f32> =
-            goals.map(|(i, goal)| height("goal", i, goal, largest)).collect::<anyhow::Result<_>>()?;
         let safety_m = scenario.deconfliction.safety_distance_m;
         let schedule = ScheduleConfig {
             separation_m: safety_m + STRAY_M,
@@ -121,7 +78,19 @@ impl Mission {
             cruise_mps: scenario.mission.cruise_mps,
             vertical_mps: VERTICAL_MPS,
         };
-        Ok(Self { scenario, map, roadmap, roadmap_file, tasks, descents_m, schedule, timing })
+        let goals = goals(&scenario, &map, &schedule)?;
+        let tasks = tasks(&scenario, &map)?;
+        let largest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
+        let descents_m = goals
+            .iter()
+            .enumerate()
+            .map(|(i, goal)| height_over_ground(&map, &format!("goal {i}"), goal, largest_m))
+            .collect::<anyhow::Result<_>>()?;
+        let (roadmap, header) = build(&scenario, &map, &goals)?;
+        let roadmap_file = roadmap::encode(&roadmap, &header)?;
+        timing.roadmap_s = begun.elapsed().as_secs_f64();
+        drop(stage);
+        Ok(Self { scenario, map, goals, roadmap, roadmap_file, tasks, descents_m, schedule, timing })
     }
 
     /// Plans the whole swarm as every companion does.
@@ -131,7 +100,7 @@ impl Mission {
         let request = PlanRequest {
             vehicles: &self.tasks,
             descents_m: &self.descents_m,
-            mode: self.scenario.mission.planner_mode(),
+            mode: planner_mode(&self.scenario.mission),
             schedule: self.schedule,
         };
         let mut workspace = Box::new(PlanWorkspace::new());
@@ -163,15 +132,119 @@ impl Mission {
         }
     }
 
-    /// How vehicles keep apart.
-    pub fn deconfliction(&self) -> DeconflictConfig {
-        DeconflictConfig {
-            method: self.scenario.deconfliction.method,
-            safety_distance_m: self.scenario.deconfliction.safety_distance_m,
-            cruise_mps: self.scenario.mission.cruise_mps,
-            accel_mps2: ACCEL_MPS2,
+    /// Place of a vehicle in the scenario.
+    ///
+    /// # Errors
+    /// No vehicle has this id.
+    pub fn index_of(&self, id: u8) -> anyhow::Result<usize> {
+        let index = self.tasks.iter().position(|task| task.id == id);
+        index.ok_or_else(|| anyhow!("no vehicle has id {id}: {}", self.scenario.path))
+    }
+
+    /// CRC-32 of what all companions must agree on: roadmap, tasks, goals and separation.
+    pub fn crc(&self) -> u32 {
+        const CRC32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
+        let mut digest = CRC32.digest();
+        digest.update(&self.view().crc().to_le_bytes());
+        for task in &self.tasks {
+            digest.update(&[task.id]);
+            digest.update(&task.goal.unwrap_or(u16::MAX).to_le_bytes());
+            digest.update(&task.required_clearance_m.to_le_bytes());
+        }
+        for number in [self.schedule.separation_m, self.schedule.cruise_mps].iter().chain(&self.descents_m) {
+            digest.update(&number.to_le_bytes());
+        }
+        digest.finalize()
+    }
+}
+
+fn planner_mode(mission: &scenario::Mission) -> Mode {
+    match (mission.mode, mission.objective) {
+        (scenario::Mode::Labelled, _) => Mode::Labelled,
+        (_, scenario::Objective::Total) => Mode::Unlabelled(Objective::TotalDistance),
+        (_, scenario::Objective::Makespan) => Mode::Unlabelled(Objective::Makespan),
+    }
+}
+
+/// Height of a point over where a vehicle of this radius stands below it.
+fn height_over_ground(map: &VoxelMap, what: &str, point: &Point, radius_m: f32) -> anyhow::Result<f32> {
+    let Some(ground_m) = map.ground_below(point) else {
+        bail!("{what} has no ground below it to stand on: choose a place over a floor");
+    };
+    let height_m = point.z - ground_m - radius_m;
+    if height_m < 0.0 {
+        bail!("{what} is {:.2} m above the ground, less than the radius of {radius_m} m", point.z - ground_m);
+    }
+    Ok(height_m)
+}
+
+fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
+    let task = |vehicle: &scenario::Vehicle| {
+        let what = format!("the start of vehicle {}", vehicle.id);
+        Ok(VehicleTask {
+            id: vehicle.id,
+            required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
+            climb_m: height_over_ground(map, &what, &vehicle.start, vehicle.radius_m)?,
+            goal: vehicle.goal.map(|goal| goal as u16),
+        })
+    };
+    scenario.vehicles.iter().map(task).collect()
+}
+
+/// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
+fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyhow::Result<Vec<Point>> {
+    let given = &scenario.mission.goals;
+    if scenario.mission.mode != scenario::Mode::SingleGoal {
+        return Ok(given.clone());
+    }
+    let (goal, wanted) = (given[0], scenario.vehicles.len());
+    let required_m = scenario.required_clearance_m();
+    let apart_m = schedule.separation_m;
+    // As many discs of half the spacing as fit a circle, with room to spare for walls.
+    let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
+    let steps = (reach_m / SLOT_GRID_M) as i32;
+    let mut offsets: Vec<(i32, i32)> =
+        (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
+    offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
+    let mut slots: Vec<Point> = Vec::new();
+    for (i, j) in offsets {
+        let slot = goal + Point::new(i as f32, j as f32, 0.0) * SLOT_GRID_M;
+        let apart = slots.iter().all(|s| (s - slot).norm() >= apart_m);
+        if apart && segment_is_clear(&map.grid(), &goal, &slot, required_m) {
+            slots.push(slot);
+            if slots.len() == wanted {
+                return Ok(slots);
+            }
         }
     }
+    bail!("only {} of {wanted} vehicles find room {apart_m} m apart in sight of the single goal", slots.len())
+}
+
+fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<(Roadmap, RoadmapHeader)> {
+    let starts = scenario.vehicles.iter().map(|v| v.start);
+    let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
+    let settings = &scenario.roadmap;
+    // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too small for it.
+    let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
+    let config = Config {
+        nodes: settings.nodes as usize,
+        edge_min_m: settings.edge_min_m,
+        edge_max_m: settings.edge_max_m,
+        clearance_m: smallest_m + settings.safety_margin_m,
+        seed: scenario.seed,
+        sampling: settings.sampling,
+    };
+    let roadmap = roadmap::build(map, &terminals, &config)?;
+    let header = RoadmapHeader {
+        origin: scenario.map.origin,
+        edge_min_m: config.edge_min_m,
+        edge_max_m: config.edge_max_m,
+        tested_clearance_m: config.clearance_m,
+        max_clearance_m: roadmap::CLEARANCE_MAX_M,
+        starts: scenario.vehicles.len() as u16,
+        goals: goals.len() as u16,
+    };
+    Ok((roadmap, header))
 }
 
 fn describe(error: &PlanError) -> anyhow::Error {

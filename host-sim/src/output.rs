@@ -6,8 +6,12 @@ use anyhow::Context;
 use planner_core::Point;
 
 use crate::mission::{Mission, SwarmPlan};
-use crate::report::{self, MapSurface, ReportData, RoadmapLines, VehicleTrack};
+use crate::report::{
+    self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
+};
 use crate::result::{self, MissionResult, Timing};
+use crate::swarm::Flight;
+use crate::swarm::monitor::Sample;
 
 /// The page without a flight: map, roadmap, paths.
 pub fn planned_page(mission: &Mission, plan: &SwarmPlan, result: &MissionResult) -> anyhow::Result<ReportData> {
@@ -28,7 +32,7 @@ pub fn planned_page(mission: &Mission, plan: &SwarmPlan, result: &MissionResult)
         })
         .collect();
     Ok(ReportData {
-        title: scenario.name.clone(),
+        title: scenario.path.clone(),
         command: result.command.to_owned(),
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
@@ -41,6 +45,38 @@ pub fn planned_page(mission: &Mission, plan: &SwarmPlan, result: &MissionResult)
         result: serde_json::to_value(result)?,
         ..ReportData::default()
     })
+}
+
+/// The page of a flown mission: tracks, log and smallest distances too.
+pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyhow::Result<ReportData> {
+    let mut page = planned_page(mission, plan, &flight.result)?;
+    for (vehicle, track) in page.vehicles.iter_mut().zip(&flight.tracks) {
+        vehicle.track = track.iter().map(|&(t_s, position)| TrackPoint { t_s, position }).collect();
+    }
+    page.events = flight.log.clone();
+    let t_s: Vec<f32> = flight.samples.iter().map(|s| s.t_s).collect();
+    let plot = |title: &str, limit: Limit, value: fn(&Sample) -> f32| Plot {
+        title: title.to_owned(),
+        unit: "m".to_owned(),
+        limit: Some(limit),
+        curves: vec![Curve {
+            name: "smallest".to_owned(),
+            vehicle: None,
+            t_s: t_s.clone(),
+            values: flight.samples.iter().map(value).collect(),
+        }],
+    };
+    let safety = Limit {
+        value: mission.scenario.deconfliction.safety_distance_m,
+        label: "safety distance".to_owned(),
+    };
+    let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
+    let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
+    page.plots = vec![
+        plot("Smallest separation", safety, |s| s.separation_m),
+        plot("Smallest wall clearance", body, |s| s.clearance_m),
+    ];
+    Ok(page)
 }
 
 /// Writes `result.json`, `timing.json` and `report.html`.
@@ -56,4 +92,41 @@ pub fn write(dir: &Path, result: &MissionResult, timing: &Timing, mut page: Repo
 pub fn write_points(path: &Path, points: impl Iterator<Item = Point>) -> anyhow::Result<()> {
     let text: String = points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
     std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// Prints what `result.json` holds, for a person.
+pub fn print_summary(result: &MissionResult, dir: &Path) {
+    println!("vehicle  goal  reached  landed   path m  flown m   time s  end");
+    let yes = |b: bool| if b { "yes" } else { "no" };
+    for v in &result.vehicles {
+        println!(
+            "{:>7}  {:>4}  {:>7}  {:>6}  {:>7.1}  {:>7.1}  {:>7.1}  {}",
+            v.id,
+            v.goal.map_or("-".to_owned(), |g| g.to_string()),
+            yes(v.reached),
+            yes(v.landed),
+            v.path_m,
+            v.flown_m,
+            v.flight_time_s,
+            v.end
+        );
+    }
+    let safety = &result.safety;
+    let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
+    println!();
+    println!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
+    println!("walls      {} contacts, nearest {}", safety.wall_contacts, metres(safety.min_clearance_m));
+    println!(
+        "vehicles   {} violations of {} m, nearest {}, {} deadlocks",
+        safety.violations,
+        safety.safety_distance_m,
+        metres(safety.min_separation_m),
+        safety.deadlocks
+    );
+    println!(
+        "roadmap    {} nodes, {} edges, {} bytes",
+        result.roadmap.nodes, result.roadmap.edges, result.roadmap.bytes
+    );
+    println!("total      {:.1} m, makespan {:.1} s", result.totals.path_m, result.totals.makespan_s);
+    println!("report     {}", dir.join("report.html").display());
 }

@@ -133,6 +133,7 @@ pub struct HalfEdge {
 }
 
 impl HalfEdge {
+    #[inline]
     fn from_bytes(bytes: &[u8; WORD_LEN]) -> Self {
         let millimetres = u16::from_le_bytes([bytes[2], bytes[3]]);
         Self { target: target_of(bytes), clearance_m: f32::from(millimetres) / 1000.0 }
@@ -144,10 +145,13 @@ fn in_range(node: &Point) -> bool {
     node.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
 }
 
-fn target_of(bytes: &[u8; WORD_LEN]) -> u16 {
+/// The target of a half-edge as it lies in the file.
+#[inline]
+pub(crate) fn target_of(bytes: &[u8; WORD_LEN]) -> u16 {
     u16::from_le_bytes([bytes[0], bytes[1]])
 }
 
+#[inline(always)]
 fn node_of(b: &[u8; NODE_LEN]) -> Point {
     let at = |i: usize| f32::from_le_bytes([b[i], b[i + 1], b[i + 2], b[i + 3]]);
     Point::new(at(0), at(4), at(8))
@@ -292,12 +296,18 @@ impl<'a> RoadmapView<'a> {
     /// The edges out of a node, targets ascending; none for a node that does not exist.
     #[inline]
     pub fn half_edges(&self, node: u16) -> impl ExactSizeIterator<Item = HalfEdge> + use<'a> {
-        self.row(node).iter().map(HalfEdge::from_bytes)
+        self.row(node).1.iter().map(HalfEdge::from_bytes)
+    }
+
+    /// A half-edge by its index.
+    #[inline]
+    pub(crate) fn half_edge(&self, k: usize) -> HalfEdge {
+        HalfEdge::from_bytes(&self.half_edges[k])
     }
 
     /// The edge from `a` to `b`, if there is one. O(log degree).
     pub fn edge_between(&self, a: u16, b: u16) -> Option<HalfEdge> {
-        let row = self.row(a);
+        let (_, row) = self.row(a);
         row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
     }
 
@@ -314,14 +324,16 @@ impl<'a> RoadmapView<'a> {
         edge.clearance_m > required_m || required_m <= self.header.tested_clearance_m
     }
 
-    fn row(&self, node: u16) -> &'a [[u8; WORD_LEN]] {
+    /// Index of a node's first half-edge, and its half-edges.
+    #[inline]
+    pub(crate) fn row(&self, node: u16) -> (usize, &'a [[u8; WORD_LEN]]) {
         let at = usize::from(node);
         match self.offsets.get(at..at + 2) {
             Some([from, to]) => {
-                let range = u32::from_le_bytes(*from) as usize..u32::from_le_bytes(*to) as usize;
-                self.half_edges.get(range).unwrap_or(&[])
+                let (from, to) = (u32::from_le_bytes(*from) as usize, u32::from_le_bytes(*to) as usize);
+                (from, self.half_edges.get(from..to).unwrap_or(&[]))
             }
-            _ => &[],
+            _ => (0, &[]),
         }
     }
 }

@@ -69,7 +69,7 @@ pub struct Gate {
 }
 
 /// What one companion needs of the swarm's plan.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehiclePlan<const W: usize, const G: usize> {
     /// Index of the goal flown to; `None` when none is left for this vehicle.
     pub goal: Option<u16>,

@@ -6,14 +6,21 @@
 //!
 //! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the target is settled or
 //! already reached too cheaply for any edge of that squared length, so a square root is taken only when it may change a
-//! distance. Ties go to the lower node index, so the same roadmap gives the same path everywhere.
+//! distance. A host that searches often keeps the lengths at hand ([`WithLengths`]). Ties go to the lower node index, so the same roadmap gives the same path everywhere.
 
 use heapless::Vec;
 
-use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::Point;
+use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 
 mod heap;
-use heap::{Heap, SETTLED, UNSEEN};
+use heap::{Heap, SETTLED};
+
+/// Half-edges looked at together; a row is seldom longer.
+const CHUNK: usize = 64;
+
+/// Up to so many targets the search is drawn to each in turn: a board's 32 vehicles.
+const FEW_TARGETS: usize = 32;
 
 /// Why a search gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,12 +86,123 @@ impl<const N: usize> Default for SearchWorkspace<N> {
     }
 }
 
+/// A roadmap to search: as it lies in flash ([`RoadmapView`]), or with its edge lengths at hand ([`WithLengths`]). Both
+/// give the same paths and lengths, bit for bit.
+pub trait Graph {
+    /// The roadmap.
+    fn view(&self) -> &RoadmapView<'_>;
+
+    /// Length in metres of half-edge `k`, which leads from `here` to `target`.
+    fn length(&self, k: usize, here: &Point, target: u16) -> f32;
+
+    /// Which of these half-edges may shorten the way to their targets, `reached` being the way to `here`: their places in
+    /// `half_edges` go to `out`, their number is returned. `first` is the index of the first. None that does is left out.
+    ///
+    /// Most do not: the target is settled, or reached more cheaply. They are told apart by selects, since which they are
+    /// cannot be predicted.
+    fn gains(
+        &self,
+        first: usize,
+        half_edges: &[[u8; 4]],
+        here: &Point,
+        reached: f32,
+        distance: &[f32],
+        out: &mut [u8; CHUNK],
+    ) -> usize;
+}
+
+impl Graph for RoadmapView<'_> {
+    fn view(&self) -> &RoadmapView<'_> {
+        self
+    }
+
+    #[inline]
+    fn length(&self, _k: usize, here: &Point, target: u16) -> f32 {
+        libm::sqrtf((self.node(target) - here).norm_squared())
+    }
+
+    #[inline]
+    fn gains(
+        &self,
+        _first: usize,
+        half_edges: &[[u8; 4]],
+        here: &Point,
+        reached: f32,
+        distance: &[f32],
+        out: &mut [u8; CHUNK],
+    ) -> usize {
+        // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
+        // is eight times the rounding of the three products.
+        const SLACK: f32 = 1.0 + 1e-6;
+        let mut count = 0;
+        for (place, half_edge) in half_edges.iter().enumerate() {
+            let target = target_of(half_edge);
+            let room = distance[usize::from(target)] - reached;
+            let squared = (self.node(target) - here).norm_squared();
+            out[count % CHUNK] = place as u8;
+            count += usize::from(squared <= room * libm::fabsf(room) * SLACK);
+        }
+        count
+    }
+}
+
+/// A roadmap with the lengths of its half-edges in memory, 4 bytes each: for hosts, where many searches follow.
+#[derive(Clone, Copy, Debug)]
+pub struct WithLengths<'a> {
+    view: RoadmapView<'a>,
+    lengths: &'a [f32],
+}
+
+impl<'a> WithLengths<'a> {
+    /// Fills `lengths`, which holds one number for each half-edge or more.
+    pub fn new(view: RoadmapView<'a>, lengths: &'a mut [f32]) -> Result<Self, SearchError> {
+        let lengths = lengths.get_mut(..view.half_edge_count()).ok_or(SearchError::WorkspaceTooSmall)?;
+        for node in 0..view.node_count() as u16 {
+            let (first, row) = view.row(node);
+            for (length, half_edge) in lengths[first..].iter_mut().zip(row) {
+                *length = view.distance_m(node, target_of(half_edge));
+            }
+        }
+        Ok(Self { view, lengths })
+    }
+}
+
+impl Graph for WithLengths<'_> {
+    fn view(&self) -> &RoadmapView<'_> {
+        &self.view
+    }
+
+    #[inline]
+    fn length(&self, k: usize, _here: &Point, _target: u16) -> f32 {
+        self.lengths[k]
+    }
+
+    #[inline]
+    fn gains(
+        &self,
+        first: usize,
+        half_edges: &[[u8; 4]],
+        _here: &Point,
+        reached: f32,
+        distance: &[f32],
+        out: &mut [u8; CHUNK],
+    ) -> usize {
+        let mut count = 0;
+        let lengths = &self.lengths[first..first + half_edges.len()];
+        for (place, (half_edge, length)) in half_edges.iter().zip(lengths).enumerate() {
+            out[count % CHUNK] = place as u8;
+            count += usize::from(reached + length < distance[usize::from(target_of(half_edge))]);
+        }
+        count
+    }
+}
+
 /// The shortest passable path from `from` to `to`. Returns its length in metres and leaves its nodes, ends included, in
 /// `out_nodes`.
 ///
 /// `passable(node, edge)` says whether `edge` may be flown out of `node`: size by clearance, blocked nodes and edges.
 pub fn astar<const N: usize, const P: usize>(
-    view: &RoadmapView<'_>,
+    graph: &impl Graph,
     from: u16,
     to: u16,
     passable: impl Fn(u16, &HalfEdge) -> bool,
@@ -92,28 +210,18 @@ pub fn astar<const N: usize, const P: usize>(
     out_nodes: &mut Vec<u16, P>,
 ) -> Result<f32, SearchError> {
     out_nodes.clear();
-    check_node(view, to)?;
-    let goal = view.node(to);
-    let mut target_left = 1;
-    search(
-        view,
-        from,
-        passable,
-        |node| libm::sqrtf((view.node(node) - goal).norm_squared()),
-        |node| {
-            target_left -= usize::from(node == to);
-            target_left == 0
-        },
-        ws,
-    )?;
+    search(graph, from, &[to], passable, ws)?;
     ws.path_to(to, out_nodes)?;
     Ok(ws.distance_m(to))
 }
 
 /// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`; infinite where there is
-/// none. Stops when all targets are settled. One row of the cost matrix.
+/// none. One row of the cost matrix; stops when all targets are settled.
+///
+/// For few targets the search is drawn to them one after another: what A* settled for one target stays settled, its
+/// distance is final, and only the waiting nodes are ordered anew for the next. For many it is Dijkstra's.
 pub fn dijkstra_row<const N: usize>(
-    view: &RoadmapView<'_>,
+    graph: &impl Graph,
     from: u16,
     targets: &[u16],
     passable: impl Fn(u16, &HalfEdge) -> bool,
@@ -123,77 +231,139 @@ pub fn dijkstra_row<const N: usize>(
     if out.len() != targets.len() {
         return Err(SearchError::OutputLength);
     }
-    for &target in targets {
-        check_node(view, target)?;
-    }
-    let mut left = targets.len();
-    search(
-        view,
-        from,
-        passable,
-        |_| 0.0,
-        |node| {
-            left -= targets.iter().filter(|&&t| t == node).count();
-            left == 0
-        },
-        ws,
-    )?;
+    search(graph, from, targets, passable, ws)?;
     for (length, &target) in out.iter_mut().zip(targets) {
         *length = ws.distance_m(target);
     }
     Ok(())
 }
 
+/// The cost matrix of an allocation: lengths in metres of the shortest passable paths from each of `starts` to each of
+/// `goals`, row-major into `out`; infinite where there is none.
+///
+/// Searched from the starts or, against the direction of flight, from the goals, whichever is likely less work: a search
+/// drawn to targets that lie close together settles few nodes beside those on the way. `passable` is always asked about
+/// the direction of flight.
+pub fn cost_matrix<const N: usize>(
+    graph: &impl Graph,
+    starts: &[u16],
+    goals: &[u16],
+    passable: impl Fn(u16, &HalfEdge) -> bool,
+    ws: &mut SearchWorkspace<N>,
+    out: &mut [f32],
+) -> Result<(), SearchError> {
+    if starts.len().checked_mul(goals.len()) != Some(out.len()) {
+        return Err(SearchError::OutputLength);
+    }
+    let view = graph.view();
+    for &node in starts.iter().chain(goals) {
+        check_node(view, node)?;
+    }
+    if out.is_empty() {
+        return Ok(());
+    }
+    let ((starts_at, starts_across), (goals_at, goals_across)) = (spread(view, starts), spread(view, goals));
+    let between = libm::sqrtf((goals_at - starts_at).norm_squared());
+    let from_starts = starts.len() as f32 * (between + goals_across);
+    let from_goals = goals.len() as f32 * (between + starts_across);
+    if from_starts <= from_goals {
+        for (&start, row) in starts.iter().zip(out.chunks_mut(goals.len())) {
+            dijkstra_row(graph, start, goals, &passable, ws, row)?;
+        }
+        return Ok(());
+    }
+    let in_flight = |node: u16, edge: &HalfEdge| passable(edge.target, &HalfEdge { target: node, ..*edge });
+    for (column, &goal) in goals.iter().enumerate() {
+        search(graph, goal, starts, in_flight, ws)?;
+        for (row, &start) in starts.iter().enumerate() {
+            out[row * goals.len() + column] = ws.distance_m(start);
+        }
+    }
+    Ok(())
+}
+
+/// Centre and diagonal of the box around some nodes.
+fn spread(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
+    let first = nodes.first().map_or(Point::zeros(), |&node| view.node(node));
+    let corners = nodes.iter().map(|&node| view.node(node));
+    let (low, high) = corners.fold((first, first), |(low, high), p| (low.inf(&p), high.sup(&p)));
+    ((low + high) / 2.0, libm::sqrtf((high - low).norm_squared()))
+}
+
 fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }
 
-/// Settles nodes in order of distance + `heuristic` until `done(node)` or none is left.
+/// Settles nodes until all of `targets` are settled or none is left to settle.
 fn search<const N: usize>(
-    view: &RoadmapView<'_>,
+    graph: &impl Graph,
     from: u16,
+    targets: &[u16],
     passable: impl Fn(u16, &HalfEdge) -> bool,
-    heuristic: impl Fn(u16) -> f32,
-    mut done: impl FnMut(u16) -> bool,
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
+    let view = graph.view();
     if view.node_count() > N {
         return Err(SearchError::WorkspaceTooSmall);
     }
     check_node(view, from)?;
-    ws.heap.clear();
-    ws.distance[usize::from(from)] = 0.0;
+    for &target in targets {
+        check_node(view, target)?;
+    }
+    ws.heap.clear(view.node_count());
+    let distance = &mut ws.distance[..view.node_count()];
+    distance.fill(f32::INFINITY);
+    distance[usize::from(from)] = 0.0;
     ws.parent[usize::from(from)] = from;
-    ws.heap.push(from, heuristic(from));
-    while let Some(node) = ws.heap.pop() {
-        if done(node) {
-            break;
+    ws.heap.push(from, 0.0);
+    let informed = targets.len() <= FEW_TARGETS;
+    for &target in targets {
+        let goal = view.node(target);
+        let heuristic = |node: u16| match informed {
+            true => libm::sqrtf((view.node(node) - goal).norm_squared()),
+            false => 0.0,
+        };
+        if informed && ws.heap.place(target) != SETTLED {
+            let distance = &ws.distance;
+            ws.heap.reorder(|node| distance[usize::from(node)] + heuristic(node));
         }
-        let here = view.node(node);
-        let reached = ws.distance[usize::from(node)];
-        for edge in view.half_edges(node) {
-            let target = usize::from(edge.target);
-            let place = ws.heap.place(edge.target);
-            if place == SETTLED {
-                continue;
-            }
-            let squared = (view.node(edge.target) - here).norm_squared();
-            if place != UNSEEN {
-                let room = ws.distance[target] - reached;
-                if room <= 0.0 || squared >= room * room {
-                    continue;
-                }
-            }
-            let length = reached + libm::sqrtf(squared);
-            if (place != UNSEEN && length >= ws.distance[target]) || !passable(node, &edge) {
-                continue;
-            }
-            ws.distance[target] = length;
-            ws.parent[target] = node;
-            ws.heap.push(edge.target, length + heuristic(edge.target));
+        while ws.heap.place(target) != SETTLED
+            && let Some(node) = ws.heap.pop()
+        {
+            relax(graph, node, &passable, heuristic, ws);
         }
     }
     Ok(())
+}
+
+/// Offers the settled `node`'s edges to its neighbours.
+#[inline]
+fn relax<const N: usize>(
+    graph: &impl Graph,
+    node: u16,
+    passable: &impl Fn(u16, &HalfEdge) -> bool,
+    heuristic: impl Fn(u16) -> f32,
+    ws: &mut SearchWorkspace<N>,
+) {
+    let view = graph.view();
+    let distance = &mut ws.distance[..view.node_count()];
+    let (here, reached) = (view.node(node), distance[usize::from(node)]);
+    let (first, row) = view.row(node);
+    for (chunk, half_edges) in row.chunks(CHUNK).enumerate() {
+        let first = first + chunk * CHUNK;
+        let mut gains = [0; CHUNK];
+        let count = graph.gains(first, half_edges, &here, reached, distance, &mut gains);
+        for &place in gains.iter().take(count) {
+            let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
+            let length = reached + graph.length(k, &here, target);
+            let gain = length < distance[usize::from(target)] && ws.heap.place(target) != SETTLED;
+            if gain && passable(node, &view.half_edge(k)) {
+                distance[usize::from(target)] = length;
+                ws.parent[usize::from(target)] = node;
+                ws.heap.push(target, length + heuristic(target));
+            }
+        }
+    }
 }
 
 #[cfg(test)]

@@ -39,6 +39,7 @@ const ONE: i32 = 1 << FRACTION_BITS;
 pub type Snapped = [i32; 3];
 
 /// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells beyond the grid.
+#[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     const REACH: f32 = MAX_DIM as f32;
     let mut out = [0; 3];
@@ -78,6 +79,12 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
 
 /// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact.
 pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -> bool {
+    snapped_rest_touches(grid, a, b, 0.0)
+}
+
+/// As [`snapped_segment_touches`] for a segment whose first part, the share `known` of it from `a`, is known to touch nothing.
+#[inline]
+pub(crate) fn snapped_rest_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped, known: f32) -> bool {
     let dims = grid.shape().dims;
     if grid.outside() == Outside::Blocked {
         let inside =
@@ -86,22 +93,31 @@ pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -
             return true;
         }
     }
-    Walk::new(grid, a, b).touches()
+    let size = [0, 1, 2].map(|axis| (b[axis] - a[axis]).unsigned_abs());
+    if size[0] >= size[1] && size[0] >= size[2] {
+        Walk::<0, 1, 2>::new(grid, a, b, known).touches()
+    } else if size[1] >= size[2] {
+        Walk::<1, 0, 2>::new(grid, a, b, known).touches()
+    } else {
+        Walk::<2, 0, 1>::new(grid, a, b, known).touches()
+    }
 }
 
-/// The walk along the longest axis `u`; `v` and `w` are the other two.
-struct Walk<'g> {
+/// The walk along the longest axis `U`; `V` and `W` are the other two.
+struct Walk<'g, const U: usize, const V: usize, const W: usize> {
     words: &'g [u64],
     a: Snapped,
     b: Snapped,
-    axes: [usize; 3],
-    /// Cells along u, v, w.
+    /// Where along `U` the walk begins and ends.
+    start: i32,
+    end: i32,
+    /// Cells along each axis.
     dims: [i32; 3],
-    /// Words from one brick to the next along u, v, w.
+    /// Words from one brick to the next along each axis.
     strides: [i32; 3],
-    /// Change of v and w over one lattice unit of u, times 2³⁰.
-    slopes: [i64; 2],
-    /// What v and w may err by, in lattice units.
+    /// Change of each coordinate over one lattice unit of `U`, times 2³⁰.
+    slopes: [i64; 3],
+    /// What a coordinate at a place along `U` may err by, in lattice units.
     slack: i32,
 }
 
@@ -128,6 +144,14 @@ impl Span {
         let first = (self.first - brick * 4).max(0) as u32;
         let last = (self.last - brick * 4).min(3) as u32;
         (0b1111 << first) & (0b1111 >> (3 - last))
+    }
+
+    /// As [`Self::lanes`], none if they do not meet.
+    #[inline(always)]
+    fn lanes_if_met(self, brick: i32) -> u32 {
+        let first = (self.first - brick * 4).clamp(0, 4) as u32;
+        let last = (self.last - brick * 4).clamp(-1, 3);
+        (0b1111 << first) & (0b1111 >> (3 - last) as u32)
     }
 }
 
@@ -159,69 +183,64 @@ const fn lane_masks() -> [[u64; 16]; 3] {
     out
 }
 
-impl<'g> Walk<'g> {
+impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     #[inline(always)]
-    fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped) -> Self {
+    fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        let size = d.map(i32::unsigned_abs);
-        let axes = if size[0] >= size[1] && size[0] >= size[2] {
-            [0, 1, 2]
-        } else if size[1] >= size[2] {
-            [1, 0, 2]
-        } else {
-            [2, 0, 1]
-        };
+        // A thousandth and a cell less than known, against the rounding of `known` and of this product.
+        let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE).max(0);
+        // Along U upwards, so that the walk has one direction.
+        let ((a, b), (start, end)) =
+            if d[U] < 0 { ((*b, *a), (b[U], a[U] - skip)) } else { ((*a, *b), (a[U] + skip, b[U])) };
         let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
-        let strides = [1, bx, bx * by];
-        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so v and w by 2⁻²² of the length, and two units.
-        let per_u = if d[axes[0]] == 0 { 0.0 } else { (1 << 30) as f32 / d[axes[0]] as f32 };
+        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the length, and two units.
+        let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
         Self {
             words: grid.words(),
-            // Along u upwards, so that the walk has one direction.
-            a: if d[axes[0]] < 0 { *b } else { *a },
-            b: if d[axes[0]] < 0 { *a } else { *b },
-            axes,
-            dims: axes.map(|axis| grid.shape().dims[axis] as i32),
-            strides: axes.map(|axis| strides[axis]),
-            slopes: [1, 2].map(|i| (d[axes[i]] as f32 * per_u) as i64),
-            slack: (size[axes[0]] >> 21) as i32 + 3,
+            a,
+            b,
+            start,
+            end,
+            dims: grid.shape().dims.map(|n| n as i32),
+            strides: [1, bx, bx * by],
+            slopes: d.map(|d| (d as f32 * per_u) as i64),
+            slack: (d[U].unsigned_abs() >> 21) as i32 + 3,
         }
     }
 
-    /// v (`i` = 1) or w (`i` = 2) where the segment is at `u`, within `slack`.
+    /// The coordinate on `axis` where the segment is at `u`, within `slack`.
     #[inline(always)]
-    fn at(&self, i: usize, u: i32) -> i32 {
-        let run = i64::from(u - self.a[self.axes[0]]);
-        self.a[self.axes[i]] + ((run * self.slopes[i - 1]) >> 30) as i32
+    fn at(&self, axis: usize, u: i32) -> i32 {
+        let run = i64::from(u - self.a[U]);
+        self.a[axis] + ((run * self.slopes[axis]) >> 30) as i32
     }
 
+    #[inline(always)]
     fn touches(&self) -> bool {
-        let (start, end) = (self.a[self.axes[0]], self.b[self.axes[0]]);
         // A cell is closed: an end on its face touches the one before too.
-        let whole = Span::new(start, end, 1, self.dims[0]);
+        let whole = Span::new(self.start, self.end, 1, self.dims[U]);
         if whole.first > whole.last {
             return false;
         }
-        let mut v = self.at(1, start.max((whole.first * ONE).min(end)));
-        let mut w = self.at(2, start.max((whole.first * ONE).min(end)));
+        let first = (whole.first * ONE).clamp(self.start, self.end);
+        let (mut v, mut w) = (self.at(V, first), self.at(W, first));
         for brick in whole.first >> 2..=whole.last >> 2 {
-            let u = end.min((brick + 1) * (4 * ONE)).max(start);
-            let (next_v, next_w) = (self.at(1, u), self.at(2, u));
-            let span_v = Span::new(v, next_v, self.slack, self.dims[1]);
-            let span_w = Span::new(w, next_w, self.slack, self.dims[2]);
+            let u = ((brick + 1) * (4 * ONE)).clamp(self.start, self.end);
+            let (next_v, next_w) = (self.at(V, u), self.at(W, u));
+            let span_v = Span::new(v, next_v, self.slack, self.dims[V]);
+            let span_w = Span::new(w, next_w, self.slack, self.dims[W]);
             (v, w) = (next_v, next_w);
-            let row = brick * self.strides[0];
+            let row = brick * self.strides[U];
             for brick_w in span_w.first >> 2..=span_w.last >> 2 {
                 for brick_v in span_v.first >> 2..=span_v.last >> 2 {
                     let word =
-                        self.words[(row + brick_v * self.strides[1] + brick_w * self.strides[2]) as usize];
+                        self.words[(row + brick_v * self.strides[V] + brick_w * self.strides[W]) as usize];
                     if word == 0 {
                         continue;
                     }
-                    let near = word
-                        & lane_mask(self.axes[1], span_v.lanes(brick_v))
-                        & lane_mask(self.axes[2], span_w.lanes(brick_w));
-                    if near != 0 && self.brick_touches(near, [brick, brick_v, brick_w]) {
+                    let near =
+                        word & lane_mask(V, span_v.lanes(brick_v)) & lane_mask(W, span_w.lanes(brick_w));
+                    if near != 0 && self.brick_touches(near, brick, brick_v, brick_w) {
                         return true;
                     }
                 }
@@ -230,34 +249,27 @@ impl<'g> Walk<'g> {
         false
     }
 
-    /// Looks at the occupied cells `near` of a brick, one layer along u at a time.
-    fn brick_touches(&self, near: u64, brick: [i32; 3]) -> bool {
-        let (start, end) = (self.a[self.axes[0]], self.b[self.axes[0]]);
+    /// Looks at the occupied cells `near` of a brick, one layer along `U` at a time.
+    #[inline(always)]
+    fn brick_touches(&self, near: u64, brick_u: i32, brick_v: i32, brick_w: i32) -> bool {
+        let floor = brick_u * (4 * ONE);
+        let from = floor.clamp(self.start, self.end);
+        let (mut v, mut w) = (self.at(V, from), self.at(W, from));
         for layer in 0..4 {
-            let near = near & lane_mask(self.axes[0], 1 << layer);
-            if near == 0 {
-                continue;
-            }
-            let floor = (brick[0] * 4 + layer) * ONE;
-            let (from, to) = (floor.clamp(start, end), (floor + ONE).clamp(start, end));
-            let mut layer_mask = near;
-            for i in [1, 2] {
-                let span = Span::new(self.at(i, from), self.at(i, to), self.slack, self.dims[i]);
-                let base = brick[i] * 4;
-                if span.first > base + 3 || span.last < base || span.first > span.last {
-                    layer_mask = 0;
-                } else {
-                    layer_mask &= lane_mask(self.axes[i], span.lanes(brick[i]));
-                }
-            }
-            while layer_mask != 0 {
-                let bit = layer_mask.trailing_zeros() as i32;
-                layer_mask &= layer_mask - 1;
+            let to = (floor + (layer + 1) * ONE).clamp(self.start, self.end);
+            let (next_v, next_w) = (self.at(V, to), self.at(W, to));
+            let layer_v = Span::new(v, next_v, self.slack, self.dims[V]).lanes_if_met(brick_v);
+            let layer_w = Span::new(w, next_w, self.slack, self.dims[W]).lanes_if_met(brick_w);
+            (v, w) = (next_v, next_w);
+            let mut cells = near & lane_mask(U, 1 << layer) & lane_mask(V, layer_v) & lane_mask(W, layer_w);
+            while cells != 0 {
+                let bit = cells.trailing_zeros() as i32;
+                cells &= cells - 1;
                 let lane = [bit & 3, bit >> 2 & 3, bit >> 4];
                 let mut cell = [0; 3];
-                for i in 0..3 {
-                    cell[self.axes[i]] = brick[i] * 4 + lane[self.axes[i]];
-                }
+                cell[U] = brick_u * 4 + lane[U];
+                cell[V] = brick_v * 4 + lane[V];
+                cell[W] = brick_w * 4 + lane[W];
                 if cell_is_touched(&self.a, &self.b, cell) {
                     return true;
                 }
@@ -269,6 +281,7 @@ impl<'g> Walk<'g> {
 
 /// Whether a segment meets a closed cell: the six separating axes, in integers. Coordinates stay below 1.5 · 2³⁰, so the
 /// two products and their difference below 2⁶³.
+#[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
     const HALF: i64 = (ONE / 2) as i64;
     let mut d = [0_i64; 3];

@@ -36,6 +36,7 @@ pub struct GridShape {
 
 impl GridShape {
     /// Bricks along each axis.
+    #[inline]
     pub fn bricks(&self) -> [u32; 3] {
         self.dims.map(|d| d.div_ceil(BRICK_CELLS))
     }
@@ -71,6 +72,7 @@ impl GridShape {
     }
 
     /// Word index and bit mask of a cell inside the grid.
+    #[inline]
     pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
         let [bx, by, _] = self.bricks();
         let word = ((k / 4 * by + j / 4) * bx + i / 4) as usize;
@@ -114,21 +116,25 @@ impl<'a> VoxelGrid<'a> {
     }
 
     /// Shape and place.
+    #[inline]
     pub fn shape(&self) -> &GridShape {
         &self.shape
     }
 
     /// What lies beyond the faces.
+    #[inline]
     pub fn outside(&self) -> Outside {
         self.outside
     }
 
     /// The bricks, x fastest, then y, then z.
+    #[inline]
     pub fn words(&self) -> &'a [u64] {
         self.words
     }
 
     /// Whether a cell is an obstacle. Panics outside the grid.
+    #[inline]
     pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
         let (word, mask) = self.shape.address(cell);
         self.words[word] & mask != 0

@@ -2,6 +2,7 @@
 #![forbid(unsafe_code)]
 
 mod bare_metal;
+mod bench;
 mod install;
 mod shell;
 mod test;
@@ -15,11 +16,14 @@ use clap::Parser;
 enum Command {
     /// Everything CI runs; installs what is missing, or says in one line what to install.
     Test(test::Args),
+    /// Our times beside those of other programs.
+    Bench(bench::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Test(args) => test::run(&args),
+        Command::Bench(args) => bench::run_bench(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

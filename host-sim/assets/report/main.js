@@ -1,7 +1,8 @@
 // The page's state: time, playing, selection; keyboard, and what the address asks for.
 //
-// `?t=SECONDS` or `#t=SECONDS` sets the time, `view=iso|top|front|side` the camera, `select=ID` a vehicle. After the first
-// frame `document.body.dataset` holds `ready` and counts of what was drawn.
+// `?t=SECONDS` or `#t=SECONDS` sets the time, `view=iso|top|front|side` the camera, `select=ID` and
+// `follow=ID` a vehicle, `map=x-ray|solid|off` and `cut=METRES` how the map is drawn. After the first frame
+// `document.body.dataset` holds `ready` and counts of what was drawn.
 
 const ICONS = { play: "M3 1v12l10-6z", pause: "M3 1h3v12H3zM8 1h3v12H8z" };
 const state = { time: 0, playing: false, selected: null, frame: 0 };
@@ -14,8 +15,6 @@ function reportWithoutScene(host) {
   return null;
 }
 
-const hasWebGl = Boolean(document.createElement("canvas").getContext("webgl2"));
-const view = hasWebGl ? buildView(byId("view"), (id) => select(id)) : reportWithoutScene(byId("view"));
 buildHeader();
 buildSummary();
 const markRow = buildVehicleTable((id) => select(state.selected === id ? null : id));
@@ -23,6 +22,10 @@ const showEvents = buildEvents((t) => seek(t));
 const showPlots = buildPlots((t) => seek(t));
 byId("scenario").hidden = report.scenario_toml === "";
 document.querySelector("#scenario pre").textContent = report.scenario_toml;
+byId("transport").hidden = endTime === 0;
+// Last, when the panels around it have their sizes.
+const hasWebGl = Boolean(document.createElement("canvas").getContext("webgl2"));
+const view = hasWebGl ? buildView(byId("view"), (id) => select(id)) : reportWithoutScene(byId("view"));
 
 function setTime(t) {
   state.time = Math.min(endTime, Math.max(0, t));
@@ -76,7 +79,6 @@ function setPlaying(playing) {
   requestAnimationFrame(advance);
 }
 
-byId("transport").hidden = endTime === 0;
 byId("time").max = endTime;
 byId("time").addEventListener("input", (e) => seek(Number(e.target.value)));
 byId("play").addEventListener("click", () => setPlaying(!state.playing));
@@ -96,7 +98,7 @@ document.addEventListener("keydown", (e) => {
 const asked = new URLSearchParams(location.search);
 for (const [key, value] of new URLSearchParams(location.hash.slice(1))) asked.set(key, value);
 if (view) {
-  buildLayers(view);
+  buildLayers(view, asked);
   for (const name of Object.keys(VIEWS)) {
     const button = byId("views").appendChild(element("button", name[0].toUpperCase() + name.slice(1), { title: `View ${name}` }));
     button.addEventListener("click", () => { byId("follow").value = ""; view.follow(null); view.setView(name); });
@@ -106,3 +108,7 @@ if (view) {
 setPlaying(false);
 setTime(Number(asked.get("t")) || 0);
 if (asked.has("select")) select(Number(asked.get("select")));
+if (asked.has("follow")) {
+  byId("follow").value = asked.get("follow");
+  view?.follow(Number(asked.get("follow")));
+}

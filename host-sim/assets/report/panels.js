@@ -26,11 +26,32 @@ function verdict(key, safety) {
   return "";
 }
 
+// Seconds below a tenth read better as milliseconds.
+function quantity(value, unit) {
+  if (unit === "s" && isNumber(value) && Math.abs(value) < 0.1) return [`${Number((value * 1000).toPrecision(2))}`, "ms"];
+  return [valueText(value), isNumber(value) ? unit : ""];
+}
+
 function row(list, name, value, { unit = "", style = "", note = "" } = {}) {
-  const dd = element("dd", valueText(value), { class: style });
-  if (unit && isNumber(value)) dd.append(element("small", ` ${unit}`));
+  const [text, shownUnit] = quantity(value, unit);
+  const dd = element("dd", text, { class: style });
+  if (shownUnit) dd.append(element("small", ` ${shownUnit}`));
   if (note) dd.append(element("small", ` ${note}`));
   list.append(element("dt", name), dd);
+}
+
+const SAFETY_ORDER = ["wall_contacts", "violations", "deadlocks", "min_separation_m", "min_clearance_m"];
+
+// The figures of one section of the result, the safety figures in order and with their limits.
+function rows(list, section, figures) {
+  const keys = Object.keys(figures).filter((key) => key !== "safety_distance_m" || !("min_separation_m" in figures));
+  if (section === "safety") keys.sort((a, b) => SAFETY_ORDER.indexOf(a) - SAFETY_ORDER.indexOf(b));
+  for (const key of keys) {
+    const [name, unit] = nameAndUnit(key);
+    const style = section === "safety" && flown ? verdict(key, figures) : "";
+    const note = key === "min_separation_m" && isNumber(figures.safety_distance_m) ? `(limit ${valueText(figures.safety_distance_m)} m)` : "";
+    row(list, name, figures[key], { unit: key === "bytes" ? "B" : unit, style, note });
+  }
 }
 
 function buildHeader() {
@@ -47,35 +68,28 @@ function buildHeader() {
 function buildSummary() {
   const host = byId("summary");
   const result = report.result ?? {};
-  const list = () => host.appendChild(element("dl"));
-  const rows = Array.isArray(result.vehicles) ? result.vehicles : [];
-  if (rows.length > 0) {
-    const top = list();
+  const ends = Array.isArray(result.vehicles) ? result.vehicles : [];
+  if (!flown && ends.length > 0) {
+    const assigned = ends.filter((v) => isNumber(v.goal)).length;
+    row(host.appendChild(element("dl")), "Given a goal", `${assigned} of ${ends.length}`);
+  }
+  if (flown && ends.length > 0) {
+    const top = host.appendChild(element("dl"));
     for (const [key, name] of [["reached", "Reached their goal"], ["landed", "Landed"]]) {
-      if (!rows.some((v) => typeof v[key] === "boolean")) continue;
-      const count = rows.filter((v) => v[key]).length;
-      row(top, name, `${count} of ${rows.length}`, { style: count === rows.length ? "ok" : "bad" });
+      if (!ends.some((v) => typeof v[key] === "boolean")) continue;
+      const count = ends.filter((v) => v[key]).length;
+      row(top, name, `${count} of ${ends.length}`, { style: count === ends.length ? "ok" : "bad" });
     }
   }
-  for (const section of ["safety", "totals", "roadmap", "coverage", "formation"]) {
-    const figures = result[section];
+  const sections = { ...result, computing_time: report.timing };
+  for (const section of ["safety", "totals", "coverage", "formation", "roadmap", "computing_time"]) {
+    const figures = sections[section];
     if (!figures || typeof figures !== "object") continue;
-    host.append(element("h3", section === "totals" ? "Totals" : section[0].toUpperCase() + section.slice(1)));
-    const target = list();
-    for (const [key, value] of Object.entries(figures)) {
-      const [name, unit] = nameAndUnit(key);
-      const style = section === "safety" ? verdict(key, figures) : "";
-      const note = key === "min_separation_m" && isNumber(figures.safety_distance_m) ? `(≥ ${valueText(figures.safety_distance_m)})` : "";
-      row(target, name, value, { unit: key === "bytes" ? "B" : unit, style, note });
-    }
-  }
-  if (report.timing && typeof report.timing === "object") {
-    host.append(element("h3", "Computing time"));
-    const target = list();
-    for (const [key, value] of Object.entries(report.timing)) {
-      const [name, unit] = nameAndUnit(key);
-      row(target, name, value, { unit });
-    }
+    const folded = ["roadmap", "computing_time"].includes(section);
+    const name = section[0].toUpperCase() + section.slice(1).replace("_", " ");
+    const box = host.appendChild(element(folded ? "details" : "div"));
+    box.append(element(folded ? "summary" : "h3", name));
+    rows(box.appendChild(element("dl")), section, figures);
   }
 }
 
@@ -93,9 +107,9 @@ function buildVehicleTable(onSelect) {
     const tr = element("tr", null, { tabindex: 0 });
     const id = element("td");
     id.append(element("span", null, { class: "swatch", style: `background: ${cssColor(v.color)}` }), v.id);
-    const landed = typeof result.landed === "boolean" ? element("td", result.landed ? "yes" : "no", { class: result.landed ? "ok" : "bad" }) : element("td", "–");
+    const landed = flown && typeof result.landed === "boolean" ? element("td", result.landed ? "yes" : "no", { class: result.landed ? "ok" : "bad" }) : element("td", "–");
     const end = element("td", result.end ?? "–", { title: result.end ?? "" });
-    tr.append(id, element("td", result.goal ?? v.goal_index ?? "–"), landed, element("td", fixed(result.path_m, 1)), element("td", fixed(result.flown_m, 1)), element("td", fixed(result.flight_time_s, 1)), end);
+    tr.append(id, element("td", result.goal ?? v.goal_index ?? "–"), landed, element("td", fixed(result.path_m, 1)), element("td", fixed(flown ? result.flown_m : null, 1)), element("td", fixed(flown ? result.flight_time_s : null, 1)), end);
     tr.addEventListener("click", () => onSelect(v.id));
     tr.addEventListener("keydown", (e) => { if (e.key === "Enter") onSelect(v.id); });
     rows.set(v.id, tr);
@@ -134,7 +148,7 @@ function buildEvents(onSeek) {
   };
 }
 
-function buildLayers(view) {
+function buildLayers(view, asked) {
   const host = byId("layer-list");
   const check = (name, on, change, title = "") => {
     const label = element("label", null, { title });
@@ -150,6 +164,7 @@ function buildLayers(view) {
     const style = element("select", null, { "aria-label": "Map style" });
     for (const name of ["x-ray", "solid", "off"]) style.append(element("option", name));
     style.addEventListener("change", () => { view.map.show(style.value); view.invalidate(); });
+    if (["x-ray", "solid", "off"].includes(asked.get("map"))) style.value = asked.get("map");
     view.map.show(style.value);
     const line = element("div", null, { class: "row" });
     line.append(element("span", "Map"), style);
@@ -164,6 +179,7 @@ function buildLayers(view) {
       const change = () => {
         const height = Number(input.value);
         plane.constant = sign * height + 1e-3;
+        if (plane === cutAbove) view.map.cutAt(height);
         value.textContent = `${height.toFixed(2)} m`;
         view.invalidate();
       };
@@ -172,10 +188,10 @@ function buildLayers(view) {
       host.append(label, input);
       change();
     };
-    slider("Cut above", cutAbove, 1, high);
+    slider("Cut above", cutAbove, 1, Number(asked.get("cut")) || high);
     slider("Cut below", cutBelow, -1, low);
     host.append(element("hr"));
-    if (view.map.creases.geometry.attributes.position.count > 0) check("Edges", true, (shown) => { view.map.creases.visible = shown; });
+    if (report.map.creases.length > 0) check("Edges", true, (shown) => { view.map.creases.visible = shown; });
   }
   layer("Roadmap", "roadmap", true);
   layer("Planned paths", "planned", true);
@@ -186,8 +202,9 @@ function buildLayers(view) {
   if (view.safetyDistance > 0) check("Safety distance", false, view.setRings, "Rings of half the safety distance: two that touch are at the limit");
   layer("Obstacles", "obstacles", true);
   layer("Grid", "grid", true);
-  if (report.map && report.map.drawn_m > report.map.resolution_m) {
-    byId("notice").hidden = false;
-    byId("notice").textContent = `Map drawn at ${report.map.drawn_m} m, planned at ${report.map.resolution_m} m`;
-  }
+  const notices = [];
+  if (vehicles.length > 0 && !flown) notices.push("Planned only: nothing was flown");
+  if (report.map && report.map.drawn_m > report.map.resolution_m) notices.push(`Map drawn at ${report.map.drawn_m} m, planned at ${report.map.resolution_m} m`);
+  byId("notice").hidden = notices.length === 0;
+  byId("notice").textContent = notices.join(". ");
 }

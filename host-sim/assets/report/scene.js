@@ -26,9 +26,11 @@ function niceStep(span, parts) {
   return decade * [5, 2, 1].find((m) => m * decade <= raw);
 }
 
-function scaleLabel(text, x, y, z) {
+// A label of the scale along `axis`, hidden where one looks along that axis.
+function scaleLabel(axis, text, x, y, z) {
   const label = new THREE.CSS2DObject(element("div", text, { class: "scale" }));
   label.position.set(x, y, z);
+  label.userData.axis = axis;
   return label;
 }
 
@@ -36,37 +38,41 @@ function buildGrid() {
   const group = new THREE.Group();
   const span = Math.max(extent.max[0] - extent.min[0], extent.max[1] - extent.min[1], 1);
   const major = niceStep(span, 4);
-  const [x0, y0] = [0, 1].map((a) => Math.floor(extent.min[a] / major - 0.001) * major);
-  const [x1, y1] = [0, 1].map((a) => Math.ceil(extent.max[a] / major + 0.001) * major);
-  const z = extent.min[2];
-  const lines = { minor: [], major: [] };
   const minor = major / 5;
-  for (let i = 0; i <= Math.round((x1 - x0) / minor); i++) lines[i % 5 ? "minor" : "major"].push(x0 + i * minor, y0, z, x0 + i * minor, y1, z);
-  for (let i = 0; i <= Math.round((y1 - y0) / minor); i++) lines[i % 5 ? "minor" : "major"].push(x0, y0 + i * minor, z, x1, y0 + i * minor, z);
+  const z = extent.min[2];
+  // Lines in whole minor steps, one step wider than the box; every fifth, counted from 0, is a major one.
+  const [i0, j0] = [0, 1].map((a) => Math.floor(extent.min[a] / minor + 1e-3) - 1);
+  const [i1, j1] = [0, 1].map((a) => Math.ceil(extent.max[a] / minor - 1e-3) + 1);
+  const [x0, y0, x1, y1] = [i0, j0, i1, j1].map((i) => i * minor);
+  const lines = { minor: [], major: [] };
+  for (let i = i0; i <= i1; i++) lines[i % 5 ? "minor" : "major"].push(i * minor, y0, z, i * minor, y1, z);
+  for (let j = j0; j <= j1; j++) lines[j % 5 ? "minor" : "major"].push(x0, j * minor, z, x1, j * minor, z);
   for (const [kind, opacity] of [["minor", 0.3], ["major", 0.75]]) {
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(lines[kind]), 3));
-    const mesh = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x4a545e, transparent: true, opacity, depthWrite: false }));
+    const mesh = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x4a545e, transparent: true, opacity, depthWrite: false, fog: false }));
     mesh.renderOrder = -1;
     group.add(mesh);
   }
   const digits = major < 1 ? 1 : 0;
   const off = span * 0.02;
-  for (let x = x0; x <= x1 + 1e-6; x += major) group.add(scaleLabel(x.toFixed(digits), x, y0 - off, z));
-  for (let y = y0; y <= y1 + 1e-6; y += major) group.add(scaleLabel(y.toFixed(digits), x0 - off, y, z));
-  group.add(scaleLabel("E [m]", (x0 + x1) / 2, y0 - 3.2 * off, z), scaleLabel("N [m]", x0 - 3.2 * off, (y0 + y1) / 2, z));
+  const first = (from) => Math.ceil(from / major - 1e-6) * major;
+  for (let x = first(x0); x <= x1 + 1e-6; x += major) group.add(scaleLabel("x", x.toFixed(digits), x, y0 - off, z));
+  for (let y = first(y0); y <= y1 + 1e-6; y += major) group.add(scaleLabel("y", y.toFixed(digits), x1 + off, y, z));
+  group.add(scaleLabel("x", "E [m]", (x0 + x1) / 2, y0 - 4 * off, z), scaleLabel("y", "N [m]", x1 + 4 * off, (y0 + y1) / 2, z));
   const height = extent.max[2] - z;
   if (height > 0) {
     const step = niceStep(height, 4);
-    const pole = [x0, y1, z, x0, y1, extent.max[2]];
+    const [px, py] = [extent.min[0] - off, extent.min[1] - off];
+    const pole = [px, py, z, px, py, extent.max[2]];
     for (let u = Math.ceil(z / step) * step; u <= extent.max[2] + 1e-6; u += step) {
-      pole.push(x0 - off / 2, y1, u, x0, y1, u);
-      if (u > z + step / 2) group.add(scaleLabel(u.toFixed(step < 1 ? 1 : 0), x0 - off, y1 + off, u));
+      pole.push(px - off / 2, py, u, px, py, u);
+      if (u > z + step / 2) group.add(scaleLabel("z", u.toFixed(step < 1 ? 1 : 0), px - 1.5 * off, py, u));
     }
-    group.add(scaleLabel("U [m]", x0, y1, extent.max[2] + 2 * off));
+    group.add(scaleLabel("z", "U [m]", px, py, extent.max[2] + 1.5 * off));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(pole), 3));
-    group.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x5b6671 })));
+    group.add(new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ color: 0x5b6671, fog: false })));
   }
   return group;
 }
@@ -91,7 +97,7 @@ function buildRoadmap() {
 function fatLine(xyz, color, width, opacity) {
   const geometry = new THREE.LineGeometry();
   geometry.setPositions(xyz);
-  const line = new THREE.Line2(geometry, new THREE.LineMaterial({ color, linewidth: width, transparent: true, opacity, depthWrite: false }));
+  const line = new THREE.Line2(geometry, new THREE.LineMaterial({ color, linewidth: width, transparent: true, opacity, depthWrite: false, fog: false }));
   line.frustumCulled = false;
   return line;
 }
@@ -102,7 +108,7 @@ function marker(pixels, paint) {
   paint(canvas.getContext("2d"));
   const map = new THREE.CanvasTexture(canvas);
   map.colorSpace = THREE.SRGBColorSpace;
-  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, sizeAttenuation: false, depthWrite: false }));
+  const sprite = new THREE.Sprite(new THREE.SpriteMaterial({ map, sizeAttenuation: false, depthWrite: false, fog: false }));
   sprite.userData.pixels = pixels;
   return sprite;
 }
@@ -161,6 +167,8 @@ function buildVehicle(v, safetyDistance) {
   parts.quadrotor = quadrotor(v.radius_m, color);
   parts.dot = marker(15, disc(css));
   parts.dot.renderOrder = 6;
+  // Seen through walls: where the vehicles are matters more than what stands before them.
+  parts.dot.material.depthTest = false;
   parts.labelText = element("div", v.id, { class: "label", style: `border-color: ${css}` });
   parts.label = new THREE.CSS2DObject(parts.labelText);
   parts.body.add(parts.quadrotor, parts.dot, parts.label);

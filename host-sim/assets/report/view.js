@@ -9,7 +9,7 @@ const VIEWS = {
 
 // Returns what the rest of the page asks of the scene.
 function buildView(host, onPick) {
-  const renderer = new THREE.WebGLRenderer({ antialias: true });
+  const renderer = new THREE.WebGLRenderer({ antialias: true, preserveDrawingBuffer: true });
   renderer.localClippingEnabled = true;
   renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
   renderer.domElement.className = "gl";
@@ -19,6 +19,8 @@ function buildView(host, onPick) {
 
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(0x15181c);
+  // Far edges of the map fade, so that near and far walls can be told apart.
+  scene.fog = new THREE.Fog(0x15181c, 1, 2);
   const sun = new THREE.DirectionalLight(0xffffff, 1.7);
   sun.position.set(0.5, -0.8, 1.2);
   scene.add(new THREE.HemisphereLight(0xdfe9f5, 0x39424c, 1.5), sun);
@@ -40,7 +42,11 @@ function buildView(host, onPick) {
   const obstacles = report.obstacles.map(buildObstacle);
   for (const o of obstacles) layers.obstacles.add(o.mesh);
   const sprites = [];
-  scene.traverse((o) => { if (o.isSprite) sprites.push(o); });
+  const scales = [];
+  scene.traverse((o) => {
+    if (o.isSprite) sprites.push(o);
+    if (o.userData.axis) scales.push(o);
+  });
 
   const camera = new THREE.PerspectiveCamera(36, 1, 0.1, 1000);
   camera.up.set(0, 0, 1);
@@ -52,7 +58,7 @@ function buildView(host, onPick) {
   let time = 0;
   let selected = null;
   let followed = null;
-  const rings = { visible: false };
+  let fitted = null;
 
   function invalidate() {
     if (asked) return;
@@ -66,9 +72,13 @@ function buildView(host, onPick) {
     const reach = distance + 3 * extent.radius;
     camera.near = Math.max(distance / 400, distance - 4 * extent.radius, 0.02);
     camera.far = reach;
+    scene.fog.near = Math.max(0, distance - 0.9 * extent.radius);
+    scene.fog.far = distance + 1.8 * extent.radius;
     camera.updateProjectionMatrix();
     const perPixel = (2 * Math.tan((camera.fov * Math.PI) / 360)) / host.clientHeight;
     for (const sprite of sprites) sprite.scale.setScalar(sprite.userData.pixels * perPixel);
+    const sight = camera.getWorldDirection(new THREE.Vector3());
+    for (const label of scales) label.visible = Math.abs(sight[label.userData.axis]) < 0.97;
     for (const p of parts) {
       if (p.ring) p.ring.quaternion.copy(camera.quaternion);
       // From far away a dot stands for the vehicle; near by one sees it in its true size.
@@ -85,10 +95,24 @@ function buildView(host, onPick) {
 
   function setView(name) {
     const { from, fov } = VIEWS[name];
+    fitted = name;
     camera.fov = fov;
-    const half = Math.tan((fov * Math.PI) / 360) * Math.min(1, camera.aspect);
+    camera.updateProjectionMatrix();
     controls.target.set(...extent.center);
-    camera.position.set(...from).normalize().multiplyScalar((extent.radius * 0.92) / half).add(controls.target);
+    // From too near, back off until every corner of the box is well inside the picture.
+    let distance = extent.radius / Math.tan((fov * Math.PI) / 360);
+    const corners = [0, 1, 2, 3, 4, 5, 6, 7].map((c) => [0, 1, 2].map((a) => ((c >> a) & 1 ? extent.max : extent.min)[a]));
+    const fits = () => corners.every((c) => {
+      const p = new THREE.Vector3(...c).project(camera);
+      return Math.abs(p.x) < 0.86 && Math.abs(p.y) < 0.86;
+    });
+    for (let step = 0; step < 60; step++) {
+      camera.position.set(...from).normalize().multiplyScalar(distance).add(controls.target);
+      camera.lookAt(controls.target);
+      camera.updateMatrixWorld();
+      if (fits()) break;
+      distance *= 1.04;
+    }
     controls.update();
     invalidate();
   }
@@ -130,6 +154,7 @@ function buildView(host, onPick) {
   function follow(id) {
     followed = parts.find((p) => p.vehicle.id === id) ?? null;
     if (followed) {
+      fitted = null;
       const offset = camera.position.clone().sub(controls.target);
       controls.target.copy(followed.body.position);
       const near = Math.min(offset.length(), 14 / Math.tan((camera.fov * Math.PI) / 360));
@@ -156,7 +181,9 @@ function buildView(host, onPick) {
     labels.setSize(width, height);
     camera.aspect = width / height;
     camera.updateProjectionMatrix();
-    invalidate();
+    // Resizing clears the canvas: draw at once, and fit again unless the user has moved the camera.
+    if (fitted) setView(fitted);
+    draw();
   }
 
   // The vehicle within 14 pixels of a click.
@@ -177,9 +204,11 @@ function buildView(host, onPick) {
   });
 
   controls.addEventListener("change", invalidate);
+  controls.addEventListener("start", () => { fitted = null; });
+  byId("layers").open = host.clientWidth >= 760;
   resize();
   new ResizeObserver(resize).observe(host);
-  setRings(rings.visible);
+  setRings(false);
   Object.assign(document.body.dataset, {
     faces: map ? map.faces : 0,
     roadmapEdges: roadmap ? roadmap.edges.length / 2 : 0,

@@ -1,9 +1,8 @@
 export {
-  AmbientLight, BackSide, BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DirectionalLight,
-  FrontSide, Group, HemisphereLight, LineBasicMaterial, LineLoop, LineSegments, MathUtils, Matrix4, Mesh,
-  MeshBasicMaterial, MeshLambertMaterial, OrthographicCamera, PerspectiveCamera, Plane, Points, PointsMaterial, Quaternion,
-  Raycaster, RingGeometry, Scene, SphereGeometry, SRGBColorSpace, Sprite, SpriteMaterial, TorusGeometry, Vector2, Vector3,
-  WebGLRenderer,
+  BackSide, BufferAttribute, BufferGeometry, CanvasTexture, Color, CylinderGeometry, DirectionalLight, DoubleSide,
+  Fog, Group, HemisphereLight, LineBasicMaterial, LineLoop, LineSegments, Mesh, MeshBasicMaterial,
+  MeshLambertMaterial, NearestFilter, PerspectiveCamera, Plane, PlaneGeometry, Scene, SphereGeometry, Sprite,
+  SpriteMaterial, SRGBColorSpace, TorusGeometry, Vector3, WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/addons/controls/OrbitControls.js";
 export { Line2 } from "three/addons/lines/Line2.js";

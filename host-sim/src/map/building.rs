@@ -28,10 +28,12 @@ pub const DEFAULT_SEED: u64 = 1;
 const WALL_M: f32 = 0.25;
 /// The corridor between y = 9.5 and y = 14.5, walls excluded.
 const CORRIDOR_M: [f32; 2] = [9.5, 14.5];
-/// Shafts through the slabs: (x from, x to, y from, y to).
-const SHAFTS_M: [[f32; 4]; 3] = [[0.75, 6.75, 9.0, 15.0], [17.5, 23.5, 9.0, 15.0], [34.75, 40.25, 9.0, 15.0]];
+/// Shafts through the slabs, as wide as the corridor: x from and to.
+const SHAFTS_M: [[f32; 2]; 3] = [[0.75, 6.25], [17.5, 23.0], [34.75, 40.25]];
+/// Walls across the corridor, before and behind the shafts: x of their west faces.
+const CROSS_WALLS_M: [f32; 4] = [6.75, 16.75, 23.5, 34.0];
 /// The lobby's partition-free part of the ground floor, along x.
-const LOBBY_M: [f32; 2] = [7.5, 33.5];
+const LOBBY_M: [f32; 2] = [7.5, 31.0];
 
 /// An axis-parallel box to fill or to carve, metres.
 struct Block {
@@ -73,10 +75,10 @@ fn blocks(seed: u64) -> Vec<Block> {
     for floor in 0..FLOORS {
         plan.floor(floor);
     }
-    for [x0, x1, y0, y1] in SHAFTS_M {
+    for [x0, x1] in SHAFTS_M {
         for floor in 1..FLOORS {
             let z = floor as f32 * FLOOR_HEIGHT_M;
-            plan.carve([x0, y0, z - 0.5], [x1, y1, z + 0.5]);
+            plan.carve([x0, CORRIDOR_M[0], z], [x1, CORRIDOR_M[1], z + WALL_M]);
         }
     }
     plan.blocks
@@ -114,26 +116,31 @@ impl Plan {
             (CORRIDOR_M[1] + WALL_M, width - WALL_M, CORRIDOR_M[1]),
         ] {
             self.solid([0.0, wall, z], [length, wall + WALL_M, ceiling]);
-            // Four or five rooms a side: partitions near even shares, moved by up to 0.6 m.
-            let rooms = 4 + (self.rng.next_u32() % 2) as usize;
+            // Five or six rooms a side: partitions near even shares, moved by up to 0.4 m.
+            let rooms = 5 + (self.rng.next_u32() % 2) as usize;
             let mut west = WALL_M;
             for room in 1..=rooms {
                 let east = if room == rooms {
                     length - WALL_M
                 } else {
-                    length * room as f32 / rooms as f32 + self.uniform(-0.6, 0.6)
+                    length * room as f32 / rooms as f32 + self.uniform(-0.4, 0.4)
                 };
                 if room < rooms {
                     self.solid([east, y0, z], [east + WALL_M, y1, ceiling]);
                 }
                 self.door(west, east, wall, z);
-                if room < rooms && self.rng.next_u32() % 2 == 0 {
+                if room < rooms && self.rng.next_u32().is_multiple_of(2) {
                     let at = self.uniform(y0 + 1.0, y1 - 4.5);
-                    self.carve([east, at, z], [east + WALL_M, at + 3.25, z + 3.5]);
+                    self.carve([east, at, z], [east + WALL_M, at + 3.0, z + 3.5]);
                 }
                 self.window(west, east, if y0 < 1.0 { 0.0 } else { width - WALL_M }, z);
                 west = east + WALL_M;
             }
+        }
+        // Walls across the corridor, each with a wide opening.
+        for x in CROSS_WALLS_M {
+            self.solid([x, CORRIDOR_M[0], z], [x + WALL_M, CORRIDOR_M[1], ceiling]);
+            self.carve([x, CORRIDOR_M[0] + 0.75, z], [x + WALL_M, CORRIDOR_M[1] - 0.75, z + 4.0]);
         }
         if floor == 0 {
             let [x0, x1] = LOBBY_M;
@@ -143,14 +150,70 @@ impl Plan {
 
     /// A door from the corridor into the room between `west` and `east`.
     fn door(&mut self, west: f32, east: f32, wall: f32, z: f32) {
-        let width = self.uniform(3.0, 4.0);
-        let at = self.uniform(west + 1.0, east - 1.0 - width);
-        let height = self.uniform(3.25, 4.0);
+        let width = self.uniform(3.5, 4.25);
+        let at = self.uniform(west + 0.75, east - 0.75 - width);
+        let height = self.uniform(3.75, 4.5);
         self.carve([at, wall, z], [at + width, wall + WALL_M, z + height]);
     }
 
     fn window(&mut self, west: f32, east: f32, wall: f32, z: f32) {
         let at = self.uniform(west + 1.0, (west + east) / 2.0);
         self.carve([at, wall, z + 1.0], [(at + 2.5).min(east - 0.5), wall + WALL_M, z + 2.5]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::edt::ClearanceField;
+    use crate::map::occupancy::Unknown;
+
+    /// The floors that a vehicle with 0.8 m of clearance reaches from the lobby, over cell centres.
+    fn floors_reached(map: &OccupancyMap) -> Vec<u32> {
+        let voxels = map.voxel_map(Unknown::Blocked);
+        let (field, shape) = (ClearanceField::new(&voxels.grid()), voxels.shape);
+        let start = shape.cell_of(&Point::new(20.0, 5.0, 1.5)).unwrap();
+        let index = |[i, j, k]: [u32; 3]| ((k * shape.dims[1] + j) * shape.dims[0] + i) as usize;
+        let mut seen = vec![false; shape.dims.iter().map(|&d| d as usize).product()];
+        seen[index(start)] = true;
+        let mut queue = vec![start];
+        let mut rooms = std::collections::BTreeSet::new();
+        while let Some(cell) = queue.pop() {
+            let center = shape.center(cell);
+            // A room, not the corridor or a shaft.
+            if !(CORRIDOR_M[0] - 2.0..CORRIDOR_M[1] + 2.0).contains(&center.y) {
+                rooms.insert((center.z / FLOOR_HEIGHT_M) as u32);
+            }
+            for (axis, step) in [(0, 1), (0, -1), (1, 1), (1, -1), (2, 1), (2, -1)] {
+                let mut next = cell;
+                next[axis] = next[axis].wrapping_add_signed(step);
+                if next[axis] < shape.dims[axis]
+                    && !seen[index(next)]
+                    && field.lower_bound_m(&shape.center(next)) > 0.8
+                {
+                    seen[index(next)] = true;
+                    queue.push(next);
+                }
+            }
+        }
+        rooms.into_iter().collect()
+    }
+
+    #[test]
+    fn rooms_on_every_floor_are_reached_whatever_the_seed() {
+        for seed in [DEFAULT_SEED, 2, 7] {
+            let map = building(seed, 0.25).unwrap();
+            assert_eq!(map.shape().dims, [164, 96, 196]);
+            assert_eq!(map.counts().unknown, 0);
+            assert_eq!(floors_reached(&map), (0..FLOORS).collect::<Vec<_>>(), "seed {seed}");
+        }
+    }
+
+    #[test]
+    fn the_seed_decides() {
+        let map = building(DEFAULT_SEED, 0.5).unwrap();
+        assert_eq!(map, building(DEFAULT_SEED, 0.5).unwrap());
+        assert_ne!(map, building(2, 0.5).unwrap());
+        assert!(building(1, 0.01).is_err() && building(1, f32::NAN).is_err());
     }
 }

@@ -55,3 +55,18 @@ pub fn load(file: &str, resolution_m: f32) -> Result<OccupancyMap, MapError> {
         Source::Bt(path) => OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_tell_the_source() {
+        assert_eq!(Source::parse("builtin:building").unwrap(), Source::Building(building::DEFAULT_SEED));
+        assert_eq!(Source::parse("builtin:building?seed=7").unwrap(), Source::Building(7));
+        assert_eq!(Source::parse("a/b.BT").unwrap(), Source::Bt(Path::new("a/b.BT")));
+        for wrong in ["builtin:castle", "builtin:building?seed=x", "hall.obj", "hall", ""] {
+            assert!(matches!(Source::parse(wrong), Err(MapError::UnknownKind { .. })), "{wrong}");
+        }
+    }
+}

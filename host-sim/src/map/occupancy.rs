@@ -135,13 +135,13 @@ impl OccupancyMap {
         // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
         let resolution: f64 = self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
         let mut min = [0; 3];
-        for axis in 0..3 {
-            let cells = f64::from(self.shape.min[axis]) / resolution;
+        for (key_min, &corner) in min.iter_mut().zip(self.shape.min.iter()) {
+            let cells = f64::from(corner) / resolution;
             if (cells - cells.round()).abs() > HAIR {
                 return Err(refuse("its corner does not lie on a multiple of the resolution"));
             }
             let key = cells.round() + f64::from(KEY_ORIGIN);
-            min[axis] = if key >= 0.0 { key as u32 } else { u32::MAX };
+            *key_min = if key >= 0.0 { key as u32 } else { u32::MAX };
         }
         Octree::from_cells(resolution, min, self.shape.dims, |cell| self.at(cell))
             .ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side"))

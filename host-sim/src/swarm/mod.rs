@@ -1,4 +1,267 @@
 //! A whole swarm on the desk: companions and simulated autopilots joined by emulated serial links and a radio.
+//!
+//! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario gives the same flight,
+//! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
+//! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and tells nobody.
 
+pub mod ground_station;
+pub mod member;
+pub mod monitor;
 pub mod radio;
 pub mod serial;
+
+use std::time::{Duration, Instant as Clock};
+
+use companion::{Config, Event, PlanFailure, RosterEntry, State};
+use planner_core::Point;
+use planner_core::frames::enu_to_geodetic;
+
+use self::ground_station::GroundStation;
+use self::member::{DeskCompanion, Member, STEP_US, is_finished};
+use self::monitor::{Monitor, Sample};
+use self::radio::{Radio, RadioConfig};
+use self::serial::SerialConfig;
+use crate::autopilot;
+use crate::capacity::VEHICLES;
+use crate::map::edt::ClearanceField;
+use crate::mission::{ACCEL_MPS2, Mission, SwarmPlan, VERTICAL_MPS};
+use crate::progress::Progress;
+use crate::report::{self, Level};
+use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+
+/// A vehicle within this distance of its goal has reached it, metres.
+const REACHED_M: f32 = 0.5;
+/// Simulated time that goes on after the last vehicle is done, seconds.
+const AFTERMATH_S: f64 = 1.0;
+
+/// A flown mission.
+pub struct Flight {
+    /// `result.json`.
+    pub result: MissionResult,
+    /// True tracks, times and places, one per vehicle.
+    pub tracks: Vec<Vec<(f32, Point)>>,
+    /// Smallest distances over time.
+    pub samples: Vec<Sample>,
+    /// What the companions reported.
+    pub log: Vec<report::Event>,
+    /// Simulated seconds.
+    pub simulated_s: f64,
+    /// Seconds of this machine's clock that the simulation took.
+    pub took_s: f64,
+}
+
+/// Flies a planned mission. `plan` is what the companions will ask for; every one of them gets its part of it.
+pub fn fly(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    command: &'static str,
+    realtime: bool,
+    progress: &Progress,
+) -> anyhow::Result<Flight> {
+    let scenario = &mission.scenario;
+    let settings = &scenario.simulation;
+    let mut members = members(mission)?;
+    let mut radio = Radio::new(
+        RadioConfig {
+            range_m: settings.radio_range_m,
+            loss: f64::from(settings.radio_loss),
+            delay_s: f64::from(settings.radio_delay_s),
+        },
+        members.len(),
+        scenario.seed,
+    );
+    let field = ClearanceField::new(&mission.map.grid());
+    let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
+    let safety_distance_m = scenario.deconfliction.safety_distance_m;
+    let mut monitor = Monitor::new(mission.map.grid(), &field, safety_distance_m, &radii);
+    let mut ground_station = GroundStation::new();
+    let mut log = Vec::new();
+    let mut nearest_goal_m = vec![f32::INFINITY; members.len()];
+    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
+    let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
+    let bar = progress.steps("flight", settings.time_limit_s as u64);
+    let began = Clock::now();
+    let mut ends_at_s = f64::INFINITY;
+    let mut t_s = 0.0;
+    for step in 0..steps {
+        let now_us = (step + 1) * STEP_US;
+        t_s = now_us as f64 * 1e-6;
+        for (i, member) in members.iter_mut().enumerate() {
+            let id = scenario.vehicles[i].id;
+            member.step(step, i, &mission.map, &mut radio, &places, |event| {
+                log.extend(log_entry(t_s, id, event));
+            });
+            if member.wants_plan {
+                match mission.own_plan(plan, i) {
+                    Ok(own) => member.answer_plan(now_us, Ok(&own)),
+                    Err(_) => member.answer_plan(now_us, Err(PlanFailure::Capacity)),
+                }
+            }
+            places[i] = member.autopilot.truth().position;
+            if let Some(goal) = plan.flights[i].goal {
+                let goal = mission.goals[usize::from(goal)];
+                nearest_goal_m[i] = nearest_goal_m[i].min((places[i] - goal).norm());
+            }
+        }
+        ground_station.step(now_us, &members, &mut radio, &places);
+        let seen: Vec<_> = members.iter().map(Member::observation).collect();
+        monitor.observe(t_s, &seen);
+        if step % 250 == 0 {
+            bar.at(t_s as u64);
+            let done = |(m, f): (&Member, &planner_core::schedule::Flight<_>)| {
+                is_finished(m.companion.state()) || (f.goal.is_none() && ground_station.started())
+            };
+            if ends_at_s.is_infinite() && members.iter().zip(&plan.flights).all(done) {
+                ends_at_s = t_s + AFTERMATH_S;
+            }
+        }
+        if t_s >= ends_at_s {
+            break;
+        }
+        if realtime {
+            let due = Duration::from_micros(now_us);
+            std::thread::sleep(due.saturating_sub(began.elapsed()));
+        }
+    }
+    let took_s = began.elapsed().as_secs_f64();
+    let vehicles: Vec<_> = (0..members.len())
+        .map(|i| vehicle_result(&members[i], &plan.flights[i], monitor.flown_m(i), nearest_goal_m[i], t_s))
+        .collect();
+    let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
+    let all_served = served == mission.goals.len().min(members.len());
+    let did_its_task = |v: &VehicleResult| v.goal.is_none() || (v.reached && v.landed);
+    let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
+    let finite = |m: f32| m.is_finite().then(|| rounded(m));
+    let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
+    let result = MissionResult {
+        command,
+        scenario: scenario.path.clone(),
+        seed: scenario.seed,
+        complete: clean && all_served && vehicles.iter().all(did_its_task),
+        vehicles,
+        totals: Totals {
+            path_m: rounded(plan.total_m() as f32),
+            makespan_s: (last_landing_s - ground_station.started_s()).max(0.0),
+        },
+        safety: Safety {
+            wall_contacts: monitor.wall_contacts,
+            min_clearance_m: finite(monitor.min_clearance_m),
+            min_separation_m: finite(monitor.min_separation_m),
+            safety_distance_m: rounded(safety_distance_m),
+            violations: monitor.violations,
+            deadlocks: monitor.deadlocks,
+        },
+        roadmap: mission.roadmap_size(),
+    };
+    log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
+        t_s: *t_s as f32,
+        vehicle: Some(scenario.vehicles[*i].id),
+        level: Level::Error,
+        text: text.clone(),
+    }));
+    let tracks = (0..members.len()).map(|i| monitor.track(i).to_vec()).collect();
+    Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
+}
+
+fn log_entry(t_s: f64, id: u8, event: Event) -> Option<report::Event> {
+    let Event::StateChanged { from, to, text } = event else { return None };
+    let level = match to {
+        State::Aborted | State::Failsafe => Level::Error,
+        State::PilotControl | State::AutopilotSilent | State::PositionLost | State::Alone => Level::Warning,
+        _ => Level::Info,
+    };
+    let text = if text.is_empty() { format!("{from:?} → {to:?}") } else { format!("{from:?} → {to:?}: {text}") };
+    Some(report::Event { t_s: t_s as f32, vehicle: Some(id), level, text })
+}
+
+fn vehicle_result(
+    member: &Member,
+    flight: &planner_core::schedule::Flight<{ crate::capacity::WAYPOINTS }>,
+    flown_m: f64,
+    nearest_goal_m: f32,
+    now_s: f64,
+) -> VehicleResult {
+    let flight_time_s = member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
+    VehicleResult {
+        id: flight.id,
+        goal: flight.goal,
+        reached: nearest_goal_m <= REACHED_M,
+        landed: member.landed_s.is_some(),
+        path_m: rounded(flight.path.length_m()),
+        flown_m: rounded(flown_m as f32),
+        flight_time_s: rounded(flight_time_s as f32),
+        end: format!("{:?}", member.companion.state()),
+    }
+}
+
+fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
+    let scenario = &mission.scenario;
+    let settings = &scenario.simulation;
+    let serial = SerialConfig {
+        baud: settings.serial_baud,
+        latency_s: 0.001,
+        corruption: f64::from(settings.serial_corruption),
+        buffer: 4096,
+    };
+    scenario
+        .vehicles
+        .iter()
+        .zip(&mission.tasks)
+        .map(|(vehicle, task)| {
+            let pad = vehicle.start - Point::new(0.0, 0.0, task.climb_m);
+            let limits = autopilot::VehicleLimits {
+                radius_m: vehicle.radius_m,
+                speed_max_mps: vehicle.speed_max_mps,
+                ..autopilot::VehicleLimits::default()
+            };
+            let config = autopilot::Config {
+                system_id: vehicle.id,
+                world_origin: scenario.map.origin,
+                // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
+                ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
+                home: vehicle.home,
+                start: pad,
+                vehicle: limits,
+                wind: Point::new(settings.wind_mps, 0.0, 0.0),
+                gust_mps: settings.gust_mps,
+                position_noise_m: settings.position_noise_m,
+                seed: scenario.seed,
+                ..autopilot::Config::default()
+            };
+            let companion = new_companion(companion_config(mission, vehicle.id)?)?;
+            Member::new(&config, companion, serial, scenario.seed)
+        })
+        .collect()
+}
+
+/// What the companion of one vehicle is told; the same whether it runs in a swarm simulation or alone.
+pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
+    let scenario = &mission.scenario;
+    let index = mission.index_of(id)?;
+    let vehicle = &scenario.vehicles[index];
+    let mut roster: Vec<RosterEntry> =
+        scenario.vehicles.iter().map(|v| RosterEntry { system_id: v.id, start: v.start }).collect();
+    roster.sort_unstable_by_key(|entry| entry.system_id);
+    let mut config = Config::new(id, vehicle.start, scenario.map.origin);
+    config.roster = heapless::Vec::from_slice(&roster)
+        .map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
+    config.mission_crc = mission.crc();
+    config.cruise_mps = scenario.mission.cruise_mps.min(vehicle.speed_max_mps);
+    config.climb_mps = VERTICAL_MPS;
+    config.accel_mps2 = ACCEL_MPS2;
+    config.radius_m = vehicle.radius_m;
+    config.required_clearance_m = mission.tasks[index].required_clearance_m;
+    config.safety_distance_m = scenario.deconfliction.safety_distance_m;
+    config.method = scenario.deconfliction.method;
+    config.geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
+    Ok(config)
+}
+
+/// A companion on the heap: it is too large for a stack.
+///
+/// # Errors
+/// The configuration names what is wrong.
+pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
+    let companion = DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
+    Ok(Box::new(companion))
+}

@@ -85,6 +85,8 @@ pub struct Monitor<'a> {
     pub min_separation_m: f32,
     /// Smallest distances over time.
     pub samples: Vec<Sample>,
+    /// What went wrong: seconds, vehicle, and what.
+    pub incidents: Vec<(f64, usize, String)>,
 }
 
 impl<'a> Monitor<'a> {
@@ -114,20 +116,21 @@ impl<'a> Monitor<'a> {
             min_clearance_m: f32::INFINITY,
             min_separation_m: f32::INFINITY,
             samples: Vec::new(),
+            incidents: Vec::new(),
         }
     }
 
     /// Looks at all vehicles at one physics step.
     pub fn observe(&mut self, t_s: f64, seen: &[Observation]) {
         for (i, now) in seen.iter().enumerate() {
-            self.watch_walls(i, now);
+            self.watch_walls(i, t_s, now);
             self.watch_progress(i, t_s, now);
             let vehicle = &mut self.vehicles[i];
             if let Some(last) = vehicle.last.replace(now.position) {
                 vehicle.flown_m += f64::from((now.position - last).norm());
             }
         }
-        self.watch_pairs(seen);
+        self.watch_pairs(t_s, seen);
         if t_s - self.recorded_s >= RECORD_S - 1e-6 {
             self.recorded_s = t_s;
             self.samples.push(Sample { t_s: t_s as f32, ..self.window });
@@ -148,7 +151,7 @@ impl<'a> Monitor<'a> {
         &self.vehicles[vehicle].track
     }
 
-    fn watch_walls(&mut self, i: usize, now: &Observation) {
+    fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
         if now.phase == Phase::Grounded {
             return;
         }
@@ -168,9 +171,12 @@ impl<'a> Monitor<'a> {
         } else {
             false
         };
-        let vehicle = &mut self.vehicles[i];
-        self.wall_contacts += u32::from(touches && !vehicle.in_contact);
-        vehicle.in_contact = touches;
+        let was_touching = std::mem::replace(&mut self.vehicles[i].in_contact, touches);
+        if touches && !was_touching {
+            self.wall_contacts += 1;
+            let [x, y, z] = now.position.into();
+            self.incidents.push((t_s, i, format!("touches an obstacle at [{x:.2}, {y:.2}, {z:.2}]")));
+        }
     }
 
     /// Whether a body on or near the floor touches something that is not below its centre.
@@ -196,7 +202,7 @@ impl<'a> Monitor<'a> {
         })
     }
 
-    fn watch_pairs(&mut self, seen: &[Observation]) {
+    fn watch_pairs(&mut self, t_s: f64, seen: &[Observation]) {
         let n = seen.len();
         for i in 0..n {
             for j in 0..i {
@@ -207,7 +213,10 @@ impl<'a> Monitor<'a> {
                 self.window.separation_m = self.window.separation_m.min(apart);
                 let near = apart < self.safety_distance_m;
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
-                self.violations += u32::from(near && !was_near);
+                if near && !was_near {
+                    self.violations += 1;
+                    self.incidents.push((t_s, i, format!("nearer than the safety distance to vehicle no. {}", j + 1)));
+                }
             }
         }
         self.min_separation_m = self.min_separation_m.min(self.window.separation_m);
@@ -223,6 +232,7 @@ impl<'a> Monitor<'a> {
         } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
             vehicle.stuck = true;
             self.deadlocks += 1;
+            self.incidents.push((t_s, i, format!("no progress for {DEADLOCK_S} s")));
         }
     }
 }

@@ -31,9 +31,10 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
     for row in 0..costs.rows as u16 {
         let line = costs.row(row, state.row);
         for ((price, least_row), &cost) in state.price.iter_mut().zip(least_row.iter_mut()).zip(line) {
-            if f64::from(cost) < *price {
-                (*price, *least_row) = (f64::from(cost), row);
-            }
+            // Selects, as in the searches: which row is cheaper cannot be predicted.
+            let cheaper = f64::from(cost) < *price;
+            *price = if cheaper { f64::from(cost) } else { *price };
+            *least_row = if cheaper { row } else { *least_row };
         }
     }
     if state.price.contains(&f64::INFINITY) {
@@ -86,7 +87,7 @@ fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
 /// it is served next, or is left for an augmenting path where no price moved. Returns the rows left free.
 fn reduce_rows(costs: &Costs<'_>, state: &mut State<'_>, rows_in: usize) -> Option<usize> {
     let (mut at, mut left) = (0, 0);
-    // Rows chase one another for as long as prices fall; the bound of the crate-wide rule on bounded work.
+    // Rows chase one another for as long as prices fall; this bounds the work.
     let mut budget = rows_in * costs.cols;
     while at < rows_in {
         let row = state.free[at];

@@ -7,7 +7,7 @@
 
 use super::{Config, Workspace};
 use crate::Point;
-use crate::segment::{lane_mask, segment_is_clear};
+use crate::segment::{Snapped, lane_mask, segment_is_clear, snap, snapped_rest_touches};
 use crate::voxel::VoxelGrid;
 
 /// Cells. Places below are computed to within 2⁻¹¹ cell as long as the grid has at most [`MAX_CELLS`] cells a side:
@@ -17,7 +17,7 @@ const MAX_CELLS: u32 = 4096;
 /// How deep behind a face the cell is probed, cells.
 const DEPTH: f32 = 1.0 / 64.0;
 /// Boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
-const BOXES: usize = 8;
+const BOXES: usize = 32;
 
 /// Cells `low..high` on each axis, all free.
 #[derive(Clone, Copy, Default)]
@@ -39,6 +39,8 @@ pub(super) struct Sight<'g, 'a> {
     here: [f32; 3],
     /// `here` in cells.
     at: [f32; 3],
+    /// `here` as the exact check takes it.
+    snapped: Option<Snapped>,
     /// The box around `here` relative to it, cells; `None` where it cannot be used.
     view: Option<View>,
 }
@@ -66,6 +68,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             newest: 0,
             here: [0.0; 3],
             at: [0.0; 3],
+            snapped: None,
             view: None,
         }
     }
@@ -74,6 +77,7 @@ impl<'g, 'a> Sight<'g, 'a> {
     pub(super) fn stand_at(&mut self, here: [f32; 3]) {
         let shape = self.grid.shape();
         self.here = here;
+        self.snapped = snap(shape, &Point::from(here));
         self.view = None;
         if shape.dims.iter().any(|&d| d > MAX_CELLS) {
             return;
@@ -120,14 +124,15 @@ impl<'g, 'a> Sight<'g, 'a> {
         places: &[u16],
         mut found: impl FnMut(usize) -> Result<(), E>,
     ) -> Result<(), E> {
-        let here = Point::from(self.here);
         for &place in places {
             let place = usize::from(place);
             let there = workspace.point(place);
-            let clear = match self.view.as_ref().and_then(|view| self.judge(view, there)) {
-                Some(clear) => clear,
-                None => segment_is_clear(self.grid, &here, &Point::from(there), self.clearance_m),
-            };
+            let clear =
+                match self.view.as_ref().map_or(Judgement::Leaves(0.0), |view| self.judge(view, there)) {
+                    Judgement::Clear => true,
+                    Judgement::Blocked => false,
+                    Judgement::Leaves(known) => self.check(there, known),
+                };
             if clear {
                 found(place)?;
             }
@@ -135,9 +140,22 @@ impl<'g, 'a> Sight<'g, 'a> {
         Ok(())
     }
 
+    /// The exact check of the segment from here; the share `known` of it lies in the box.
+    #[inline]
+    fn check(&self, there: [f32; 3], known: f32) -> bool {
+        let there = Point::from(there);
+        if self.clearance_m > 0.0 {
+            return segment_is_clear(self.grid, &Point::from(self.here), &there, self.clearance_m);
+        }
+        match (&self.snapped, snap(self.grid.shape(), &there)) {
+            (Some(a), Some(b)) => !snapped_rest_touches(self.grid, a, &b, known),
+            _ => false,
+        }
+    }
+
     /// Whether the segment from here is clear, where that can be told for certain.
     #[inline(always)]
-    fn judge(&self, view: &View, there: [f32; 3]) -> Option<bool> {
+    fn judge(&self, view: &View, there: [f32; 3]) -> Judgement {
         let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);
         let inside = (d[0] > view.clear_low[0])
             & (d[0] < view.clear_high[0])
@@ -146,7 +164,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             & (d[2] > view.clear_low[2])
             & (d[2] < view.clear_high[2]);
         if inside {
-            return Some(true);
+            return Judgement::Clear;
         }
         // A component of zero never leaves: the quotient is infinite.
         let leave = [0, 1, 2].map(|axis| {
@@ -162,9 +180,24 @@ impl<'g, 'a> Sight<'g, 'a> {
             let part = q - cell[axis] as f32;
             certain &= part > GUARD && part < 1.0 - GUARD && cell[axis] < self.grid.shape().dims[axis] as i32;
         }
-        let hit = certain && self.grid.is_occupied(cell.map(|c| c as u32));
-        hit.then_some(false)
+        if certain && self.grid.is_occupied(cell.map(|c| c as u32)) {
+            Judgement::Blocked
+        } else {
+            // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead.
+            let inside = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + GUARD) / d[axis].abs());
+            Judgement::Leaves(inside[0].min(inside[1]).min(inside[2]).clamp(0.0, 1.0))
+        }
     }
+}
+
+/// What the box alone tells of a ray.
+enum Judgement {
+    /// It ends inside.
+    Clear,
+    /// It meets an obstacle behind a face.
+    Blocked,
+    /// This share of it lies in the box; the rest is open.
+    Leaves(f32),
 }
 
 impl FreeBox {

@@ -1,7 +1,7 @@
 //! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries always suffice.
 
 /// The node was not reached yet.
-pub(super) const UNSEEN: u16 = 0;
+const UNSEEN: u16 = 0;
 /// The node has left the heap: its distance is final.
 pub(super) const SETTLED: u16 = u16::MAX;
 
@@ -16,8 +16,27 @@ pub(super) struct Heap<const N: usize> {
     places: [u16; N],
 }
 
+fn entry_of(node: u16, cost: f32) -> u64 {
+    u64::from(cost.to_bits()) << 16 | u64::from(node)
+}
+
 fn node_of(entry: u64) -> usize {
     (entry & 0xffff) as usize
+}
+
+/// Index of the least entry. A full set is compared pairwise: selects, where branches would be mispredicted.
+#[inline(always)]
+fn least_of(entries: &[u64]) -> usize {
+    if let Ok([a, b, c, d]) = <&[u64; ARITY]>::try_from(entries) {
+        let (left, left_at) = if b < a { (b, 1) } else { (a, 0) };
+        let (right, right_at) = if d < c { (d, 3) } else { (c, 2) };
+        return if right < left { right_at } else { left_at };
+    }
+    let mut least = 0;
+    for k in 1..entries.len() {
+        least = if entries[k] < entries[least] { k } else { least };
+    }
+    least
 }
 
 impl<const N: usize> Heap<N> {
@@ -25,9 +44,10 @@ impl<const N: usize> Heap<N> {
         Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
     }
 
-    pub(super) fn clear(&mut self) {
+    /// Empties it for nodes below `nodes`.
+    pub(super) fn clear(&mut self, nodes: usize) {
         self.len = 0;
-        self.places.fill(UNSEEN);
+        self.places[..nodes].fill(UNSEEN);
     }
 
     #[inline]
@@ -45,7 +65,7 @@ impl<const N: usize> Heap<N> {
             }
             place => usize::from(place) - 1,
         };
-        let entry = u64::from(cost.to_bits()) << 16 | u64::from(node);
+        let entry = entry_of(node, cost);
         while at > 0 {
             let above = (at - 1) / ARITY;
             if self.entries[above] <= entry {
@@ -65,24 +85,26 @@ impl<const N: usize> Heap<N> {
         self.len -= 1;
         let entry = self.entries[self.len];
         if self.len > 0 {
-            self.sift_down(entry);
+            self.sift_down(0, entry);
         }
         Some(node_of(top) as u16)
     }
 
-    fn sift_down(&mut self, entry: u64) {
-        let mut at = 0;
+    /// Gives every node in it a new cost. O(length).
+    pub(super) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
+        for at in (0..self.len).rev() {
+            let node = node_of(self.entries[at]) as u16;
+            self.sift_down(at, entry_of(node, cost(node)));
+        }
+    }
+
+    fn sift_down(&mut self, mut at: usize, entry: u64) {
         loop {
             let first = at * ARITY + 1;
             if first >= self.len {
                 break;
             }
-            let mut least = first;
-            for child in first + 1..(first + ARITY).min(self.len) {
-                if self.entries[child] < self.entries[least] {
-                    least = child;
-                }
-            }
+            let least = first + least_of(&self.entries[first..(first + ARITY).min(self.len)]);
             if self.entries[least] >= entry {
                 break;
             }

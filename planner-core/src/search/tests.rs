@@ -30,12 +30,12 @@ fn graphs() -> impl Strategy<Value = (StdVec<Point>, StdVec<Edge>)> {
 }
 
 /// All pairs by Floyd and Warshall, f64.
-fn brute_force(view: &RoadmapView<'_>, passable: impl Fn(&HalfEdge) -> bool) -> StdVec<StdVec<f64>> {
+fn brute_force(view: &RoadmapView<'_>, passable: impl Fn(u16, &HalfEdge) -> bool) -> StdVec<StdVec<f64>> {
     let n = view.node_count();
     let mut d = vec![vec![f64::INFINITY; n]; n];
     for (a, row) in d.iter_mut().enumerate() {
         row[a] = 0.0;
-        for edge in view.half_edges(a as u16).filter(&passable) {
+        for edge in view.half_edges(a as u16).filter(|edge| passable(a as u16, edge)) {
             let along = view.node(edge.target).cast::<f64>() - view.node(a as u16).cast::<f64>();
             row[usize::from(edge.target)] = along.norm();
         }
@@ -76,16 +76,21 @@ proptest! {
         let bytes = encode(&header(1, 1), &nodes, &edges);
         let view = RoadmapView::parse(&bytes).unwrap();
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, REQUIRED_M);
-        let expected = brute_force(&view, |edge| view.clears(edge, REQUIRED_M));
+        let expected = brute_force(&view, passable);
         let all: StdVec<u16> = (0..nodes.len() as u16).collect();
         let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
         let mut path = Vec::<u16, CAPACITY>::new();
+        let mut lengths = vec![0.0; view.half_edge_count()];
+        let with_lengths = WithLengths::new(view, &mut lengths).unwrap();
+        let mut quick = vec![f32::NAN; nodes.len()];
         for &from in &all {
+            dijkstra_row(&with_lengths, from, &all, passable, &mut ws, &mut quick).unwrap();
             let mut row = vec![f32::NAN; nodes.len()];
             dijkstra_row(&view, from, &all, passable, &mut ws, &mut row).unwrap();
             for &to in &all {
                 let best = expected[usize::from(from)][usize::from(to)];
                 prop_assert!(close(f64::from(row[usize::from(to)]), best));
+                prop_assert_eq!(row[usize::from(to)].to_bits(), quick[usize::from(to)].to_bits());
                 match ws.path_to(to, &mut path) {
                     Ok(()) => check_path(&view, &path, (from, to), row[usize::from(to)]),
                     Err(e) => prop_assert_eq!((e, best), (SearchError::NoPath, f64::INFINITY)),
@@ -95,6 +100,9 @@ proptest! {
                 let best = expected[usize::from(from)][usize::from(to)];
                 match astar(&view, from, to, passable, &mut ws, &mut path) {
                     Ok(length) => {
+                        let (same, mut same_path) = (path.clone(), Vec::<u16, CAPACITY>::new());
+                        let again = astar(&with_lengths, from, to, passable, &mut ws, &mut same_path);
+                        prop_assert_eq!((again, same_path), (Ok(length), same));
                         prop_assert!(close(f64::from(length), best));
                         check_path(&view, &path, (from, to), length);
                     }
@@ -162,4 +170,34 @@ fn a_row_without_targets_searches_nothing_and_repeated_targets_are_all_filled() 
     let mut row = [0.0; 3];
     assert_eq!(dijkstra_row(&view, 0, &[1, 0, 1], |_, _| true, &mut ws, &mut row), Ok(()));
     assert_eq!(row, [4.0, 0.0, 4.0]);
+}
+
+proptest! {
+    #[test]
+    fn the_cost_matrix_equals_brute_force_from_either_side(
+        (nodes, edges) in graphs(),
+        picks in proptest::collection::vec(any::<u16>(), 1..9),
+        split in any::<proptest::sample::Index>(),
+        one_way in 0u16..4,
+    ) {
+        let bytes = encode(&header(1, 1), &nodes, &edges);
+        let view = RoadmapView::parse(&bytes).unwrap();
+        let picks: StdVec<u16> = picks.iter().map(|pick| pick % nodes.len() as u16).collect();
+        let (starts, goals) = picks.split_at(split.index(picks.len() + 1));
+        // A rule with a direction shows whether the search against the flight turns it round.
+        let passable = |from: u16, edge: &HalfEdge| (from + 2 * edge.target) % 4 >= one_way;
+        let mut ws = Box::new(SearchWorkspace::<CAPACITY>::new());
+        let mut matrix = vec![f32::NAN; starts.len() * goals.len()];
+        cost_matrix(&view, starts, goals, passable, &mut ws, &mut matrix).unwrap();
+        let expected = brute_force(&view, passable);
+        for (row, &start) in starts.iter().enumerate() {
+            for (column, &goal) in goals.iter().enumerate() {
+                let best = expected[usize::from(start)][usize::from(goal)];
+                prop_assert!(close(f64::from(matrix[row * goals.len() + column]), best));
+            }
+        }
+        let short = &mut [0.0; 99][..starts.len() * goals.len() + 1];
+        let refused = cost_matrix(&view, starts, goals, passable, &mut ws, short);
+        prop_assert_eq!(refused, Err(SearchError::OutputLength));
+    }
 }

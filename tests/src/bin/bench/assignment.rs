@@ -25,7 +25,7 @@ pub fn rows() -> Vec<Row> {
 }
 
 #[derive(Clone, Copy)]
-pub enum Kind {
+enum Kind {
     Real,
     Integer,
 }
@@ -43,7 +43,8 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
             let start = Instant::now();
             let (columns, _) = lapjv::lapjv(black_box(&matrix)).expect("a square matrix");
             theirs.push(start.elapsed());
-            let their_total: f64 = columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
+            let their_total: f64 =
+                columns.iter().enumerate().map(|(i, &j)| f64::from(costs[i * n + j])).sum();
             // Theirs sums prices in f32 and may miss the optimum by that rounding; ours must never be worse.
             assert!(result.total <= their_total + 1e-9 * their_total, "seed {seed}: not the optimum");
         }
@@ -57,7 +58,7 @@ fn compare(n: usize, instances: u64, kind: Kind, ws: &mut AssignmentWorkspace<LA
 }
 
 /// Uniform in [1, 100), from a seeded SplitMix64.
-pub fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
+fn random_costs(n: usize, kind: Kind, seed: u64) -> Vec<f32> {
     let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let mut unit = || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);

@@ -1,0 +1,132 @@
+//! What a companion is told before it starts: who it is, who flies with it, and how fast and how close.
+
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::frames::Geodetic;
+
+/// One vehicle of the mission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RosterEntry {
+    /// MAVLink system id, 1…255.
+    pub system_id: u8,
+    /// First point of its path, ENU metres; its height is the altitude climbed to.
+    pub start: Point,
+}
+
+/// Settings of one companion. `V` vehicles at most.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config<const V: usize> {
+    /// MAVLink system id of the vehicle, shared by autopilot and companion.
+    pub system_id: u8,
+    /// Every vehicle of the mission, this one included, sorted by system id.
+    pub roster: Vec<RosterEntry, V>,
+    /// Origin of the mission frame.
+    pub origin: Geodetic,
+    /// CRC-32 of the mission file; neighbours with another one fly another mission.
+    pub mission_crc: u32,
+    /// Nominal speed along the path, m/s.
+    pub cruise_mps: f32,
+    /// Speed of the climb, m/s.
+    pub climb_mps: f32,
+    /// Acceleration and braking, m/s².
+    pub accel_mps2: f32,
+    /// Radius of the vehicle, metres.
+    pub radius_m: f32,
+    /// Radius and safety margin, metres: the clearance every edge was tested at.
+    pub required_clearance_m: f32,
+    /// Smallest distance between two vehicles' centres, metres.
+    pub safety_distance_m: f32,
+    /// How vehicles keep apart.
+    pub method: Method,
+    /// A vehicle further than this from its start, horizontally, does not take off, metres.
+    pub start_tolerance_m: f32,
+    /// Battery charge at which it lands, percent; 0 never.
+    pub battery_low_percent: i8,
+    /// Minimum and maximum corner of the volume it may be in, ENU metres.
+    pub geofence: Option<(Point, Point)>,
+}
+
+/// Why a configuration was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ConfigError {
+    /// The vehicle's own system id is not in the roster, or 0.
+    NotInRoster,
+    /// The roster is not sorted by system id, or names one twice.
+    RosterOrder,
+    /// A number is NaN or infinite, or a speed, acceleration or distance is not positive.
+    NotPositive,
+    /// The mission origin is not a place on earth.
+    Origin,
+}
+
+impl<const V: usize> Config<V> {
+    /// The values of a small indoor vehicle; the roster holds only itself.
+    pub fn new(system_id: u8, start: Point, origin: Geodetic) -> Self {
+        let mut roster = Vec::new();
+        // A roster without room for its own vehicle is refused by `check`.
+        let _ = roster.push(RosterEntry { system_id, start });
+        Self {
+            system_id,
+            roster,
+            origin,
+            mission_crc: 0,
+            cruise_mps: 2.0,
+            climb_mps: 1.0,
+            accel_mps2: 1.5,
+            radius_m: 0.3,
+            required_clearance_m: 0.8,
+            safety_distance_m: 1.5,
+            method: Method::Priority,
+            start_tolerance_m: 2.0,
+            battery_low_percent: 15,
+            geofence: None,
+        }
+    }
+
+    /// The entry of this vehicle and its rank by system id.
+    pub fn own(&self) -> Option<(u16, &RosterEntry)> {
+        let at = self.roster.iter().position(|e| e.system_id == self.system_id)?;
+        Some((at as u16, &self.roster[at]))
+    }
+
+    /// Whether it can be flown.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if self.system_id == 0 || self.own().is_none() {
+            return Err(ConfigError::NotInRoster);
+        }
+        if self.roster.windows(2).any(|pair| pair[0].system_id >= pair[1].system_id) {
+            return Err(ConfigError::RosterOrder);
+        }
+        let positive = [
+            self.cruise_mps,
+            self.climb_mps,
+            self.accel_mps2,
+            self.radius_m,
+            self.required_clearance_m,
+            self.safety_distance_m,
+            self.start_tolerance_m,
+        ];
+        let starts = self.roster.iter().flat_map(|e| e.start.iter());
+        if positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || starts.into_iter().any(|c| !c.is_finite())
+        {
+            return Err(ConfigError::NotPositive);
+        }
+        if self.origin.is_valid() { Ok(()) } else { Err(ConfigError::Origin) }
+    }
+}
+
+/// Why there is no plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PlanFailure {
+    /// The roadmap is absent or damaged.
+    NoRoadmap,
+    /// No route leads to the goal.
+    Unreachable,
+    /// No departure keeps clear of the other vehicles.
+    Blocked,
+    /// The plan is larger than this board's memory.
+    Capacity,
+    /// The plan does not begin at this vehicle's start, or holds a number that is not finite.
+    Invalid,
+}

@@ -1,0 +1,320 @@
+//! A scripted PX4 for unit tests: the modes, acks and streams the companion relies on, and a vehicle that goes where the
+//! setpoint says at a limited speed. The real closed loop is host-sim's.
+
+extern crate std;
+use std::vec::Vec;
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::*;
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::frames::{self, Geodetic, Projection};
+use planner_core::path::Path;
+use planner_core::schedule::VehiclePlan;
+
+use crate::frame::{self, Frame, Framer, Header, MAX_SENT};
+use crate::{Companion, Config, Duration, Event, Instant, Link, RosterEntry, px4};
+
+pub type Small = Companion<4, 16, 8>;
+
+pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+/// 300 m away and 20 m up: frames that are mixed up fly into the ground.
+pub const EKF_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
+pub const SYSTEM: u8 = 42;
+pub const START: Point = Point::new(8.0, 12.0, 1.5);
+pub const GOAL: Point = Point::new(16.0, 12.0, 3.5);
+
+/// The autopilot, the radio's other end, and the companion between them.
+pub struct Bench {
+    pub companion: Small,
+    pub now: Instant,
+    pub enu: Point,
+    pub mode: u32,
+    pub armed: bool,
+    pub status: u8,
+    pub battery: i8,
+    /// Commands refused: `MAV_CMD` numbers.
+    pub refused: Vec<u16>,
+    pub silent: bool,
+    pub no_position: bool,
+    pub stays_armed: bool,
+    /// No setpoint moves it.
+    pub stuck: bool,
+    pub never_lands: bool,
+    pub events: Vec<Event>,
+    pub setpoints: Vec<(Instant, Point, u16)>,
+    pub commands: Vec<(u16, f32, f32, f32)>,
+    pub texts: Vec<std::string::String>,
+    pub swarm: Vec<Frame>,
+    pub acks: Vec<(u16, u8, u8, u8)>,
+    target: Option<Point>,
+    framers: [Framer; 2],
+    sequence: u8,
+    gcs_sequence: u8,
+    landed_at: Option<Instant>,
+    pub origin: Geodetic,
+    pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
+}
+
+pub fn config() -> Config<4> {
+    let mut config = Config::new(SYSTEM, START, ORIGIN);
+    config.method = Method::Priority;
+    config.mission_crc = 0xC0FFEE;
+    config
+}
+
+pub fn two_vehicles() -> Config<4> {
+    let mut config = config();
+    config.roster.push(RosterEntry { system_id: 77, start: Point::new(8.0, 20.0, 1.5) }).unwrap();
+    config
+}
+
+pub fn plan() -> VehiclePlan<16, 8> {
+    let mut path = Path::new();
+    for point in [START, Point::new(16.0, 12.0, 1.5), GOAL] {
+        path.push(point, 1.2).unwrap();
+    }
+    let gates = heapless::Vec::new();
+    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, gates, plan_crc: 5 }
+}
+
+impl Bench {
+    pub fn new(config: Config<4>) -> Self {
+        Self {
+            companion: Companion::new(config).unwrap(),
+            now: Instant::ZERO,
+            enu: Point::new(START.x, START.y, 0.0),
+            mode: px4::HOLD,
+            armed: false,
+            status: 3,
+            battery: 90,
+            refused: Vec::new(),
+            silent: false,
+            no_position: false,
+            stays_armed: false,
+            stuck: false,
+            never_lands: false,
+            events: Vec::new(),
+            setpoints: Vec::new(),
+            commands: Vec::new(),
+            texts: Vec::new(),
+            swarm: Vec::new(),
+            acks: Vec::new(),
+            target: None,
+            framers: [Framer::new(), Framer::new()],
+            sequence: 0,
+            gcs_sequence: 0,
+            landed_at: None,
+            origin: EKF_ORIGIN,
+            answer_plan: Some(Ok(plan())),
+        }
+    }
+
+    pub fn state(&self) -> crate::State {
+        self.companion.state()
+    }
+
+    pub fn ned(&self) -> Vector3<f64> {
+        let place = frames::enu_to_geodetic(&ORIGIN, &self.enu);
+        frames::geodetic_to_ned(Projection::Px4, &self.origin, &place)
+    }
+
+    pub fn bytes<M: MessageData>(&mut self, message: &M) -> Vec<u8> {
+        let mut out = [0; MAX_SENT];
+        let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
+        self.sequence = self.sequence.wrapping_add(1);
+        let len = frame::encode(header, message, &mut out);
+        out[..len].to_vec()
+    }
+
+    fn tell<M: MessageData>(&mut self, message: &M) {
+        let bytes = self.bytes(message);
+        self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
+        self.drain();
+    }
+
+    /// A command from the ground station, on the swarm link.
+    pub fn command(&mut self, command: MavCmd, param1: f32, system: u8, component: u8) {
+        let data = COMMAND_LONG_DATA {
+            command,
+            param1,
+            target_system: system,
+            target_component: component,
+            ..Default::default()
+        };
+        let mut out = [0; MAX_SENT];
+        let header = Header { system: 255, component: 190, sequence: self.gcs_sequence };
+        self.gcs_sequence = self.gcs_sequence.wrapping_add(1);
+        let len = frame::encode(header, &data, &mut out);
+        self.companion.handle_bytes(Link::Swarm, self.now, &out[..len]);
+        self.drain();
+    }
+
+    pub fn start(&mut self) {
+        self.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, crate::COMPONENT);
+    }
+
+    pub fn drain(&mut self) {
+        for link in [Link::Autopilot, Link::Swarm] {
+            let mut out = [0; MAX_SENT];
+            loop {
+                let len = self.companion.poll_transmit(link, &mut out);
+                if len == 0 {
+                    break;
+                }
+                let mut input = &out[..len];
+                let frame = self.framers[link as usize].next(self.now, &mut input).expect("a whole frame");
+                assert_eq!((frame.system, frame.component), (SYSTEM, crate::COMPONENT));
+                self.receive(link, frame);
+            }
+        }
+        while let Some(event) = self.companion.poll_event() {
+            self.events.push(event);
+            if event == Event::PlanRequested
+                && let Some(answer) = self.answer_plan.clone()
+            {
+                self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+            }
+        }
+    }
+
+    fn receive(&mut self, link: Link, frame: Frame) {
+        let p = frame.padded();
+        if frame.message_id == COMMAND_ACK_DATA::ID {
+            self.acks.push((u16::from_le_bytes([p[0], p[1]]), p[2], p[8], p[9]));
+        }
+        if let Some(text) = frame.decode::<STATUSTEXT_DATA>() {
+            self.texts.push(text.text.to_str().unwrap().into());
+        }
+        if link == Link::Swarm {
+            self.swarm.push(frame);
+            return;
+        }
+        if let Some(s) = frame.decode::<SET_POSITION_TARGET_LOCAL_NED_DATA>() {
+            assert_eq!((s.target_system, s.target_component), (SYSTEM, 1));
+            assert_eq!(s.coordinate_frame, MavFrame::MAV_FRAME_LOCAL_NED);
+            let ned = Vector3::new(f64::from(s.x), f64::from(s.y), f64::from(s.z));
+            let place = frames::ned_to_geodetic(Projection::Px4, &self.origin, &ned);
+            let enu = frames::geodetic_to_enu(&ORIGIN, &place);
+            self.target = (s.type_mask.bits() == px4::MASK_POSITION_VELOCITY).then_some(enu);
+            self.setpoints.push((self.now, enu, s.type_mask.bits()));
+        }
+        if let Some(c) = frame.decode::<COMMAND_LONG_DATA>() {
+            assert_eq!((c.target_system, c.target_component), (SYSTEM, 1));
+            let number = c.command as u16;
+            self.commands.push((number, c.param1, c.param2, c.param3));
+            if self.silent || self.refused.contains(&number) {
+                return;
+            }
+            match c.command {
+                MavCmd::MAV_CMD_DO_SET_MODE => {
+                    self.mode = (c.param2 as u32) << 16 | (c.param3 as u32) << 24;
+                }
+                MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0,
+                MavCmd::MAV_CMD_REQUEST_MESSAGE if c.param1 == 49.0 => {
+                    let origin = GPS_GLOBAL_ORIGIN_DATA {
+                        latitude: (self.origin.lat_deg * 1e7).round() as i32,
+                        longitude: (self.origin.lon_deg * 1e7).round() as i32,
+                        altitude: (self.origin.alt_m * 1e3) as i32,
+                        ..Default::default()
+                    };
+                    self.tell(&origin);
+                }
+                _ => {}
+            }
+        }
+    }
+
+    pub fn heartbeat(&mut self) -> Vec<u8> {
+        let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
+        let mut data = HEARTBEAT_DATA { custom_mode: self.mode, base_mode: armed, ..Default::default() };
+        data.autopilot = MavAutopilot::MAV_AUTOPILOT_PX4;
+        data.system_status =
+            if self.status >= 5 { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
+        self.bytes(&data)
+    }
+
+    pub fn on_ground(&self) -> bool {
+        self.enu.z < 0.05
+    }
+
+    /// 50 ms of flight and telemetry.
+    pub fn tick(&mut self) {
+        self.now = self.now + Duration::from_millis(50);
+        self.companion.handle_timeout(self.now);
+        self.drain();
+        let step = 0.1;
+        let target = match self.mode {
+            px4::OFFBOARD => self.target,
+            px4::LAND if !self.never_lands => Some(Point::new(self.enu.x, self.enu.y, 0.0)),
+            _ => None,
+        };
+        if let Some(target) = target.filter(|_| self.armed && !self.stuck) {
+            let way = target - self.enu;
+            self.enu += way * (step / way.norm().max(step));
+        }
+        let landing = self.mode == px4::LAND && self.on_ground() && self.armed;
+        self.landed_at = if landing { self.landed_at.or(Some(self.now)) } else { None };
+        if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200)) && !self.stays_armed {
+            self.armed = false;
+        }
+        if self.silent {
+            return;
+        }
+        let count = self.now.micros() / 50_000;
+        if count.is_multiple_of(20) {
+            let bytes = self.heartbeat();
+            self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
+            self.drain();
+            let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
+            self.tell(&status);
+        }
+        if count.is_multiple_of(4) {
+            let landed_state = if self.on_ground() {
+                MavLandedState::MAV_LANDED_STATE_ON_GROUND
+            } else {
+                MavLandedState::MAV_LANDED_STATE_IN_AIR
+            };
+            self.tell(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
+        }
+        if !self.no_position {
+            let ned = self.ned();
+            self.tell(&LOCAL_POSITION_NED_DATA {
+                time_boot_ms: self.now.boot_ms(),
+                x: ned.x as f32,
+                y: ned.y as f32,
+                z: ned.z as f32,
+                ..Default::default()
+            });
+        }
+    }
+
+    pub fn run(&mut self, seconds: f32) {
+        for _ in 0..(seconds * 20.0) as u32 {
+            self.tick();
+        }
+    }
+
+    /// Runs until a state is reached; panics with what happened if it is not within the time.
+    pub fn until(&mut self, state: crate::State, seconds: f32) {
+        for _ in 0..(seconds * 20.0) as u32 {
+            if self.state() == state {
+                return;
+            }
+            self.tick();
+        }
+        assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
+    }
+
+    /// A bench in the middle of its path.
+    pub fn following(config: Config<4>) -> Self {
+        let mut bench = Self::new(config);
+        bench.until(crate::State::Ready, 6.0);
+        bench.start();
+        bench.until(crate::State::Follow, 20.0);
+        bench.run(2.0);
+        assert_eq!(bench.state(), crate::State::Follow);
+        bench
+    }
+}

@@ -1,0 +1,308 @@
+//! Where to be now: the setpoint of each state, made from the path, the neighbours and the autopilot's position.
+
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
+use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
+use planner_core::schedule::VehiclePlan;
+
+use crate::config::Config;
+use crate::mission::State;
+use crate::neighbours::Neighbours;
+use crate::telemetry::Telemetry;
+use crate::time::Instant;
+
+/// This near the end of the climb or of the path counts as there, metres.
+const ARRIVED_M: f32 = 0.35;
+/// Slower than this counts as standing at the end of the path, m/s.
+const STANDING_MPS: f32 = 0.5;
+/// The climb's reference is at most this far above the vehicle, metres.
+const CLIMB_LEAD_M: f32 = 1.5;
+/// Stretch of the path searched for the nearest point, metres to either side.
+const REJOIN_WINDOW_M: f32 = 5.0;
+/// Less than this is no progress, metres.
+const PROGRESS_M: f32 = 0.25;
+
+/// Before anyone was asked: wait.
+const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
+
+/// What the autopilot is sent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Setpoint {
+    /// Nothing: the state streams no setpoints.
+    None,
+    /// Be there, moving so: ENU metres and m/s.
+    Move(Point, Point),
+    /// Stand still wherever that is: no position is known to refer to.
+    Stop,
+}
+
+/// The reference and what moves it.
+#[derive(Clone, Debug)]
+pub struct Guidance {
+    track: TrackConfig,
+    deconflict: DeconflictConfig,
+    climb_mps: f32,
+    tracker: Tracker,
+    /// Last advice of the neighbours.
+    pub advice: Advice,
+    reference: Option<Reference>,
+    on_path: bool,
+    brake_at_m: f32,
+    hold: Point,
+    climb_z: f32,
+    progress_m: f32,
+    progress_at: Instant,
+    /// Whether it flies back the way it came.
+    pub returning: bool,
+}
+
+/// What guidance reads beside its own state.
+pub struct Scene<'a, const W: usize, const G: usize> {
+    /// The plan, if there is one with a path.
+    pub plan: Option<&'a VehiclePlan<W, G>>,
+    /// The autopilot.
+    pub telemetry: &'a Telemetry,
+    /// Rank in the roster.
+    pub rank: u16,
+}
+
+impl Guidance {
+    pub fn new<const V: usize>(config: &Config<V>) -> Self {
+        Self {
+            track: TrackConfig {
+                cruise_mps: config.cruise_mps,
+                accel_mps2: config.accel_mps2,
+                radius_m: config.radius_m,
+                ..TrackConfig::default()
+            },
+            deconflict: DeconflictConfig {
+                method: config.method,
+                safety_distance_m: config.safety_distance_m,
+                cruise_mps: config.cruise_mps,
+                accel_mps2: config.accel_mps2,
+            },
+            climb_mps: config.climb_mps,
+            tracker: Tracker::default(),
+            advice: NOT_ASKED,
+            reference: None,
+            on_path: false,
+            brake_at_m: f32::INFINITY,
+            hold: Point::zeros(),
+            climb_z: 0.0,
+            progress_m: 0.0,
+            progress_at: Instant::ZERO,
+            returning: false,
+        }
+    }
+
+    /// Forgets a former flight.
+    pub fn reset(&mut self) {
+        self.tracker = Tracker::default();
+        self.reference = None;
+        self.on_path = false;
+        self.returning = false;
+        self.advice = NOT_ASKED;
+    }
+
+    pub fn hold_at(&mut self, point: Point) {
+        self.hold = point;
+        self.on_path = false;
+    }
+
+    pub fn begin_climb(&mut self, position: &Point) {
+        self.reset();
+        self.climb_z = position.z;
+    }
+
+    pub fn run(&mut self, now: Instant) {
+        self.on_path = true;
+        self.brake_at_m = f32::INFINITY;
+        self.progress_m = self.tracker.along_m;
+        self.progress_at = now;
+    }
+
+    /// Stops the reference within its braking distance; off the path, where the vehicle is.
+    pub fn brake(&mut self, position: &Point) {
+        if self.on_path {
+            let braking = self.tracker.speed_mps * self.tracker.speed_mps / (2.0 * self.track.accel_mps2);
+            self.brake_at_m = self.tracker.along_m + braking;
+        } else {
+            self.hold = *position;
+        }
+    }
+
+    /// Goes on from the nearest point of the path.
+    pub fn rejoin<const W: usize>(&mut self, path: &Path<W>, position: &Point, now: Instant) {
+        let along_m =
+            path.project(position, self.tracker.along_m, REJOIN_WINDOW_M).clamp(0.0, path.length_m());
+        self.tracker = Tracker { along_m, speed_mps: 0.0 };
+        self.run(now);
+    }
+
+    /// Replaces the path by the way back to its first point. The clearance of each leg goes with it.
+    pub fn turn_back<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
+        let along_m = self.tracker.along_m;
+        let mut back = Path::new();
+        let ahead = path.waypoints().iter().find(|w| w.along_m >= along_m);
+        let mut clearance_m = ahead.map_or(0.0, |w| w.clearance_m);
+        if let Some(here) = path.point_at(along_m) {
+            // No more points than the path has: those behind, and this one for at least one ahead.
+            let _ = back.push(here, clearance_m);
+        }
+        for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < along_m) {
+            let _ = back.push(waypoint.position, clearance_m);
+            clearance_m = waypoint.clearance_m;
+        }
+        *path = back;
+        self.tracker = Tracker::default();
+        self.returning = true;
+        self.run(now);
+    }
+
+    /// Arc length told to neighbours and gates: negative before and in the climb, beyond the path's length in the
+    /// descent.
+    pub fn progress_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {
+        let Some(plan) = scene.plan else { return 0.0 };
+        let (path, z) = (&plan.path, scene.telemetry.position.z);
+        let length_m = path.length_m();
+        let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
+        let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
+        match state {
+            State::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
+            State::Land if self.reached_end(path) => length_m + (end_z - z).clamp(0.0, plan.descent_m),
+            // A metre beyond the ground, so that every gate on this flight opens.
+            State::Disarm | State::Done if self.reached_end(path) => length_m + plan.descent_m + 1.0,
+            _ if self.on_path => {
+                let behind = self.track.lead_max_m * 2.0;
+                let seen =
+                    path.project(&scene.telemetry.position, self.tracker.along_m - behind * 0.5, behind);
+                seen.min(self.tracker.along_m)
+            }
+            _ => -plan.climb_m,
+        }
+    }
+
+    /// Whether the shared plan's path was flown to its end.
+    pub fn at_goal<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        !self.returning && scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    }
+
+    fn reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
+        self.on_path && self.tracker.along_m >= path.length_m()
+    }
+
+    /// One step of `dt_s`: new advice, new reference.
+    pub fn step<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        dt_s: f32,
+    ) {
+        let Some(plan) = scene.plan else { return };
+        let position = &scene.telemetry.position;
+        let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
+        if matches!(state, State::Scheduled | State::Follow) {
+            let own = Own { rank: scene.rank, position: *position, along_m, path: &plan.path };
+            self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
+        }
+        if state == State::Climb {
+            let top = plan.path.point_at(0.0).map_or(self.climb_z, |p| p.z);
+            let lead = position.z + CLIMB_LEAD_M;
+            self.climb_z = (self.climb_z + self.climb_mps * dt_s).min(lead.max(self.climb_z)).min(top);
+        }
+        if self.on_path && setpoints_flow(state) && state != State::PilotControl {
+            let advice = if state == State::Follow {
+                self.advice
+            } else {
+                Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
+            };
+            self.reference =
+                path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s);
+            if self.tracker.along_m > self.progress_m + PROGRESS_M {
+                self.progress_m = self.tracker.along_m;
+                self.progress_at = now;
+            }
+        }
+    }
+
+    /// Time since the reference last moved on.
+    pub fn progress_at(&self) -> Instant {
+        self.progress_at
+    }
+
+    pub fn climb_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let start = scene.plan.and_then(|plan| plan.path.point_at(0.0));
+        start.is_some_and(|start| {
+            let apart = start - scene.telemetry.position;
+            self.climb_z >= start.z && apart.norm() < 2.0 * ARRIVED_M && apart.z.abs() < ARRIVED_M
+        })
+    }
+
+    pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let (Some(plan), Some(reference)) = (scene.plan, self.reference) else { return false };
+        self.on_path
+            && reference.finished
+            && (reference.position - scene.telemetry.position).norm() < ARRIVED_M
+            && scene.telemetry.velocity.norm() < STANDING_MPS
+            && (self.advice.stop_within_m > plan.descent_m || self.returning)
+    }
+
+    /// Whether the straight way from the vehicle to the nearest point of the path stays inside the leg's clearance.
+    pub fn near_path<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let Some(plan) = scene.plan else { return false };
+        let position = &scene.telemetry.position;
+        let along_m = plan.path.project(position, self.tracker.along_m, REJOIN_WINDOW_M);
+        let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
+        let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
+        (nearest - position).norm() <= leg.clearance_m - self.track.radius_m
+    }
+
+    /// The setpoint of this moment.
+    pub fn setpoint<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+    ) -> Setpoint {
+        if !setpoints_flow(state) {
+            return Setpoint::None;
+        }
+        let still = Vector3::zeros();
+        if scene.telemetry.position_at.is_none() || state == State::PositionLost {
+            return Setpoint::Stop;
+        }
+        match state {
+            State::PilotControl => Setpoint::Move(scene.telemetry.position, still),
+            State::Climb => {
+                let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
+                let rate = if self.climb_z < start.z { self.climb_mps } else { 0.0 };
+                Setpoint::Move(Point::new(start.x, start.y, self.climb_z), Point::new(0.0, 0.0, rate))
+            }
+            _ => match self.reference {
+                Some(reference) if self.on_path => Setpoint::Move(reference.position, reference.velocity),
+                _ => Setpoint::Move(self.hold, still),
+            },
+        }
+    }
+}
+
+/// Whether setpoints go out in this state: from before Offboard until landed, never in a failsafe.
+pub fn setpoints_flow(state: State) -> bool {
+    use State::*;
+    matches!(
+        state,
+        Streaming
+            | Engaging
+            | Arming
+            | Climb
+            | Follow
+            | Paused
+            | Alone
+            | AutopilotSilent
+            | PositionLost
+            | Land
+            | PilotControl
+    )
+}

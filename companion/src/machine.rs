@@ -1,0 +1,499 @@
+//! The companion itself: routes frames in, runs the mission table, makes frames out.
+
+use heapless::Deque;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TUNNEL_DATA,
+};
+use planner_core::Point;
+use planner_core::schedule::VehiclePlan;
+
+use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
+use crate::config::{Config, ConfigError, PlanFailure};
+use crate::frame::{Counters, Frame, Framer};
+use crate::guidance::{Guidance, Scene, setpoints_flow};
+use crate::intent::Intent;
+use crate::mission::{self, Action, Inputs, Row, State};
+use crate::neighbours::Neighbours;
+use crate::outbox::{Outbox, Outgoing};
+use crate::px4;
+use crate::telemetry::{Change, Telemetry};
+use crate::time::{Duration, Instant};
+
+/// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
+const SETPOINT_EVERY: Duration = Duration::from_millis(50);
+/// On the ground the table is looked at five times a second.
+const IDLE_EVERY: Duration = Duration::from_millis(200);
+const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
+const SWARM_EVERY: Duration = Duration::from_millis(200);
+const RETRY_EVERY: Duration = Duration::from_millis(1000);
+const DISARM_AFTER: Duration = Duration::from_millis(4000);
+/// Streams asked for at each step while connecting.
+const SETUP_BURST: usize = 5;
+/// Rows taken at one instant; more would be a cycle in the table.
+const ROWS_AT_ONCE: usize = 4;
+const GPS_GLOBAL_ORIGIN: u16 = 49;
+const EVENTS: usize = 16;
+
+/// One of the two ports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// The serial port to the flight controller.
+    Autopilot,
+    /// The radio to the swarm and the ground station.
+    Swarm,
+}
+
+/// What the shell should know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// Plan, and answer with [`Companion::handle_plan`].
+    PlanRequested,
+    /// The mission moved on.
+    StateChanged {
+        /// Before.
+        from: State,
+        /// After.
+        to: State,
+        /// The row's text, empty if it has none.
+        text: &'static str,
+    },
+}
+
+/// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
+#[derive(Clone, Debug)]
+pub struct Companion<const V: usize, const W: usize, const G: usize> {
+    pub(crate) config: Config<V>,
+    rank: u16,
+    start: Point,
+    framers: [Framer; 2],
+    pub(crate) outboxes: [Outbox; 2],
+    pub(crate) telemetry: Telemetry,
+    neighbours: Neighbours<V>,
+    pub(crate) plan: Option<VehiclePlan<W, G>>,
+    plan_failed: bool,
+    pub(crate) state: State,
+    entered_at: Instant,
+    wishes: Wishes,
+    repeats: Repeats,
+    pub(crate) guidance: Guidance,
+    mode_before: u32,
+    pub(crate) now: Instant,
+    stepped_at: Instant,
+    next_step: Instant,
+    next_heartbeat: Instant,
+    next_swarm: Instant,
+    retry_at: Instant,
+    origin_at: Instant,
+    setup: usize,
+    pub(crate) setpoint_due: bool,
+    pub(crate) heartbeat_due: [bool; 2],
+    pub(crate) version_due: [bool; 2],
+    pub(crate) position_due: bool,
+    pub(crate) intent_due: bool,
+    events: Deque<Event, EVENTS>,
+}
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// A companion that has heard nothing yet.
+    pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
+        config.check()?;
+        let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
+        let start = own.start;
+        Ok(Self {
+            rank,
+            start,
+            framers: [Framer::new(), Framer::new()],
+            outboxes: [Outbox::default(), Outbox::default()],
+            telemetry: Telemetry::new(),
+            neighbours: Neighbours::new(&config.roster, config.system_id),
+            plan: None,
+            plan_failed: false,
+            state: State::WaitAutopilot,
+            entered_at: Instant::ZERO,
+            wishes: Wishes::default(),
+            repeats: Repeats::default(),
+            guidance: Guidance::new(&config),
+            mode_before: 0,
+            now: Instant::ZERO,
+            stepped_at: Instant::ZERO,
+            next_step: Instant::ZERO,
+            next_heartbeat: Instant::ZERO,
+            next_swarm: Instant::ZERO,
+            retry_at: Instant::ZERO,
+            origin_at: Instant::ZERO,
+            setup: px4::STREAMS.len(),
+            setpoint_due: false,
+            heartbeat_due: [false; 2],
+            version_due: [false; 2],
+            position_due: false,
+            intent_due: false,
+            events: Deque::new(),
+            config,
+        })
+    }
+
+    /// Where the mission is.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The autopilot as last heard.
+    pub fn telemetry(&self) -> &Telemetry {
+        &self.telemetry
+    }
+
+    /// System id of the vehicle waited for; 0 when free.
+    pub fn waiting_for(&self) -> u8 {
+        self.guidance.advice.waiting_for
+    }
+
+    /// Progress told to the swarm, metres along the own path.
+    pub fn progress_m(&self) -> f32 {
+        self.guidance.progress_m(self.state, &self.scene())
+    }
+
+    /// What a link's framer counted.
+    pub fn counters(&self, link: Link) -> Counters {
+        self.framers[link as usize].counters()
+    }
+
+    /// Messages dropped because a link's queue was full.
+    pub fn dropped(&self, link: Link) -> u32 {
+        self.outboxes[link as usize].dropped()
+    }
+
+    /// Takes bytes of a link in, all received by `now`.
+    pub fn handle_bytes(&mut self, link: Link, now: Instant, bytes: &[u8]) {
+        self.now = now;
+        let mut input = bytes;
+        let mut relevant = false;
+        while let Some(frame) = self.framers[link as usize].next(now, &mut input) {
+            relevant |= self.handle_frame(link, &frame);
+        }
+        if relevant {
+            self.run_table();
+        }
+    }
+
+    /// Lets time pass: to be called when [`Self::poll_timeout`] is due.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.now = now;
+        for link in [Link::Autopilot, Link::Swarm] {
+            // Frees what a partial frame held back.
+            self.handle_bytes(link, now, &[]);
+        }
+        if now >= self.next_step {
+            self.step();
+        }
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + HEARTBEAT_EVERY;
+            self.heartbeat_due = [true; 2];
+        }
+        if now >= self.next_swarm {
+            self.next_swarm = now + SWARM_EVERY;
+            self.position_due = self.telemetry.position_at.is_some();
+            self.intent_due = true;
+        }
+    }
+
+    /// Takes the planner's answer in. Ignored unless a plan was asked for.
+    pub fn handle_plan(&mut self, now: Instant, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
+        self.now = now;
+        if self.state != State::Planning {
+            return;
+        }
+        match outcome {
+            Ok(plan) if self.is_sound(plan) => self.plan = Some(plan.clone()),
+            _ => self.plan_failed = true,
+        }
+        self.run_table();
+    }
+
+    /// The next event.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// When [`Self::handle_timeout`] is due.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        Some(self.next_step.min(self.next_heartbeat).min(self.next_swarm))
+    }
+
+    pub(crate) fn scene(&self) -> Scene<'_, W, G> {
+        Scene {
+            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
+            telemetry: &self.telemetry,
+            rank: self.rank,
+        }
+    }
+
+    /// Finite, from our own start, and a path wherever there is a goal.
+    fn is_sound(&self, plan: &VehiclePlan<W, G>) -> bool {
+        let heights = [plan.climb_m, plan.descent_m];
+        let finite = heights.iter().all(|h| h.is_finite() && *h >= 0.0)
+            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
+        let first = plan.path.waypoints().first();
+        let begins = first.is_some_and(|w| (w.position - self.start).norm() < 0.1);
+        finite && (begins || plan.goal.is_none())
+    }
+
+    /// Returns whether the mission table should be looked at.
+    fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
+        if let Some(command) = commands::read(frame, self.config.system_id) {
+            if !self.repeats.is_repeat(frame, command.command, self.now) {
+                self.handle_command(link, &command);
+                return true;
+            }
+            return false;
+        }
+        match link {
+            Link::Autopilot => {
+                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
+                    return false;
+                }
+                let change = self.telemetry.handle(self.now, &self.config.origin, frame);
+                if change == Change::OriginLost {
+                    self.origin_at = self.now;
+                }
+                change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
+            }
+            Link::Swarm => {
+                self.handle_neighbour(frame);
+                false
+            }
+        }
+    }
+
+    fn handle_neighbour(&mut self, frame: &Frame) {
+        let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
+        let id = frame.system;
+        if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
+            return;
+        }
+        if !self.neighbours.accept(id, frame.sequence, self.now) {
+            return;
+        }
+        if frame.message_id == TUNNEL_DATA::ID {
+            if let Some(intent) = Intent::decode(frame.padded(), id) {
+                let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
+                self.neighbours.handle_intent(self.now, &intent, self.config.mission_crc, plan_crc);
+            }
+        } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
+            self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
+        }
+    }
+
+    fn handle_command(&mut self, link: Link, command: &Command) {
+        let result = match commands::apply(&mut self.wishes, self.state, command) {
+            Some(result) => result,
+            None if command.command == commands::REQUEST => self.request(link, command.param1),
+            // To all components: another one's.
+            None if !command.to_component => return,
+            None => UNSUPPORTED,
+        };
+        if command.to_us {
+            let ack = Outgoing::Ack { command: command.command, result, to: command.from };
+            self.outboxes[link as usize].push(ack);
+        }
+    }
+
+    fn request(&mut self, link: Link, message: f32) -> u8 {
+        if message == HEARTBEAT_DATA::ID as f32 {
+            self.heartbeat_due[link as usize] = true;
+        } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
+            self.version_due[link as usize] = true;
+        } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
+            self.position_due = self.telemetry.position_at.is_some();
+        } else {
+            return DENIED;
+        }
+        ACCEPTED
+    }
+
+    /// One step of the control loop: reference, table, and what is asked for again.
+    fn step(&mut self) {
+        let now = self.now;
+        let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
+        self.stepped_at = now;
+        let scene = Scene {
+            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
+            telemetry: &self.telemetry,
+            rank: self.rank,
+        };
+        self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s);
+        self.run_table();
+        self.repeat_requests();
+        let flows = setpoints_flow(self.state);
+        self.setpoint_due = flows;
+        let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
+        // Steps keep their rhythm; after a long gap the rhythm starts anew instead of catching up.
+        let due = self.next_step + every;
+        self.next_step = if due > now { due } else { now + every };
+    }
+
+    fn repeat_requests(&mut self) {
+        let now = self.now;
+        let heard = self.telemetry.heartbeat_at.is_some();
+        let autopilot = &mut self.outboxes[Link::Autopilot as usize];
+        if heard && self.telemetry.ekf_origin.is_none() && now >= self.origin_at {
+            self.origin_at = now + RETRY_EVERY;
+            autopilot.push(Outgoing::Request(GPS_GLOBAL_ORIGIN));
+        }
+        for _ in 0..SETUP_BURST {
+            if let Some(&(id, interval_us)) = px4::STREAMS.get(self.setup) {
+                autopilot.push(Outgoing::Interval(id, interval_us));
+                self.setup += 1;
+            }
+        }
+        if now < self.retry_at {
+            return;
+        }
+        self.retry_at = now + RETRY_EVERY;
+        match self.state {
+            State::Engaging => autopilot.push(Outgoing::Mode(px4::OFFBOARD)),
+            State::Arming => autopilot.push(Outgoing::Arm(true)),
+            State::Land if self.telemetry.custom_mode != px4::LAND => {
+                autopilot.push(Outgoing::Mode(px4::LAND));
+            }
+            State::Disarm => {
+                self.retry_at = now + DISARM_AFTER;
+                autopilot.push(Outgoing::Arm(false));
+            }
+            _ => {}
+        }
+    }
+
+    fn run_table(&mut self) {
+        for _ in 0..ROWS_AT_ONCE {
+            let inputs = self.inputs();
+            let Some(row) = mission::update(self.state, &inputs) else { return };
+            self.take(row);
+        }
+    }
+
+    fn inputs(&self) -> Inputs {
+        let (t, now, scene) = (&self.telemetry, self.now, self.scene());
+        let offboard = t.custom_mode == px4::OFFBOARD;
+        let mode_foreign = match self.state {
+            State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
+            // Disarming after a landing the autopilot chooses a mode of its own.
+            State::Land | State::Disarm => !offboard && t.custom_mode != px4::LAND && t.armed,
+            _ => !offboard,
+        };
+        let away = t.position - self.start;
+        let follow = self.state == State::Follow;
+        let fence = self.config.geofence;
+        let inside =
+            |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
+        Inputs {
+            in_state: now - self.entered_at,
+            heartbeat_age: t.heartbeat_age(now),
+            position_age: t.position_age(now),
+            stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
+            neighbour_age: self.neighbours.silence(now, self.entered_at),
+            neighbour_heard: self.neighbours.heard_within(now, HEARTBEAT_EVERY),
+            plan_ready: self.plan.is_some(),
+            plan_failed: self.plan_failed,
+            has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
+            at_start: away.xy().norm() <= self.config.start_tolerance_m,
+            start: self.wishes.start,
+            pause: self.wishes.pause,
+            resume: self.wishes.resume,
+            land: self.wishes.land,
+            turn_back: self.wishes.turn_back && !self.guidance.returning,
+            armed: t.armed,
+            offboard,
+            mode_foreign,
+            critical: t.is_critical(),
+            on_ground: t.on_ground == Some(true),
+            gates_open: self.guidance.advice.stop_within_m > 0.05,
+            climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
+            path_done: follow && self.guidance.path_done(&scene),
+            near_path: self.state == State::PilotControl && self.guidance.near_path(&scene),
+            battery_low: (0..=100).contains(&t.battery_percent)
+                && t.battery_percent < self.config.battery_low_percent,
+            outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
+        }
+    }
+
+    fn take(&mut self, row: &'static Row) {
+        let (from, now) = (self.state, self.now);
+        self.state = row.to;
+        self.entered_at = now;
+        self.wishes = Wishes { start: self.wishes.start, ..Wishes::default() };
+        let ended = matches!(row.to, State::Aborted | State::Done);
+        if ended || row.action == Action::ForgetStart {
+            self.wishes.start = false;
+        }
+        self.act(from, row);
+        if !row.text.is_empty() {
+            let text = Outgoing::Text { warning: row.warning, text: row.text };
+            self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
+        }
+        // Full only if the shell does not drain: then the newest is lost.
+        let _ = self.events.push_back(Event::StateChanged { from, to: row.to, text: row.text });
+        // The step that the new state needs is due now.
+        if setpoints_flow(row.to) && !setpoints_flow(from) {
+            self.next_step = now;
+        }
+    }
+
+    fn act(&mut self, from: State, row: &Row) {
+        let now = self.now;
+        let position = self.telemetry.position;
+        match row.action {
+            Action::None | Action::ForgetStart => {}
+            Action::Connect => self.setup = 0,
+            Action::RequestPlan => {
+                self.plan = None;
+                self.plan_failed = false;
+                self.guidance.reset();
+                let _ = self.events.push_back(Event::PlanRequested);
+            }
+            Action::HoldHere => {
+                self.mode_before = self.telemetry.custom_mode;
+                self.guidance.hold_at(position);
+            }
+            Action::AskOffboard | Action::AskArm => self.retry_at = now,
+            Action::AskLand => {
+                self.retry_at = now;
+                if from == State::PilotControl {
+                    self.guidance.hold_at(position);
+                } else {
+                    self.guidance.brake(&position);
+                }
+            }
+            Action::AskDisarm if row.to == State::Disarm => self.retry_at = now + DISARM_AFTER,
+            Action::AskDisarm => self.outboxes[Link::Autopilot as usize].push(Outgoing::Arm(false)),
+            Action::BeginClimb => self.guidance.begin_climb(&position),
+            Action::RunPath => self.guidance.run(now),
+            Action::BrakeOnPath => self.guidance.brake(&position),
+            Action::Rejoin => {
+                if let Some(plan) = &self.plan {
+                    self.guidance.rejoin(&plan.path, &position, now);
+                }
+            }
+            Action::TurnBack => {
+                if let Some(plan) = &mut self.plan {
+                    self.guidance.turn_back(&mut plan.path, now);
+                    // Off the shared plan: neighbours keep clear of us as of a stranger.
+                    plan.gates.clear();
+                    core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
+                }
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "machine_tests.rs"]
+mod tests;
+
+#[cfg(test)]
+#[path = "scene_tests.rs"]
+mod scene_tests;
+
+#[cfg(test)]
+#[path = "hostile_tests.rs"]
+mod hostile_tests;

@@ -1,0 +1,224 @@
+//! The mission against a scripted PX4: the way it should go, and every way it should not.
+
+extern crate std;
+use std::vec::Vec;
+
+use mavlink::dialects::ardupilotmega::MavCmd;
+
+use super::*;
+use crate::fake_px4::*;
+
+/// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
+pub(super) fn assert_no_gap(bench: &Bench) {
+    for pair in bench.setpoints.windows(2) {
+        assert!(pair[1].0 - pair[0].0 <= Duration::from_millis(100), "{pair:?}");
+    }
+}
+
+fn states(bench: &Bench) -> Vec<State> {
+    let to = |e: &Event| match e {
+        Event::StateChanged { to, .. } => Some(*to),
+        Event::PlanRequested => None,
+    };
+    bench.events.iter().filter_map(to).collect()
+}
+
+#[test]
+fn flies_the_mission_and_lands_at_the_goal() {
+    let mut bench = Bench::new(config());
+    bench.until(State::Ready, 6.0);
+    bench.run(15.0);
+    assert!(!bench.armed && bench.setpoints.is_empty(), "nothing before MISSION_START");
+    bench.start();
+    assert_eq!(bench.acks.pop(), Some((300, 0, 255, 190)));
+    bench.until(State::Done, 60.0);
+    use State::*;
+    let flown = [Scheduled, Streaming, Engaging, Arming, Climb, Follow, Land, Disarm, Done];
+    assert!(states(&bench).ends_with(&flown), "{:?}", states(&bench));
+    assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
+    assert!(!bench.armed);
+    assert_no_gap(&bench);
+    // A second of setpoints before Offboard is asked for.
+    let engaged = bench.commands.iter().position(|c| c.0 == 176).unwrap();
+    assert_eq!(bench.commands[engaged], (176, 1.0, 6.0, 0.0));
+    // The setpoints never leave the tube around the way, though the EKF origin is 300 m away.
+    for (_, at, mask) in &bench.setpoints {
+        assert_eq!(*mask, px4::MASK_POSITION_VELOCITY);
+        assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
+    }
+}
+
+#[test]
+fn a_pilot_is_never_fought() {
+    let mut bench = Bench::following(config());
+    bench.mode = 0x0003_0000;
+    bench.until(State::PilotControl, 3.0);
+    let asked = bench.commands.len();
+    bench.enu += Point::new(0.0, 0.3, 0.0);
+    bench.run(3.0);
+    let (_, at, _) = *bench.setpoints.last().unwrap();
+    assert!((at - bench.enu).norm() < 0.01, "only the current position goes out");
+    assert_eq!(bench.commands.len(), asked, "and no command");
+    // Offboard alone does not resume, nor resume alone.
+    bench.mode = px4::OFFBOARD;
+    bench.run(3.0);
+    assert_eq!(bench.state(), State::PilotControl);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.state(), State::Follow);
+    bench.until(State::Done, 60.0);
+    assert_no_gap(&bench);
+}
+
+#[test]
+fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
+    let mut bench = Bench::following(config());
+    bench.mode = 0x0003_0000;
+    bench.until(State::PilotControl, 3.0);
+    for _ in 0..20 {
+        bench.enu += Point::new(0.0, 0.1, 0.0);
+        bench.run(0.1);
+    }
+    bench.mode = px4::OFFBOARD;
+    bench.run(2.0);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.state(), State::Land);
+    bench.until(State::Done, 30.0);
+}
+
+#[test]
+fn a_failsafe_gets_no_setpoints() {
+    let mut bench = Bench::following(config());
+    (bench.mode, bench.status) = (px4::RTL, 5);
+    bench.until(State::Failsafe, 3.0);
+    let sent = bench.setpoints.len();
+    bench.run(5.0);
+    assert_eq!(bench.setpoints.len(), sent);
+    (bench.armed, bench.enu.z) = (false, 0.0);
+    bench.until(State::Aborted, 3.0);
+    bench.run(5.0);
+    assert_eq!(bench.setpoints.len(), sent);
+}
+
+#[test]
+fn pause_brakes_on_the_path_and_resume_goes_on() {
+    let mut bench = Bench::following(config());
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, 0, 0);
+    assert_eq!(bench.state(), State::Paused);
+    assert!(bench.acks.iter().all(|a| a.0 != 193), "a broadcast is not answered");
+    bench.run(4.0);
+    let stood = bench.enu;
+    bench.run(4.0);
+    assert!((bench.enu - stood).norm() < 0.01 && stood.x < 15.0);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, 0);
+    bench.until(State::Done, 60.0);
+    assert_no_gap(&bench);
+}
+
+#[test]
+fn land_and_return_are_obeyed() {
+    let mut bench = Bench::following(config());
+    bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+    bench.until(State::Done, 30.0);
+    assert!(bench.enu.x > 8.5 && bench.enu.x < 15.0);
+    assert_no_gap(&bench);
+    let mut bench = Bench::following(config());
+    bench.run(2.0);
+    bench.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+    bench.until(State::Done, 60.0);
+    assert!((bench.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{:?}", bench.enu);
+    assert_no_gap(&bench);
+}
+
+#[test]
+fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
+    let mut bench = Bench::new(config());
+    bench.until(State::Ready, 6.0);
+    bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.acks.pop(), Some((179, 3, 255, 190)));
+    for (system, component) in [(SYSTEM, 0), (SYSTEM, 1), (0, 0), (SYSTEM + 1, crate::COMPONENT)] {
+        bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, system, component);
+    }
+    bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, 1);
+    bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM + 1, crate::COMPONENT);
+    assert_eq!((bench.acks.len(), bench.state()), (0, State::Ready));
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.acks.pop(), Some((193, 1, 255, 190)), "not now");
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 7.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.acks.pop(), Some((193, 2, 255, 190)));
+    bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 148.0, SYSTEM, crate::COMPONENT);
+    assert_eq!(bench.acks.pop(), Some((512, 0, 255, 190)));
+    assert!(bench.swarm.iter().any(|f| f.message_id == 148));
+}
+
+#[test]
+fn an_unsound_plan_is_refused() {
+    let mut elsewhere = plan();
+    elsewhere.path = planner_core::path::Path::new();
+    elsewhere.path.push(Point::new(1.0, 1.0, 1.5), 1.0).unwrap();
+    for answer in [Ok(elsewhere), Err(PlanFailure::Unreachable)] {
+        let mut bench = Bench::new(config());
+        bench.answer_plan = Some(answer);
+        bench.until(State::Aborted, 6.0);
+        bench.answer_plan = Some(Ok(plan()));
+        bench.start();
+        bench.until(State::Ready, 6.0);
+        bench.run(10.0);
+        assert_eq!(bench.state(), State::Ready, "start is to be commanded anew");
+    }
+}
+
+#[test]
+fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
+    let mut gated = plan();
+    gated.gates.push(planner_core::schedule::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+    let mut bench = Bench::new(two_vehicles());
+    bench.answer_plan = Some(Ok(gated));
+    bench.until(State::Ready, 6.0);
+    bench.start();
+    let mut other = Bench::new(two_vehicles());
+    let hear = |bench: &mut Bench, other: &mut Bench, progress_m: f32, crc: u32| {
+        let mut payload = [0; 133];
+        let points = heapless::Vec::new();
+        let flags = crate::intent::ON_PLAN | crate::intent::FLYING;
+        let intent = Intent {
+            system_id: 77,
+            flags,
+            mission_crc: 0xC0FFEE,
+            plan_crc: crc,
+            progress_m,
+            speed_mps: 1.0,
+            points,
+        };
+        let len = intent.encode(&mut payload);
+        let place = GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: bench.now.boot_ms(),
+            lat: 403_330_000,
+            lon: -37_659_000,
+            alt: 710_000,
+            ..Default::default()
+        };
+        let mut out = [0; crate::frame::MAX_SENT];
+        let head = |sequence| crate::frame::Header { system: 77, component: 191, sequence };
+        let sequence = (bench.now.boot_ms() / 50 * 2) as u8;
+        let n = crate::frame::encode_raw(
+            head(sequence),
+            TUNNEL_DATA::ID,
+            TUNNEL_DATA::EXTRA_CRC,
+            &payload[..len],
+            &mut out,
+        );
+        bench.companion.handle_bytes(Link::Swarm, bench.now, &out[..n]);
+        let n = crate::frame::encode(head(sequence.wrapping_add(1)), &place, &mut out);
+        bench.companion.handle_bytes(Link::Swarm, bench.now, &out[..n]);
+        other.run(0.05);
+        bench.run(0.5);
+    };
+    bench.run(20.0);
+    for (progress_m, crc) in [(1.0, 5), (5.9, 5), (6.5, 6)] {
+        hear(&mut bench, &mut other, progress_m, crc);
+        assert_eq!((bench.state(), bench.armed), (State::Scheduled, false), "{progress_m} on plan {crc}");
+    }
+    assert_eq!(bench.companion.waiting_for(), 77);
+    hear(&mut bench, &mut other, 6.5, 5);
+    bench.until(State::Follow, 20.0);
+}

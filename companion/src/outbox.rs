@@ -1,0 +1,124 @@
+//! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here: they are made
+//! fresh when the link is polled. A full queue refuses the newest and counts it.
+
+use heapless::Deque;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavSeverity, STATUSTEXT_DATA,
+};
+
+use crate::frame::{self, Header};
+use crate::px4;
+
+/// Entries a link holds.
+pub const DEPTH: usize = 32;
+
+/// A message that waits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outgoing {
+    /// SET_MESSAGE_INTERVAL: message id, microseconds or −1.
+    Interval(u16, f32),
+    /// REQUEST_MESSAGE: message id.
+    Request(u16),
+    /// DO_SET_MODE to a `custom_mode`.
+    Mode(u32),
+    /// COMPONENT_ARM_DISARM.
+    Arm(bool),
+    /// COMMAND_ACK.
+    Ack {
+        /// The command answered.
+        command: u16,
+        /// `MAV_RESULT`.
+        result: u8,
+        /// Whom: system and component.
+        to: (u8, u8),
+    },
+    /// STATUSTEXT.
+    Text {
+        /// Warning, else information.
+        warning: bool,
+        /// At most 50 bytes.
+        text: &'static str,
+    },
+}
+
+/// The queue of one link.
+#[derive(Clone, Debug, Default)]
+pub struct Outbox {
+    queue: Deque<Outgoing, DEPTH>,
+    sequence: u8,
+    dropped: u32,
+}
+
+impl Outbox {
+    /// Puts a message at the end; a full queue drops and counts it. What is asked for again by itself (streams, modes,
+    /// arming) is asked for again; a dropped text or ack is lost.
+    pub fn push(&mut self, message: Outgoing) {
+        if self.queue.push_back(message).is_err() {
+            self.dropped = self.dropped.wrapping_add(1);
+        }
+    }
+
+    /// Messages dropped since the start.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Free entries.
+    pub fn room(&self) -> usize {
+        DEPTH - self.queue.len()
+    }
+
+    /// The header of the next frame of this link.
+    pub fn header(&mut self, system: u8) -> Header {
+        let sequence = self.sequence;
+        self.sequence = self.sequence.wrapping_add(1);
+        Header { system, component: crate::COMPONENT, sequence }
+    }
+
+    /// Writes the first that waits; 0 if none does.
+    pub fn transmit(&mut self, system: u8, out: &mut [u8]) -> usize {
+        let Some(message) = self.queue.pop_front() else { return 0 };
+        let header = self.header(system);
+        let command = |command, param1: f32, param2: f32, param3: f32| COMMAND_LONG_DATA {
+            command,
+            param1,
+            param2,
+            param3,
+            target_system: system,
+            target_component: crate::AUTOPILOT,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let long = match message {
+            Outgoing::Interval(id, us) => {
+                command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, f32::from(id), us, 0.0)
+            }
+            Outgoing::Request(id) => command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0),
+            Outgoing::Mode(mode) => {
+                let (main, sub) = px4::mode_params(mode);
+                command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub)
+            }
+            Outgoing::Arm(arm) => {
+                command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
+            }
+            Outgoing::Ack { command, result, to } => {
+                // By field: the command may be unknown to the crate, and its type lacks the addressee.
+                let [low, high] = command.to_le_bytes();
+                let payload = [low, high, result, 0, 0, 0, 0, 0, to.0, to.1];
+                return frame::encode_raw(
+                    header,
+                    COMMAND_ACK_DATA::ID,
+                    COMMAND_ACK_DATA::EXTRA_CRC,
+                    &payload,
+                    out,
+                );
+            }
+            Outgoing::Text { warning, text } => {
+                let severity =
+                    if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO };
+                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.into() }, out);
+            }
+        };
+        frame::encode(header, &long, out)
+    }
+}

@@ -1,0 +1,293 @@
+//! A scene for every row of the mission table.
+
+extern crate std;
+use std::vec::Vec;
+
+use mavlink::dialects::ardupilotmega::MavCmd;
+
+use super::*;
+use crate::fake_px4::*;
+use crate::mission::Guard;
+
+/// Every row of the table is taken in some scene below or above; `taken` collects them.
+#[test]
+fn every_row_has_its_scene() {
+    let mut texts: Vec<std::string::String> = Vec::new();
+    let mut scene = |mut bench: Bench, script: &dyn Fn(&mut Bench), end: State, seconds: f32| {
+        script(&mut bench);
+        bench.until(end, seconds);
+        texts.append(&mut bench.texts);
+    };
+    use State::*;
+    let ready = || {
+        let mut bench = Bench::new(config());
+        bench.until(Ready, 6.0);
+        bench
+    };
+    let land = |b: &mut Bench| b.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, 191);
+    let back = |b: &mut Bench| b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, 191);
+    let pause = |b: &mut Bench| b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, 191);
+    let resume = |b: &mut Bench| b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, 191);
+    let to = |state: State| {
+        let mut bench = ready();
+        bench.start();
+        bench.until(state, 30.0);
+        bench
+    };
+    let flying = || Bench::following(config());
+    // The autopilot, the pilot, the failsafe.
+    scene(flying(), &|b| b.armed = false, Aborted, 3.0);
+    scene(flying(), &|b| (b.mode, b.status) = (px4::RTL, 5), Failsafe, 3.0);
+    scene(flying(), &|b| b.mode = px4::HOLD, PilotControl, 3.0);
+    let landing = || {
+        let mut bench = flying();
+        bench.never_lands = true;
+        land(&mut bench);
+        bench.run(2.0);
+        assert_eq!(bench.state(), Land);
+        bench
+    };
+    scene(landing(), &|b| (b.mode, b.status) = (px4::RTL, 5), Failsafe, 3.0);
+    scene(landing(), &|b| b.mode = px4::HOLD, PilotControl, 3.0);
+    scene(landing(), &|b| b.run(125.0), Land, 1.0);
+    scene(
+        to(Engaging),
+        &|b| {
+            b.mode = px4::RTL;
+            b.status = 5;
+            b.refused.push(176);
+        },
+        Aborted,
+        5.0,
+    );
+    scene(
+        to(Streaming),
+        &|b| {
+            b.mode = px4::RTL;
+            b.refused.push(176);
+        },
+        Aborted,
+        5.0,
+    );
+    // Links and position.
+    scene(ready(), &|b| b.silent = true, WaitAutopilot, 5.0);
+    scene(to(Streaming), &|b| b.silent = true, Aborted, 5.0);
+    scene(flying(), &|b| b.silent = true, AutopilotSilent, 5.0);
+    scene(flying(), &|b| b.silent = true, Aborted, 70.0);
+    scene(
+        flying(),
+        &|b| {
+            b.silent = true;
+            b.run(6.0);
+            b.silent = false;
+        },
+        Done,
+        60.0,
+    );
+    scene(landing(), &|b| b.silent = true, Aborted, 65.0);
+    scene(ready(), &|b| b.no_position = true, WaitPosition, 4.0);
+    scene(to(Streaming), &|b| b.no_position = true, Aborted, 4.0);
+    scene(flying(), &|b| b.no_position = true, PositionLost, 3.0);
+    scene(flying(), &|b| b.no_position = true, Done, 30.0);
+    scene(
+        flying(),
+        &|b| {
+            b.no_position = true;
+            b.run(2.0);
+            b.no_position = false;
+        },
+        Done,
+        60.0,
+    );
+    // Orders and limits.
+    scene(
+        flying(),
+        &|b| {
+            b.no_position = true;
+            b.run(1.5);
+            land(b);
+        },
+        Done,
+        30.0,
+    );
+    scene(flying(), &|b| b.battery = 5, Done, 30.0);
+    let mut fenced = config();
+    fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));
+    scene(Bench::following(fenced), &|_| {}, Done, 60.0);
+    scene(flying(), &|b| back(b), Done, 60.0);
+    scene(to(Climb), &|b| back(b), Done, 60.0);
+    // The mission in order, and where it halts.
+    scene(
+        ready(),
+        &|b| {
+            b.enu.x += 1.5;
+            b.run(0.3);
+            b.enu.x += 1.5;
+            b.run(0.3);
+            b.start();
+        },
+        Aborted,
+        1.0,
+    );
+    scene(
+        ready(),
+        &|b| {
+            b.armed = true;
+            b.run(1.5);
+            b.start();
+        },
+        Aborted,
+        1.0,
+    );
+    scene(to(Streaming), &|b| land(b), Aborted, 1.0);
+    scene(to(Streaming), &|b| back(b), Aborted, 1.0);
+    scene(to(Streaming), &|b| b.refused.push(176), Aborted, 8.0);
+    scene(to(Streaming), &|b| b.refused.push(400), Aborted, 16.0);
+    scene(
+        to(Climb),
+        &|b| {
+            b.stuck = true;
+            b.run(61.0);
+            b.stuck = false;
+        },
+        Done,
+        30.0,
+    );
+    scene(flying(), &|b| pause(b), Paused, 1.0);
+    scene(
+        flying(),
+        &|b| {
+            pause(b);
+            b.run(3.0);
+            resume(b);
+        },
+        Done,
+        60.0,
+    );
+    scene(
+        flying(),
+        &|b| {
+            pause(b);
+            b.run(601.0);
+        },
+        Done,
+        30.0,
+    );
+    scene(
+        flying(),
+        &|b| {
+            b.stuck = true;
+            b.run(310.0);
+            b.stuck = false;
+        },
+        Done,
+        30.0,
+    );
+    scene(
+        flying(),
+        &|b| {
+            b.stays_armed = true;
+            b.refused.push(400);
+            land(b);
+        },
+        Aborted,
+        60.0,
+    );
+    let lonely = || Bench::following(two_vehicles());
+    scene(lonely(), &|b| b.stuck = true, Alone, 15.0);
+    scene(
+        lonely(),
+        &|b| {
+            b.stuck = true;
+            b.run(50.0);
+            b.stuck = false;
+        },
+        Done,
+        30.0,
+    );
+    let mut unanswered = Bench::new(config());
+    unanswered.answer_plan = None;
+    scene(
+        unanswered,
+        &|b| {
+            b.run(35.0);
+            b.answer_plan = Some(Ok(plan()));
+        },
+        Ready,
+        40.0,
+    );
+    let mut idle = Bench::new(config());
+    idle.answer_plan = Some(Ok(VehiclePlan { goal: None, path: Default::default(), ..plan() }));
+    scene(
+        idle,
+        &|b| {
+            b.until(Ready, 6.0);
+            b.start();
+        },
+        Done,
+        1.0,
+    );
+    let mut planless = Bench::new(config());
+    planless.answer_plan = Some(Err(PlanFailure::NoRoadmap));
+    scene(planless, &|b| b.run(6.0), Aborted, 1.0);
+    // After the pilot, after a failsafe.
+    let piloted = || {
+        let mut bench = flying();
+        bench.mode = px4::HOLD;
+        bench.until(PilotControl, 3.0);
+        bench
+    };
+    scene(piloted(), &|b| b.armed = false, Aborted, 3.0);
+    scene(piloted(), &|b| (b.mode, b.status) = (px4::RTL, 5), Failsafe, 3.0);
+    scene(
+        piloted(),
+        &|b| {
+            b.mode = px4::OFFBOARD;
+            b.run(2.0);
+            resume(b);
+        },
+        Done,
+        60.0,
+    );
+    scene(
+        piloted(),
+        &|b| {
+            for _ in 0..20 {
+                b.enu.y += 0.1;
+                b.run(0.1);
+            }
+            b.mode = px4::OFFBOARD;
+            b.run(2.0);
+            resume(b);
+        },
+        Done,
+        30.0,
+    );
+    scene(piloted(), &|b| b.run(901.0), PilotControl, 1.0);
+    scene(
+        flying(),
+        &|b| {
+            (b.mode, b.status) = (px4::RTL, 5);
+            b.run(302.0);
+            b.armed = false;
+        },
+        Aborted,
+        3.0,
+    );
+    scene(
+        ready(),
+        &|b| {
+            b.start();
+            b.until(Streaming, 3.0);
+            land(b);
+            b.start();
+        },
+        Ready,
+        6.0,
+    );
+    // `Alone` → heard again has its own test; the rest must all have been said.
+    for row in mission::TABLE.iter().filter(|row| !row.text.is_empty() && row.guard != Guard::NeighbourHeard)
+    {
+        assert!(texts.iter().any(|t| t == row.text), "no scene took: {}", row.text);
+    }
+}

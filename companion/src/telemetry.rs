@@ -1,0 +1,216 @@
+//! What the autopilot says of itself, turned into the mission frame.
+//!
+//! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
+//! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
+//! EKF origin moved: it counts as lost until the origin is heard anew.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA};
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic, Projection};
+
+use crate::frame::Frame;
+use crate::time::{Duration, Instant};
+
+const HEARTBEAT: u32 = 0;
+const EXTENDED_SYS_STATE: u32 = 245;
+/// `MAV_AUTOPILOT_INVALID`: not a flight controller.
+const NOT_AN_AUTOPILOT: u8 = 8;
+const ARMED: u8 = 0x80;
+const CRITICAL: u8 = 5;
+const ON_GROUND: u8 = 1;
+/// Further than this plus [`JUMP_MPS`] × time since the last position is a jump, metres.
+const JUMP_M: f32 = 2.0;
+/// Faster than any vehicle flown so, m/s.
+const JUMP_MPS: f32 = 20.0;
+/// After this long without a frame the sequence starts afresh.
+const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
+
+/// Drops frames that repeat or come late: up to 64 behind the newest of the last second.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SequenceFilter {
+    last: Option<(u8, Instant)>,
+}
+
+impl SequenceFilter {
+    /// Whether the frame is new.
+    pub fn accept(&mut self, sequence: u8, now: Instant) -> bool {
+        if let Some((last, at)) = self.last {
+            let behind = last.wrapping_sub(sequence);
+            if behind < 64 && now - at < SEQUENCE_LIFETIME {
+                return false;
+            }
+        }
+        self.last = Some((sequence, now));
+        true
+    }
+}
+
+/// What changed by a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Nothing, or not for us.
+    None,
+    /// Something is newer.
+    Updated,
+    /// The EKF origin is no longer known: ask for it.
+    OriginLost,
+}
+
+/// The autopilot as last heard.
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry {
+    sequence: SequenceFilter,
+    /// When HEARTBEAT was last heard.
+    pub heartbeat_at: Option<Instant>,
+    /// Flight mode, the autopilot's own number.
+    pub custom_mode: u32,
+    /// Whether the motors are armed.
+    pub armed: bool,
+    /// `MAV_STATE`.
+    pub system_status: u8,
+    /// Whether the landing detector says ground; `None` before the first report.
+    pub on_ground: Option<bool>,
+    /// Battery charge in percent, −1 unknown.
+    pub battery_percent: i8,
+    /// EKF origin, once heard.
+    pub ekf_origin: Option<Geodetic>,
+    /// When the position below was heard; `None` while it is unknown.
+    pub position_at: Option<Instant>,
+    /// Place, ENU metres.
+    pub position: Point,
+    /// Velocity, ENU m/s.
+    pub velocity: Point,
+    boot_ms: u32,
+}
+
+impl Telemetry {
+    /// Nothing heard.
+    pub fn new() -> Self {
+        Self { battery_percent: -1, ..Self::default() }
+    }
+
+    /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
+    pub fn is_critical(&self) -> bool {
+        self.system_status >= CRITICAL
+    }
+
+    /// Time since the last HEARTBEAT; the greatest value if none came.
+    pub fn heartbeat_age(&self, now: Instant) -> Duration {
+        age(self.heartbeat_at, now)
+    }
+
+    /// Time since the last usable position; the greatest value if none is known.
+    pub fn position_age(&self, now: Instant) -> Duration {
+        age(self.position_at, now)
+    }
+
+    /// Takes a frame of the autopilot link in.
+    pub fn handle(&mut self, now: Instant, mission_origin: &Geodetic, frame: &Frame) -> Change {
+        if !self.sequence.accept(frame.sequence, now) {
+            return Change::None;
+        }
+        match frame.message_id {
+            // By field: a vehicle type newer than the crate must not make the autopilot silent.
+            HEARTBEAT => {
+                let p = frame.padded();
+                if p[5] == NOT_AN_AUTOPILOT {
+                    return Change::None;
+                }
+                self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+                self.armed = p[6] & ARMED != 0;
+                self.system_status = p[7];
+                self.heartbeat_at = Some(now);
+                Change::Updated
+            }
+            EXTENDED_SYS_STATE => {
+                let landed = frame.padded()[1];
+                if landed != 0 {
+                    self.on_ground = Some(landed == ON_GROUND);
+                }
+                Change::Updated
+            }
+            SYS_STATUS_DATA::ID => match frame.decode::<SYS_STATUS_DATA>() {
+                Some(status) => {
+                    self.battery_percent = status.battery_remaining;
+                    Change::Updated
+                }
+                None => Change::None,
+            },
+            GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
+                Some(origin) => self.handle_origin(&origin),
+                None => Change::None,
+            },
+            LOCAL_POSITION_NED_DATA::ID => match frame.decode::<LOCAL_POSITION_NED_DATA>() {
+                Some(local) => self.handle_position(now, mission_origin, &local),
+                None => Change::None,
+            },
+            _ => Change::None,
+        }
+    }
+
+    fn handle_origin(&mut self, data: &GPS_GLOBAL_ORIGIN_DATA) -> Change {
+        let origin = Geodetic {
+            lat_deg: f64::from(data.latitude) * 1e-7,
+            lon_deg: f64::from(data.longitude) * 1e-7,
+            alt_m: f64::from(data.altitude) * 1e-3,
+        };
+        if !origin.is_valid() {
+            return Change::None;
+        }
+        if self.ekf_origin != Some(origin) {
+            self.ekf_origin = Some(origin);
+            // The next position is about the new origin and no jump.
+            self.position_at = None;
+        }
+        Change::Updated
+    }
+
+    fn handle_position(
+        &mut self,
+        now: Instant,
+        mission_origin: &Geodetic,
+        d: &LOCAL_POSITION_NED_DATA,
+    ) -> Change {
+        let fields = [d.x, d.y, d.z, d.vx, d.vy, d.vz];
+        let older = self.boot_ms.wrapping_sub(d.time_boot_ms);
+        let rebooted = older > 10_000 && older < u32::MAX / 2;
+        let stale = older < u32::MAX / 2 && !rebooted && self.position_at.is_some();
+        if fields.iter().any(|f| !f.is_finite()) || stale {
+            return Change::None;
+        }
+        self.boot_ms = d.time_boot_ms;
+        let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
+            self.ekf_origin = None;
+            self.position_at = None;
+            return if rebooted { Change::OriginLost } else { Change::None };
+        };
+        let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
+        let geodetic = frames::ned_to_geodetic(Projection::Px4, &ekf_origin, &ned);
+        let position = frames::geodetic_to_enu(mission_origin, &geodetic);
+        if let Some(at) = self.position_at
+            && (position - self.position).norm() > JUMP_M + JUMP_MPS * (now - at).secs_f32()
+        {
+            self.ekf_origin = None;
+            self.position_at = None;
+            return Change::OriginLost;
+        }
+        self.position = position;
+        // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
+        self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
+        self.position_at = Some(now);
+        Change::Updated
+    }
+
+    /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.
+    pub fn to_ned(&self, mission_origin: &Geodetic, point: &Point) -> Option<Vector3<f32>> {
+        let geodetic = frames::enu_to_geodetic(mission_origin, point);
+        let ned = frames::geodetic_to_ned(Projection::Px4, &self.ekf_origin?, &geodetic);
+        Some(Vector3::new(ned.x as f32, ned.y as f32, ned.z as f32))
+    }
+}
+
+fn age(at: Option<Instant>, now: Instant) -> Duration {
+    at.map_or(Duration::from_micros(u64::MAX), |at| now - at)
+}

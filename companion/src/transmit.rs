@@ -1,0 +1,149 @@
+//! Frames out: what is made fresh when a link is polled.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame, MavModeFlag,
+    MavProtocolCapability, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+    TUNNEL_DATA,
+};
+use planner_core::{Point, frames};
+
+use crate::frame;
+use crate::guidance::Setpoint;
+use crate::intent::{self, Intent};
+use crate::machine::{Companion, Link};
+use crate::mission::State;
+use crate::px4;
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
+    pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
+        if out.len() < frame::MAX_SENT {
+            return 0;
+        }
+        let at = link as usize;
+        let system = self.config.system_id;
+        if link == Link::Autopilot
+            && core::mem::take(&mut self.setpoint_due)
+            && let Some(data) = self.setpoint()
+        {
+            return frame::encode(self.outboxes[at].header(system), &data, out);
+        }
+        if core::mem::take(&mut self.heartbeat_due[at]) {
+            return frame::encode(self.outboxes[at].header(system), &self.heartbeat(), out);
+        }
+        if core::mem::take(&mut self.version_due[at]) {
+            return frame::encode(self.outboxes[at].header(system), &version(), out);
+        }
+        if link == Link::Swarm && core::mem::take(&mut self.position_due) {
+            let data = self.global_position();
+            return frame::encode(self.outboxes[at].header(system), &data, out);
+        }
+        if link == Link::Swarm && core::mem::take(&mut self.intent_due) {
+            let mut payload = [0; 133];
+            let len = self.intent().encode(&mut payload);
+            let header = self.outboxes[at].header(system);
+            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        self.outboxes[at].transmit(system, out)
+    }
+
+    fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
+        let (position, velocity, mask) = match self.guidance.setpoint(self.state, &self.scene()) {
+            Setpoint::None => return None,
+            Setpoint::Move(position, velocity) => match self.telemetry.to_ned(&self.config.origin, &position)
+            {
+                Some(ned) => (ned, frames::swap_enu_ned(&velocity), px4::MASK_POSITION_VELOCITY),
+                None => (Point::zeros(), Point::zeros(), px4::MASK_VELOCITY),
+            },
+            Setpoint::Stop => (Point::zeros(), Point::zeros(), px4::MASK_VELOCITY),
+        };
+        Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
+            time_boot_ms: self.now.boot_ms(),
+            x: position.x,
+            y: position.y,
+            z: position.z,
+            vx: velocity.x,
+            vy: velocity.y,
+            vz: velocity.z,
+            type_mask: PositionTargetTypemask::from_bits_truncate(mask),
+            target_system: self.config.system_id,
+            target_component: crate::AUTOPILOT,
+            coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
+            ..SET_POSITION_TARGET_LOCAL_NED_DATA::default()
+        })
+    }
+
+    fn heartbeat(&self) -> HEARTBEAT_DATA {
+        let system_status = match self.state {
+            State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
+            State::Planning | State::Ready | State::Done | State::Aborted => MavState::MAV_STATE_STANDBY,
+            State::AutopilotSilent | State::PositionLost | State::Failsafe => MavState::MAV_STATE_CRITICAL,
+            _ => MavState::MAV_STATE_ACTIVE,
+        };
+        HEARTBEAT_DATA {
+            custom_mode: self.state as u32,
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            system_status,
+            mavlink_version: 3,
+        }
+    }
+
+    fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
+        let t = &self.telemetry;
+        let place = frames::enu_to_geodetic(&self.config.origin, &t.position);
+        let cm = frames::swap_enu_ned(&t.velocity) * 100.0;
+        GLOBAL_POSITION_INT_DATA {
+            // When the position was heard, so that a copy is known as one.
+            time_boot_ms: t.position_at.unwrap_or_default().boot_ms(),
+            lat: libm::round(place.lat_deg * 1e7) as i32,
+            lon: libm::round(place.lon_deg * 1e7) as i32,
+            alt: libm::round(place.alt_m * 1e3) as i32,
+            relative_alt: libm::roundf(t.position.z * 1e3) as i32,
+            vx: cm.x as i16,
+            vy: cm.y as i16,
+            vz: cm.z as i16,
+            hdg: u16::MAX,
+        }
+    }
+
+    fn intent(&self) -> Intent {
+        use State::*;
+        let flags = match self.state {
+            Done => intent::GROUNDED | intent::LANDED,
+            Disarm => intent::GROUNDED,
+            _ if self.telemetry.armed && self.telemetry.on_ground != Some(true) => intent::FLYING,
+            _ => intent::GROUNDED,
+        };
+        let on_plan = !self.guidance.returning
+            && matches!(
+                self.state,
+                Ready | Scheduled | Streaming | Engaging | Arming | Climb | Follow | Paused
+            )
+            || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
+        let plan = self.plan.as_ref();
+        let mut points = heapless::Vec::new();
+        let along_m = self.progress_m();
+        let ahead = plan.into_iter().flat_map(|plan| plan.path.waypoints()).filter(|w| w.along_m > along_m);
+        points.extend(ahead.take(intent::POINTS).map(|w| w.position));
+        Intent {
+            system_id: self.config.system_id,
+            flags: flags | if on_plan && plan.is_some() { intent::ON_PLAN } else { 0 },
+            mission_crc: self.config.mission_crc,
+            plan_crc: plan.map_or(0, |plan| plan.plan_crc),
+            progress_m: along_m,
+            speed_mps: self.telemetry.velocity.norm(),
+            points,
+        }
+    }
+}
+
+fn version() -> AUTOPILOT_VERSION_DATA {
+    AUTOPILOT_VERSION_DATA {
+        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
+        ..AUTOPILOT_VERSION_DATA::default()
+    }
+}

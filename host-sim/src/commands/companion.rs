@@ -1,0 +1,111 @@
+//! `host-sim companion`: one vehicle's companion in a process of its own, beside any autopilot.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
+
+use companion::frame::MAX_SENT;
+use companion::{Event, Instant, Link, PlanFailure, State};
+use heapless::Vec as FixedVec;
+
+use super::load;
+use crate::link::{self, LinkUrl};
+use crate::mission::Mission;
+use crate::progress::Progress;
+use crate::swarm::ground_station::mission_start;
+use crate::swarm::member::is_finished;
+use crate::swarm::{companion_config, new_companion};
+
+/// Arguments of `host-sim companion`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The mission of the whole swarm
+    scenario: PathBuf,
+    /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT or tcp-listen:HOST:PORT
+    #[arg(long, value_name = "URL")]
+    autopilot: LinkUrl,
+    /// Link to the other companions; without it this vehicle flies as the only one
+    #[arg(long, value_name = "URL")]
+    swarm: Option<LinkUrl>,
+    /// Which vehicle of the scenario this is, by its MAVLink system id
+    #[arg(long, value_name = "N")]
+    id: u8,
+    /// Start the mission as soon as it is ready, without a ground station's command
+    #[arg(long)]
+    start: bool,
+}
+
+/// Sleep between two looks at the links.
+const NAP: Duration = Duration::from_millis(1);
+
+/// Runs until the mission ends. Exit code 0 if it was flown to its end.
+///
+/// # Errors
+/// Bad input or a link that fails, by name and place.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let mut mission = Mission::prepare(load(&args.scenario, None)?, &Progress::on_terminal())?;
+    let index = mission.index_of(args.id)?;
+    let plan = mission.plan()?;
+    let own = mission.own_plan(&plan, index).map(|mut own| {
+        if args.swarm.is_none() {
+            own.gates.clear();
+        }
+        own
+    });
+    let mut config = companion_config(&mission, args.id)?;
+    if args.swarm.is_none() {
+        println!("no --swarm link: vehicle {} flies as the only one", args.id);
+        config.roster = config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
+    }
+    let mut companion = new_companion(config)?;
+    let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];
+    if let Some(swarm) = &args.swarm {
+        links.push((Link::Swarm, swarm.open()?));
+    }
+    let began = Clock::now();
+    let now = || Instant::from_micros(began.elapsed().as_micros() as u64);
+    let mut buffer = [0; 2048];
+    loop {
+        for (link, io) in &mut links {
+            loop {
+                let length = io.receive(&mut buffer)?;
+                if length == 0 {
+                    break;
+                }
+                companion.handle_bytes(*link, now(), &buffer[..length]);
+            }
+        }
+        if companion.poll_timeout().is_some_and(|due| due <= now()) {
+            companion.handle_timeout(now());
+        }
+        while let Some(event) = companion.poll_event() {
+            match (event, &own) {
+                (Event::PlanRequested, Ok(own)) => companion.handle_plan(now(), Ok(own)),
+                (Event::PlanRequested, Err(_)) => companion.handle_plan(now(), Err(PlanFailure::Capacity)),
+                (Event::StateChanged { from, to, text }, _) => {
+                    println!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
+                    if args.start && to == State::Ready {
+                        let mut frame = [0; MAX_SENT];
+                        let length = mission_start(args.id, 0, &mut frame);
+                        companion.handle_bytes(Link::Swarm, now(), &frame[..length]);
+                    }
+                }
+            }
+        }
+        for (link, io) in &mut links {
+            loop {
+                let length = companion.poll_transmit(*link, &mut buffer);
+                if length == 0 {
+                    break;
+                }
+                io.send(&buffer[..length])?;
+            }
+        }
+        let state = companion.state();
+        if is_finished(state) {
+            return Ok(if state == State::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+        }
+        sleep(NAP);
+    }
+}

@@ -1,0 +1,83 @@
+//! `host-sim fly` and `host-sim demo`: plan, fly, report.
+
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+use std::time::Instant;
+
+use anyhow::Context;
+
+use super::load;
+use crate::mission::Mission;
+use crate::output;
+use crate::progress::Progress;
+use crate::report::Level;
+use crate::scenario::{self, Scenario};
+use crate::swarm;
+
+/// The demo's scenario, in the program itself: nothing to find on the machine.
+const DEMO: &str = include_str!("../../scenarios/demo.toml");
+
+/// Arguments of `host-sim fly`.
+#[derive(Debug, clap::Args)]
+pub struct FlyArgs {
+    /// The scenario
+    scenario: PathBuf,
+    /// Directory for `result.json`, `timing.json` and `report.html`
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Fly at the speed of the clock instead of as fast as it goes
+    #[arg(long)]
+    realtime: bool,
+    /// Take this seed instead of the scenario's
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+}
+
+/// Arguments of `host-sim demo`.
+#[derive(Debug, clap::Args)]
+pub struct DemoArgs {
+    /// Directory for `result.json`, `timing.json` and `report.html`
+    #[arg(long, value_name = "DIR", default_value = "out/demo")]
+    out: PathBuf,
+}
+
+/// Runs `fly`.
+///
+/// # Errors
+/// Bad input, by name and place.
+pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
+    plan_and_fly(load(&args.scenario, args.seed)?, "fly", &args.out, args.realtime)
+}
+
+/// Runs `demo`.
+///
+/// # Errors
+/// The output cannot be written.
+pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
+    let scenario = scenario::parse(DEMO, "demo.toml").context("the demo's own scenario")?;
+    plan_and_fly(scenario, "demo", &args.out, false)
+}
+
+fn plan_and_fly(scenario: Scenario, command: &'static str, out: &Path, realtime: bool) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    let progress = Progress::on_terminal();
+    let mut mission = Mission::prepare(scenario, &progress)?;
+    let plan = mission.plan()?;
+    let flight = swarm::fly(&mission, &plan, command, realtime, &progress)?;
+    let page = output::flown_page(&mission, &plan, &flight)?;
+    mission.timing.simulated_s = flight.simulated_s;
+    mission.timing.wall_s = began.elapsed().as_secs_f64();
+    output::write(out, &flight.result, &mission.timing, page)?;
+    output::print_summary(&flight.result, out);
+    for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
+        let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
+        println!("           {:.2} s{id}: {}", incident.t_s, incident.text);
+    }
+    println!(
+        "           {:.0} s simulated in {:.1} s, {:.0} × real time",
+        flight.simulated_s,
+        flight.took_s,
+        flight.simulated_s / flight.took_s
+    );
+    Ok(if flight.result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}

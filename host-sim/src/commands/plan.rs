@@ -1,0 +1,82 @@
+//! `host-sim plan`: roadmap, assignment and paths; no flight.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use super::load;
+use crate::capacity::WAYPOINTS;
+use crate::mission::{Mission, SwarmPlan};
+use crate::output;
+use crate::progress::Progress;
+use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+
+/// Arguments of `host-sim plan`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scenario
+    scenario: PathBuf,
+    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, by name and place.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    let mut mission = Mission::prepare(load(&args.scenario, None)?, &Progress::on_terminal())?;
+    let plan = mission.plan()?;
+    let result = planned(&mission, &plan);
+    let page = output::planned_page(&mission, &plan, &result)?;
+    mission.timing.wall_s = began.elapsed().as_secs_f64();
+    output::write(&args.out, &result, &mission.timing, page)?;
+    output::write_points(&args.out.join("starts.txt"), mission.scenario.vehicles.iter().map(|v| v.start))?;
+    output::write_points(&args.out.join("goals.txt"), mission.goals.iter().copied())?;
+    output::print_summary(&result, &args.out);
+    Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
+    let schedule = &mission.schedule;
+    let nominal_s = |f: &planner_core::schedule::Flight<WAYPOINTS>| {
+        (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
+    };
+    let flying = || plan.flights.iter().filter(|f| f.goal.is_some());
+    let clearances = flying().flat_map(|f| f.path.waypoints()).map(|w| w.clearance_m);
+    let min_clearance_m = clearances.fold(f32::INFINITY, f32::min);
+    let vehicles: Vec<_> = plan
+        .flights
+        .iter()
+        .map(|flight| VehicleResult {
+            id: flight.id,
+            goal: flight.goal,
+            reached: false,
+            landed: false,
+            path_m: rounded(flight.path.length_m()),
+            flown_m: 0.0,
+            flight_time_s: flight.goal.map_or(0.0, |_| rounded(nominal_s(flight))),
+            end: if flight.goal.is_some() { "planned" } else { "no goal" }.to_owned(),
+        })
+        .collect();
+    let makespan_s = flying().map(|f| f.depart_s + nominal_s(f)).fold(0.0, f32::max);
+    MissionResult {
+        command: "plan",
+        scenario: mission.scenario.path.clone(),
+        seed: mission.scenario.seed,
+        complete: flying().count() == mission.goals.len().min(vehicles.len()),
+        vehicles,
+        totals: Totals { path_m: rounded(plan.total_m() as f32), makespan_s: rounded(makespan_s) },
+        safety: Safety {
+            wall_contacts: 0,
+            min_clearance_m: min_clearance_m.is_finite().then(|| rounded(min_clearance_m)),
+            min_separation_m: None,
+            safety_distance_m: rounded(mission.scenario.deconfliction.safety_distance_m),
+            violations: 0,
+            deadlocks: 0,
+        },
+        roadmap: mission.roadmap_size(),
+    }
+}

@@ -1,0 +1,282 @@
+//! A scenario: everything a run depends on, in one TOML file.
+//!
+//! Every key has a default but the map, the vehicles and the goals. A key that nobody knows, a value out of range or
+//! two values that cannot both hold are errors that name file, line and column. Lengths are metres in the mission's
+//! ENU frame. Keys for what is not built yet are read and then refused by name: see [`Scenario::check_supported`].
+
+mod error;
+mod sections;
+#[cfg(test)]
+mod tests;
+
+mod reader;
+
+use std::path::{Path, PathBuf};
+
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+
+use crate::map::Unknown;
+pub use error::{Place, ScenarioError};
+pub use planner_core::deconflict::Method;
+pub use planner_core::prm::Sampling;
+
+/// A scenario, checked.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// Its name: the path it was read from.
+    pub path: String,
+    /// Its text, as read.
+    pub text: String,
+    /// Of everything random.
+    pub seed: u64,
+    /// `[map]`
+    pub map: Map,
+    /// `[roadmap]`
+    pub roadmap: Roadmap,
+    /// `[mission]`
+    pub mission: Mission,
+    /// `[[vehicles]]`, as they stand in the file.
+    pub vehicles: Vec<Vehicle>,
+    /// `[deconfliction]`
+    pub deconfliction: Deconfliction,
+    /// `[simulation]`
+    pub simulation: Simulation,
+    /// `[[faults]]`
+    pub faults: Vec<Fault>,
+    /// `[area]`: coverage.
+    pub area: Option<Unbuilt>,
+    /// `[formation]`
+    pub formation: Option<Unbuilt>,
+    /// What is asked for and not built yet, in the file's order.
+    unsupported: Vec<ScenarioError>,
+}
+
+/// A table that is read by a part not built yet.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unbuilt {
+    /// The table as TOML values.
+    pub table: toml::Table,
+}
+
+/// `[map]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Map {
+    /// A builtin's name, or a path that is relative to the working directory (resolved against the scenario's folder).
+    pub file: String,
+    /// Edge of a planning cell.
+    pub resolution_m: f32,
+    /// Whether unknown space may be flown through.
+    pub unknown: Unknown,
+    /// Mission origin.
+    pub origin: Geodetic,
+}
+
+/// `[roadmap]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Roadmap {
+    /// Random nodes besides starts and goals.
+    pub nodes: u32,
+    /// Shortest edge.
+    pub edge_min_m: f32,
+    /// Longest edge.
+    pub edge_max_m: f32,
+    /// Margin beyond a vehicle's radius.
+    pub safety_margin_m: f32,
+    /// How nodes are drawn.
+    pub sampling: Sampling,
+}
+
+/// `[mission]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mission {
+    /// Who goes where.
+    pub mode: Mode,
+    /// What an assignment minimises.
+    pub objective: Objective,
+    /// Speed along a path, metres a second.
+    pub cruise_mps: f32,
+    /// Tasks, ENU metres.
+    pub goals: Vec<Point>,
+    /// Where vehicles may be.
+    pub geofence: Option<Geofence>,
+}
+
+/// Who goes where.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Goals are shared out.
+    Unlabelled,
+    /// Each vehicle names its goal.
+    Labelled,
+    /// All to the one goal.
+    SingleGoal,
+    /// An area is covered.
+    Coverage,
+    /// A formation is flown.
+    Formation,
+}
+
+/// What an assignment minimises.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Objective {
+    /// The sum of path lengths.
+    Total,
+    /// The longest path.
+    Makespan,
+}
+
+/// A box, ENU metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Geofence {
+    /// Lowest corner.
+    pub min: Point,
+    /// Highest corner.
+    pub max: Point,
+}
+
+/// One of `[[vehicles]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Vehicle {
+    /// MAVLink system id, 1 to 250.
+    pub id: u8,
+    /// Where it stands, ENU metres.
+    pub start: Point,
+    /// Index of its goal, in labelled missions.
+    pub goal: Option<usize>,
+    /// Radius of its hull.
+    pub radius_m: f32,
+    /// Its layer on 2D maps.
+    pub altitude_m: Option<f32>,
+    /// Highest speed, metres a second.
+    pub speed_max_mps: f32,
+    /// Flight time on one battery.
+    pub endurance_s: Option<f32>,
+    /// What it can carry.
+    pub payload_kg: Option<f32>,
+    /// What autopilot it has.
+    pub personality: Personality,
+    /// Its home, if not its start.
+    pub home: Option<Geodetic>,
+    /// Its EKF origin, if not its home.
+    pub ekf_origin: Option<Geodetic>,
+    /// Where its companion runs.
+    pub companion: Companion,
+}
+
+/// What a simulated autopilot is like.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Personality {
+    /// PX4.
+    Px4,
+    /// ArduCopter.
+    ArduPilot,
+}
+
+/// Where a companion runs.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Companion {
+    /// In this process.
+    InProcess,
+    /// Behind a link.
+    Url(String),
+}
+
+/// `[deconfliction]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Deconfliction {
+    /// How vehicles keep apart.
+    pub method: Method,
+    /// What they keep, centre to centre.
+    pub safety_distance_m: f32,
+}
+
+/// `[simulation]`
+#[derive(Clone, Debug, PartialEq)]
+pub struct Simulation {
+    /// Mean wind, metres a second.
+    pub wind_mps: f32,
+    /// Gusts on top.
+    pub gust_mps: f32,
+    /// Standard deviation of the reported position.
+    pub position_noise_m: f32,
+    /// Serial links, bits a second.
+    pub serial_baud: u32,
+    /// Share of bytes corrupted.
+    pub serial_corruption: f32,
+    /// Share of radio frames lost.
+    pub radio_loss: f32,
+    /// Delay of a radio frame.
+    pub radio_delay_s: f32,
+    /// Beyond it nobody hears.
+    pub radio_range_m: f32,
+    /// When a run is given up.
+    pub time_limit_s: f32,
+}
+
+/// One of `[[faults]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fault {
+    /// When it strikes.
+    pub at_s: f32,
+    /// How long it lasts; for good if absent.
+    pub duration_s: Option<f32>,
+    /// Whom it strikes, if one.
+    pub vehicle: Option<u8>,
+    /// What it is, one of [`FAULT_KINDS`].
+    pub kind: &'static str,
+    /// `radio-cut`: which way.
+    pub direction: Option<String>,
+    /// `position-jump`: by how much.
+    pub offset_m: Option<Point>,
+    /// `obstacle`: where.
+    pub position: Option<Point>,
+    /// `obstacle`: how large.
+    pub radius_m: Option<f32>,
+}
+
+/// Every kind of fault.
+pub const FAULT_KINDS: [&str; 14] = [
+    "kill",
+    "radio-cut",
+    "serial-stall",
+    "serial-corrupt",
+    "position-jump",
+    "origin-change",
+    "gps-loss",
+    "battery-low",
+    "pilot-takeover",
+    "pilot-return",
+    "autopilot-reboot",
+    "companion-reset",
+    "late-plan",
+    "bad-roadmap",
+];
+/// The fault that puts an obstacle into the world.
+pub const FAULT_OBSTACLE: &str = "obstacle";
+
+impl Scenario {
+    /// Refuses what the file asks for and is not built yet, so that nothing is silently ignored.
+    pub fn check_supported(&self) -> Result<(), ScenarioError> {
+        self.unsupported.first().map_or(Ok(()), |error| Err(error.clone()))
+    }
+
+    /// The largest clearance any vehicle needs: its radius and the safety margin.
+    pub fn required_clearance_m(&self) -> f32 {
+        self.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max) + self.roadmap.safety_margin_m
+    }
+}
+
+/// Reads a scenario file; paths in it are relative to its folder.
+pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
+    let name = path.display().to_string();
+    let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
+    let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot read it: {e}")))?;
+    let folder = path.parent().map(PathBuf::from).unwrap_or_default();
+    sections::parse(&text, &name, &folder)
+}
+
+/// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working directory.
+pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
+    sections::parse(text, name, Path::new(""))
+}

@@ -1,0 +1,225 @@
+//! A cursor over a TOML table that keeps where every value stands and which keys were asked for.
+//!
+//! Derived deserialising loses the place of a value once its range is checked, and cannot name the nearest key; here
+//! both are at hand where the value is read.
+
+use std::cell::RefCell;
+use std::ops::{Range, RangeInclusive};
+
+use toml::Spanned;
+use toml::de::{DeString, DeTable, DeValue};
+
+use super::error::{Place, ScenarioError};
+
+/// Bytes of the scenario.
+pub(super) type Span = Range<usize>;
+pub(super) type Result<T> = std::result::Result<T, ScenarioError>;
+
+/// The text and its name, for errors.
+#[derive(Clone, Copy)]
+pub(super) struct Text<'a> {
+    pub(super) file: &'a str,
+    pub(super) text: &'a str,
+}
+
+impl Text<'_> {
+    pub(super) fn error(&self, span: &Span, why: impl Into<String>) -> ScenarioError {
+        ScenarioError {
+            file: self.file.into(),
+            place: Some(Place::of(self.text, span)),
+            why: why.into(),
+            hint: None,
+        }
+    }
+
+    pub(super) fn with_hint(
+        &self,
+        span: &Span,
+        why: impl Into<String>,
+        hint: impl Into<String>,
+    ) -> ScenarioError {
+        ScenarioError { hint: Some(hint.into()), ..self.error(span, why) }
+    }
+}
+
+/// A value with its name in errors.
+#[derive(Clone)]
+pub(super) struct Value<'a> {
+    pub(super) text: Text<'a>,
+    pub(super) name: String,
+    pub(super) span: Span,
+    value: &'a DeValue<'a>,
+}
+
+impl<'a> Value<'a> {
+    fn new(text: Text<'a>, name: String, value: &'a Spanned<DeValue<'a>>) -> Self {
+        Self { text, name, span: value.span(), value: value.get_ref() }
+    }
+
+    pub(super) fn error(&self, why: &str) -> ScenarioError {
+        self.text.error(&self.span, format!("{} {why}", self.name))
+    }
+
+    fn expected(&self, what: &str) -> ScenarioError {
+        self.error(&format!("must be {what}, not a value of type {}", self.value.type_str()))
+    }
+
+    /// A finite number inside a range.
+    pub(super) fn f64(&self, range: &RangeInclusive<f64>) -> Result<f64> {
+        let number = match self.value {
+            DeValue::Float(float) => float.as_str().parse::<f64>().ok(),
+            DeValue::Integer(_) => self.integer().map(|i| i as f64),
+            _ => return Err(self.expected("a number")),
+        };
+        match number {
+            Some(number) if number.is_finite() && range.contains(&number) => Ok(number),
+            _ => Err(self.error(&format!("must be a number from {} to {}", range.start(), range.end()))),
+        }
+    }
+
+    fn integer(&self) -> Option<i64> {
+        let DeValue::Integer(integer) = self.value else { return None };
+        i64::from_str_radix(integer.as_str(), integer.radix()).ok()
+    }
+
+    /// A whole number inside a range.
+    pub(super) fn whole(&self, range: RangeInclusive<u64>) -> Result<u64> {
+        if !self.value.is_integer() {
+            return Err(self.expected("a whole number"));
+        }
+        match self.integer().and_then(|i| u64::try_from(i).ok()) {
+            Some(number) if range.contains(&number) => Ok(number),
+            _ => {
+                Err(self.error(&format!("must be a whole number from {} to {}", range.start(), range.end())))
+            }
+        }
+    }
+
+    pub(super) fn str(&self) -> Result<&'a str> {
+        self.value.as_str().ok_or_else(|| self.expected("a string"))
+    }
+
+    /// One of several words; each stands beside its meaning.
+    pub(super) fn word<T: Copy>(&self, words: &[(&str, T)]) -> Result<T> {
+        let given = self.str()?;
+        if let Some((_, meaning)) = words.iter().find(|(word, _)| *word == given) {
+            return Ok(*meaning);
+        }
+        let all: Vec<String> = words.iter().map(|(word, _)| format!("\"{word}\"")).collect();
+        let error = self.error(&format!("must be one of {}", all.join(", ")));
+        Err(ScenarioError { hint: nearest(given, words.iter().map(|(word, _)| *word)), ..error })
+    }
+
+    pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
+        let array = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
+        let item = |(i, value)| Value::new(self.text, format!("{}[{i}]", self.name), value);
+        Ok(array.iter().enumerate().map(item).collect())
+    }
+
+    /// Three finite numbers.
+    pub(super) fn triple(&self) -> Result<[f64; 3]> {
+        let items = self.items()?;
+        let [x, y, z] = items.as_slice() else {
+            return Err(
+                self.error(&format!("must be three numbers, east, north, up in metres, not {}", items.len()))
+            );
+        };
+        let range = -1e6..=1e6;
+        Ok([x.f64(&range)?, y.f64(&range)?, z.f64(&range)?])
+    }
+
+    pub(super) fn is_table(&self) -> bool {
+        self.value.is_table()
+    }
+
+    pub(super) fn table(&self) -> Result<Table<'a>> {
+        match self.value {
+            DeValue::Table(table) => Ok(Table::new(self.text, &self.name, self.span.clone(), table)),
+            _ => Err(self.expected("a table")),
+        }
+    }
+}
+
+/// A table whose keys are asked for one by one; [`Table::finish`] refuses those nobody asked for.
+pub(super) struct Table<'a> {
+    pub(super) text: Text<'a>,
+    pub(super) span: Span,
+    name: String,
+    table: &'a DeTable<'a>,
+    known: RefCell<Vec<&'static str>>,
+}
+
+impl<'a> Table<'a> {
+    pub(super) fn new(text: Text<'a>, name: &str, span: Span, table: &'a DeTable<'a>) -> Self {
+        Self { text, span, name: name.into(), table, known: RefCell::default() }
+    }
+
+    fn path(&self, key: &str) -> String {
+        if self.name.is_empty() { key.into() } else { format!("{}.{key}", self.name) }
+    }
+
+    pub(super) fn get(&self, key: &'static str) -> Option<Value<'a>> {
+        self.known.borrow_mut().push(key);
+        self.table.get(key).map(|value| Value::new(self.text, self.path(key), value))
+    }
+
+    /// The value, or an error at the table.
+    pub(super) fn need(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
+        self.get(key).ok_or_else(|| {
+            // A misspelt key is what the user sees in the file; that it is missing is only what follows from it.
+            let misspelt = |(given, _): &(&Spanned<_>, _)| {
+                strsim::jaro_winkler(AsRef::<str>::as_ref(given.get_ref()), key) > 0.85
+            };
+            match self.table.iter().find(misspelt) {
+                Some((given, _)) => self.unknown(given, Some(format!("did you mean `{key}`?"))),
+                None => self.text.with_hint(&self.span, format!("{} is missing", self.path(key)), hint),
+            }
+        })
+    }
+
+    fn unknown(&self, key: &Spanned<DeString<'_>>, hint: Option<String>) -> ScenarioError {
+        let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
+        let error = self.text.error(&key.span(), format!("unknown key `{}`{place}", key.get_ref()));
+        ScenarioError { hint, ..error }
+    }
+
+    /// Names keys that will be asked for later.
+    pub(super) fn expect(&self, keys: &[&'static str]) {
+        self.known.borrow_mut().extend(keys);
+    }
+
+    pub(super) fn f32(&self, key: &'static str, default: f32, range: RangeInclusive<f64>) -> Result<f32> {
+        self.get(key).map_or(Ok(default), |v| v.f64(&range).map(|n| n as f32))
+    }
+
+    pub(super) fn optional_f32(&self, key: &'static str, range: RangeInclusive<f64>) -> Result<Option<f32>> {
+        self.get(key).map(|v| v.f64(&range).map(|n| n as f32)).transpose()
+    }
+
+    pub(super) fn whole(&self, key: &'static str, default: u64, range: RangeInclusive<u64>) -> Result<u64> {
+        self.get(key).map_or(Ok(default), |v| v.whole(range))
+    }
+
+    pub(super) fn word<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
+        self.get(key).map_or(Ok(default), |v| v.word(words))
+    }
+
+    /// Refuses the first key in the file that was never asked for.
+    pub(super) fn finish(&self) -> Result<()> {
+        let known = self.known.borrow();
+        let unknown = self.table.iter().filter(|(key, _)| !known.contains(&key.get_ref().as_ref()));
+        let Some((key, _)) = unknown.min_by_key(|(key, _)| key.span().start) else { return Ok(()) };
+        Err(self.unknown(key, nearest(key.get_ref(), known.iter().copied())))
+    }
+}
+
+/// The nearest word, or all of them where none is near.
+fn nearest<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
+    let score = |word: &&str| strsim::jaro_winkler(given, word);
+    let best = words.clone().max_by(|a, b| score(a).total_cmp(&score(b)))?;
+    if score(&best) > 0.7 {
+        return Some(format!("did you mean `{best}`?"));
+    }
+    let all: Vec<String> = words.map(|word| format!("`{word}`")).collect();
+    Some(format!("known are {}", all.join(", ")))
+}

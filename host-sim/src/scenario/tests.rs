@@ -1,0 +1,303 @@
+use super::*;
+
+const GOOD: &str = r#"
+[map]
+file = "builtin:building"
+[mission]
+goals = [[38.5, 19.0, 7.3], [3.0, 4.0, 12.5]]
+[[vehicles]]
+id = 1
+start = [8.0, 12.0, 1.5]
+[[vehicles]]
+id = 2
+start = [8.0, 15.0, 1.5]
+"#;
+
+#[test]
+fn a_short_scenario_has_the_defaults() {
+    let scenario = parse(GOOD, "good.toml").unwrap();
+    scenario.check_supported().unwrap();
+    assert_eq!((scenario.seed, scenario.map.resolution_m, scenario.map.unknown), (1, 0.25, Unknown::Blocked));
+    let roadmap = &scenario.roadmap;
+    assert_eq!((roadmap.nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
+    assert_eq!((scenario.mission.mode, scenario.mission.cruise_mps), (Mode::Unlabelled, 2.0));
+    assert_eq!(scenario.mission.goals[1], Point::new(3.0, 4.0, 12.5));
+    assert_eq!(
+        (scenario.vehicles.len(), scenario.vehicles[1].id, scenario.vehicles[1].radius_m),
+        (2, 2, 0.3)
+    );
+    assert_eq!(scenario.deconfliction, Deconfliction { method: Method::Priority, safety_distance_m: 1.5 });
+    assert_eq!((scenario.simulation.serial_baud, scenario.simulation.time_limit_s), (921_600, 600.0));
+    assert!((scenario.required_clearance_m() - 0.8).abs() < 1e-6);
+}
+
+/// `GOOD` with one text replaced by another.
+fn changed(from: &str, to: &str) -> String {
+    assert!(GOOD.contains(from), "{from}");
+    GOOD.replacen(from, to, 1)
+}
+
+#[test]
+fn wrong_scenarios_are_told_where_and_why() {
+    let apart = "vehicles 1 and 2 start 1.00 m apart, below the safety distance of 1.5 m";
+    let words = "mission.mode must be one of \"unlabelled\", \"labelled\", \"single-goal\", \"coverage\", \
+                 \"formation\", \"unlabeled\", \"labeled\"";
+    let kinds = "is not a map that can be read: unknown kind of map: hall.obj: expected an OctoMap `.bt` file, or \
+                 `builtin:building`, `builtin:building?seed=N`";
+    let labelled = "[mission]\nmode = \"labeled\"";
+    let cases: &[(&str, &str, &str, &str, Option<&str>)] = &[
+        (
+            "[mission]",
+            "[mission]\ncruise_mp = 1",
+            "5:1",
+            "unknown key `cruise_mp` in mission",
+            Some("did you mean `cruise_mps`?"),
+        ),
+        ("[mission]", "[misson]", "4:2", "unknown key `misson`", Some("did you mean `mission`?")),
+        ("[map]", "sede = 1\n[map]", "2:1", "unknown key `sede`", Some("did you mean `seed`?")),
+        (
+            "start = [8.0, 15.0",
+            "strat = [8.0, 15.0",
+            "11:1",
+            "unknown key `strat` in vehicles[1]",
+            Some("did you mean `start`?"),
+        ),
+        ("id = 2", "id = 1", "10:6", "vehicles[1].id is 1, which another vehicle already has", None),
+        ("id = 2", "id = 251", "10:6", "vehicles[1].id must be a whole number from 1 to 250", None),
+        (
+            "id = 2",
+            "id = 2.0",
+            "10:6",
+            "vehicles[1].id must be a whole number, not a value of type float",
+            None,
+        ),
+        (
+            "id = 2",
+            "",
+            "9:1",
+            "vehicles[1].id is missing",
+            Some("each vehicle has its own MAVLink system id, 1 to 250"),
+        ),
+        ("15.0, 1.5]", "13.0, 1.5]", "11:9", apart, None),
+        (
+            "15.0, 1.5]",
+            "nan, 1.5]",
+            "11:15",
+            "vehicles[1].start[1] must be a number from -1000000 to 1000000",
+            None,
+        ),
+        (
+            "15.0, 1.5]",
+            "1.5]",
+            "11:9",
+            "vehicles[1].start must be three numbers, east, north, up in metres, not 2",
+            None,
+        ),
+        (
+            "id = 2",
+            "id = 2\nradius_m = 0",
+            "11:12",
+            "vehicles[1].radius_m must be a number from 0.001 to 100",
+            None,
+        ),
+        (
+            "id = 2",
+            "id = 2\npersonality = \"px\"",
+            "11:15",
+            "vehicles[1].personality must be one of \"px4\", \"ardupilot\"",
+            Some("did you mean `px4`?"),
+        ),
+        ("[mission]", "[mission]\nmode = \"labbeled\"", "5:8", words, Some("did you mean `labeled`?")),
+        (
+            "[mission]",
+            labelled,
+            "7:1",
+            "vehicle 1 has no goal in a labelled mission",
+            Some("add `goal = N`, an index into mission.goals from 0"),
+        ),
+        (
+            "[mission]",
+            "[mission]\nmode = \"single-goal\"",
+            "6:9",
+            "mission.mode \"single-goal\" takes one goal, not 2",
+            None,
+        ),
+        (
+            "[[38.5, 19.0, 7.3], [3.0, 4.0, 12.5]]",
+            "[]",
+            "5:9",
+            "mission.goals is missing or empty",
+            Some("add `goals = [[east, north, up], …]` in metres, or `goals_file = \"FILE\"`, to [mission]"),
+        ),
+        (
+            "[38.5, 19.0, 7.3]",
+            "{ lat_deg = 40, lon_deg = -3, alt_m = 7 }",
+            "5:10",
+            "mission.goals[0] is given by latitude and longitude, but map.origin is missing",
+            Some("add `origin = { lat_deg = …, lon_deg = …, alt_m = … }` to [map], or give metres"),
+        ),
+        (
+            "[38.5, 19.0, 7.3]",
+            "{ lat_deg = 91, lon_deg = -3, alt_m = 7 }",
+            "5:22",
+            "mission.goals[0].lat_deg must be a number from -90 to 90",
+            None,
+        ),
+        (
+            "[mission]",
+            "[mission]\ngoals_file = \"g.txt\"",
+            "5:14",
+            "mission.goals_file cannot stand beside mission.goals: give one of them",
+            None,
+        ),
+        ("builtin:building", "hall.obj", "3:8", &format!("map.file {kinds}"), None),
+        (
+            "[mission]",
+            "[roadmap]\nedge_min_m = 9\n[mission]",
+            "4:1",
+            "roadmap.edge_max_m (8 m) must be above roadmap.edge_min_m (9 m)",
+            None,
+        ),
+        (
+            "[mission]",
+            "[mission]\ngeofence = { min = [0, 0, 0], max = [1, 0, 1] }",
+            "5:12",
+            "mission.geofence must have every coordinate of min below that of max",
+            None,
+        ),
+        (
+            "[mission]",
+            "[[faults]]\nat_s = 2\nkind = \"kil\"\n[mission]",
+            "6:8",
+            "",
+            Some("did you mean `kill`?"),
+        ),
+        (
+            "[mission]",
+            "[[faults]]\nat_s = 2\nkind = \"kill\"\nvehicle = 9\n[mission]",
+            "7:11",
+            "faults[0].vehicle is no vehicle's id",
+            None,
+        ),
+    ];
+    for &(from, to, place, why, hint) in cases {
+        let error = parse(&changed(from, to), "bad.toml").unwrap_err();
+        let at = error.place.as_ref().map(|p| format!("{}:{}", p.line, p.column));
+        assert_eq!(at.as_deref(), Some(place), "{error}");
+        assert!(if why.is_empty() { true } else { error.why == why }, "{error}\nwant {why}");
+        assert_eq!(error.hint.as_deref(), hint, "{error}");
+    }
+}
+
+#[test]
+fn an_error_shows_its_line() {
+    let error = parse(&changed("[mission]", "[mission]\ncruise_mp = 1"), "bad.toml").unwrap_err();
+    let want = "bad scenario: bad.toml:5:1: unknown key `cruise_mp` in mission\n  |\n5 | cruise_mp = 1\n  | ^^^^^^^^^\n\
+                hint: did you mean `cruise_mps`?";
+    assert_eq!(error.to_string(), want);
+}
+
+#[test]
+fn what_is_missing_altogether_is_said() {
+    let error = parse("seed = 1\n", "empty.toml").unwrap_err();
+    assert_eq!((error.why.as_str(), error.place.unwrap().line), ("map is missing", 1));
+    let error = parse("[map\n", "broken.toml").unwrap_err();
+    assert!(error.why.starts_with("not TOML: "), "{error}");
+    let error = load(Path::new("no/such.toml")).unwrap_err();
+    assert!(error.to_string().starts_with("bad scenario: no/such.toml: cannot read it: "), "{error}");
+}
+
+#[test]
+fn what_is_not_built_yet_is_refused_by_name() {
+    let cases = [
+        ("[mission]", "[[faults]]\nat_s = 1\nkind = \"kill\"\n[mission]", "not available yet: faults"),
+        ("[mission]", "[area]\nheight_m = 20\n[mission]", "not available yet: [area]"),
+        ("[mission]", "[formation]\npure = true\n[mission]", "not available yet: [formation]"),
+        ("[mission]", "[mission]\nmode = \"coverage\"", "not available yet: this mission.mode"),
+        ("id = 2", "id = 2\npersonality = \"ardupilot\"", "not available yet: personality \"ardupilot\""),
+        (
+            "id = 2",
+            "id = 2\ncompanion = \"tcp:127.0.0.1:5000\"",
+            "not available yet: a companion behind a URL",
+        ),
+        ("id = 2", "id = 2\nendurance_s = 900", "not available yet: endurance_s"),
+    ];
+    for (from, to, why) in cases {
+        let scenario = parse(&changed(from, to), "later.toml").unwrap();
+        assert_eq!(scenario.check_supported().unwrap_err().why, why);
+    }
+}
+
+#[test]
+fn geodetic_goals_are_metres_about_the_origin() {
+    let origin = "origin = { lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 700.0 }\n[mission]";
+    let text = changed("[mission]", origin);
+    let text = text.replace("[38.5, 19.0, 7.3]", "{ lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 712.5 }");
+    let goal = parse(&text, "geo.toml").unwrap().mission.goals[0];
+    assert!((goal - Point::new(0.0, 0.0, 12.5)).norm() < 1e-4, "{goal}");
+}
+
+#[test]
+fn paths_are_relative_to_the_scenario() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = changed("builtin:building", "maps/hall.bt");
+    let text = text.replace("goals = [[38.5, 19.0, 7.3], [3.0, 4.0, 12.5]]", "goals_file = \"goals.txt\"");
+    std::fs::write(folder.path().join("s.toml"), text).unwrap();
+    std::fs::write(folder.path().join("goals.txt"), "# two\n1 2 3\n\n4.5 5 6\n").unwrap();
+    let scenario = load(&folder.path().join("s.toml")).unwrap();
+    assert_eq!(Path::new(&scenario.map.file), folder.path().join("maps/hall.bt"));
+    assert_eq!(scenario.mission.goals, [Point::new(1.0, 2.0, 3.0), Point::new(4.5, 5.0, 6.0)]);
+    std::fs::write(folder.path().join("goals.txt"), "1 2 3\n1 x 3\n").unwrap();
+    let error = load(&folder.path().join("s.toml")).unwrap_err();
+    assert!(error.why.ends_with("goals.txt:2: expected `x y z` in metres, found `1 x 3`"), "{error}");
+}
+
+/// Starts and goals clear of everything by more than the required clearance, on a map that can be loaded.
+fn check_places(scenario: &Scenario) {
+    let map = crate::map::load(&scenario.map.file, scenario.map.resolution_m).unwrap();
+    let voxels = map.voxel_map(scenario.map.unknown);
+    let grid = voxels.grid();
+    let shape = *grid.shape();
+    let clearance = scenario.required_clearance_m();
+    for point in scenario.vehicles.iter().map(|v| &v.start).chain(&scenario.mission.goals) {
+        let reach = (clearance / shape.resolution_m).ceil() as i64 + 1;
+        let center = shape.cell_of(point).unwrap_or_else(|| panic!("{point} is beyond the map"));
+        let range = |axis: usize| {
+            let c = i64::from(center[axis]);
+            (c - reach).max(0) as u32..(c + reach + 1).min(i64::from(shape.dims[axis])) as u32
+        };
+        for k in range(2) {
+            for j in range(1) {
+                for i in range(0).filter(|&i| grid.is_occupied([i, j, k])) {
+                    let half = Point::repeat(shape.resolution_m / 2.0);
+                    let away = ((shape.center([i, j, k]) - point).abs() - half).sup(&Point::zeros()).norm();
+                    assert!(away > clearance, "{point} is {away} m from an obstacle, {clearance} m required");
+                }
+            }
+        }
+        assert!(voxels.ground_below(point).is_some(), "{point} is over nothing");
+    }
+}
+
+#[test]
+fn the_demo_has_room() {
+    let scenario = parse(include_str!("../../scenarios/demo.toml"), "demo.toml").unwrap();
+    scenario.check_supported().unwrap();
+    assert_eq!((scenario.vehicles.len(), scenario.mission.goals.len()), (10, 10));
+    check_places(&scenario);
+}
+
+#[test]
+fn the_scanned_buildings_have_room() {
+    for name in ["geb079", "manufacturing"] {
+        let folder = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/../tests/scenarios"));
+        let scenario = load(&folder.join(format!("{name}.toml"))).unwrap();
+        scenario.check_supported().unwrap();
+        assert_eq!((scenario.vehicles.len(), scenario.mission.goals.len()), (4, 4));
+        if Path::new(&scenario.map.file).exists() {
+            check_places(&scenario);
+        } else {
+            println!("skipped: no {}", scenario.map.file);
+        }
+    }
+}

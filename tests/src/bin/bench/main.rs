@@ -1,0 +1,74 @@
+//! `cargo xtask bench`: our times beside those of the programs we are compared to, measured alternately in one run.
+//!
+//! Prints a table; `--out FILE` writes the rows as JSON, `[{ "name", "ours", "theirs", "ratio", "unit", "n" }]`.
+
+mod assignment;
+mod roadmap;
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use serde::Serialize;
+
+/// One line of the bench: `ratio` is theirs / ours, so more is better.
+#[derive(Clone, Debug, Serialize)]
+pub struct Row {
+    /// What was done.
+    pub name: String,
+    /// Our median.
+    pub ours: f64,
+    /// Their median.
+    pub theirs: f64,
+    /// theirs / ours.
+    pub ratio: f64,
+    /// Unit of both.
+    pub unit: &'static str,
+    /// Size of the problem.
+    pub n: usize,
+}
+
+#[derive(Parser)]
+#[command(about = "Our times beside those of other programs")]
+struct Args {
+    /// Write the rows to this file as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Run only the groups whose name contains this: roadmap, assignment.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    only: String,
+    /// The built C++ baseline for the roadmap rows; without it they are skipped.
+    #[arg(long, value_name = "PROGRAM")]
+    peer: Option<PathBuf>,
+}
+
+fn main() -> Result<()> {
+    let args = Args::parse();
+    let mut rows = Vec::new();
+    if "roadmap".contains(&args.only) {
+        match &args.peer {
+            Some(peer) => rows.extend(roadmap::rows(peer)?),
+            None => println!("roadmap: skipped, no --peer PROGRAM"),
+        }
+    }
+    if "assignment".contains(&args.only) {
+        rows.extend(assignment::rows());
+    }
+    println!("{:28} {:>7} {:>12} {:>12} {:>8}", "name", "n", "ours", "theirs", "ratio");
+    for row in &rows {
+        println!(
+            "{:28} {:>7} {:>9.3} {unit} {:>9.3} {unit} {:>7.2}x",
+            row.name,
+            row.n,
+            row.ours,
+            row.theirs,
+            row.ratio,
+            unit = row.unit
+        );
+    }
+    if let Some(out) = &args.out {
+        std::fs::write(out, serde_json::to_string_pretty(&rows)?)
+            .with_context(|| format!("cannot write {}", out.display()))?;
+    }
+    Ok(())
+}

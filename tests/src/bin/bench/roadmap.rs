@@ -1,0 +1,248 @@
+//! Roadmap and searches beside `algorithm1.cpp`: P3D Algorithm 1 as printed, all pairs, OctoMap's `castRay`.
+//!
+//! Both get the same map (the built-in building at 0.25 m, for theirs written as `.bt`), the same ten starts and goals,
+//! 2300 random nodes, Dmin 0.5 m, Dmax 8 m, margin 0, and are run alternately. Loading the map is in neither time:
+//! they hold an octree, we the voxel grid. All else is: random nodes, the index of nodes, neighbours, rays, and the
+//! graph both ways (theirs an adjacency list, ours the roadmap file with its CRC-32). Nothing is kept from one repeat to the next.
+
+use std::io::Write as _;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use host_sim::map::{Unknown, bt, building};
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use planner_core::prm::{self, Config, Edge, Sampling, Workspace, squared_length};
+use planner_core::roadmap::{self, RoadmapHeader, RoadmapView};
+use planner_core::search::{SearchWorkspace, astar, dijkstra_row};
+use planner_core::voxel::VoxelGrid;
+use serde::Deserialize;
+
+use crate::Row;
+
+const RESOLUTION_M: f32 = 0.25;
+const NODES: usize = 2300;
+const EDGE_MIN_M: f32 = 0.5;
+const EDGE_MAX_M: f32 = 8.0;
+const VEHICLES: usize = 10;
+/// Rounds of one run of theirs and [`REPEATS`] of ours on one core and on two.
+const ROUNDS: usize = 9;
+const REPEATS: usize = 3;
+/// Capacities of the default board.
+type BoardWorkspace = Workspace<4096, 4096>;
+
+/// What the baseline prints.
+#[derive(Deserialize)]
+struct Theirs {
+    nodes: usize,
+    rays: usize,
+    edges: usize,
+    solved: usize,
+    labelled_m: f64,
+    nodes_ms: f64,
+    edges_ms: f64,
+    labelled_search_ms: f64,
+    matrix_search_ms: f64,
+}
+
+/// A row for the roadmap on one core and on two, for ten A* and for the 10 × 10 cost matrix, milliseconds.
+pub fn rows(peer: &Path) -> Result<Vec<Row>> {
+    let map = building::building(building::DEFAULT_SEED, RESOLUTION_M)?;
+    let dir = tempfile::tempdir()?;
+    let files = ["building.bt", "starts.txt", "goals.txt"].map(|name| dir.path().join(name));
+    bt::write(&map.to_octree("builtin:building")?, &files[0])?;
+    let terminals = terminals();
+    for (file, points) in files[1..].iter().zip(terminals.chunks(VEHICLES)) {
+        let mut out = std::fs::File::create(file)?;
+        for p in points {
+            writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
+        }
+    }
+    let voxels = map.voxel_map(Unknown::Blocked);
+    let grid = voxels.grid();
+    let mut ours = Ours::new(&grid, &terminals);
+    let two = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
+    let mut theirs = Vec::new();
+    let mut times: [Vec<f64>; 4] = Default::default();
+    for round in 0..ROUNDS {
+        theirs.push(run(peer, &files)?);
+        for repeat in 0..REPEATS {
+            let seed = (1000 + round * REPEATS + repeat) as u64;
+            times[1].push(two.install(|| ours.build(seed, true))?);
+            let built_by_two = ours.bytes.clone();
+            times[0].push(ours.build(seed, false)?);
+            ensure!(ours.bytes == built_by_two, "seed {seed}: two cores built another roadmap than one");
+            let (labelled, matrix) = ours.search()?;
+            times[2].push(labelled);
+            times[3].push(matrix);
+        }
+    }
+    let last = &theirs[theirs.len() - 1];
+    println!(
+        "theirs: {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m",
+        last.nodes, last.rays, last.edges, last.solved, last.labelled_m
+    );
+    println!(
+        "ours:   {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m (other random nodes)",
+        ours.nodes.len(),
+        ours.rays(),
+        ours.edges.len(),
+        ours.solved,
+        ours.labelled_m
+    );
+    let column = |value: fn(&Theirs) -> f64| median(theirs.iter().map(value).collect());
+    let build = column(|t| t.nodes_ms + t.edges_ms);
+    let all = [
+        ("roadmap one core", build, NODES),
+        ("roadmap two cores", build, NODES),
+        ("ten A*", column(|t| t.labelled_search_ms), VEHICLES),
+        ("10x10 matrix", column(|t| t.matrix_search_ms), VEHICLES),
+    ];
+    Ok(all
+        .into_iter()
+        .zip(times)
+        .map(|((name, theirs, n), times)| {
+            let ours = median(times);
+            Row { name: name.into(), ours, theirs, ratio: theirs / ours, unit: "ms", n }
+        })
+        .collect())
+}
+
+/// Ten starts in the lobby, ten goals in the corridors above.
+fn terminals() -> Vec<Point> {
+    let along = |i: usize| 8.5 + 2.5 * i as f32;
+    let starts = (0..VEHICLES).map(|i| Point::new(along(i), 4.0, 1.5));
+    let goals = (0..VEHICLES).map(|i| {
+        let floor = 1 + i % (building::FLOORS as usize - 1);
+        Point::new(if i % 2 == 0 { 12.1 } else { 29.1 }, 12.1, floor as f32 * building::FLOOR_HEIGHT_M + 1.6)
+    });
+    starts.chain(goals).collect()
+}
+
+fn run(peer: &Path, files: &[std::path::PathBuf]) -> Result<Theirs> {
+    let out = Command::new(peer)
+        .args(files)
+        .args([EDGE_MIN_M.to_string(), EDGE_MAX_M.to_string(), NODES.to_string(), REPEATS.to_string()])
+        .output()
+        .with_context(|| format!("cannot run {}", peer.display()))?;
+    let text = String::from_utf8_lossy(&out.stdout);
+    let line = text.lines().find(|line| line.starts_with('{'));
+    let line = line.with_context(|| format!("{} printed no JSON line but: {text}", peer.display()))?;
+    Ok(serde_json::from_str(line)?)
+}
+
+struct Ours<'a> {
+    grid: &'a VoxelGrid<'a>,
+    terminals: &'a [Point],
+    workspace: Box<BoardWorkspace>,
+    search: Box<SearchWorkspace<4096>>,
+    nodes: Vec<Point>,
+    edges: Vec<roadmap::Edge>,
+    bytes: Vec<u8>,
+    solved: usize,
+    labelled_m: f64,
+}
+
+impl<'a> Ours<'a> {
+    fn new(grid: &'a VoxelGrid<'a>, terminals: &'a [Point]) -> Self {
+        Self {
+            grid,
+            terminals,
+            workspace: Box::new(Workspace::new()),
+            search: Box::new(SearchWorkspace::new()),
+            nodes: Vec::new(),
+            edges: Vec::new(),
+            bytes: Vec::new(),
+            solved: 0,
+            labelled_m: 0.0,
+        }
+    }
+
+    /// Builds the roadmap anew; milliseconds.
+    fn build(&mut self, seed: u64, threads: bool) -> Result<f64> {
+        let config = Config {
+            nodes: NODES,
+            edge_min_m: EDGE_MIN_M,
+            edge_max_m: EDGE_MAX_M,
+            clearance_m: 0.0,
+            seed,
+            sampling: Sampling::Uniform,
+        };
+        self.nodes = Vec::new();
+        self.edges = Vec::new();
+        self.bytes = Vec::new();
+        let start = Instant::now();
+        self.nodes = vec![Point::zeros(); self.terminals.len() + NODES];
+        prm::sample_nodes(self.grid, None, self.terminals, &config, &mut self.nodes).map_err(named)?;
+        let edge = |e: Edge| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
+        if threads {
+            let edges = host_sim::prm::connect(self.grid, &self.nodes, &config, &mut self.workspace)
+                .map_err(named)?;
+            self.edges = edges.into_iter().map(edge).collect();
+        } else {
+            self.workspace.index(&self.nodes, &config).map_err(named)?;
+            prm::connect_range(self.grid, &self.workspace, &config, 0..self.nodes.len(), |e| {
+                self.edges.push(edge(e));
+                Ok(())
+            })
+            .map_err(named)?;
+        }
+        let header = RoadmapHeader {
+            origin: Geodetic::default(),
+            edge_min_m: EDGE_MIN_M,
+            edge_max_m: EDGE_MAX_M,
+            tested_clearance_m: 0.0,
+            max_clearance_m: 4.0,
+            starts: VEHICLES as u16,
+            goals: VEHICLES as u16,
+        };
+        let len =
+            roadmap::encoded_len(self.nodes.len(), self.edges.len()).context("the roadmap fits 32 bits")?;
+        self.bytes = vec![0; len];
+        roadmap::write(&header, &self.nodes, &self.edges, &mut self.bytes).map_err(named)?;
+        Ok(start.elapsed().as_secs_f64() * 1e3)
+    }
+
+    /// Ten labelled A*, then ten Dijkstra rows; milliseconds of each.
+    fn search(&mut self) -> Result<(f64, f64)> {
+        let view = RoadmapView::parse(&self.bytes).map_err(named)?;
+        let mut path = heapless::Vec::<u16, 256>::new();
+        (self.solved, self.labelled_m) = (0, 0.0);
+        let start = Instant::now();
+        for i in 0..VEHICLES as u16 {
+            let goal = VEHICLES as u16 + i;
+            if let Ok(length) = astar(&view, i, goal, |_, _| true, &mut self.search, &mut path) {
+                self.solved += 1;
+                self.labelled_m += f64::from(length);
+            }
+        }
+        let labelled = start.elapsed().as_secs_f64() * 1e3;
+        let goals: Vec<u16> = (VEHICLES as u16..2 * VEHICLES as u16).collect();
+        let mut row = [0.0; VEHICLES];
+        let start = Instant::now();
+        for i in 0..VEHICLES as u16 {
+            dijkstra_row(&view, i, &goals, |_, _| true, &mut self.search, &mut row).map_err(named)?;
+            std::hint::black_box(&row);
+        }
+        Ok((labelled, start.elapsed().as_secs_f64() * 1e3))
+    }
+
+    /// Pairs in the range of lengths: what Algorithm 1 casts a ray for.
+    fn rays(&self) -> usize {
+        let range = EDGE_MIN_M * EDGE_MIN_M..=EDGE_MAX_M * EDGE_MAX_M;
+        let near =
+            |k: usize, l: usize| range.contains(&squared_length(self.nodes[k].into(), self.nodes[l].into()));
+        (0..self.nodes.len()).map(|k| (k + 1..self.nodes.len()).filter(|&l| near(k, l)).count()).sum()
+    }
+}
+
+fn named(error: impl std::fmt::Debug) -> anyhow::Error {
+    anyhow::anyhow!("{error:?}")
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}

@@ -1,0 +1,278 @@
+//! The report page in headless Chromium: it opens clean, and map, paths and moving vehicles are on the picture.
+//!
+//! Chromium is the one named by `FLOCKMATE_CHROMIUM`, else `chromium` or `google-chrome` of the path; without one the
+//! tests say so and pass.
+
+use std::env;
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
+
+use host_sim::report::{
+    Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
+    vehicle_color, write,
+};
+use planner_core::Point;
+use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use serde_json::json;
+
+const WINDOW: (u32, u32) = (1280, 800);
+/// Software rendering on a busy machine takes seconds; a page that hangs would take for ever.
+const BROWSER_LIMIT: Duration = Duration::from_secs(120);
+
+fn chromium() -> Option<PathBuf> {
+    if let Some(named) = env::var_os("FLOCKMATE_CHROMIUM") {
+        return Some(named.into());
+    }
+    let path = env::var_os("PATH")?;
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file())
+}
+
+/// Two floors of two rooms, 12 × 8 × 6 m at 0.25 m, joined by doors and a shaft.
+fn building() -> MapSurface {
+    let shape = GridShape { dims: [48, 32, 24], min: Point::zeros(), resolution_m: 0.25 };
+    let filled = |i: u32, j: u32, k: u32| {
+        let slab = k.is_multiple_of(12) || k == 23;
+        let shaft = (36..42).contains(&i) && (4..10).contains(&j) && k == 12;
+        let hull = i == 0 || j == 0 || i == 47 || j == 31;
+        let window = (14..20).contains(&i) && (4..9).contains(&(k % 12));
+        let door = (12..18).contains(&j) && (1..9).contains(&(k % 12));
+        (slab && !shaft) || (hull && !window) || (i == 24 && !door)
+    };
+    let mut words = vec![0; shape.brick_count()];
+    for (i, j, k) in (0..48).flat_map(|i| (0..32).flat_map(move |j| (0..24).map(move |k| (i, j, k)))) {
+        if filled(i, j, k) {
+            let (word, mask) = shape.address([i, j, k]);
+            words[word] |= mask;
+        }
+    }
+    MapSurface::of(&VoxelGrid::new(shape, Outside::Blocked, &words).expect("a valid grid"))
+}
+
+/// A vehicle that follows `path` at 1 m/s.
+fn vehicle(id: u8, path: Vec<Point>) -> VehicleTrack {
+    let mut track = vec![TrackPoint { t_s: 0.0, position: path[0] }];
+    for leg in path.windows(2) {
+        let from = track.last().expect("at least the start").t_s;
+        let length = (leg[1] - leg[0]).norm();
+        let steps = (length * 5.0).ceil();
+        track.extend((1..=steps as u32).map(|s| {
+            let share = s as f32 / steps;
+            TrackPoint { t_s: from + length * share, position: leg[0] + (leg[1] - leg[0]) * share }
+        }));
+    }
+    let (start, goal) = (path[0], path.last().copied());
+    VehicleTrack { id, radius_m: 0.3, color: None, goal_index: Some(0), start, goal, planned: path, track }
+}
+
+fn report() -> ReportData {
+    let p = Point::new;
+    let vehicles = vec![
+        vehicle(
+            1,
+            vec![p(2.0, 2.0, 0.5), p(2.0, 3.7, 1.5), p(9.7, 3.7, 1.5), p(9.7, 1.7, 1.5), p(9.7, 1.7, 4.5)],
+        ),
+        vehicle(
+            7,
+            vec![p(2.0, 6.5, 0.5), p(3.0, 6.5, 1.5), p(3.0, 3.7, 1.5), p(8.5, 3.7, 1.5), p(8.5, 6.5, 0.5)],
+        ),
+    ];
+    let curve = |name: &str, vehicle| Curve {
+        name: name.to_owned(),
+        vehicle,
+        t_s: vec![0.0, 4.0, 8.0, 12.0],
+        values: vec![4.5, 1.9, f32::NAN, 3.0],
+    };
+    let limit = Some(Limit { value: 1.5, label: "safety distance".to_owned() });
+    let plot =
+        |title: &str, limit, curves| Plot { title: title.to_owned(), unit: "m".to_owned(), limit, curves };
+    let event = |t_s, vehicle, level, text: &str| Event { t_s, vehicle, level, text: text.to_owned() };
+    ReportData {
+        title: "Two rooms </script><b>&".to_owned(),
+        command: "fly".to_owned(),
+        generated_by: "host-sim 0.1.0".to_owned(),
+        scenario_toml: "seed = 1 # <!-- -->".to_owned(),
+        map: Some(building()),
+        roadmap: Some(RoadmapLines {
+            nodes: vec![p(2.0, 2.0, 1.5), p(5.0, 3.7, 1.5), p(9.0, 3.7, 1.5), p(9.7, 1.7, 4.5)],
+            edges: vec![[0, 1], [1, 2], [2, 3]],
+        }),
+        events: vec![
+            event(0.0, Some(1), Level::Info, "armed"),
+            event(3.0, Some(7), Level::Warning, "holds for UAV 1"),
+            event(12.0, None, Level::Error, "<img src=x onerror=alert(1)>"),
+        ],
+        plots: vec![
+            plot("Smallest separation", limit, vec![curve("separation", None)]),
+            plot("Speed", None, vec![curve("UAV 1", Some(1)), curve("UAV 7", Some(7))]),
+        ],
+        vehicles,
+        obstacles: vec![],
+        result: json!({
+            "complete": true,
+            "vehicles": [{ "id": 1, "goal": 0, "reached": true, "landed": true, "path_m": 14.1, "end": "landed" }],
+            "safety": { "wall_contacts": 0, "min_separation_m": 1.9, "safety_distance_m": 1.5, "min_clearance_m": null },
+            "totals": { "path_m": 25.0, "makespan_s": 13.0 },
+        }),
+        timing: None,
+    }
+}
+
+/// What Chromium made of one opening of the page.
+struct Opened {
+    dom: String,
+    pixels: Vec<[u8; 3]>,
+}
+
+/// Opens `page` once for its document and once for its picture, with `hash` after the address.
+fn open(chromium: &Path, page: &Path, hash: &str) -> Opened {
+    let dom = browse(chromium, page, hash, "--dump-dom");
+    Opened { dom, pixels: picture(chromium, page, hash) }
+}
+
+/// The window's pixels, row by row from the top.
+fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
+    let file = page.with_extension("png");
+    browse(chromium, page, hash, &format!("--screenshot={}", file.display()));
+    let decoder = png::Decoder::new(BufReader::new(File::open(&file).expect("a screenshot")));
+    let mut reader = decoder.read_info().expect("a PNG header");
+    let mut bytes = vec![0; reader.output_buffer_size().expect("a size that fits memory")];
+    let info = reader.next_frame(&mut bytes).expect("a PNG frame");
+    assert_eq!((info.width, info.height), WINDOW);
+    bytes.chunks_exact(info.color_type.samples()).map(|p| [p[0], p[1], p[2]]).collect()
+}
+
+/// Runs Chromium to its end, fails on anything the page wrote to the console, and returns its standard output.
+fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
+    let profile = tempfile::tempdir().expect("a profile directory");
+    let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
+    let mut child = Command::new(chromium)
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--no-first-run",
+            "--disable-background-networking",
+        ])
+        .args(["--disable-sync", "--enable-unsafe-swiftshader", "--enable-logging=stderr", "--v=0"])
+        .args(["--virtual-time-budget=4000", "--force-device-scale-factor=1", "--hide-scrollbars"])
+        .arg(format!("--user-data-dir={}", profile.path().join("profile").display()))
+        .arg(format!("--window-size={},{}", WINDOW.0, WINDOW.1))
+        .arg(action)
+        .arg(format!("file://{}{hash}", page.display()))
+        .stdin(Stdio::null())
+        .stdout(File::create(&out).expect("a file for stdout"))
+        .stderr(File::create(&err).expect("a file for stderr"))
+        .spawn()
+        .expect("Chromium starts");
+    let begun = Instant::now();
+    let status = loop {
+        if let Some(status) = child.try_wait().expect("the child can be waited for") {
+            break status;
+        }
+        if begun.elapsed() > BROWSER_LIMIT {
+            child.kill().expect("our own child can be killed");
+            child.wait().expect("a killed child ends");
+            panic!("Chromium did not end within {BROWSER_LIMIT:?}");
+        }
+        sleep(Duration::from_millis(50));
+    };
+    let log = String::from_utf8_lossy(&fs::read(&err).expect("stderr")).into_owned();
+    assert!(status.success(), "Chromium failed: {log}");
+    // Reading pixels back for the screenshot makes the driver itself complain.
+    let said: Vec<_> =
+        log.lines().filter(|l| l.contains("CONSOLE") && !l.contains("GL Driver Message")).collect();
+    assert!(said.is_empty(), "the page wrote to the console: {said:#?}");
+    fs::read_to_string(&out).expect("stdout is text")
+}
+
+impl Opened {
+    /// A number the page left on its body.
+    fn count(&self, name: &str) -> f64 {
+        let (_, rest) =
+            self.dom.split_once(&format!("data-{name}=\"")).unwrap_or_else(|| panic!("no data-{name}"));
+        rest.split('"')
+            .next()
+            .and_then(|n| n.parse().ok())
+            .unwrap_or_else(|| panic!("data-{name} is no number"))
+    }
+
+    /// Places in the scene (left of the side panel, above the plots) of this colour, `tolerance` steps a channel.
+    fn places(&self, color: [u8; 3], tolerance: u8) -> Vec<(u32, u32)> {
+        let at = |i: usize| (i as u32 % WINDOW.0, i as u32 / WINDOW.0);
+        let matches = self
+            .pixels
+            .iter()
+            .enumerate()
+            .filter(|&(_, &p)| p.iter().zip(color).all(|(&a, b)| a.abs_diff(b) <= tolerance));
+        matches
+            .map(|(i, _)| at(i))
+            .filter(|&(x, y)| x < WINDOW.0 - 400 && y > 50 && y < WINDOW.1 - 230)
+            .collect()
+    }
+}
+
+#[test]
+fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
+    let Some(chromium) = chromium() else {
+        println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a directory");
+    let page = dir.path().join("report.html");
+    write(&page, &report()).expect("the page is written");
+    let size = fs::metadata(&page).expect("the page is there").len();
+    assert!(size < 1_500_000, "{size} bytes");
+
+    let start = open(&chromium, &page, "#t=0&view=iso");
+    assert_eq!(start.count("ready"), 1.0);
+    assert!(start.count("faces") > 20.0 && start.count("triangles") > 2.0 * start.count("faces"));
+    assert!(start.count("lines") > 100.0);
+    assert_eq!((start.count("roadmap-edges"), start.count("paths"), start.count("tracks")), (3.0, 2.0, 2.0));
+    assert_eq!((start.count("vehicles"), start.count("t")), (2.0, 0.0));
+    assert!(start.dom.contains("<h1 id=\"title\">Two rooms &lt;/script&gt;&lt;b&gt;&amp;</h1>"));
+    assert!(!start.dom.contains("<img"));
+
+    let later = open(&chromium, &page, "#t=8&view=iso");
+    assert_eq!(later.count("t"), 8.0);
+    for index in 0..2 {
+        let color = vehicle_color(index);
+        let (before, after) = (start.places(color, 3), later.places(color, 3));
+        // Before the start only the disc and the markers are full colour; later the flown track is.
+        assert!(before.len() > 60, "{color:?}: {} pixels at the start", before.len());
+        assert!(after.len() > before.len() + 100, "{color:?}: {} then {}", before.len(), after.len());
+        let appeared = after.iter().filter(|place| !before.contains(place)).count();
+        let left = before.iter().filter(|place| !after.contains(place)).count();
+        // Planned paths cover 85 % of the ground behind them.
+        let planned = color.map(|c| ((u16::from(c) * 85 + 24 * 15) / 100) as u8);
+        let planned = start.places(planned, 10).len();
+        assert!(planned > 100, "{color:?}: {planned} pixels of planned path");
+        assert!(appeared > 100 && left > 20, "{color:?}: {appeared} appeared, {left} left");
+    }
+}
+
+#[test]
+fn map_style_and_roadmap_change_the_picture() {
+    let Some(chromium) = chromium() else {
+        println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
+        return;
+    };
+    let dir = tempfile::tempdir().expect("a directory");
+    let whole = dir.path().join("whole.html");
+    let bare = dir.path().join("bare.html");
+    write(&whole, &report()).expect("the page is written");
+    write(&bare, &ReportData { roadmap: None, ..report() }).expect("the page is written");
+    let pictures =
+        [(&whole, "#map=x-ray"), (&whole, "#map=off"), (&whole, "#map=solid&cut=2.5"), (&bare, "#map=off")];
+    let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
+    let changed = |a: &[[u8; 3]], b: &[[u8; 3]]| a.iter().zip(b).filter(|(p, q)| p != q).count();
+    assert!(changed(&glass, &none) > 20_000, "x-ray: {}", changed(&glass, &none));
+    assert!(changed(&solid, &none) > 20_000, "solid: {}", changed(&solid, &none));
+    assert!(changed(&solid, &glass) > 20_000, "solid against x-ray: {}", changed(&solid, &glass));
+    // Beside the lines themselves one row of the layer panel goes with the roadmap.
+    assert!(changed(&none, &bare) > 300, "roadmap: {}", changed(&none, &bare));
+}

@@ -1,0 +1,60 @@
+//! `cargo xtask bench`: builds the C++ baseline, then runs the bench beside it.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+
+use crate::install;
+use crate::shell::{cargo, command, root, run, target_dir};
+
+/// Where the baseline lies, seen from the checkout.
+const PEER: &str = "../shared/peers/algorithm1.cpp";
+
+/// What may be chosen.
+#[derive(clap::Args)]
+pub struct Args {
+    /// Write the rows to this file as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Run only the groups whose name contains this: roadmap, assignment.
+    #[arg(long, value_name = "NAME")]
+    only: Option<String>,
+}
+
+/// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be built.
+pub fn run_bench(args: &Args) -> Result<()> {
+    let mut bench = cargo();
+    bench.args(["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin", "bench", "--"]);
+    match peer() {
+        Ok(peer) => {
+            bench.arg("--peer").arg(peer);
+        }
+        Err(why) => println!("roadmap rows: skipped, {why:#}"),
+    }
+    if let Some(out) = &args.out {
+        bench.arg("--out").arg(std::path::absolute(out)?);
+    }
+    if let Some(only) = &args.only {
+        bench.arg("--only").arg(only);
+    }
+    run(&mut bench)
+}
+
+/// The baseline built as its own header says, if its source is newer than the program.
+fn peer() -> Result<PathBuf> {
+    let source = root().join(PEER);
+    let modified = |file: &Path| file.metadata().and_then(|m| m.modified());
+    let source_time = modified(&source).with_context(|| format!("{PEER} is not there"))?;
+    let program = target_dir().join("algorithm1");
+    if modified(&program).is_ok_and(|built| built >= source_time) {
+        return Ok(program);
+    }
+    install::debian(install::PEER)?;
+    std::fs::create_dir_all(target_dir())?;
+    run(command("g++")
+        .args(["-O3", "-march=native", "-o"])
+        .arg(&program)
+        .arg(&source)
+        .args(["-loctomap", "-loctomath"]))?;
+    Ok(program)
+}
