@@ -26,8 +26,10 @@
 //! assert!(bytes > 10_000, "a second of PX4's flood");
 //! ```
 
+mod config;
 pub mod geodesy;
 mod inbox;
+mod messages;
 pub mod noise;
 pub mod port;
 pub mod px4;
@@ -42,6 +44,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic, Projection};
 
+pub use self::config::{Config, ConfigError, Personality};
 use self::geodesy::LocalFrame;
 use self::noise::Disturbance;
 use self::port::Port;
@@ -51,90 +54,6 @@ use self::px4::{Commander, Sense};
 use self::telemetry::Snapshot;
 use self::vehicle::{Demand, Vehicle};
 pub use self::vehicle::{State, VehicleLimits};
-
-/// Which autopilot is simulated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Personality {
-    /// PX4 1.17, Offboard.
-    #[default]
-    Px4,
-    /// ArduCopter 4.6, Guided.
-    Ardupilot,
-}
-
-/// What a simulated autopilot is made from.
-#[derive(Clone, Debug)]
-pub struct Config {
-    /// MAVLink system id, 1 to 255.
-    pub system_id: u8,
-    /// Which autopilot it is.
-    pub personality: Personality,
-    /// Origin of the mission frame.
-    pub world_origin: Geodetic,
-    /// Origin of the autopilot's own local frame.
-    pub ekf_origin: Geodetic,
-    /// Home; `None` is where it stands when it arms.
-    pub home: Option<Geodetic>,
-    /// Where the centre of its body starts, ENU metres.
-    pub start: Point,
-    /// Heading at the start, radians clockwise from north.
-    pub heading_rad: f32,
-    /// What the airframe can do.
-    pub vehicle: VehicleLimits,
-    /// Mean wind, ENU m/s.
-    pub wind: Point,
-    /// Standard deviation of gusts, m/s.
-    pub gust_mps: f32,
-    /// Standard deviation of the position estimate, metres.
-    pub position_noise_m: f32,
-    /// Seed of gusts and noise.
-    pub seed: u64,
-    /// UTC at boot, microseconds since 1970.
-    pub boot_unix_us: u64,
-    /// MAVLink ports, at least one, each with its own stream settings.
-    pub ports: usize,
-}
-
-impl Default for Config {
-    /// PX4 as system 1 at rest on flat ground at the mission origin, in still air.
-    fn default() -> Self {
-        let origin = Geodetic { lat_deg: 47.397_742, lon_deg: 8.545_594, alt_m: 488.0 };
-        let vehicle = VehicleLimits::default();
-        Self {
-            system_id: 1,
-            personality: Personality::Px4,
-            world_origin: origin,
-            ekf_origin: origin,
-            home: None,
-            start: Point::new(0.0, 0.0, vehicle.radius_m),
-            heading_rad: 0.0,
-            vehicle,
-            wind: Point::zeros(),
-            gust_mps: 0.0,
-            position_noise_m: 0.0,
-            seed: 1,
-            boot_unix_us: 1_767_225_600_000_000,
-            ports: 1,
-        }
-    }
-}
-
-/// Why no autopilot can be made from a [`Config`].
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum ConfigError {
-    /// Only PX4 is simulated so far.
-    #[error("personality `ardupilot` is not simulated yet: only `px4` is")]
-    Personality,
-    /// A latitude, longitude or altitude out of range.
-    #[error("{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude")]
-    Place(&'static str),
-    /// A number that is not finite, or not positive where it must be.
-    #[error("{0} must be finite and not negative")]
-    Number(&'static str),
-    /// System id 0 is broadcast.
-    #[error("system id 0 means everybody: choose 1 to 255")]
-    SystemId,
-}
 
 /// One simulated vehicle with its autopilot.
 #[derive(Clone, Debug)]
@@ -165,7 +84,7 @@ impl Autopilot {
     /// # Errors
     /// Refuses what [`ConfigError`] names.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
-        check(config)?;
+        config::check(config)?;
         let mut vehicle = Vehicle::new(config.vehicle, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
@@ -455,47 +374,6 @@ impl Autopilot {
         self.gps_ok = ok;
         self.commander.set_position_ok(ok);
     }
-}
-
-fn check(config: &Config) -> Result<(), ConfigError> {
-    if config.personality != Personality::Px4 {
-        return Err(ConfigError::Personality);
-    }
-    if config.system_id == 0 {
-        return Err(ConfigError::SystemId);
-    }
-    let home = config.home.unwrap_or(config.world_origin);
-    for (name, place) in
-        [("world origin", config.world_origin), ("EKF origin", config.ekf_origin), ("home", home)]
-    {
-        if !place.is_valid() {
-            return Err(ConfigError::Place(name));
-        }
-    }
-    if !config.start.iter().chain(config.wind.iter()).all(|x| x.is_finite())
-        || !config.heading_rad.is_finite()
-    {
-        return Err(ConfigError::Number("start position, heading and wind"));
-    }
-    let v = &config.vehicle;
-    let positive = [
-        v.radius_m,
-        v.speed_max_mps,
-        v.climb_max_mps,
-        v.descend_max_mps,
-        v.acceleration_max_mps2,
-        v.jerk_max_mps3,
-        v.tilt_max_deg,
-        v.lag_s,
-        v.drag_per_s,
-        v.endurance_s,
-        config.gust_mps,
-        config.position_noise_m,
-    ];
-    if positive.iter().any(|x| !x.is_finite() || *x < 0.0) {
-        return Err(ConfigError::Number("every vehicle limit, gust and noise"));
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -8,8 +8,8 @@ use mavlink::dialects::ardupilotmega as dialect;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
-use crate::autopilot::port::Port;
-use crate::autopilot::vehicle::GRAVITY;
+use super::messages::scaled;
+use super::port::Port;
 
 /// Message id and interval in microseconds of each stream; 0 is off until asked for.
 pub const STREAMS: [(u32, u32); 27] = [
@@ -44,15 +44,6 @@ pub const STREAMS: [(u32, u32); 27] = [
 
 const AUTOPILOT_VERSION: u32 = 148;
 const PROTOCOL_VERSION: u32 = 300;
-/// What PX4 1.17 announced, without FTP (32), geofence (0x4000) and rally points (0x8000), which are not simulated.
-const CAPABILITIES: u64 = 0x28DF;
-/// 1.17.0, release.
-const VERSION: u32 = 17_891_583;
-/// Sensors present, enabled and healthy of SYS_STATUS.
-const SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
-/// MAV_SYS_STATUS_PREARM_CHECK.
-const PREARM: u32 = 0x1000_0000;
-const POSITION_SENSORS: u32 = 0x4000;
 
 /// PX4's own interval of a stream, microseconds; 0 where it is off or unknown.
 pub fn default_interval(id: u32) -> u32 {
@@ -135,20 +126,20 @@ pub fn attitude(force: &Vector3<f32>, heading: f32) -> Attitude {
 }
 
 impl Snapshot {
-    fn attitude(&self) -> &Attitude {
+    pub(super) fn attitude(&self) -> &Attitude {
         self.attitude.get_or_init(|| attitude(&self.specific_force, self.heading.0))
     }
 
-    fn boot_ms(&self) -> u32 {
+    pub(super) fn boot_ms(&self) -> u32 {
         (self.time_us / 1000) as u32
     }
 
-    fn volts(&self) -> f32 {
+    pub(super) fn volts(&self) -> f32 {
         // Four cells between BAT1_V_EMPTY and BAT1_V_CHARGED.
         4.0 * (3.6 + 0.45 * self.battery)
     }
 
-    fn heading_deg(&self) -> f32 {
+    pub(super) fn heading_deg(&self) -> f32 {
         let degrees = self.heading.0.to_degrees();
         if degrees < 0.0 { degrees + 360.0 } else { degrees }
     }
@@ -298,245 +289,6 @@ impl Snapshot {
         }
         true
     }
-
-    fn throttle(&self) -> f32 {
-        if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }
-    }
-
-    /// Pressure of the standard atmosphere, hPa, to first order about sea level and exact enough below 2 km.
-    fn pressure(&self) -> f32 {
-        let ratio = 1.0 - 2.255_77e-5 * self.geodetic.alt_m as f32;
-        1013.25 * libm::powf(ratio.max(0.1), 5.255_88)
-    }
-
-    fn send_heartbeat(&self, port: &mut Port) {
-        let (custom, base, status) = self.mode;
-        let [a, b, c, d] = custom.to_le_bytes();
-        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 12, protocol version 3.
-        port.send_raw(0, &[a, b, c, d, 2, 12, base, status, 3]);
-    }
-
-    fn send_sys_status(&self, port: &mut Port) {
-        let [present, enabled, mut health] = SENSORS;
-        if self.armable {
-            health |= PREARM;
-        }
-        if !self.gps.2 {
-            health &= !(POSITION_SENSORS | 0x20);
-        }
-        let bits = dialect::MavSysStatusSensor::from_bits_retain;
-        port.send(&dialect::SYS_STATUS_DATA {
-            onboard_control_sensors_present: bits(present),
-            onboard_control_sensors_enabled: bits(enabled),
-            onboard_control_sensors_health: bits(health),
-            load: 300,
-            voltage_battery: (1000.0 * self.volts()) as u16,
-            current_battery: -100,
-            drop_rate_comm: 0,
-            errors_comm: 0,
-            errors_count1: 0,
-            errors_count2: 0,
-            errors_count3: 0,
-            errors_count4: 0,
-            battery_remaining: (100.0 * self.battery) as i8,
-        });
-    }
-
-    fn send_gps(&self, port: &mut Port) {
-        let (north, east, fix) = self.gps;
-        let cos = libm::cos(self.geodetic.lat_deg.to_radians()).max(0.01);
-        let at = Geodetic {
-            lat_deg: self.geodetic.lat_deg + f64::from(north) / 111_195.0,
-            lon_deg: self.geodetic.lon_deg + f64::from(east) / (111_195.0 * cos),
-            ..self.geodetic
-        };
-        let (lat, lon, alt) = scaled(&at);
-        let v = self.velocity.cast::<f32>();
-        let course = libm::atan2f(v.y, v.x).to_degrees();
-        port.send(&dialect::GPS_RAW_INT_DATA {
-            time_usec: self.time_us,
-            lat,
-            lon,
-            alt,
-            eph: 70,
-            epv: 110,
-            vel: (100.0 * libm::sqrtf(v.x * v.x + v.y * v.y)) as u16,
-            cog: (100.0 * if course < 0.0 { course + 360.0 } else { course }) as u16,
-            fix_type: if fix {
-                dialect::GpsFixType::GPS_FIX_TYPE_3D_FIX
-            } else {
-                dialect::GpsFixType::GPS_FIX_TYPE_NO_FIX
-            },
-            satellites_visible: if fix { 10 } else { 0 },
-        });
-    }
-
-    fn send_global_position(&self, port: &mut Port) {
-        let (lat, lon, alt) = scaled(&self.geodetic);
-        let centimetres = |v: f64| (100.0 * v) as i16;
-        port.send(&dialect::GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: self.boot_ms(),
-            lat,
-            lon,
-            alt,
-            relative_alt: libm::round(1000.0 * (self.geodetic.alt_m - self.home.0.alt_m)) as i32,
-            vx: centimetres(self.velocity.x),
-            vy: centimetres(self.velocity.y),
-            vz: centimetres(self.velocity.z),
-            hdg: ((100.0 * self.heading_deg()) as u16).min(35_999),
-        });
-    }
-
-    fn send_servos(&self, port: &mut Port) {
-        let motor = if self.armed { 1000 + (1000.0 * self.throttle()) as u16 } else { 900 };
-        port.send(&dialect::SERVO_OUTPUT_RAW_DATA {
-            time_usec: self.time_us as u32,
-            servo1_raw: motor,
-            servo2_raw: motor,
-            servo3_raw: motor,
-            servo4_raw: motor,
-            servo5_raw: 900,
-            servo6_raw: 900,
-            servo7_raw: 900,
-            servo8_raw: 900,
-            port: 0,
-        });
-    }
-
-    fn send_target(&self, port: &mut Port) {
-        let [p, v, a] = self.target.map(|x| x.cast::<f32>());
-        port.send(&dialect::POSITION_TARGET_LOCAL_NED_DATA {
-            time_boot_ms: self.boot_ms(),
-            x: p.x,
-            y: p.y,
-            z: p.z,
-            vx: v.x,
-            vy: v.y,
-            vz: v.z,
-            afx: a.x,
-            afy: a.y,
-            afz: a.z,
-            yaw: self.heading.0,
-            yaw_rate: 0.0,
-            type_mask: dialect::PositionTargetTypemask::empty(),
-            coordinate_frame: dialect::MavFrame::MAV_FRAME_LOCAL_NED,
-        });
-    }
-
-    fn send_imu(&self, port: &mut Port) {
-        // Thrust lies along the body's own axis, so the accelerometer sees it whole on z.
-        port.send(&dialect::HIGHRES_IMU_DATA {
-            time_usec: self.time_us,
-            xacc: 0.0,
-            yacc: 0.0,
-            zacc: -self.specific_force.norm(),
-            xgyro: 0.0,
-            ygyro: 0.0,
-            zgyro: self.heading.1,
-            xmag: 0.21,
-            ymag: 0.0,
-            zmag: 0.39,
-            abs_pressure: self.pressure(),
-            diff_pressure: 0.0,
-            pressure_alt: self.geodetic.alt_m as f32,
-            temperature: 15.0,
-            fields_updated: dialect::HighresImuUpdatedFlags::from_bits_retain(6719),
-        });
-    }
-
-    fn send_distance(&self, port: &mut Port) {
-        port.send(&dialect::DISTANCE_SENSOR_DATA {
-            time_boot_ms: self.boot_ms(),
-            min_distance: 0,
-            max_distance: 10_000,
-            current_distance: (100.0 * self.height).clamp(0.0, 10_000.0) as u16,
-            mavtype: dialect::MavDistanceSensor::MAV_DISTANCE_SENSOR_LASER,
-            id: 0,
-            orientation: dialect::MavSensorOrientation::MAV_SENSOR_ROTATION_PITCH_270,
-            covariance: 0,
-        });
-    }
-
-    fn send_battery(&self, port: &mut Port) {
-        let mut voltages = [u16::MAX; 10];
-        voltages[0] = (1000.0 * self.volts()) as u16;
-        port.send(&dialect::BATTERY_STATUS_DATA {
-            current_consumed: (5000.0 * (1.0 - self.battery)) as i32,
-            energy_consumed: -1,
-            temperature: i16::MAX,
-            voltages,
-            current_battery: -100,
-            id: 0,
-            battery_function: dialect::MavBatteryFunction::MAV_BATTERY_FUNCTION_ALL,
-            mavtype: dialect::MavBatteryType::MAV_BATTERY_TYPE_LIPO,
-            battery_remaining: (100.0 * self.battery) as i8,
-        });
-    }
-
-    fn send_version(&self, port: &mut Port) {
-        let git = [0, 0, 0, 196, 209, 42, 241, 214];
-        port.send(&dialect::AUTOPILOT_VERSION_DATA {
-            capabilities: dialect::MavProtocolCapability::from_bits_retain(CAPABILITIES),
-            uid: 5_283_920_058_631_409_000 + u64::from(self.system_id),
-            flight_sw_version: VERSION,
-            middleware_sw_version: VERSION,
-            os_sw_version: 101_854_463,
-            board_version: 1,
-            vendor_id: 0,
-            product_id: 0,
-            flight_custom_version: git,
-            middleware_custom_version: git,
-            os_custom_version: [0; 8],
-        });
-    }
-
-    fn send_home(&self, port: &mut Port) {
-        let (home, ned) = &self.home;
-        let (latitude, longitude, altitude) = scaled(home);
-        let ned = ned.cast::<f32>();
-        port.send(&dialect::HOME_POSITION_DATA {
-            latitude,
-            longitude,
-            altitude,
-            x: ned.x,
-            y: ned.y,
-            z: ned.z,
-            q: [1.0, 0.0, 0.0, 0.0],
-            approach_x: 0.0,
-            approach_y: 0.0,
-            approach_z: 0.0,
-        });
-    }
-
-    fn send_odometry(&self, port: &mut Port) {
-        // Diagonals only, upper triangle row by row; what is not known is NaN.
-        let mut pose_covariance = [f32::NAN; 21];
-        let mut velocity_covariance = [f32::NAN; 21];
-        for (at, variance) in [(0, 0.043), (6, 0.043), (11, 0.08), (15, 4e-4), (18, 4e-4), (20, 0.03)] {
-            pose_covariance[at] = variance;
-        }
-        for (at, variance) in [(0, 0.009), (6, 0.009), (11, 0.005)] {
-            velocity_covariance[at] = variance;
-        }
-        let (p, v) = (self.ned.cast::<f32>(), self.velocity.cast::<f32>());
-        port.send(&dialect::ODOMETRY_DATA {
-            time_usec: self.time_us,
-            x: p.x,
-            y: p.y,
-            z: p.z,
-            q: self.attitude().quaternion,
-            vx: v.x,
-            vy: v.y,
-            vz: v.z,
-            rollspeed: 0.0,
-            pitchspeed: 0.0,
-            yawspeed: self.heading.1,
-            pose_covariance,
-            velocity_covariance,
-            frame_id: dialect::MavFrame::MAV_FRAME_LOCAL_NED,
-            child_frame_id: dialect::MavFrame::MAV_FRAME_LOCAL_NED,
-        });
-    }
 }
 
 /// The payload of PING, whose type the crate calls deprecated.
@@ -546,13 +298,4 @@ pub fn ping(time_us: u64, seq: u32, system: u8, component: u8) -> [u8; 14] {
     payload[8..12].copy_from_slice(&seq.to_le_bytes());
     payload[12..].copy_from_slice(&[system, component]);
     payload
-}
-
-/// Latitude and longitude in 1e-7 degrees and altitude in millimetres, rounded.
-fn scaled(position: &Geodetic) -> (i32, i32, i32) {
-    (
-        libm::round(position.lat_deg * 1e7) as i32,
-        libm::round(position.lon_deg * 1e7) as i32,
-        libm::round(position.alt_m * 1e3) as i32,
-    )
 }

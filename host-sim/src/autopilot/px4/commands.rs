@@ -230,5 +230,5 @@ fn mode_of(base: u8, main: u8, sub: u8) -> Option<Mode> {
 
 /// A message id that came in a float.
 fn message_id(value: f32) -> Option<u32> {
-    (value >= 0.0 && value < 16_777_216.0).then_some(value as u32)
+    (0.0..16_777_216.0).contains(&value).then_some(value as u32)
 }

@@ -420,8 +420,8 @@ impl Commander {
     fn update_failsafe(&mut self, sense: &Sense, tuning: &Tuning) {
         let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sense.now_us, tuning);
         let battery_out = sense.battery < tuning.battery_critical && !self.intention.ends_with_flight();
-        let action = if !self.position_ok && self.mode() != Mode::Land {
-            Some(Mode::Land)
+        let action = if !self.position_ok {
+            (self.intention != Mode::Land).then_some(Mode::Land)
         } else if stream_lost {
             match tuning.offboard_loss_action {
                 4 => Some(Mode::Land),
@@ -440,7 +440,7 @@ impl Commander {
         } else {
             None
         };
-        if action != self.failsafe && !(action.is_none() && !self.position_ok) {
+        if action != self.failsafe {
             self.failsafe = action;
             self.enter(self.mode(), sense);
         }
