@@ -16,6 +16,10 @@ use crate::time::Instant;
 const ARRIVED_M: f32 = 0.35;
 /// Slower than this counts as standing at the end of the path, m/s.
 const STANDING_MPS: f32 = 0.5;
+/// This near its top the climb is done, metres.
+const CLIMBED_M: f32 = 0.12;
+/// The climb ends no slower than this, m/s.
+const CREEP_MPS: f32 = 0.05;
 /// The climb's reference is at most this far above the vehicle, metres.
 const CLIMB_LEAD_M: f32 = 1.5;
 /// Stretch of the path searched for the nearest point, metres to either side.
@@ -211,7 +215,8 @@ impl Guidance {
         if state == State::Climb {
             let top = plan.path.point_at(0.0).map_or(self.climb_z, |p| p.z);
             let lead = position.z + CLIMB_LEAD_M;
-            self.climb_z = (self.climb_z + self.climb_mps * dt_s).min(lead.max(self.climb_z)).min(top);
+            let rate = self.climb_rate(top);
+            self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
         }
         if self.on_path && setpoints_flow(state) && state != State::PilotControl {
             let advice = if state == State::Follow {
@@ -233,11 +238,21 @@ impl Guidance {
         self.progress_at
     }
 
+    /// Speed of the climb's reference: it brakes at half the acceleration, so that a low ceiling is not overshot into.
+    fn climb_rate(&self, top: f32) -> f32 {
+        let left = top - self.climb_z;
+        if left <= 0.0 {
+            return 0.0;
+        }
+        libm::fminf(self.climb_mps, libm::fmaxf(libm::sqrtf(self.track.accel_mps2 * left), CREEP_MPS))
+    }
+
     pub fn climb_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
         let start = scene.plan.and_then(|plan| plan.path.point_at(0.0));
         start.is_some_and(|start| {
             let apart = start - scene.telemetry.position;
-            self.climb_z >= start.z && apart.norm() < 2.0 * ARRIVED_M && apart.z.abs() < ARRIVED_M
+            // Both reference and vehicle at the top: a low climb must not count as done on the pad.
+            self.climb_z >= start.z && apart.norm() < 2.0 * ARRIVED_M && apart.z.abs() < CLIMBED_M
         })
     }
 
@@ -277,7 +292,7 @@ impl Guidance {
             State::PilotControl => Setpoint::Move(scene.telemetry.position, still, still),
             State::Climb => {
                 let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
-                let rate = if self.climb_z < start.z { self.climb_mps } else { 0.0 };
+                let rate = self.climb_rate(start.z);
                 let place = Point::new(start.x, start.y, self.climb_z);
                 Setpoint::Move(place, Point::new(0.0, 0.0, rate), still)
             }

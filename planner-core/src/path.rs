@@ -139,7 +139,8 @@ pub struct TrackConfig {
     pub deviation_min_m: f32,
     /// Largest deviation to allow for in the open, metres.
     pub deviation_max_m: f32,
-    /// The reference slows from half this distance ahead of the vehicle and stops at it, metres.
+    /// The reference slows from half this distance ahead of the vehicle and stops at it, metres; between walls it is
+    /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner.
     pub lead_max_m: f32,
 }
 
@@ -182,6 +183,9 @@ pub struct Reference {
     pub finished: bool,
 }
 
+/// The reference may always be this far ahead: what an autopilot lags at walking speed, metres.
+const LEAD_LEAST_M: f32 = 0.4;
+
 /// Half of the clearance a leg leaves beyond the body, within the configured bounds.
 fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
@@ -216,7 +220,10 @@ pub fn advance<const W: usize>(
     let here = path.point_at(tracker.along_m)?;
     let length_m = path.length_m();
     let lead = (vehicle - here).norm();
-    let waiting = fminf(fmaxf((cfg.lead_max_m - lead) / (0.5 * cfg.lead_max_m), 0.0), 1.0);
+    let leg = points.iter().find(|w| w.along_m > 0.0 && w.along_m >= tracker.along_m);
+    let allowed = leg.map_or(cfg.deviation_max_m, |w| deviation(cfg, w.clearance_m));
+    let lead_max = fminf(cfg.lead_max_m, fmaxf(4.0 * allowed, LEAD_LEAST_M));
+    let waiting = fminf(fmaxf((lead_max - lead) / (0.5 * lead_max), 0.0), 1.0);
     let mut speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
     let brake = |distance: f32, end: f32| sqrtf(end * end + 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0));
     speed = fminf(speed, brake(advice.stop_within_m, 0.0));
