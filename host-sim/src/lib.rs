@@ -8,6 +8,7 @@ pub mod link;
 pub mod map;
 pub mod mission;
 pub mod output;
+pub mod prm;
 pub mod progress;
 pub mod report;
 pub mod result;
