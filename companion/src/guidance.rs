@@ -22,8 +22,13 @@ const CLIMBED_M: f32 = 0.12;
 const CREEP_MPS: f32 = 0.05;
 /// The climb's reference is at most this far above the vehicle, metres.
 const CLIMB_LEAD_M: f32 = 1.5;
-/// Stretch of the path searched for the nearest point, metres to either side.
-const REJOIN_WINDOW_M: f32 = 5.0;
+/// Stretch of the path searched for the nearest point after the pilot, metres to either side.
+pub const REJOIN_WINDOW_M: f32 = 5.0;
+/// The same after the position was lost, metres: the vehicle stopped within its braking distance of the reference, so a
+/// position further along is not to be believed.
+pub const LOST_WINDOW_M: f32 = 2.5;
+/// A nearest point this near the end of the window lies beyond it, metres.
+const WINDOW_EDGE_M: f32 = 0.01;
 /// Less than this is no progress, metres.
 const PROGRESS_M: f32 = 0.25;
 
@@ -265,11 +270,15 @@ impl Guidance {
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 
-    /// Whether the straight way from the vehicle to the nearest point of the path stays inside the leg's clearance.
-    pub fn near_path<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+    /// Whether the vehicle is within `window_m` of its place along the path, and the straight way to the nearest point of
+    /// the path stays inside the leg's clearance.
+    pub fn near_path<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, window_m: f32) -> bool {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
-        let along_m = plan.path.project(position, self.tracker.along_m, REJOIN_WINDOW_M);
+        let along_m = plan.path.project(position, self.tracker.along_m, window_m);
+        if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
+            return false;
+        }
         let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
         let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
         (nearest - position).norm() <= leg.clearance_m - self.track.radius_m

@@ -15,6 +15,7 @@
 
 pub mod commands;
 pub mod config;
+mod events;
 #[cfg(test)]
 mod fake_px4;
 pub mod frame;
@@ -30,7 +31,8 @@ pub mod time;
 mod transmit;
 
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
-pub use machine::{Companion, Event, Link};
+pub use events::{Event, Link};
+pub use machine::Companion;
 pub use mission::State;
 pub use time::{Duration, Instant};
 

@@ -10,8 +10,9 @@ use planner_core::schedule::VehiclePlan;
 
 use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
+use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
-use crate::guidance::{Guidance, Scene, setpoints_flow};
+use crate::guidance::{Guidance, LOST_WINDOW_M, REJOIN_WINDOW_M, Scene, setpoints_flow};
 use crate::intent::Intent;
 use crate::mission::{self, Action, Inputs, Row, State};
 use crate::neighbours::Neighbours;
@@ -35,31 +36,6 @@ const ROWS_AT_ONCE: usize = 4;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
 const EVENTS: usize = 16;
 
-/// One of the two ports.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Link {
-    /// The serial port to the flight controller.
-    Autopilot,
-    /// The radio to the swarm and the ground station.
-    Swarm,
-}
-
-/// What the shell should know.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
-    /// Plan, and answer with [`Companion::handle_plan`].
-    PlanRequested,
-    /// The mission moved on.
-    StateChanged {
-        /// Before.
-        from: State,
-        /// After.
-        to: State,
-        /// The row's text, empty if it has none.
-        text: &'static str,
-    },
-}
-
 /// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
@@ -71,7 +47,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) telemetry: Telemetry,
     neighbours: Neighbours<V>,
     pub(crate) plan: Option<VehiclePlan<W, G>>,
-    plan_failed: bool,
+    plan_failure: Option<PlanFailure>,
     pub(crate) state: State,
     entered_at: Instant,
     wishes: Wishes,
@@ -109,7 +85,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             telemetry: Telemetry::new(),
             neighbours: Neighbours::new(&config.roster, config.system_id),
             plan: None,
-            plan_failed: false,
+            plan_failure: None,
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             wishes: Wishes::default(),
@@ -206,7 +182,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         match outcome {
             Ok(plan) if self.is_sound(plan) => self.plan = Some(plan.clone()),
-            _ => self.plan_failed = true,
+            Ok(_) => self.plan_failure = Some(PlanFailure::Invalid),
+            Err(failure) => self.plan_failure = Some(failure),
         }
         self.run_table();
     }
@@ -256,6 +233,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
+                    // It may have been started anew and know nothing of the streams we asked for.
+                    self.setup = 0;
                 }
                 change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }
@@ -391,11 +370,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             in_state: now - self.entered_at,
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
+            jumped: t.is_settling(now),
             stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
             neighbour_age: self.neighbours.silence(now, self.entered_at),
             neighbour_heard: self.neighbours.heard_within(now, HEARTBEAT_EVERY),
             plan_ready: self.plan.is_some(),
-            plan_failed: self.plan_failed,
+            plan_failed: self.plan_failure.is_some(),
+            roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
             has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
             at_start: away.xy().norm() <= self.config.start_tolerance_m,
             start: self.wishes.start,
@@ -408,10 +389,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             mode_foreign,
             critical: t.is_critical(),
             on_ground: t.on_ground == Some(true),
+            airborne: t.armed && t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05,
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
-            near_path: self.state == State::PilotControl && self.guidance.near_path(&scene),
+            near_path: match self.state {
+                State::PilotControl => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
+                State::PositionLost => self.guidance.near_path(&scene, LOST_WINDOW_M),
+                _ => false,
+            },
             battery_low: (0..=100).contains(&t.battery_percent)
                 && t.battery_percent < self.config.battery_low_percent,
             outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
@@ -433,7 +419,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
         }
         // Full only if the shell does not drain: then the newest is lost.
-        let _ = self.events.push_back(Event::StateChanged { from, to: row.to, text: row.text });
+        let changed = Event::StateChanged { from, to: row.to, text: row.text, warning: row.warning };
+        let _ = self.events.push_back(changed);
         // The step that the new state needs is due now.
         if setpoints_flow(row.to) && !setpoints_flow(from) {
             self.next_step = now;
@@ -448,7 +435,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::Connect => self.setup = 0,
             Action::RequestPlan => {
                 self.plan = None;
-                self.plan_failed = false;
+                self.plan_failure = None;
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }
@@ -459,7 +446,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::AskOffboard | Action::AskArm => self.retry_at = now,
             Action::AskLand => {
                 self.retry_at = now;
-                if from == State::PilotControl {
+                // Off the path, or not known to be on it: the reference may be beyond a wall.
+                if matches!(from, State::PilotControl | State::PositionLost | State::AutopilotSilent) {
                     self.guidance.hold_at(position);
                 } else {
                     self.guidance.brake(&position);

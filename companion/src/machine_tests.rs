@@ -86,6 +86,45 @@ fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
 }
 
 #[test]
+fn a_jump_of_five_metres_is_not_flown_after() {
+    for jump in [Point::new(0.0, 5.0, 0.0), Point::new(5.0, 0.0, 0.0), Point::new(-5.0, 0.0, 0.0)] {
+        let mut bench = Bench::following(config());
+        bench.enu += jump;
+        let jumped_at = bench.now;
+        bench.until(State::PositionLost, 0.2);
+        bench.until(State::Land, 2.0);
+        let lasted = bench.now - jumped_at;
+        assert!(lasted >= crate::telemetry::SETTLE && lasted < Duration::from_millis(1300), "{lasted:?}");
+        // The first setpoint after the jump may still be made before the position is heard, the last is to land.
+        let mut stops = 0;
+        for (at, place, mask) in &bench.setpoints {
+            if *at > jumped_at + Duration::from_millis(60) {
+                let stop = *mask == px4::MASK_VELOCITY;
+                assert!(stop || (place - bench.enu).norm() < 0.15, "{place} sent at {:?}", bench.enu);
+                stops += u32::from(stop);
+            }
+        }
+        assert!(stops >= 18, "{stops}");
+        bench.until(State::Done, 30.0);
+        assert_no_gap(&bench);
+    }
+}
+
+#[test]
+fn an_origin_that_moves_in_flight_stops_it_for_a_second() {
+    let mut bench = Bench::following(config());
+    bench.origin.lat_deg += 0.002;
+    bench.origin.alt_m -= 30.0;
+    let moved_at = bench.now;
+    bench.until(State::PositionLost, 0.2);
+    bench.until(State::Follow, 2.0);
+    assert!(bench.now - moved_at >= crate::telemetry::SETTLE);
+    bench.until(State::Done, 60.0);
+    assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
+    assert_no_gap(&bench);
+}
+
+#[test]
 fn a_failsafe_gets_no_setpoints() {
     let mut bench = Bench::following(config());
     (bench.mode, bench.status) = (px4::RTL, 5);

@@ -63,10 +63,16 @@ pub enum Guard {
     PositionKnown,
     /// The position is older than the limit.
     NoPosition,
+    /// The position jumped, or the EKF origin moved, within the last second.
+    PositionJumped,
+    /// Motors on and off the ground.
+    FoundFlying,
     /// The plan has come.
     PlanReady,
     /// There will be no plan.
     PlanFailed,
+    /// There will be no plan, for want of the mission's roadmap.
+    RoadmapBad,
     /// MISSION_START was commanded.
     StartCommanded,
     /// MISSION_START, and no goal is left for this vehicle.
@@ -99,6 +105,10 @@ pub enum Guard {
     PauseCommanded,
     /// DO_PAUSE_CONTINUE 1.
     ResumeCommanded,
+    /// A fresh position, and the way back to the path is free.
+    BackOnPath,
+    /// A fresh position, but elsewhere than where it stopped on the path.
+    BackOffPath,
     /// Offboard again, DO_PAUSE_CONTINUE 1, and the way back to the path is free.
     ResumedOnPath,
     /// Offboard again, DO_PAUSE_CONTINUE 1, but too far from the path.
@@ -180,6 +190,8 @@ pub struct Inputs {
     pub heartbeat_age: Duration,
     /// Time since the last usable position.
     pub position_age: Duration,
+    /// The position jumped lately.
+    pub jumped: bool,
     /// Time without progress along the path.
     pub stalled: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
@@ -190,6 +202,8 @@ pub struct Inputs {
     pub plan_ready: bool,
     /// The shell has none.
     pub plan_failed: bool,
+    /// The shell has none because the roadmap is missing or not the mission's.
+    pub roadmap_bad: bool,
     /// The plan has a goal.
     pub has_goal: bool,
     /// Horizontally near the start point.
@@ -214,6 +228,8 @@ pub struct Inputs {
     pub critical: bool,
     /// The landing detector says ground.
     pub on_ground: bool,
+    /// Motors on, and the landing detector says air.
+    pub airborne: bool,
     /// The neighbours leave room to go.
     pub gates_open: bool,
     /// At the altitude of the start.
@@ -241,8 +257,11 @@ impl Guard {
             Self::NoHeartbeat => i.heartbeat_age > limit,
             Self::PositionKnown => i.position_age < FRESH,
             Self::NoPosition => i.position_age > limit,
+            Self::PositionJumped => i.jumped,
+            Self::FoundFlying => i.airborne,
             Self::PlanReady => i.plan_ready,
             Self::PlanFailed => i.plan_failed,
+            Self::RoadmapBad => i.roadmap_bad,
             Self::StartCommanded => i.start,
             Self::StartWithoutGoal => i.start && !i.has_goal,
             Self::StartElsewhere => i.start && !i.at_start,
@@ -259,6 +278,8 @@ impl Guard {
             Self::Stalled => i.stalled >= limit,
             Self::PauseCommanded => i.pause,
             Self::ResumeCommanded => i.resume,
+            Self::BackOnPath => i.position_age < FRESH && i.near_path,
+            Self::BackOffPath => i.position_age < FRESH && !i.near_path,
             Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
             Self::LandCommanded => i.land,
@@ -333,6 +354,8 @@ pub static TABLE: &[Row] = &[
     warn(&[Land, Disarm],     G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
     warn(&[Streaming, Engaging, Arming], G::FailsafeActs, NOW, Aborted,     A::ForgetStart, "Failsafe before take-off: start cancelled"),
     warn(&[Streaming, Engaging, Arming], G::ModeTaken, NOW, Aborted,        A::ForgetStart, "Mode changed by pilot: start cancelled"),
+    // Started anew in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
+    warn(WAITING,             G::FoundFlying,      NOW,    Failsafe,        A::ForgetStart, "Found in flight: no mission"),
     // Links and position.
     warn(WAITING,             G::NoHeartbeat,      s(3),   WaitAutopilot,   A::ForgetStart, "Autopilot silent: start cancelled"),
     warn(&[Streaming, Engaging, Arming], G::NoHeartbeat, s(3), Aborted,     A::ForgetStart, "Autopilot silent: start cancelled"),
@@ -340,6 +363,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Land, Disarm, PilotControl, Failsafe], G::NoHeartbeat, s(60), Aborted, A::ForgetStart, "Autopilot lost"),
     warn(&[Planning, Ready, Scheduled], G::NoPosition, s(2), WaitPosition,  A::ForgetStart, "Position lost: start cancelled"),
     warn(&[Streaming, Engaging, Arming], G::NoPosition, s(1), Aborted,      A::ForgetStart, "Position lost: start cancelled"),
+    warn(SOUND,               G::PositionJumped,   NOW,    PositionLost,    A::BrakeOnPath, "Position jumped: stopping"),
     warn(SOUND,               G::NoPosition,       s(1),   PositionLost,    A::BrakeOnPath, "Position lost: stopping"),
     // Orders and limits in flight.
     info(SOUND,               G::LandCommanded,    NOW,    Land,            A::AskLand,     "Landing as commanded"),
@@ -352,6 +376,7 @@ pub static TABLE: &[Row] = &[
     info(&[WaitAutopilot],    G::AutopilotHeard,   NOW,    WaitPosition,    A::Connect,     "Autopilot found"),
     info(&[WaitPosition],     G::PositionKnown,    NOW,    Planning,        A::RequestPlan, "Position known: planning"),
     info(&[WaitPosition],     G::Elapsed,          s(2),   WaitPosition,    A::Connect,     ""),
+    warn(&[Planning],         G::RoadmapBad,       NOW,    Aborted,         A::ForgetStart, "Roadmap missing or wrong: mission aborted"),
     warn(&[Planning],         G::PlanFailed,       NOW,    Aborted,         A::ForgetStart, "No plan: mission aborted"),
     info(&[Planning],         G::PlanReady,        NOW,    Ready,           A::None,        "Ready"),
     warn(&[Planning],         G::Elapsed,          s(30),  Planning,        A::RequestPlan, "Plan is late: asked again"),
@@ -377,9 +402,10 @@ pub static TABLE: &[Row] = &[
     warn(&[Paused],           G::Elapsed,          s(600), Land,            A::AskLand,     "Paused for 10 min: landing"),
     info(&[Alone],            G::NeighbourHeard,   NOW,    Follow,          A::RunPath,     "Neighbours heard again"),
     warn(&[Alone],            G::Elapsed,          s(30),  Land,            A::AskLand,     "Neighbours still silent: landing"),
-    info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    Follow,          A::RunPath,     "Autopilot heard again"),
+    info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    PositionLost,    A::BrakeOnPath, "Autopilot heard again"),
     warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Aborted,         A::ForgetStart, "Autopilot lost"),
-    info(&[PositionLost],     G::PositionKnown,    NOW,    Follow,          A::RunPath,     "Position known again"),
+    info(&[PositionLost],     G::BackOnPath,       NOW,    Follow,          A::Rejoin,      "Position known again"),
+    warn(&[PositionLost],     G::BackOffPath,      NOW,    Land,            A::AskLand,     "Position is elsewhere: landing"),
     warn(&[PositionLost],     G::Elapsed,          s(3),   Land,            A::AskLand,     "Position still lost: landing"),
     info(&[Land],             G::Disarmed,         NOW,    Done,            A::ForgetStart, "Landed"),
     info(&[Land],             G::OnGround,         NOW,    Disarm,          A::AskDisarm,   ""),

@@ -86,8 +86,13 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::AutopilotHeard | G::PositionKnown => {}
         G::NoHeartbeat => i.heartbeat_age = long,
         G::NoPosition => i.position_age = long,
+        G::PositionJumped => (i.position_age, i.jumped) = (long, true),
+        G::FoundFlying => i.airborne = true,
+        G::BackOnPath => i.near_path = true,
+        G::BackOffPath => {}
         G::PlanReady => i.plan_ready = true,
         G::PlanFailed => i.plan_failed = true,
+        G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
         G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
         G::StartWithoutGoal => (i.start, i.at_start, i.armed) = (true, true, false),
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
@@ -124,7 +129,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             let mut inputs = inputs_for(row.guard);
             // Where a position or an autopilot heard already moves on, they are not known yet.
             match (from, row.guard) {
-                (PositionLost, G::PositionKnown) | (AutopilotSilent, G::AutopilotHeard) => {}
+                (PositionLost, G::BackOnPath | G::BackOffPath) | (AutopilotSilent, G::AutopilotHeard) => {}
                 (WaitPosition, G::PositionKnown) | (WaitAutopilot, G::AutopilotHeard) => {}
                 (PositionLost | WaitPosition, _) => inputs.position_age = FRESH,
                 (AutopilotSilent, _) => inputs.heartbeat_age = HEARD,

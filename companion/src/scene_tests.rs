@@ -99,6 +99,15 @@ fn every_row_has_its_scene() {
         Done,
         60.0,
     );
+    scene(
+        flying(),
+        &|b| {
+            b.enu.y += 5.0;
+            b.until(PositionLost, 0.2);
+        },
+        Done,
+        30.0,
+    );
     // Orders and limits.
     scene(
         flying(),
@@ -120,10 +129,11 @@ fn every_row_has_its_scene() {
     scene(
         ready(),
         &|b| {
-            b.enu.x += 1.5;
-            b.run(0.3);
-            b.enu.x += 1.5;
-            b.run(0.3);
+            // Dragged, not so fast that it were a jump.
+            for _ in 0..3 {
+                b.enu.x += 1.0;
+                b.run(0.3);
+            }
             b.start();
         },
         Aborted,
@@ -230,6 +240,24 @@ fn every_row_has_its_scene() {
     let mut planless = Bench::new(config());
     planless.answer_plan = Some(Err(PlanFailure::NoRoadmap));
     scene(planless, &|b| b.run(6.0), Aborted, 1.0);
+    let mut unreachable = Bench::new(config());
+    unreachable.answer_plan = Some(Err(PlanFailure::Unreachable));
+    scene(unreachable, &|b| b.run(6.0), Aborted, 1.0);
+    // A companion that starts in the air: nothing is sent, the autopilot's failsafe lands.
+    let mut found = Bench::new(config());
+    (found.armed, found.mode, found.enu.z) = (true, px4::OFFBOARD, 1.5);
+    scene(
+        found,
+        &|b| {
+            b.until(Failsafe, 3.0);
+            b.start();
+            b.run(3.0);
+            assert!(b.setpoints.is_empty() && b.commands.iter().all(|c| c.0 != 400 && c.0 != 176));
+            (b.armed, b.enu.z) = (false, 0.0);
+        },
+        Aborted,
+        3.0,
+    );
     // After the pilot, after a failsafe.
     let piloted = || {
         let mut bench = flying();

@@ -2,7 +2,8 @@
 //!
 //! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
 //! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
-//! EKF origin moved: it counts as lost until the origin is heard anew.
+//! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
+//! anew and [`SETTLE`] has passed without another jump.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA};
@@ -20,10 +21,12 @@ const NOT_AN_AUTOPILOT: u8 = 8;
 const ARMED: u8 = 0x80;
 const CRITICAL: u8 = 5;
 const ON_GROUND: u8 = 1;
-/// Further than this plus [`JUMP_MPS`] × time since the last position is a jump, metres.
-const JUMP_M: f32 = 2.0;
-/// Faster than any vehicle flown so, m/s.
-const JUMP_MPS: f32 = 20.0;
+/// Further than this plus [`JUMP_MPS`] × time from where the last position and velocity lead is a jump, metres.
+const JUMP_M: f32 = 1.0;
+/// More than any vehicle flown so changes its velocity between two positions, m/s.
+const JUMP_MPS: f32 = 5.0;
+/// After a jump the position is not used for this long; another one starts it anew.
+pub const SETTLE: Duration = Duration::from_millis(1000);
 /// After this long without a frame the sequence starts afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
@@ -83,6 +86,9 @@ pub struct Telemetry {
     /// Velocity, ENU m/s.
     pub velocity: Point,
     boot_ms: u32,
+    /// When a position was last read, used or not.
+    read_at: Option<Instant>,
+    settled_at: Instant,
 }
 
 impl Telemetry {
@@ -104,6 +110,11 @@ impl Telemetry {
     /// Time since the last usable position; the greatest value if none is known.
     pub fn position_age(&self, now: Instant) -> Duration {
         age(self.position_at, now)
+    }
+
+    /// Whether the position jumped lately.
+    pub fn is_settling(&self, now: Instant) -> bool {
+        now < self.settled_at
     }
 
     /// Takes a frame of the autopilot link in.
@@ -139,7 +150,7 @@ impl Telemetry {
                 None => Change::None,
             },
             GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
-                Some(origin) => self.handle_origin(&origin),
+                Some(origin) => self.handle_origin(now, &origin),
                 None => Change::None,
             },
             LOCAL_POSITION_NED_DATA::ID => match frame.decode::<LOCAL_POSITION_NED_DATA>() {
@@ -150,7 +161,7 @@ impl Telemetry {
         }
     }
 
-    fn handle_origin(&mut self, data: &GPS_GLOBAL_ORIGIN_DATA) -> Change {
+    fn handle_origin(&mut self, now: Instant, data: &GPS_GLOBAL_ORIGIN_DATA) -> Change {
         let origin = Geodetic {
             lat_deg: f64::from(data.latitude) * 1e-7,
             lon_deg: f64::from(data.longitude) * 1e-7,
@@ -159,10 +170,15 @@ impl Telemetry {
         if !origin.is_valid() {
             return Change::None;
         }
+        if self.ekf_origin.is_some_and(|known| known != origin) {
+            // A position on its way may still be about the old one.
+            self.settled_at = now + SETTLE;
+        }
         if self.ekf_origin != Some(origin) {
             self.ekf_origin = Some(origin);
             // The next position is about the new origin and no jump.
             self.position_at = None;
+            self.read_at = None;
         }
         Change::Updated
     }
@@ -176,31 +192,40 @@ impl Telemetry {
         let fields = [d.x, d.y, d.z, d.vx, d.vy, d.vz];
         let older = self.boot_ms.wrapping_sub(d.time_boot_ms);
         let rebooted = older > 10_000 && older < u32::MAX / 2;
-        let stale = older < u32::MAX / 2 && !rebooted && self.position_at.is_some();
+        let stale = older < u32::MAX / 2 && !rebooted && self.read_at.is_some();
         if fields.iter().any(|f| !f.is_finite()) || stale {
             return Change::None;
         }
         self.boot_ms = d.time_boot_ms;
         let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
-            self.ekf_origin = None;
-            self.position_at = None;
-            return if rebooted { Change::OriginLost } else { Change::None };
+            return if rebooted { self.lose_position(now) } else { Change::None };
         };
         let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
         let geodetic = frames::ned_to_geodetic(Projection::Px4, &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
-        if let Some(at) = self.position_at
-            && (position - self.position).norm() > JUMP_M + JUMP_MPS * (now - at).secs_f32()
-        {
-            self.ekf_origin = None;
-            self.position_at = None;
-            return Change::OriginLost;
+        if let Some(at) = self.read_at {
+            let dt_s = (now - at).secs_f32();
+            let led_to = self.position + self.velocity * dt_s;
+            if (position - led_to).norm() > JUMP_M + JUMP_MPS * dt_s {
+                return self.lose_position(now);
+            }
         }
+        self.read_at = Some(now);
         self.position = position;
         // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
-        self.position_at = Some(now);
+        if !self.is_settling(now) {
+            self.position_at = Some(now);
+        }
         Change::Updated
+    }
+
+    fn lose_position(&mut self, now: Instant) -> Change {
+        self.ekf_origin = None;
+        self.position_at = None;
+        self.read_at = None;
+        self.settled_at = now + SETTLE;
+        Change::OriginLost
     }
 
     /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.

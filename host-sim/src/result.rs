@@ -45,7 +45,7 @@ pub struct VehicleResult {
     pub flown_m: f64,
     /// Time from take-off to landing, seconds.
     pub flight_time_s: f64,
-    /// How it ended: a state of the companion's mission.
+    /// How it ended: a state of the companion's mission, and the text of the row that led there where it is a warning.
     pub end: String,
 }
 

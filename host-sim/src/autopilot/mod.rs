@@ -49,7 +49,7 @@ use self::geodesy::LocalFrame;
 use self::noise::Disturbance;
 use self::port::Port;
 pub use self::px4::Mode;
-use self::px4::params::{Params, Tuning};
+use self::px4::params::{Params, TYPE_INT32, Tuning};
 use self::px4::{Commander, Sense};
 use self::telemetry::Snapshot;
 use self::vehicle::{Demand, Vehicle};
@@ -329,7 +329,8 @@ impl Autopilot {
         self.broadcast(49);
     }
 
-    pub(crate) fn reboot(&mut self) {
+    /// Starts anew: parameters, charge and EKF origin stay, the motors stop. In the air it falls.
+    pub fn reboot(&mut self) {
         let mut fresh = self.config.clone();
         fresh.start = self.vehicle.state().position;
         fresh.heading_rad = self.vehicle.state().heading_rad;
@@ -367,6 +368,23 @@ impl Autopilot {
     pub fn set_ekf_origin(&mut self, origin: Geodetic) {
         self.frame.set_ekf_origin(origin);
         self.announce_origin();
+    }
+
+    /// The same, by ENU metres.
+    pub fn move_ekf_origin(&mut self, by: &Point) {
+        let origin = frames::enu_to_geodetic(self.frame.ekf_origin(), by);
+        self.set_ekf_origin(origin);
+    }
+
+    /// Sets an integer parameter as an installer does before the flight.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
+        let wire = f32::from_bits(value as u32);
+        self.params.set(name, wire, TYPE_INT32).ok_or(ConfigError::Parameter(name))?;
+        self.tuning = self.params.tuning();
+        Ok(())
     }
 
     /// Takes the GPS fix away or gives it back; without it no position control flies.

@@ -190,6 +190,8 @@ impl Snapshot {
                     yawspeed: self.heading.1,
                 });
             }
+            // PX4 sends it only while the estimate is valid.
+            32 if !self.gps.2 => {}
             32 => {
                 let (p, v) = (self.ned.cast::<f32>(), self.velocity.cast::<f32>());
                 port.send(&dialect::LOCAL_POSITION_NED_DATA {

@@ -56,7 +56,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
         println!("no --swarm link: vehicle {} flies as the only one", args.id);
-        config.roster = config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
+        config.roster =
+            config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
     }
     let mut companion = new_companion(config)?;
     let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];
@@ -83,7 +84,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             match (event, &own) {
                 (Event::PlanRequested, Ok(own)) => companion.handle_plan(now(), Ok(own)),
                 (Event::PlanRequested, Err(_)) => companion.handle_plan(now(), Err(PlanFailure::Capacity)),
-                (Event::StateChanged { from, to, text }, _) => {
+                (Event::StateChanged { from, to, text, .. }, _) => {
                     println!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
                         let mut frame = [0; MAX_SENT];

@@ -227,7 +227,7 @@ pub struct Fault {
     pub kind: &'static str,
     /// `radio-cut`: which way.
     pub direction: Option<String>,
-    /// `position-jump`: by how much.
+    /// `position-jump`, `origin-change`: by how much.
     pub offset_m: Option<Point>,
     /// `obstacle`: where.
     pub position: Option<Point>,

@@ -61,12 +61,12 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let faults_value = root.get("faults");
     let faults = match &faults_value {
-        Some(value) => value.items()?.iter().map(|v| fault(&v.table()?, &ids)).collect::<Result<Vec<_>>>()?,
+        Some(value) => {
+            let items = value.items()?;
+            items.iter().map(|v| fault(&v.table()?, &ids, &mut unsupported)).collect::<Result<Vec<_>>>()?
+        }
         None => Vec::new(),
     };
-    if let (Some(value), false) = (&faults_value, faults.is_empty()) {
-        unsupported.push(not_yet(text, &value.span, "faults"));
-    }
     let area = unbuilt(&root, "area", &mut unsupported)?;
     let formation = unbuilt(&root, "formation", &mut unsupported)?;
     if let (Mode::Coverage | Mode::Formation, Some(span)) = (mission.mode, &mode_span) {
@@ -378,7 +378,7 @@ fn simulation(table: &Table<'_>) -> Result<Simulation> {
     Ok(simulation)
 }
 
-fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
+fn fault(table: &Table<'_>, ids: &[u8], unsupported: &mut Vec<ScenarioError>) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
     let kind = table.need("kind", "what happens, for example \"kill\"")?.word(&words)?;
@@ -406,6 +406,9 @@ fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
         return Err(table
             .text
             .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));
+    }
+    if fault.kind == FAULT_OBSTACLE {
+        unsupported.push(not_yet(table.text, &table.span, "faults of kind \"obstacle\""));
     }
     Ok(fault)
 }

@@ -1,26 +1,34 @@
-//! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would.
+//! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
+//! tells a vehicle to go on that its pilot gave back. Who cannot fly is not waited for, and who is late not for ever.
 
 use companion::State;
 use companion::frame::{self, Header};
 use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
 use planner_core::Point;
 
-use super::member::Member;
+use super::member::{Member, is_finished};
 use super::radio::Radio;
 
 /// System id of ground stations.
 const SYSTEM_ID: u8 = 255;
 /// MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
-/// The command is repeated this often until everybody has started, microseconds.
+/// A command is repeated this often until it is obeyed, microseconds.
 const REPEAT_US: u64 = 1_000_000;
+/// After this long with some vehicle ready those that are ready are started, microseconds.
+const PATIENCE_US: u64 = 90_000_000;
+/// A vehicle is told to go on for this long, microseconds.
+const RESUME_US: u64 = 10_000_000;
 
 /// Sends MISSION_START to system 0.
 #[derive(Debug, Default)]
 pub struct GroundStation {
     sequence: u8,
+    ready_us: Option<u64>,
     first_us: Option<u64>,
     last_us: u64,
+    /// Vehicles to tell that they go on, and until when.
+    resumes: Vec<(usize, u64)>,
 }
 
 impl GroundStation {
@@ -39,35 +47,78 @@ impl GroundStation {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Commands the start once all are ready, and again while one of them has not heard it.
+    /// Tells a vehicle to go on once its companion leaves it to the pilot.
+    pub fn resume(&mut self, now_us: u64, vehicle: usize) {
+        self.resumes.push((vehicle, now_us + RESUME_US));
+    }
+
+    /// Commands the start once all are ready, and again to each that has not heard it.
     pub fn step(&mut self, now_us: u64, members: &[Member], radio: &mut Radio, places: &[Point]) {
-        let due = self.first_us.is_none() || now_us >= self.last_us + REPEAT_US;
-        let ready = |m: &Member| m.companion.state() == State::Ready;
-        let wanted = match self.first_us {
-            None => members.iter().all(ready),
-            Some(_) => members.iter().any(ready),
-        };
-        if !(due && wanted) {
+        let state = |m: &Member| m.companion.state();
+        if self.first_us.is_none() {
+            let ready = || members.iter().filter(|m| state(m) == State::Ready);
+            if ready().next().is_some() {
+                self.ready_us.get_or_insert(now_us);
+            }
+            let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
+            let waited = self.ready_us.is_some_and(|since_us| now_us >= since_us + PATIENCE_US);
+            if self.ready_us.is_some() && (settled || waited) {
+                self.first_us = Some(now_us);
+                self.last_us = now_us;
+                self.send(now_us, START, EVERYBODY, 0.0, radio, places);
+            }
             return;
         }
-        self.first_us.get_or_insert(now_us);
+        if now_us < self.last_us + REPEAT_US {
+            return;
+        }
         self.last_us = now_us;
+        self.resumes.retain(|&(_, until_us)| now_us < until_us);
+        for (i, member) in members.iter().enumerate() {
+            let id = member.system_id();
+            if state(member) == State::Ready {
+                self.send(now_us, START, id, 0.0, radio, places);
+            }
+            if state(member) == State::PilotControl && self.resumes.iter().any(|&(of, _)| of == i) {
+                self.send(now_us, PAUSE_CONTINUE, id, 1.0, radio, places);
+            }
+        }
+    }
+
+    fn send(
+        &mut self,
+        now_us: u64,
+        command: MavCmd,
+        target_system: u8,
+        param1: f32,
+        radio: &mut Radio,
+        places: &[Point],
+    ) {
         let mut buffer = [0; frame::MAX_SENT];
-        let length = mission_start(EVERYBODY, self.sequence, &mut buffer);
+        let length = encode(command, target_system, param1, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);
         radio.broadcast(now_us, None, places, &buffer[..length]);
     }
 }
+
+const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
+const PAUSE_CONTINUE: MavCmd = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
 
 /// Target system that means all.
 const EVERYBODY: u8 = 0;
 
 /// A frame that commands the start; returns its length.
 pub fn mission_start(target_system: u8, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
-    let command = COMMAND_LONG_DATA {
-        command: MavCmd::MAV_CMD_MISSION_START,
-        target_system,
-        ..COMMAND_LONG_DATA::DEFAULT
-    };
+    encode(START, target_system, 0.0, sequence, out)
+}
+
+fn encode(
+    command: MavCmd,
+    target_system: u8,
+    param1: f32,
+    sequence: u8,
+    out: &mut [u8; frame::MAX_SENT],
+) -> usize {
+    let command = COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT };
     frame::encode(Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence }, &command, out)
 }

@@ -1,15 +1,17 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
-use companion::{Companion, Event, Instant, Link, State};
+use companion::{Companion, Config, Event, Instant, Link, State};
 use planner_core::Point;
 
 use super::monitor::{Observation, Phase};
+use super::new_companion;
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use crate::autopilot::{self, Autopilot};
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
+use crate::report::{self, Level};
 
 /// A companion with the desk's capacities.
 pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
@@ -21,6 +23,18 @@ pub const STEP_US: u64 = 4_000;
 /// Steps between two looks for the ground below, which changes slowly.
 const GROUND_STEPS: u64 = 25;
 
+/// How the shell answers a companion that asks for a plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Planner {
+    /// At once and rightly.
+    #[default]
+    Sound,
+    /// Not yet.
+    Late,
+    /// From a damaged roadmap.
+    BadRoadmap,
+}
+
 /// One vehicle.
 pub struct Member {
     /// What flies.
@@ -29,39 +43,118 @@ pub struct Member {
     pub companion: Box<DeskCompanion>,
     /// Whether the companion waits for a plan.
     pub wants_plan: bool,
+    /// How it is answered.
+    pub planner: Planner,
+    /// The last warning of a mission that did not go on since: why it left its usual course.
+    pub cause: Option<&'static str>,
     /// When it left the ground, seconds.
     pub took_off_s: Option<f64>,
     /// When it stood on the ground again with its motors off, seconds.
     pub landed_s: Option<f64>,
+    config: Config<VEHICLES>,
     up: SerialLink,
     down: SerialLink,
     ground_m: f32,
     bytes: Vec<u8>,
+    /// When the companion's clock began, microseconds.
+    companion_us: u64,
+    /// The autopilot boots until then, microseconds.
+    boots_until_us: u64,
+    killed: bool,
+    wrecked: bool,
 }
 
 impl Member {
     /// A vehicle on its pad, powered up.
     pub fn new(
         autopilot: &autopilot::Config,
-        companion: Box<DeskCompanion>,
+        config: Config<VEHICLES>,
         serial: SerialConfig,
         seed: u64,
     ) -> anyhow::Result<Self> {
         let id = u64::from(autopilot.system_id);
         Ok(Self {
             autopilot: Autopilot::new(autopilot)?,
-            companion,
+            companion: new_companion(config.clone())?,
+            config,
             wants_plan: false,
+            planner: Planner::Sound,
+            cause: None,
             took_off_s: None,
             landed_s: None,
             up: SerialLink::new(serial, seed, 2 * id),
             down: SerialLink::new(serial, seed, 2 * id + 1),
             ground_m: autopilot.start.z - autopilot.vehicle.radius_m,
             bytes: Vec::new(),
+            companion_us: 0,
+            boots_until_us: 0,
+            killed: false,
+            wrecked: false,
         })
     }
 
-    /// One physics step of the autopilot and all bytes that arrive by its end; events go to `event`.
+    /// MAVLink system id.
+    pub fn system_id(&self) -> u8 {
+        self.config.system_id
+    }
+
+    /// Whether it has lost all power.
+    pub fn killed(&self) -> bool {
+        self.killed
+    }
+
+    /// Whether it fell without its motors.
+    pub fn wrecked(&self) -> bool {
+        self.wrecked
+    }
+
+    /// Takes all power away.
+    pub fn kill(&mut self) {
+        self.cut_motors();
+        self.killed = true;
+    }
+
+    /// Starts the autopilot anew; it is silent and deaf until `until_us`.
+    pub fn reboot_autopilot(&mut self, until_us: u64) {
+        self.cut_motors();
+        self.boots_until_us = until_us;
+    }
+
+    fn cut_motors(&mut self) {
+        let truth = self.autopilot.truth();
+        self.wrecked |= truth.armed && !truth.touching;
+        self.autopilot.reboot();
+    }
+
+    /// Starts the companion anew, its clock with it.
+    ///
+    /// # Errors
+    /// None that the first start had not.
+    pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
+        self.companion = new_companion(self.config.clone())?;
+        self.companion_us = now_us;
+        self.wants_plan = false;
+        Ok(())
+    }
+
+    /// No byte passes between companion and autopilot until `until_us`.
+    pub fn stall(&mut self, until_us: u64) {
+        self.up.stall(until_us);
+        self.down.stall(until_us);
+    }
+
+    /// Changes the share of bytes that the serial link changes.
+    pub fn corrupt(&mut self, share: f64) {
+        self.up.corrupt(share);
+        self.down.corrupt(share);
+    }
+
+    /// The companion's time.
+    fn companion_now(&self, now_us: u64) -> Instant {
+        Instant::from_micros(now_us - self.companion_us)
+    }
+
+    /// One physics step of the autopilot and all bytes that arrive by its end; what the companion reports goes to `log`.
     pub fn step(
         &mut self,
         step: u64,
@@ -69,21 +162,27 @@ impl Member {
         map: &VoxelMap,
         radio: &mut Radio,
         places: &[Point],
-        mut event: impl FnMut(Event),
+        log: &mut Vec<report::Event>,
     ) {
         let now_us = (step + 1) * STEP_US;
-        let now = Instant::from_micros(now_us);
+        let now = self.companion_now(now_us);
         if step % GROUND_STEPS == station as u64 % GROUND_STEPS {
             self.ground_m = map.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
+        if self.killed {
+            return;
+        }
+        let booting = now_us < self.boots_until_us;
         let mut buffer = [0; 512];
         loop {
             let length = self.autopilot.poll_transmit(&mut buffer);
             if length == 0 {
                 break;
             }
-            self.up.write(now_us, &buffer[..length]);
+            if !booting {
+                self.up.write(now_us, &buffer[..length]);
+            }
         }
         self.up.read(now_us, &mut self.bytes);
         if !self.bytes.is_empty() {
@@ -96,12 +195,17 @@ impl Member {
             self.companion.handle_timeout(now);
         }
         while let Some(happened) = self.companion.poll_event() {
-            self.wants_plan |= happened == Event::PlanRequested;
-            event(happened);
+            match happened {
+                Event::PlanRequested => self.wants_plan = true,
+                Event::StateChanged { from, to, text, warning } => {
+                    self.note(from, to, text, warning);
+                    log.push(self.entry(now_us, from, to, text));
+                }
+            }
         }
         self.drain(now_us, station, radio, places);
         self.down.read(now_us, &mut self.bytes);
-        if !self.bytes.is_empty() {
+        if !self.bytes.is_empty() && !booting {
             self.autopilot.handle_bytes(&self.bytes);
         }
         let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.truth());
@@ -113,10 +217,41 @@ impl Member {
         }
     }
 
+    fn note(&mut self, from: State, to: State, text: &'static str, warning: bool) {
+        if warning && !text.is_empty() {
+            self.cause = Some(text);
+        } else if to == State::Follow || from == State::Aborted {
+            self.cause = None;
+        }
+    }
+
+    fn entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::Event {
+        let level = match to {
+            State::Aborted | State::Failsafe => Level::Error,
+            State::PilotControl | State::AutopilotSilent | State::PositionLost | State::Alone => {
+                Level::Warning
+            }
+            _ => Level::Info,
+        };
+        let colon = if text.is_empty() { "" } else { ": " };
+        let text = format!("{from:?} → {to:?}{colon}{text}");
+        report::Event { t_s: (now_us as f64 * 1e-6) as f32, vehicle: Some(self.system_id()), level, text }
+    }
+
+    /// How it ended: the state of its mission, and why where it left the usual course.
+    pub fn end(&self) -> String {
+        match (self.killed, self.cause) {
+            (true, _) => "Killed".to_owned(),
+            (false, Some(cause)) => format!("{:?}: {cause}", self.companion.state()),
+            (false, None) => format!("{:?}", self.companion.state()),
+        }
+    }
+
     /// Answers the companion's request for a plan.
     pub fn answer_plan(&mut self, now_us: u64, plan: Result<&OwnPlan, companion::PlanFailure>) {
         self.wants_plan = false;
-        self.companion.handle_plan(Instant::from_micros(now_us), plan);
+        let now = self.companion_now(now_us);
+        self.companion.handle_plan(now, plan);
     }
 
     fn drain(&mut self, now_us: u64, station: usize, radio: &mut Radio, places: &[Point]) {
@@ -140,12 +275,16 @@ impl Member {
     /// What the referee sees.
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.truth();
-        let phase = match (truth.touching, on_path(self.companion.state())) {
+        let state = self.companion.state();
+        let phase = match (truth.touching, on_path(state)) {
+            _ if self.wrecked => Phase::Wreck,
             (true, _) if !truth.armed => Phase::Grounded,
             (false, true) => Phase::Flying,
             _ => Phase::TakeOffOrLanding,
         };
-        Observation { position: truth.position, phase, progress_m: self.companion.progress_m() }
+        // Who stands by order of a person is in no deadlock.
+        let ordered = matches!(state, State::Paused | State::PilotControl);
+        Observation { position: truth.position, phase, ordered, progress_m: self.companion.progress_m() }
     }
 }
 

@@ -4,6 +4,7 @@
 //! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
 //! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and tells nobody.
 
+pub mod faults;
 pub mod ground_station;
 pub mod member;
 pub mod monitor;
@@ -12,19 +13,21 @@ pub mod serial;
 
 use std::time::{Duration, Instant as Clock};
 
-use companion::{Config, Event, PlanFailure, RosterEntry, State};
+use companion::{Config, PlanFailure, RosterEntry, State};
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
+use planner_core::roadmap::RoadmapView;
 
+use self::faults::{Script, World};
 use self::ground_station::GroundStation;
-use self::member::{DeskCompanion, Member, STEP_US, is_finished};
+use self::member::{DeskCompanion, Member, Planner, STEP_US, is_finished};
 use self::monitor::{Monitor, Sample};
 use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
 use crate::map::edt::ClearanceField;
-use crate::mission::{ACCEL_MPS2, Mission, SwarmPlan, VERTICAL_MPS};
+use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
@@ -33,6 +36,11 @@ use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
 const REACHED_M: f32 = 0.5;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
+/// When all have stood still for this long after a fault, no one will fly any more, seconds: longer than from a gate's
+/// opening to the take-off.
+const STILL_S: f64 = 30.0;
+/// `COM_OBL_RC_ACT`, what PX4 does when setpoints stop: 4, land. Its default returns to launch, through the ceilings.
+const OFFBOARD_LOSS: (&str, i32) = ("COM_OBL_RC_ACT", 4);
 
 /// A flown mission.
 pub struct Flight {
@@ -75,6 +83,7 @@ pub fn fly(
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
     let mut monitor = Monitor::new(mission.map.grid(), &field, safety_distance_m, &radii);
     let mut ground_station = GroundStation::new();
+    let mut script = Script::new(scenario);
     let mut log = Vec::new();
     let mut nearest_goal_m = vec![f32::INFINITY; members.len()];
     let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
@@ -82,20 +91,22 @@ pub fn fly(
     let bar = progress.steps("flight", settings.time_limit_s as u64);
     let began = Clock::now();
     let mut ends_at_s = f64::INFINITY;
+    let mut moved_s = 0.0;
     let mut t_s = 0.0;
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
         t_s = now_us as f64 * 1e-6;
+        let mut world =
+            World { members: &mut members, radio: &mut radio, ground_station: &mut ground_station };
+        script.step(now_us, &mut world, &mut log)?;
         for (i, member) in members.iter_mut().enumerate() {
-            let id = scenario.vehicles[i].id;
-            member.step(step, i, &mission.map, &mut radio, &places, |event| {
-                log.extend(log_entry(t_s, id, event));
-            });
-            if member.wants_plan {
-                match mission.own_plan(plan, i) {
-                    Ok(own) => member.answer_plan(now_us, Ok(&own)),
-                    Err(_) => member.answer_plan(now_us, Err(PlanFailure::Capacity)),
-                }
+            member.step(step, i, &mission.map, &mut radio, &places, &mut log);
+            if member.wants_plan && member.planner != Planner::Late {
+                let own = match member.planner {
+                    Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
+                    _ => mission.own_plan(plan, i).map_err(|_| PlanFailure::Capacity),
+                };
+                member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.truth().position;
             if let Some(goal) = plan.flights[i].goal {
@@ -108,10 +119,17 @@ pub fn fly(
         monitor.observe(t_s, &seen);
         if step % 250 == 0 {
             bar.at(t_s as u64);
-            let done = |(m, f): (&Member, &planner_core::schedule::Flight<_>)| {
-                is_finished(m.companion.state()) || (f.goal.is_none() && ground_station.started())
+            let started = ground_station.started();
+            let done = |i: usize| {
+                let at_rest = is_finished(members[i].companion.state()) || members[i].killed();
+                at_rest || (plan.flights[i].goal.is_none() && started) || left_to_pilot(&members[i])
             };
-            if ends_at_s.is_infinite() && members.iter().zip(&plan.flights).all(done) {
+            let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
+            if !(script.is_over() && started && members.iter().all(still)) {
+                moved_s = t_s;
+            }
+            let over = (0..members.len()).all(done) || t_s - moved_s > STILL_S;
+            if ends_at_s.is_infinite() && script.is_over() && over {
                 ends_at_s = t_s + AFTERMATH_S;
             }
         }
@@ -130,6 +148,15 @@ pub fn fly(
     let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
     let all_served = served == mission.goals.len().min(members.len());
     let did_its_task = |v: &VehicleResult| v.goal.is_none() || (v.reached && v.landed);
+    // A vehicle that a fault took out has done what it can when it stayed, or ended in a row of the table.
+    let taken_out = |i: usize| {
+        let member = &members[i];
+        script.struck(i)
+            && (member.killed()
+                || member.took_off_s.is_none()
+                || is_finished(member.companion.state())
+                || left_to_pilot(member))
+    };
     let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
     let finite = |m: f32| m.is_finite().then(|| rounded(m));
     let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
@@ -137,7 +164,9 @@ pub fn fly(
         command,
         scenario: scenario.path.clone(),
         seed: scenario.seed,
-        complete: clean && all_served && vehicles.iter().all(did_its_task),
+        complete: clean
+            && all_served
+            && vehicles.iter().enumerate().all(|(i, v)| did_its_task(v) || taken_out(i)),
         vehicles,
         totals: Totals {
             path_m: rounded(plan.total_m() as f32),
@@ -163,15 +192,21 @@ pub fn fly(
     Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
 }
 
-fn log_entry(t_s: f64, id: u8, event: Event) -> Option<report::Event> {
-    let Event::StateChanged { from, to, text } = event else { return None };
-    let level = match to {
-        State::Aborted | State::Failsafe => Level::Error,
-        State::PilotControl | State::AutopilotSilent | State::PositionLost | State::Alone => Level::Warning,
-        _ => Level::Info,
-    };
-    let text = if text.is_empty() { format!("{from:?} → {to:?}") } else { format!("{from:?} → {to:?}: {text}") };
-    Some(report::Event { t_s: t_s as f32, vehicle: Some(id), level, text })
+/// Whether a pilot has the vehicle: nobody knows for how long.
+fn left_to_pilot(member: &Member) -> bool {
+    member.companion.state() == State::PilotControl
+}
+
+/// What planning on a roadmap with one bit changed comes to.
+fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
+    let mut damaged = file.to_vec();
+    let middle = damaged.len() / 2;
+    damaged[middle] ^= 1;
+    match RoadmapView::parse(&damaged) {
+        Err(_) => Err(PlanFailure::NoRoadmap),
+        // The CRC sees every single bit.
+        Ok(_) => Err(PlanFailure::Invalid),
+    }
 }
 
 fn vehicle_result(
@@ -190,7 +225,7 @@ fn vehicle_result(
         path_m: rounded(flight.path.length_m()),
         flown_m: rounded(flown_m as f32),
         flight_time_s: rounded(flight_time_s as f32),
-        end: format!("{:?}", member.companion.state()),
+        end: member.end(),
     }
 }
 
@@ -228,8 +263,10 @@ fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 seed: scenario.seed,
                 ..autopilot::Config::default()
             };
-            let companion = new_companion(companion_config(mission, vehicle.id)?)?;
-            Member::new(&config, companion, serial, scenario.seed)
+            let mut member =
+                Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
+            member.autopilot.set_parameter(OFFBOARD_LOSS.0, OFFBOARD_LOSS.1)?;
+            Ok(member)
         })
         .collect()
 }
@@ -243,8 +280,8 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
         scenario.vehicles.iter().map(|v| RosterEntry { system_id: v.id, start: v.start }).collect();
     roster.sort_unstable_by_key(|entry| entry.system_id);
     let mut config = Config::new(id, vehicle.start, scenario.map.origin);
-    config.roster = heapless::Vec::from_slice(&roster)
-        .map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
+    config.roster =
+        heapless::Vec::from_slice(&roster).map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
     config.mission_crc = mission.crc();
     config.cruise_mps = scenario.mission.cruise_mps.min(vehicle.speed_max_mps);
     config.climb_mps = VERTICAL_MPS;
@@ -262,6 +299,7 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
 /// # Errors
 /// The configuration names what is wrong.
 pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
-    let companion = DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
+    let companion =
+        DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))
 }

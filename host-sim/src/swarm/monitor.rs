@@ -1,7 +1,8 @@
 //! The referee: looks at the true motion at every physics step and knows nothing of what companions believe.
 //!
 //! A wall contact is a body (a sphere of the vehicle's radius) that reaches into an obstacle of the exact map; one that lasts
-//! counts once. While a vehicle takes off or lands, what lies below its centre is the floor it stands on and no wall.
+//! counts once. While a vehicle takes off or lands, what lies below its centre is the floor it stands on and no wall. A
+//! wreck is an obstacle too: to touch it is a contact, to pass near it no violation.
 
 use planner_core::Point;
 use planner_core::segment::point_clearance;
@@ -27,6 +28,8 @@ pub enum Phase {
     TakeOffOrLanding,
     /// On its path.
     Flying,
+    /// Fell without its motors: an obstacle to the others from then on.
+    Wreck,
 }
 
 /// One vehicle at one step.
@@ -36,6 +39,8 @@ pub struct Observation {
     pub position: Point,
     /// What it is doing.
     pub phase: Phase,
+    /// Whether it stands by order of a person.
+    pub ordered: bool,
     /// Arc length along its path, metres.
     pub progress_m: f32,
 }
@@ -91,7 +96,12 @@ pub struct Monitor<'a> {
 
 impl<'a> Monitor<'a> {
     /// Watches vehicles of these radii.
-    pub fn new(grid: VoxelGrid<'a>, field: &'a ClearanceField, safety_distance_m: f32, radii_m: &[f32]) -> Self {
+    pub fn new(
+        grid: VoxelGrid<'a>,
+        field: &'a ClearanceField,
+        safety_distance_m: f32,
+        radii_m: &[f32],
+    ) -> Self {
         let watched = |&radius_m: &f32| Watched {
             radius_m,
             last: None,
@@ -152,7 +162,7 @@ impl<'a> Monitor<'a> {
     }
 
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
-        if now.phase == Phase::Grounded {
+        if matches!(now.phase, Phase::Grounded | Phase::Wreck) {
             return;
         }
         let radius_m = self.vehicles[i].radius_m;
@@ -206,16 +216,31 @@ impl<'a> Monitor<'a> {
         let n = seen.len();
         for i in 0..n {
             for j in 0..i {
-                if seen[i].phase == Phase::Grounded && seen[j].phase == Phase::Grounded {
+                let rests = |k: usize| matches!(seen[k].phase, Phase::Grounded | Phase::Wreck);
+                if rests(i) && rests(j) {
                     continue;
                 }
                 let apart = (seen[i].position - seen[j].position).norm();
+                if seen[i].phase == Phase::Wreck || seen[j].phase == Phase::Wreck {
+                    let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
+                    if touches && !std::mem::replace(&mut self.too_near[i * n + j], touches) {
+                        self.wall_contacts += 1;
+                        let (flier, wreck) = if seen[i].phase == Phase::Wreck { (j, i) } else { (i, j) };
+                        let text = format!("touches the wreck of vehicle no. {}", wreck + 1);
+                        self.incidents.push((t_s, flier, text));
+                    }
+                    continue;
+                }
                 self.window.separation_m = self.window.separation_m.min(apart);
                 let near = apart < self.safety_distance_m;
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
                     self.violations += 1;
-                    self.incidents.push((t_s, i, format!("nearer than the safety distance to vehicle no. {}", j + 1)));
+                    self.incidents.push((
+                        t_s,
+                        i,
+                        format!("nearer than the safety distance to vehicle no. {}", j + 1),
+                    ));
                 }
             }
         }
@@ -225,7 +250,7 @@ impl<'a> Monitor<'a> {
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         let moved = now.progress_m > vehicle.best_progress_m + PROGRESS_M;
-        if now.phase != Phase::Flying || moved {
+        if now.phase != Phase::Flying || now.ordered || moved {
             vehicle.best_progress_m = vehicle.best_progress_m.max(now.progress_m);
             vehicle.progressed_s = t_s;
             vehicle.stuck = false;
@@ -266,7 +291,7 @@ mod tests {
     }
 
     fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
-        Observation { position: Point::new(x, y, z), phase, progress_m: x }
+        Observation { position: Point::new(x, y, z), phase, ordered: false, progress_m: x }
     }
 
     #[test]
@@ -298,13 +323,25 @@ mod tests {
     #[test]
     fn a_near_pair_is_one_violation_unless_both_stand() {
         with_monitor(|mut monitor| {
-            let pair = |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
+            let pair =
+                |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
             monitor.observe(0.0, &pair(1.0, Phase::Grounded));
             assert_eq!(monitor.violations, 0);
             monitor.observe(0.1, &pair(1.4, Phase::Flying));
             monitor.observe(0.2, &pair(1.3, Phase::Flying));
             assert_eq!(monitor.violations, 1);
             assert!((monitor.min_separation_m - 1.3).abs() < 1e-6);
+        });
+    }
+
+    #[test]
+    fn a_wreck_may_be_passed_near_but_not_touched() {
+        with_monitor(|mut monitor| {
+            let wreck = at(2.0, 2.0, 1.5, Phase::Wreck);
+            for (step, z) in [3.0, 2.6, 2.4, 2.3, 2.6].into_iter().enumerate() {
+                monitor.observe(step as f64 * 0.004, &[at(2.0, 2.0, z, Phase::Flying), wreck]);
+            }
+            assert_eq!((monitor.wall_contacts, monitor.violations), (1, 0));
         });
     }
 

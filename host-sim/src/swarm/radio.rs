@@ -19,11 +19,21 @@ pub struct RadioConfig {
     pub delay_s: f64,
 }
 
+/// What a station cannot do.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cut {
+    /// It sends nothing.
+    pub tx: bool,
+    /// It hears nothing.
+    pub rx: bool,
+}
+
 /// A radio shared by a number of stations; time in microseconds since the start of the simulation.
 #[derive(Debug)]
 pub struct Radio {
     config: RadioConfig,
     rng: Pcg32,
+    cuts: Vec<Cut>,
     under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
 }
 
@@ -31,17 +41,26 @@ impl Radio {
     /// A silent radio with `stations` receivers.
     pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
         let under_way = (0..stations).map(|_| VecDeque::new()).collect();
-        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), under_way }
+        let cuts = vec![Cut::default(); stations];
+        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way }
+    }
+
+    /// Cuts a station off, or joins it again.
+    pub fn cut(&mut self, station: usize, cut: Cut) {
+        self.cuts[station] = cut;
     }
 
     /// Sends a packet from a place to every other station; `from` is `None` for one that only sends (the ground).
     pub fn broadcast(&mut self, now_us: u64, from: Option<usize>, places: &[Point], packet: &[u8]) {
+        if from.is_some_and(|from| self.cuts[from].tx) {
+            return;
+        }
         let packet: Rc<[u8]> = packet.into();
         let hears_us = now_us + (self.config.delay_s * 1e6) as u64;
         for (to, queue) in self.under_way.iter_mut().enumerate() {
             let in_range = |from: usize| (places[from] - places[to]).norm() <= self.config.range_m;
             let lost = self.config.loss > 0.0 && unit(&mut self.rng) < self.config.loss;
-            if from != Some(to) && from.is_none_or(in_range) && !lost {
+            if from != Some(to) && from.is_none_or(in_range) && !lost && !self.cuts[to].rx {
                 queue.push_back((hears_us, Rc::clone(&packet)));
             }
         }
@@ -69,6 +88,18 @@ mod tests {
         assert!(radio.receive(49_999, 1).is_none());
         assert_eq!(radio.receive(50_000, 1).as_deref(), Some(&b"hello"[..]));
         assert!(radio.receive(50_000, 0).is_none() && radio.receive(50_000, 2).is_none());
+    }
+
+    #[test]
+    fn a_cut_station_does_not_send_or_does_not_hear() {
+        let places = [Point::zeros(); 3];
+        let mut radio = Radio::new(CONFIG, 3, 1);
+        radio.cut(0, Cut { tx: true, rx: false });
+        radio.cut(2, Cut { tx: false, rx: true });
+        radio.broadcast(0, Some(0), &places, b"unheard");
+        assert!(radio.receive(50_000, 1).is_none());
+        radio.broadcast(0, Some(1), &places, b"heard");
+        assert!(radio.receive(50_000, 0).is_some() && radio.receive(50_000, 2).is_none());
     }
 
     #[test]

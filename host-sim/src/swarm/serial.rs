@@ -84,6 +84,11 @@ impl SerialLink {
         }
     }
 
+    /// Changes the share of bytes that arrive changed.
+    pub fn corrupt(&mut self, corruption: f64) {
+        self.config.corruption = corruption;
+    }
+
     /// Delivers nothing until `until_us`.
     pub fn stall(&mut self, until_us: u64) {
         self.stalled_until_us = until_us;

@@ -1,0 +1,30 @@
+//! What passes between the companion and its shell beside bytes.
+
+use crate::mission::State;
+
+/// One of the two ports.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// The serial port to the flight controller.
+    Autopilot,
+    /// The radio to the swarm and the ground station.
+    Swarm,
+}
+
+/// What the shell should know.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Event {
+    /// Plan, and answer with [`crate::Companion::handle_plan`].
+    PlanRequested,
+    /// The mission moved on.
+    StateChanged {
+        /// Before.
+        from: State,
+        /// After.
+        to: State,
+        /// The row's text, empty if it has none.
+        text: &'static str,
+        /// Whether the row is a warning: the mission leaves its usual course.
+        warning: bool,
+    },
+}

@@ -1,0 +1,166 @@
+//! The script player: strikes vehicles with the scenario's `[[faults]]` at their times and takes back what ends.
+//!
+//! | kind | strikes | ends after `duration_s` |
+//! |---|---|---|
+//! | `kill` | all power gone: silent, falls to the floor below and lies there | never |
+//! | `radio-cut` | sends (`tx`), hears (`rx`) or does neither (`both`, if not given) | hears and sends again |
+//! | `serial-stall` | no byte between companion and autopilot, either way | 3 s if not given |
+//! | `serial-corrupt` | [`CORRUPTION`] of all bytes change a bit | as before |
+//! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
+//! | `origin-change` | the EKF origin moves by `offset_m`, [`ORIGIN_MOVES_M`] if not given | moves back |
+//! | `gps-loss` | no position | position again |
+//! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
+//! | `pilot-takeover` | Position mode by the pilot's switch | as `pilot-return` |
+//! | `pilot-return` | Offboard by the pilot's switch, and the ground station tells the companion to go on | |
+//! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
+//! | `companion-reset` | a new companion with a new clock | |
+//! | `late-plan` | who asks for a plan gets no answer | answered |
+//! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
+//!
+//! A fault without a vehicle strikes all.
+
+use planner_core::Point;
+
+use super::ground_station::GroundStation;
+use super::member::{Member, Planner};
+use super::radio::{Cut, Radio};
+use crate::autopilot::Mode;
+use crate::report::{Event, Level};
+use crate::scenario::{Fault, Scenario};
+
+/// Share of bytes changed by `serial-corrupt`: half of all frames of a setpoint's length are lost.
+const CORRUPTION: f64 = 0.01;
+/// Charge left by `battery-low`: below the companions' limit, above the autopilots'.
+const BATTERY_LEFT: f32 = 0.1;
+/// Where `position-jump` moves the estimate.
+const JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
+/// Where `origin-change` moves the origin.
+const ORIGIN_MOVES_M: Point = Point::new(40.0, -30.0, 5.0);
+/// How long a stall or a boot lasts where the script does not say, seconds.
+const SPELL_S: f32 = 3.0;
+
+/// What a fault acts on.
+pub struct World<'a> {
+    /// The vehicles, in the order of the scenario.
+    pub members: &'a mut [Member],
+    /// What carries their words.
+    pub radio: &'a mut Radio,
+    /// Who tells them to go on.
+    pub ground_station: &'a mut GroundStation,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    Ahead,
+    Acting,
+    Over,
+}
+
+/// The scenario's faults and how far they have come.
+pub struct Script<'a> {
+    scenario: &'a Scenario,
+    stages: Vec<Stage>,
+    struck: Vec<bool>,
+}
+
+impl<'a> Script<'a> {
+    /// A script of which nothing has happened yet.
+    pub fn new(scenario: &'a Scenario) -> Self {
+        Self {
+            scenario,
+            stages: vec![Stage::Ahead; scenario.faults.len()],
+            struck: vec![false; scenario.vehicles.len()],
+        }
+    }
+
+    /// Whether a fault has struck the vehicle.
+    pub fn struck(&self, vehicle: usize) -> bool {
+        self.struck[vehicle]
+    }
+
+    /// Whether nothing is left to happen.
+    pub fn is_over(&self) -> bool {
+        let ends = |fault: &Fault| fault.duration_s.is_some();
+        let mut pairs = self.scenario.faults.iter().zip(&self.stages);
+        pairs.all(|(fault, stage)| *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault)))
+    }
+
+    /// Lets begin and end what is due; tells each.
+    pub fn step(&mut self, now_us: u64, world: &mut World<'_>, log: &mut Vec<Event>) -> anyhow::Result<()> {
+        let t_s = (now_us as f64 * 1e-6) as f32;
+        for (fault, stage) in self.scenario.faults.iter().zip(&mut self.stages) {
+            let ends_s = fault.duration_s.map_or(f32::INFINITY, |lasts_s| fault.at_s + lasts_s);
+            let next = match *stage {
+                Stage::Ahead if t_s >= fault.at_s => Stage::Acting,
+                Stage::Acting if t_s >= ends_s => Stage::Over,
+                _ => continue,
+            };
+            *stage = next;
+            for (i, vehicle) in self.scenario.vehicles.iter().enumerate() {
+                if fault.vehicle.is_some_and(|id| id != vehicle.id) {
+                    continue;
+                }
+                let done = if next == Stage::Acting {
+                    self.struck[i] = true;
+                    begin(fault, i, now_us, world)?;
+                    "begins"
+                } else {
+                    end(fault, i, now_us, world, f64::from(self.scenario.simulation.serial_corruption));
+                    "ends"
+                };
+                let text = format!("fault {done}: {}", fault.kind);
+                log.push(Event { t_s, vehicle: Some(vehicle.id), level: Level::Warning, text });
+            }
+        }
+        Ok(())
+    }
+}
+
+fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow::Result<()> {
+    let member = &mut world.members[i];
+    let spell_us = now_us + (fault.duration_s.unwrap_or(SPELL_S) * 1e6) as u64;
+    match fault.kind {
+        "kill" => {
+            world.radio.cut(i, Cut { tx: true, rx: true });
+            member.kill();
+        }
+        "radio-cut" => {
+            let way = fault.direction.as_deref().unwrap_or("both");
+            world.radio.cut(i, Cut { tx: way != "rx", rx: way != "tx" });
+        }
+        "serial-stall" => member.stall(spell_us),
+        "serial-corrupt" => member.corrupt(CORRUPTION),
+        "position-jump" => member.autopilot.jump_position(&fault.offset_m.unwrap_or(JUMP_M)),
+        "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_MOVES_M)),
+        "gps-loss" => member.autopilot.set_gps_ok(false),
+        "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
+        "pilot-takeover" => member.autopilot.set_pilot_mode(Mode::Position),
+        "pilot-return" => give_back(i, now_us, world),
+        "autopilot-reboot" => member.reboot_autopilot(spell_us),
+        "companion-reset" => member.reset_companion(now_us)?,
+        "late-plan" => member.planner = Planner::Late,
+        "bad-roadmap" => member.planner = Planner::BadRoadmap,
+        kind => anyhow::bail!("no fault of this kind can be played: {kind}"),
+    }
+    Ok(())
+}
+
+fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: f64) {
+    let member = &mut world.members[i];
+    match fault.kind {
+        "radio-cut" => world.radio.cut(i, Cut::default()),
+        "serial-corrupt" => member.corrupt(corruption),
+        "position-jump" => member.autopilot.jump_position(&-fault.offset_m.unwrap_or(JUMP_M)),
+        "origin-change" => member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_MOVES_M)),
+        "gps-loss" => member.autopilot.set_gps_ok(true),
+        "pilot-takeover" => give_back(i, now_us, world),
+        "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
+        // The others end by themselves, or never.
+        _ => {}
+    }
+}
+
+fn give_back(i: usize, now_us: u64, world: &mut World<'_>) {
+    world.members[i].autopilot.set_pilot_mode(Mode::Offboard);
+    world.ground_station.resume(now_us, i);
+}
