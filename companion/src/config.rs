@@ -41,7 +41,8 @@ pub struct Config<const V: usize> {
     pub method: Method,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.
     pub start_tolerance_m: f32,
-    /// Battery charge at which it lands, percent; 0 never.
+    /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
+    /// percent; 0 never.
     pub battery_low_percent: i8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,

@@ -31,6 +31,8 @@ const RETRY_EVERY: Duration = Duration::from_millis(1000);
 const DISARM_AFTER: Duration = Duration::from_millis(4000);
 /// Streams asked for at each step while connecting.
 const SETUP_BURST: usize = 5;
+/// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
+const LANDING_DRIFT_M: f32 = 1.0;
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
@@ -364,6 +366,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let away = t.position - self.start;
         let follow = self.state == State::Follow;
         let fence = self.config.geofence;
+        let charge_below = |percent| (0..percent).contains(&t.battery_percent);
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
         Inputs {
@@ -398,8 +401,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 State::PositionLost => self.guidance.near_path(&scene, LOST_WINDOW_M),
                 _ => false,
             },
-            battery_low: (0..=100).contains(&t.battery_percent)
-                && t.battery_percent < self.config.battery_low_percent,
+            battery_low: charge_below(self.config.battery_low_percent),
+            battery_critical: charge_below(self.config.battery_low_percent / 2),
+            room_below: !self
+                .neighbours
+                .any_below(&t.position, self.config.safety_distance_m + LANDING_DRIFT_M),
             outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
         }
     }

@@ -117,7 +117,9 @@ pub enum Guard {
     LandCommanded,
     /// NAV_RETURN_TO_LAUNCH.
     ReturnCommanded,
-    /// Battery charge at or below the configured one.
+    /// Battery charge below half of the configured limit.
+    BatteryCritical,
+    /// Battery charge below the configured limit, and no neighbour below.
     BatteryLow,
     /// Outside the configured volume.
     OutsideGeofence,
@@ -238,8 +240,12 @@ pub struct Inputs {
     pub path_done: bool,
     /// The way back to the path is free.
     pub near_path: bool,
-    /// Battery low.
+    /// Battery charge below the configured limit.
     pub battery_low: bool,
+    /// Battery charge below half of it.
+    pub battery_critical: bool,
+    /// No neighbour is in the column to the ground.
+    pub room_below: bool,
     /// Outside the geofence.
     pub outside: bool,
 }
@@ -284,7 +290,8 @@ impl Guard {
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
             Self::LandCommanded => i.land,
             Self::ReturnCommanded => i.turn_back,
-            Self::BatteryLow => i.battery_low,
+            Self::BatteryCritical => i.battery_critical,
+            Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::NeighbourHeard => i.neighbour_heard,
@@ -368,6 +375,7 @@ pub static TABLE: &[Row] = &[
     // Orders and limits in flight.
     info(SOUND,               G::LandCommanded,    NOW,    Land,            A::AskLand,     "Landing as commanded"),
     info(&[PositionLost, AutopilotSilent], G::LandCommanded, NOW, Land,     A::AskLand,     "Landing as commanded"),
+    warn(SOUND,               G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
     warn(SOUND,               G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
     info(&[Follow, Paused, Alone], G::ReturnCommanded, NOW, Follow,         A::TurnBack,    "Flying back to the start"),

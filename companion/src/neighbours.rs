@@ -164,6 +164,12 @@ impl<const V: usize> Neighbours<V> {
         roster.filter_map(|c| c.heard_at).any(|at| now - at < span)
     }
 
+    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
+    pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
+        let under = |p: &Point| p.z < position.z && (p - position).xy().norm() < within_m;
+        self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
+    }
+
     /// Time since any neighbour of the roster was heard; zero when all of them have landed, or there are none. Where
     /// none was ever heard, the time since `since`.
     pub fn silence(&self, now: Instant, since: Instant) -> Duration {
@@ -216,6 +222,16 @@ mod tests {
         assert!((heard.position - Point::new(0.0, 11.1, 2.5)).norm() < 0.02, "{:?}", heard.position);
         assert!((heard.velocity - Point::new(-0.5, 1.5, -0.2)).norm() < 1e-5);
         assert!((heard.age_s - 0.5).abs() < 1e-6);
+    }
+
+    #[test]
+    fn below_is_lower_and_near_the_vertical() {
+        let mut table = table();
+        let above = Point::new(0.0, 1.0, 9.0);
+        assert!(!table.any_below(&above, 2.0), "nobody was heard");
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
+        assert!(table.any_below(&above, 2.0));
+        assert!(!table.any_below(&Point::new(0.0, 3.0, 9.0), 2.0) && !table.any_below(&Point::zeros(), 2.0));
     }
 
     #[test]

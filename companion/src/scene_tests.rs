@@ -119,6 +119,7 @@ fn every_row_has_its_scene() {
         Done,
         30.0,
     );
+    scene(flying(), &|b| b.battery = 10, Done, 30.0);
     scene(flying(), &|b| b.battery = 5, Done, 30.0);
     let mut fenced = config();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));

@@ -277,7 +277,7 @@ impl Member {
         let truth = self.autopilot.truth();
         let state = self.companion.state();
         let phase = match (truth.touching, on_path(state)) {
-            _ if self.wrecked => Phase::Wreck,
+            (touching, _) if self.wrecked => if touching { Phase::Wreck } else { Phase::Falling },
             (true, _) if !truth.armed => Phase::Grounded,
             (false, true) => Phase::Flying,
             _ => Phase::TakeOffOrLanding,

@@ -28,7 +28,9 @@ pub enum Phase {
     TakeOffOrLanding,
     /// On its path.
     Flying,
-    /// Fell without its motors: an obstacle to the others from then on.
+    /// Falls without its motors.
+    Falling,
+    /// Fell: an obstacle to the others from then on.
     Wreck,
 }
 
@@ -162,7 +164,7 @@ impl<'a> Monitor<'a> {
     }
 
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
-        if matches!(now.phase, Phase::Grounded | Phase::Wreck) {
+        if matches!(now.phase, Phase::Grounded | Phase::Falling | Phase::Wreck) {
             return;
         }
         let radius_m = self.vehicles[i].radius_m;
@@ -216,20 +218,17 @@ impl<'a> Monitor<'a> {
         let n = seen.len();
         for i in 0..n {
             for j in 0..i {
-                let rests = |k: usize| matches!(seen[k].phase, Phase::Grounded | Phase::Wreck);
-                if rests(i) && rests(j) {
-                    continue;
-                }
                 let apart = (seen[i].position - seen[j].position).norm();
-                if seen[i].phase == Phase::Wreck || seen[j].phase == Phase::Wreck {
-                    let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
-                    if touches && !std::mem::replace(&mut self.too_near[i * n + j], touches) {
-                        self.wall_contacts += 1;
-                        let (flier, wreck) = if seen[i].phase == Phase::Wreck { (j, i) } else { (i, j) };
-                        let text = format!("touches the wreck of vehicle no. {}", wreck + 1);
-                        self.incidents.push((t_s, flier, text));
+                let rests = |phase| matches!(phase, Phase::Grounded | Phase::Wreck);
+                let out = |phase| matches!(phase, Phase::Falling | Phase::Wreck);
+                match (seen[i].phase, seen[j].phase) {
+                    (a, b) if rests(a) && rests(b) => continue,
+                    (a, b) if out(a) || out(b) => {
+                        let (flier, wreck) = if out(a) { (j, i) } else { (i, j) };
+                        self.watch_wreck(t_s, flier, wreck, seen[wreck].phase, apart);
+                        continue;
                     }
-                    continue;
+                    _ => {}
                 }
                 self.window.separation_m = self.window.separation_m.min(apart);
                 let near = apart < self.safety_distance_m;
@@ -245,6 +244,18 @@ impl<'a> Monitor<'a> {
             }
         }
         self.min_separation_m = self.min_separation_m.min(self.window.separation_m);
+    }
+
+    /// A wreck is no neighbour to keep the safety distance from, but an obstacle not to touch.
+    fn watch_wreck(&mut self, t_s: f64, flier: usize, wreck: usize, phase: Phase, apart_m: f32) {
+        let pair = flier.max(wreck) * self.vehicles.len() + flier.min(wreck);
+        let touches = apart_m < self.vehicles[flier].radius_m + self.vehicles[wreck].radius_m;
+        if std::mem::replace(&mut self.too_near[pair], touches) || !touches {
+            return;
+        }
+        self.wall_contacts += 1;
+        let what = if phase == Phase::Falling { "is hit by falling" } else { "touches the wreck of" };
+        self.incidents.push((t_s, flier, format!("{what} vehicle no. {}", wreck + 1)));
     }
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
