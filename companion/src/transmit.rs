@@ -51,18 +51,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let stop = (still, still, still, px4::MASK_VELOCITY);
-        let (position, velocity, acceleration, mask) =
-            match self.guidance.setpoint(self.state, &self.scene()) {
-                Setpoint::None => return None,
-                Setpoint::Stop => stop,
-                Setpoint::Move(position, velocity, acceleration) => {
-                    self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
-                        let (velocity, acceleration) =
-                            (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
-                        (ned, velocity, acceleration, px4::MASK_POSITION_VELOCITY_ACCELERATION)
-                    })
-                }
-            };
+        let (position, velocity, acceleration, mask) = match self.guidance.setpoint(self.state, &self.scene())
+        {
+            Setpoint::None => return None,
+            Setpoint::Stop => stop,
+            Setpoint::Move(position, velocity, acceleration) => {
+                self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
+                    let (velocity, acceleration) =
+                        (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
+                    (ned, velocity, acceleration, px4::MASK_POSITION_VELOCITY_ACCELERATION)
+                })
+            }
+        };
         Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.now.boot_ms(),
             x: position.x,

@@ -4,6 +4,7 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use planner_core::Point;
+use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::prm::Config;
 use planner_core::roadmap::{RoadmapHeader, RoadmapView};
@@ -139,6 +140,13 @@ impl Mission {
     pub fn index_of(&self, id: u8) -> anyhow::Result<usize> {
         let index = self.tasks.iter().position(|task| task.id == id);
         index.ok_or_else(|| anyhow!("no vehicle has id {id}: {}", self.scenario.path))
+    }
+
+    /// Where the centre of a vehicle's body is while it stands on its pad.
+    pub fn pad(&self, index: usize) -> Geodetic {
+        let start = self.scenario.vehicles[index].start;
+        let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);
+        enu_to_geodetic(&self.scenario.map.origin, &pad)
     }
 
     /// CRC-32 of what all companions must agree on: roadmap, tasks, goals and separation.
