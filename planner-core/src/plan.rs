@@ -5,7 +5,7 @@
 //! assignment of least total length over all pairs (unlabelled); what the paper leaves out is the order at shared stretches,
 //! which [`crate::schedule`] settles.
 //!
-//! Cost: one Dijkstra row per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A* and one pass
+//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A* and one pass
 //! over all scheduled pieces per vehicle.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -102,10 +102,11 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Scratch of [`plan_swarm`] for roadmaps of `N` nodes and swarms of `V` vehicles and goals.
+/// Scratch of [`plan_swarm`] and its steps, for roadmaps of `N` nodes and swarms of `V` vehicles and goals.
 pub struct PlanWorkspace<const N: usize, const V: usize> {
     search: SearchWorkspace<N>,
     assignment: AssignmentWorkspace<V>,
+    /// Starts × goals, packed from the front.
     costs: [[f32; V]; V],
     /// Scratch of the schedule, also for [`vehicle_plan`].
     pub schedule: ScheduleWorkspace,
@@ -129,12 +130,29 @@ impl<const N: usize, const V: usize> Default for PlanWorkspace<N, V> {
     }
 }
 
-/// Plans the whole swarm. Vehicles and goals that cannot be served are left out, the rest is served as well as can be.
+/// Plans the whole swarm: [`costs`], then [`assign`], then [`schedule()`]. Vehicles and goals that cannot be served are
+/// left out, the rest is served as well as can be.
 pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V>,
     out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    let mut goals = Goals::new();
+    costs(view, request, ws)?;
+    assign(request, ws, &mut goals)?;
+    schedule(view, request, &goals, ws, out)
+}
+
+/// The goal of each vehicle of a request, `None` for one that stays on its pad.
+pub type Goals<const V: usize> = Vec<Option<u16>, V>;
+
+/// First step: the length of the shortest path from every start to every goal, into the workspace; labelled, only to
+/// the vehicle's own goal. One search a vehicle, or one cost matrix where all are of one size.
+pub fn costs<const N: usize, const V: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V>,
 ) -> Result<(), PlanError> {
     let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
     let header = view.header();
@@ -144,22 +162,87 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
     if starts > V || goals > V {
         return Err(PlanError::SwarmFull);
     }
-    let mut assigned: Vec<Option<u16>, V> = Vec::new();
-    assign(view, request, ws, &mut assigned)?;
-    out.flights.clear();
+    // Cannot overflow: both numbers are at most `V`.
+    let nodes: Vec<u16, V> = (0..starts as u16).collect();
+    let targets: Vec<u16, V> = (starts as u16..(starts + goals) as u16).collect();
+    let costs = &mut ws.costs.as_flattened_mut()[..starts * goals];
+    let Some(first) = request.vehicles.first() else { return Ok(()) };
+    let labelled = request.mode == Mode::Labelled;
+    if !labelled && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m) {
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, first.required_clearance_m);
+        return search::cost_matrix(view, &nodes, &targets, passable, &mut ws.search, costs)
+            .map_err(|e| PlanError::Search(first.id, e));
+    }
     for (i, vehicle) in request.vehicles.iter().enumerate() {
+        let row = &mut costs[i * goals..(i + 1) * goals];
+        let wanted = match (labelled, vehicle.goal.map(usize::from)) {
+            (false, _) => 0..goals,
+            (true, Some(goal)) if goal < goals => goal..goal + 1,
+            (true, Some(_)) => return Err(PlanError::BadGoal(vehicle.id)),
+            (true, None) => continue,
+        };
+        let (targets, row) = (&targets[wanted.clone()], &mut row[wanted]);
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
+        search::dijkstra_row(view, i as u16, targets, passable, &mut ws.search, row)
+            .map_err(|e| PlanError::Search(vehicle.id, e))?;
+    }
+    Ok(())
+}
+
+/// Second step: who flies to which goal, from the costs left in the workspace by [`costs`].
+pub fn assign<const N: usize, const V: usize>(
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V>,
+    assigned: &mut Goals<V>,
+) -> Result<(), PlanError> {
+    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
+    if starts > V || goals > V {
+        return Err(PlanError::SwarmFull);
+    }
+    let costs = &ws.costs.as_flattened()[..starts * goals];
+    assigned.clear();
+    let _ = assigned.resize(starts, None);
+    let solve = match request.mode {
+        Mode::Unlabelled(Objective::TotalDistance) => assignment::assign,
+        Mode::Unlabelled(Objective::Makespan) => assignment::bottleneck,
+        Mode::Labelled => {
+            for (i, vehicle) in request.vehicles.iter().enumerate() {
+                let Some(goal) = vehicle.goal else { continue };
+                let row = &costs[i * goals..(i + 1) * goals];
+                let cost = row.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?;
+                assigned[i] = cost.is_finite().then_some(goal);
+            }
+            return Ok(());
+        }
+    };
+    solve(costs, starts, goals, &mut ws.assignment, assigned).map_err(PlanError::Assignment)?;
+    Ok(())
+}
+
+/// Third step: the paths to the `assigned` goals and their order at shared stretches.
+pub fn schedule<const N: usize, const V: usize, const W: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    assigned: &Goals<V>,
+    ws: &mut PlanWorkspace<N, V>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    if assigned.len() != request.vehicles.len() || usize::from(view.header().starts) != assigned.len() {
+        return Err(PlanError::Terminals);
+    }
+    out.flights.clear();
+    for (i, (vehicle, &goal)) in request.vehicles.iter().zip(assigned).enumerate() {
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
-        let descent_m = assigned[i].map_or(0.0, |goal| request.descents_m[usize::from(goal)]);
-        let flight = Flight {
-            id: vehicle.id,
-            goal: assigned[i],
-            path,
-            climb_m: vehicle.climb_m,
-            descent_m,
-            depart_s: 0.0,
+        let descent_m = match goal {
+            Some(goal) => {
+                *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?
+            }
+            None => 0.0,
         };
-        // Cannot overflow: `starts` is at most `V`.
+        let (id, climb_m) = (vehicle.id, vehicle.climb_m);
+        let flight = Flight { id, goal, path, climb_m, descent_m, depart_s: 0.0 };
+        // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     schedule_all(view, request, ws, out)?;
@@ -183,46 +266,6 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out.plan_crc = plan.crc;
     let others = plan.flights.iter().enumerate().filter(|&(i, _)| i != index).map(|(_, f)| f);
     schedule::gates(cfg, flight, others, ws, &mut out.gates)
-}
-
-fn assign<const N: usize, const V: usize>(
-    view: &RoadmapView<'_>,
-    request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
-    assigned: &mut Vec<Option<u16>, V>,
-) -> Result<(), PlanError> {
-    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
-    let mut targets: Vec<u16, V> = Vec::new();
-    // Cannot overflow: `goals` is at most `V`.
-    let _ = targets.extend_from_slice(&[0; V][..goals]);
-    for (g, target) in targets.iter_mut().enumerate() {
-        *target = (starts + g) as u16;
-    }
-    let _ = assigned.resize(starts, None);
-    for (i, vehicle) in request.vehicles.iter().enumerate() {
-        let row = &mut ws.costs[i][..goals];
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
-        search::dijkstra_row(view, i as u16, &targets, passable, &mut ws.search, row)
-            .map_err(|e| PlanError::Search(vehicle.id, e))?;
-        if request.mode == Mode::Labelled {
-            let Some(goal) = vehicle.goal else { continue };
-            let cost = row.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?;
-            assigned[i] = cost.is_finite().then_some(goal);
-        }
-    }
-    let Mode::Unlabelled(objective) = request.mode else { return Ok(()) };
-    // Pack the rows: the assignment reads a dense matrix.
-    let costs = ws.costs.as_flattened_mut();
-    for i in 0..starts {
-        costs.copy_within(i * V..i * V + goals, i * goals);
-    }
-    let costs = &costs[..starts * goals];
-    let solve = match objective {
-        Objective::TotalDistance => assignment::assign,
-        Objective::Makespan => assignment::bottleneck,
-    };
-    solve(costs, starts, goals, &mut ws.assignment, assigned).map_err(PlanError::Assignment)?;
-    Ok(())
 }
 
 /// Schedules the longest path first; who cannot be fitted in goes first in the next round.
