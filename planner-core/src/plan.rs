@@ -235,9 +235,7 @@ pub fn schedule<const N: usize, const V: usize, const W: usize>(
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
         let descent_m = match goal {
-            Some(goal) => {
-                *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?
-            }
+            Some(goal) => *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?,
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
