@@ -79,7 +79,8 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 /// Each edge with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`].
 fn annotate(grid: &VoxelGrid<'_>, nodes: &[Point], edges: &[prm::Edge]) -> Vec<Edge> {
     let clearance = |edge| {
-        prm::edge_clearance(grid, nodes, edge, CLEARANCE_MAX_M).expect("both ends of an edge we found are nodes")
+        prm::edge_clearance(grid, nodes, edge, CLEARANCE_MAX_M)
+            .expect("both ends of an edge we found are nodes")
     };
     edges
         .par_iter()
