@@ -47,6 +47,8 @@ pub struct Mission {
     pub roadmap: Roadmap,
     /// The roadmap as the file on the board.
     pub roadmap_file: Vec<u8>,
+    /// The CRC-32 at its end.
+    pub roadmap_crc: u32,
     /// The vehicles' tasks, in the order of the scenario.
     pub tasks: Vec<VehicleTask>,
     /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
@@ -89,9 +91,10 @@ impl Mission {
             .collect::<anyhow::Result<_>>()?;
         let (roadmap, header) = build(&scenario, &map, &goals)?;
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
+        let roadmap_crc = parsed(&roadmap_file).crc();
         timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
-        Ok(Self { scenario, map, goals, roadmap, roadmap_file, tasks, descents_m, schedule, timing })
+        Ok(Self { scenario, map, goals, roadmap, roadmap_file, roadmap_crc, tasks, descents_m, schedule, timing })
     }
 
     /// Plans the whole swarm as every companion does.
@@ -128,9 +131,9 @@ impl Mission {
         Ok(own)
     }
 
-    /// The roadmap as a board reads it.
+    /// The roadmap as a board reads it; the whole file is checked at each call.
     pub fn view(&self) -> RoadmapView<'_> {
-        RoadmapView::parse(&self.roadmap_file).expect("we wrote it ourselves")
+        parsed(&self.roadmap_file)
     }
 
     /// Its size.
@@ -162,7 +165,7 @@ impl Mission {
     pub fn crc(&self) -> u32 {
         const CRC32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
         let mut digest = CRC32.digest();
-        digest.update(&self.view().crc().to_le_bytes());
+        digest.update(&self.roadmap_crc.to_le_bytes());
         for task in &self.tasks {
             digest.update(&[task.id]);
             digest.update(&task.goal.unwrap_or(u16::MAX).to_le_bytes());
@@ -173,6 +176,10 @@ impl Mission {
         }
         digest.finalize()
     }
+}
+
+fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {
+    RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 
 fn planner_mode(mission: &scenario::Mission) -> Mode {
