@@ -8,3 +8,15 @@ pub const VEHICLES: usize = 256;
 pub const WAYPOINTS: usize = 64;
 /// Gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 2048;
+/// Pieces of flights among which a vehicle steps aside: 44 bytes each.
+pub const PIECES: usize = 32_768;
+
+/// A large value on the heap. Debug builds make it on a stack first, so a thread with room for that makes it.
+pub fn on_heap<T: Send + 'static>(make: fn() -> T) -> Box<T> {
+    std::thread::Builder::new()
+        .stack_size(4 * size_of::<T>() + (1 << 20))
+        .spawn(move || Box::new(make()))
+        .expect("the system starts threads")
+        .join()
+        .expect("making zeros does not panic")
+}

@@ -11,7 +11,7 @@ use planner_core::roadmap::{RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::segment::segment_is_clear;
 
-use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
+use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{RoadmapSize, Timing};
@@ -22,7 +22,7 @@ use crate::scenario::{self, Scenario};
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One companion's part of it.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
-type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES>;
+type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
 
 /// Braking and accelerating that is planned with, m/s².
 pub const ACCEL_MPS2: f32 = 1.5;
@@ -104,8 +104,8 @@ impl Mission {
             mode: planner_mode(&self.scenario.mission),
             schedule: self.schedule,
         };
-        let mut workspace = Box::new(PlanWorkspace::new());
-        let mut plan = Box::new(SwarmPlan::new());
+        let mut workspace = on_heap(PlanWorkspace::new);
+        let mut plan = on_heap(SwarmPlan::new);
         plan::plan_swarm(&view, &request, &mut workspace, &mut plan).map_err(|e| describe(&e))?;
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)

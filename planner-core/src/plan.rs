@@ -15,6 +15,7 @@ use crate::Point;
 use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::schedule::sipp::{self, Route, SippWorkspace};
 use crate::schedule::{self, Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
 use crate::search::{self, SearchError, SearchWorkspace};
 
@@ -102,20 +103,23 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Scratch of [`plan_swarm`] for roadmaps of `N` nodes and swarms of `V` vehicles and goals.
-pub struct PlanWorkspace<const N: usize, const V: usize> {
+/// Scratch of [`plan_swarm`] for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
+/// which one steps aside.
+pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     search: SearchWorkspace<N>,
+    sipp: SippWorkspace<N, P>,
     assignment: AssignmentWorkspace<V>,
     costs: [[f32; V]; V],
     /// Scratch of the schedule, also for [`vehicle_plan`].
     pub schedule: ScheduleWorkspace,
 }
 
-impl<const N: usize, const V: usize> PlanWorkspace<N, V> {
+impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
     /// All zeros.
     pub const fn new() -> Self {
         Self {
             search: SearchWorkspace::new(),
+            sipp: SippWorkspace::new(),
             assignment: AssignmentWorkspace::new(),
             costs: [[0.0; V]; V],
             schedule: ScheduleWorkspace::new(),
@@ -123,17 +127,17 @@ impl<const N: usize, const V: usize> PlanWorkspace<N, V> {
     }
 }
 
-impl<const N: usize, const V: usize> Default for PlanWorkspace<N, V> {
+impl<const N: usize, const V: usize, const P: usize> Default for PlanWorkspace<N, V, P> {
     fn default() -> Self {
         Self::new()
     }
 }
 
 /// Plans the whole swarm. Vehicles and goals that cannot be served are left out, the rest is served as well as can be.
-pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
+pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
+    ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
@@ -185,10 +189,10 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     schedule::gates(cfg, flight, others, ws, &mut out.gates)
 }
 
-fn assign<const N: usize, const V: usize>(
+fn assign<const N: usize, const V: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
+    ws: &mut PlanWorkspace<N, V, P>,
     assigned: &mut Vec<Option<u16>, V>,
 ) -> Result<(), PlanError> {
     let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
@@ -225,11 +229,11 @@ fn assign<const N: usize, const V: usize>(
     Ok(())
 }
 
-/// Schedules the longest path first; who cannot be fitted in goes first in the next round.
-fn schedule_all<const N: usize, const V: usize, const W: usize>(
+/// Schedules the longest path first; who cannot be fitted in goes first in the next round, or later gets a head start.
+fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
+    ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut order: Vec<u16, V> = Vec::new();
@@ -252,57 +256,132 @@ fn schedule_all<const N: usize, const V: usize, const W: usize>(
         straight[b].total_cmp(&straight[a]).then(out.flights[b].id.cmp(&out.flights[a].id))
     });
     let mut failed = Ok(());
-    for _ in 0..=order.len() {
-        let Err((place, error)) = schedule_round(view, request, &order, ws, out) else { return Ok(()) };
+    let mut rush = Rush { count: 0, head_start_s: 0.0 };
+    let reorderings = order.len().min(REORDERINGS);
+    for round in 0..=reorderings + HEAD_STARTS {
+        let Err((place, error)) = schedule_round(view, request, &order, &rush, ws, out) else {
+            return Ok(());
+        };
         failed = Err(error);
         let blocked = order.remove(place);
-        let front = order.iter().take_while(|&&i| out.flights[usize::from(i)].goal.is_none()).count();
-        let _ = order.insert(front, blocked);
+        // Cannot overflow: one was just removed.
+        if round < reorderings {
+            let front = order.iter().take_while(|&&i| out.flights[usize::from(i)].goal.is_none()).count();
+            let _ = order.insert(front, blocked);
+        } else {
+            rush.count = rush.count.max(order.len() + 1 - place);
+            rush.head_start_s += HEAD_START_S;
+            let _ = order.push(blocked);
+        }
     }
     failed
 }
 
-fn schedule_round<const N: usize, const V: usize, const W: usize>(
+/// Rounds in which who cannot be fitted in goes first, before others are held back for it instead.
+const REORDERINGS: usize = 16;
+/// Rounds in which others are held back, each by [`HEAD_START_S`] more.
+const HEAD_STARTS: usize = 8;
+/// What two vehicles head-on need to clear a side room, seconds.
+const HEAD_START_S: f32 = 3.0;
+
+/// The last `count` in the order may leave at once, all others only after a head start.
+struct Rush {
+    count: usize,
+    head_start_s: f32,
+}
+
+fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
     order: &[u16],
-    ws: &mut PlanWorkspace<N, V>,
+    rush: &Rush,
+    ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), (usize, PlanError)> {
     for (place, &index) in order.iter().enumerate() {
         let index = usize::from(index);
-        let Some(goal) = out.flights[index].goal else { continue };
-        let id = out.flights[index].id;
-        let mut failure = PlanError::Schedule(id, ScheduleError::Blocked);
-        let mut fitted = false;
-        for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
-            let parked = Parked::<V>::new(view, avoid, &out.flights, &order[place + 1..], index);
-            let mut nodes: Vec<u16, W> = Vec::new();
-            match find_path(view, request, index, goal, &parked, &mut ws.search, &mut nodes) {
-                Ok(length) if length.is_finite() => {}
-                Ok(_) => continue,
-                Err(error) => return Err((place, error)),
-            }
-            let path = path_of(view, &nodes).map_err(|e| (place, PlanError::Path(id, e)))?;
-            let flight = Flight { path, depart_s: 0.0, ..out.flights[index].clone() };
-            let scheduled = order[..place].iter().map(|&i| &out.flights[usize::from(i)]);
-            match schedule::earliest_departure(&request.schedule, &flight, scheduled, &mut ws.schedule) {
-                Ok(depart_s) => {
-                    let flight = Flight { depart_s, ..flight };
-                    let climb_s = flight.climb_m / request.schedule.vertical_mps;
-                    out.flights[index] = flight;
-                    out.flights[index].path.label(depart_s + climb_s, request.schedule.cruise_mps);
-                    fitted = true;
-                    break;
-                }
-                Err(error) => failure = PlanError::Schedule(id, error),
-            }
+        if out.flights[index].goal.is_none() {
+            continue;
         }
-        if !fitted {
-            return Err((place, failure));
-        }
+        let (before, waiting) = (&order[..place], &order[place + 1..]);
+        let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
+        let waits = wait_on_pad(view, request, index, before, waiting, not_before_s, ws, out);
+        let flight = match waits.map_err(|error| (place, error))? {
+            Some(flight) => flight,
+            None => step_aside(view, request, index, before, waiting, not_before_s, ws, out)
+                .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
+        };
+        out.flights[index] = flight;
     }
     Ok(())
+}
+
+/// The flight along a shortest path, after a wait on the pad; `None` if no wait is long enough.
+#[expect(clippy::too_many_arguments, reason = "the state of one round")]
+fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    index: usize,
+    before: &[u16],
+    waiting: &[u16],
+    not_before_s: f32,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &SwarmPlan<V, W>,
+) -> Result<Option<Flight<W>>, PlanError> {
+    let flight = &out.flights[index];
+    let Some(goal) = flight.goal else { return Ok(None) };
+    for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
+        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let mut nodes: Vec<u16, W> = Vec::new();
+        if find_path(view, request, index, goal, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
+            continue;
+        }
+        let mut path = path_of(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
+        path.label(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
+        let flight = Flight { path, depart_s: 0.0, ..flight.clone() };
+        let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
+        let cfg = &request.schedule;
+        match schedule::earliest_departure(cfg, &flight, not_before_s, scheduled, &mut ws.schedule) {
+            Ok(depart_s) => return Ok(Some(Flight { depart_s, ..flight })),
+            Err(ScheduleError::Blocked) => {}
+            Err(error) => return Err(PlanError::Schedule(flight.id, error)),
+        }
+    }
+    Ok(None)
+}
+
+/// The flight that arrives earliest, waiting and stepping aside on its way.
+#[expect(clippy::too_many_arguments, reason = "the state of one round")]
+fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    index: usize,
+    before: &[u16],
+    waiting: &[u16],
+    not_before_s: f32,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &SwarmPlan<V, W>,
+) -> Result<Flight<W>, ScheduleError> {
+    let mut flight = out.flights[index].clone();
+    let Some(goal) = flight.goal else { return Ok(flight) };
+    let required_m = request.vehicles[index].required_clearance_m;
+    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, required_m);
+    let mut found = Err(ScheduleError::Blocked);
+    for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
+        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let route = Route {
+            from: index as u16,
+            to: request.vehicles.len() as u16 + goal,
+            not_before_s,
+            parked: &parked.pads,
+        };
+        let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
+        found = sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight);
+        if found != Err(ScheduleError::Blocked) {
+            break;
+        }
+    }
+    found.map(|()| flight)
 }
 
 /// What a path keeps clear of beyond obstacles.
@@ -398,6 +477,7 @@ fn crc<const V: usize, const W: usize>(plan: &SwarmPlan<V, W>) -> u32 {
         digest.update(&flight.depart_s.to_le_bytes());
         for waypoint in flight.path.waypoints() {
             waypoint.position.iter().for_each(|c| digest.update(&c.to_le_bytes()));
+            digest.update(&waypoint.leave_s.to_le_bytes());
         }
     }
     digest.finalize()
