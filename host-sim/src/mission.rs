@@ -106,7 +106,16 @@ impl Mission {
         };
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
-        plan::plan_swarm(&view, &request, &mut workspace, &mut plan).map_err(|e| describe(&e))?;
+        let mut goals = plan::Goals::new();
+        // The steps of `plan_swarm`, each with its time.
+        let searching = Instant::now();
+        plan::costs(&view, &request, &mut workspace).map_err(|e| describe(&e))?;
+        let search_s = searching.elapsed().as_secs_f64();
+        let assigning = Instant::now();
+        plan::assign(&request, &mut workspace, &mut goals).map_err(|e| describe(&e))?;
+        let assignment_s = assigning.elapsed().as_secs_f64();
+        plan::schedule(&view, &request, &goals, &mut workspace, &mut plan).map_err(|e| describe(&e))?;
+        (self.timing.search_s, self.timing.assignment_s) = (search_s, assignment_s);
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)
     }

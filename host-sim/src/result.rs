@@ -93,11 +93,11 @@ pub struct Timing {
     pub map_s: f64,
     /// Sampling, edges and their clearances.
     pub roadmap_s: f64,
-    /// Paths.
+    /// The shortest paths that tell what each goal would cost each vehicle.
     pub search_s: f64,
-    /// Cost matrix and assignment.
+    /// Who flies to which goal.
     pub assignment_s: f64,
-    /// The whole plan, schedule included.
+    /// The whole plan: search, assignment, schedule.
     pub plan_s: f64,
     /// Time that passed in the simulation.
     pub simulated_s: f64,

@@ -8,6 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::*;
+use crate::Point;
 use crate::frames::Geodetic;
 use crate::roadmap::{self, Edge, RoadmapHeader};
 use crate::schedule::checker;
