@@ -94,7 +94,18 @@ impl Mission {
         let roadmap_crc = parsed(&roadmap_file).crc();
         timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
-        Ok(Self { scenario, map, goals, roadmap, roadmap_file, roadmap_crc, tasks, descents_m, schedule, timing })
+        Ok(Self {
+            scenario,
+            map,
+            goals,
+            roadmap,
+            roadmap_file,
+            roadmap_crc,
+            tasks,
+            descents_m,
+            schedule,
+            timing,
+        })
     }
 
     /// Plans the whole swarm as every companion does.

@@ -7,9 +7,9 @@
 //! Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting pieces the later vehicle gets a
-//! [`Gate`]: it enters its piece once the earlier one has left its own. Then two vehicles are never in conflicting pieces
-//! at once, however late either runs; and nobody waits for ever, since every wait is for a vehicle with an earlier label
-//! and the vehicle with the earliest label waits for none.
+//! [`Gate`]: it enters its piece once the earlier one has come to the end of its own. So two vehicles are never in
+//! conflicting pieces at once, however late either runs; and nobody waits for ever, since every wait is for a vehicle with
+//! an earlier label, and the vehicle with the earliest label waits for none (the whole argument: ARCHITECTURE.md).
 //!
 //! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or step aside on its way.
 //!
@@ -271,6 +271,16 @@ fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
     None
 }
 
+/// What a vehicle that stands at a place may stray from it along its path, metres.
+const STANDING_M: f32 = 0.25;
+
+/// The progress at which a vehicle counts as out of a piece. It may have to wait where the piece ends, for somebody whom it
+/// would block if that still counted as inside. The next piece begins there and is either in conflict too, and then
+/// counts by itself, or clear, and then so is the place between them.
+fn left_at_m(q: &Piece) -> f32 {
+    if q.to_m > q.from_m { q.to_m - STANDING_M } else { q.to_m + 0.01 }
+}
+
 /// Where `flight` waits for the `others`, in the order along its path. A gate that an earlier one implies is left out.
 pub fn gates<'a, const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
@@ -288,11 +298,10 @@ pub fn gates<'a, const W: usize, const G: usize>(
             let start_s = flight.depart_s + p.from_s;
             let earlier =
                 |q: &&Piece| other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && conflict(cfg, p, q);
-            let until = ws.other.iter().filter(earlier).map(|q| q.to_m).fold(highest, fmaxf);
-            if until > highest {
-                highest = until;
-                // A hair beyond: to stand at the end of a piece is to be in it still.
-                let gate = Gate { at_m: p.from_m, id: other.id, until_m: until + 0.01 };
+            let until_m = ws.other.iter().filter(earlier).map(left_at_m).fold(highest, fmaxf);
+            if until_m > highest {
+                highest = until_m;
+                let gate = Gate { at_m: p.from_m, id: other.id, until_m };
                 out.push(gate).map_err(|_| ScheduleError::GatesFull)?;
             }
         }

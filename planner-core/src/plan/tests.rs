@@ -107,13 +107,13 @@ proptest! {
 }
 
 /// A corridor along x with one side room off its middle; nodes by hand, every vehicle at one height.
-fn corridor(length_m: f32, side_at_m: f32) -> StdVec<u8> {
+fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
     let p = |x: f32, y: f32| Point::new(x, y, HEIGHT_M);
     // Two starts, two goals over each other's pads, the corridor, the side room.
     let mut nodes = std::vec![p(0.0, 0.0), p(length_m, 0.0), p(length_m, 0.0), p(0.0, 0.0)];
     let steps = (length_m / 2.0) as usize;
     nodes.extend((1..steps).map(|i| p(i as f32 * 2.0, 0.0)));
-    nodes.push(p(side_at_m, 4.0));
+    nodes.push(p(side_at_m, depth_m));
     let mut edges = StdVec::new();
     for a in 0..nodes.len() {
         for b in a + 1..nodes.len() {
@@ -141,15 +141,19 @@ fn corridor(length_m: f32, side_at_m: f32) -> StdVec<u8> {
 
 #[test]
 fn head_on_in_a_corridor_one_steps_into_the_side_room() {
-    for side_at_m in [8.0, 14.0, 16.0, 22.0] {
-        let bytes = corridor(30.0, side_at_m);
+    // Just deep enough to be out of the way, and deeper.
+    let depths = [2.1, 2.2, 2.4, 2.6, 2.8, 3.0, 3.2, 4.0];
+    for (side_at_m, depth_m) in
+        [8.0, 14.0, 16.0, 22.0].into_iter().flat_map(|at| depths.map(|depth| (at, depth)))
+    {
+        let bytes = corridor(30.0, side_at_m, depth_m);
         let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
-        let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 3.0);
-        assert!(plan.flights.iter().any(aside), "side room at {side_at_m}");
+        let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
+        assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
         for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
             let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 20_000);
             let kept = apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3);
-            assert!(kept, "side room at {side_at_m}: {apart:?}");
+            assert!(kept, "side room at {side_at_m}, {depth_m} deep: {apart:?}");
         }
     }
 }
