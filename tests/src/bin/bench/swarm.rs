@@ -96,7 +96,8 @@ fn ground() -> Result<OccupancyMap> {
     let shape = GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
     let mut map = OccupancyMap::unknown(shape, "ground")?;
     // One metre wide, in every second gap between two lanes, 20 m apart.
-    let pillar = |x: f32, y: f32| (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0);
+    let pillar =
+        |x: f32, y: f32| (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0);
     let [nx, ny, nz] = shape.dims;
     for k in 0..nz {
         for j in 0..ny {
@@ -127,7 +128,11 @@ fn many(map: &Path) -> String {
         goals.join(", ")
     );
     for i in 0..MANY {
-        text += &format!("\n[[vehicles]]\nid = {}\ngoal = {i}\nstart = {}\nradius_m = 0.3\n", i + 1, place(i, 0.0, 2.0));
+        text += &format!(
+            "\n[[vehicles]]\nid = {}\ngoal = {i}\nstart = {}\nradius_m = 0.3\n",
+            i + 1,
+            place(i, 0.0, 2.0)
+        );
     }
     text
 }
