@@ -16,7 +16,7 @@ const LARGEST: usize = 1000;
 pub fn rows() -> Vec<Row> {
     let mut ws = Box::new(AssignmentWorkspace::<LARGEST>::new());
     let mut rows = Vec::new();
-    for (n, instances) in [(10, 500), (100, 60), (LARGEST, 5)] {
+    for (n, instances) in [(10, 2000), (100, 60), (LARGEST, 5)] {
         for kind in [Kind::Real, Kind::Integer] {
             rows.push(compare(n, instances, kind, &mut ws));
         }

@@ -26,10 +26,13 @@ const MANY: usize = 200;
 /// Outer size of the large swarm's ground, metres, and its resolution.
 const GROUND_M: [f32; 3] = [120.0, 120.0, 16.0];
 const RESOLUTION_M: f32 = 0.5;
-/// Spacing of starts and of goals, metres.
-const SPACING_M: f32 = 4.4;
-/// Starts and goals stand in so many columns each.
-const COLUMNS: usize = 8;
+/// Lanes side by side along y, and their spacing, metres: in each a train of [`TRAIN`] vehicles.
+const LANES: usize = 20;
+const LANE_M: f32 = 5.5;
+const TRAIN: usize = MANY / LANES;
+/// From one start to the next in a lane, and from each start to its goal, metres.
+const GAP_M: f32 = 8.0;
+const WAY_M: f32 = 36.0;
 
 /// A row for the demo's ten vehicles, one for two hundred on open ground, seconds.
 pub fn rows() -> Result<Vec<Row>> {
@@ -87,19 +90,20 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     Ok((took_s, flight.simulated_s))
 }
 
-/// A floor with nine pillars between where the swarm starts and where it lands.
+/// A floor with pillars between the lanes.
 fn ground() -> Result<OccupancyMap> {
     let cells = |metres: f32| (metres / RESOLUTION_M) as u32;
     let shape = GridShape { dims: GROUND_M.map(cells), min: Point::zeros(), resolution_m: RESOLUTION_M };
     let mut map = OccupancyMap::unknown(shape, "ground")?;
-    let pillar = |metres: f32| (0..3).any(|p| (metres - (50.0 + 10.0 * p as f32)).abs() < 2.0);
-    let row = |metres: f32| (0..3).any(|p| (metres - (30.0 + 30.0 * p as f32)).abs() < 2.0);
+    // One metre wide, in every second gap between two lanes, 20 m apart.
+    let pillar =
+        |x: f32, y: f32| (x % 20.0 < 1.0) && ((y - lane_m(0) + 0.5 * (LANE_M + 1.0)) % (2.0 * LANE_M) < 1.0);
     let [nx, ny, nz] = shape.dims;
     for k in 0..nz {
         for j in 0..ny {
             for i in 0..nx {
                 let at = |cell: u32| (cell as f32 + 0.5) * RESOLUTION_M;
-                let solid = k == 0 || (pillar(at(i)) && row(at(j)));
+                let solid = k == 0 || pillar(at(i), at(j));
                 map.set([i, j, k], if solid { Occupancy::Occupied } else { Occupancy::Free });
             }
         }
@@ -107,22 +111,28 @@ fn ground() -> Result<OccupancyMap> {
     Ok(map)
 }
 
-/// Starts in the west, goals in the east, given out by the assignment.
+fn lane_m(lane: usize) -> f32 {
+    7.0 + LANE_M * lane as f32
+}
+
+/// Trains that fly east, side by side.
 fn many(map: &Path) -> String {
-    let rows = MANY / COLUMNS;
-    let place = |west_m: f32, i: usize, z: f32| {
-        let (column, row) = (i / rows, i % rows);
-        format!("[{}, {}, {z}]", west_m + SPACING_M * column as f32, 12.0 + SPACING_M * row as f32)
+    let place = |i: usize, way_m: f32, z: f32| {
+        format!("[{:?}, {:?}, {z:?}]", 4.0 + GAP_M * (i % TRAIN) as f32 + way_m, lane_m(i / TRAIN))
     };
-    let goals: Vec<_> = (0..MANY).map(|i| place(80.0, i, 2.5)).collect();
+    let goals: Vec<_> = (0..MANY).map(|i| place(i, WAY_M, 2.5)).collect();
     let mut text = format!(
-        "[map]\nfile = {:?}\nresolution_m = {RESOLUTION_M:?}\n\n[roadmap]\nnodes = 6000\nedge_max_m = 10.0\n\n[mission]\nmode = \"unlabelled\"\n\
+        "[map]\nfile = {:?}\nresolution_m = {RESOLUTION_M:?}\n\n[roadmap]\nnodes = 6000\nedge_max_m = 10.0\n\n[mission]\nmode = \"labelled\"\n\
          goals = [{}]\n\n[simulation]\nradio_range_m = 500.0\ntime_limit_s = 1800.0\n\n[deconfliction]\nmethod = \"priority\"\nsafety_distance_m = 1.5\n",
         map.to_string_lossy(),
         goals.join(", ")
     );
     for i in 0..MANY {
-        text += &format!("\n[[vehicles]]\nid = {}\nstart = {}\nradius_m = 0.3\n", i + 1, place(10.0, i, 2.0));
+        text += &format!(
+            "\n[[vehicles]]\nid = {}\ngoal = {i}\nstart = {}\nradius_m = 0.3\n",
+            i + 1,
+            place(i, 0.0, 2.0)
+        );
     }
     text
 }
