@@ -14,7 +14,7 @@ use planner_core::segment::segment_is_clear;
 use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
-use crate::result::{RoadmapSize, Timing};
+use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
 use crate::scenario::{self, Scenario};
 
@@ -87,7 +87,7 @@ impl Mission {
         let descents_m = goals
             .iter()
             .enumerate()
-            .map(|(i, goal)| height_over_ground(&map, &format!("goal {i}"), goal, largest_m))
+            .map(|(i, goal)| height_over_ground(&scenario, &map, &format!("goal {i}"), goal, largest_m))
             .collect::<anyhow::Result<_>>()?;
         let (roadmap, header) = build(&scenario, &map, &goals)?;
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
@@ -123,15 +123,36 @@ impl Mission {
         let mut goals = plan::Goals::new();
         // The steps of `plan_swarm`, each with its time.
         let searching = Instant::now();
-        plan::costs(&view, &request, &mut workspace).map_err(|e| describe(&e))?;
+        plan::costs(&view, &request, &mut workspace).map_err(|e| self.describe(&e))?;
         let search_s = searching.elapsed().as_secs_f64();
         let assigning = Instant::now();
-        plan::assign(&request, &mut workspace, &mut goals).map_err(|e| describe(&e))?;
+        plan::assign(&request, &mut workspace, &mut goals).map_err(|e| self.describe(&e))?;
         let assignment_s = assigning.elapsed().as_secs_f64();
-        plan::schedule(&view, &request, &goals, &mut workspace, &mut plan).map_err(|e| describe(&e))?;
+        plan::schedule(&view, &request, &goals, &mut workspace, &mut plan).map_err(|e| self.describe(&e))?;
         (self.timing.search_s, self.timing.assignment_s) = (search_s, assignment_s);
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)
+    }
+
+    fn describe(&self, error: &PlanError) -> anyhow::Error {
+        let path = &self.scenario.path;
+        match error {
+            PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
+                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\n  \
+                 hint: move its start or goal out of their way, or give the roadmap more nodes"
+            ),
+            PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {path}: {error:?}"),
+            other => anyhow!("no plan: {path}: {other:?}"),
+        }
+    }
+
+    /// Goals that no vehicle flies to, and vehicles that no goal is left for.
+    pub fn left(&self, plan: &SwarmPlan) -> Left {
+        let flown = |goal: &u16| plan.flights.iter().any(|f| f.goal == Some(*goal));
+        Left {
+            goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
+            vehicles: plan.flights.iter().filter(|f| f.goal.is_none()).map(|f| f.id).collect(),
+        }
     }
 
     /// One companion's part of the swarm's plan.
@@ -162,7 +183,10 @@ impl Mission {
     /// No vehicle has this id.
     pub fn index_of(&self, id: u8) -> anyhow::Result<usize> {
         let index = self.tasks.iter().position(|task| task.id == id);
-        index.ok_or_else(|| anyhow!("no vehicle has id {id}: {}", self.scenario.path))
+        index.ok_or_else(|| {
+            let ids: Vec<String> = self.tasks.iter().map(|task| task.id.to_string()).collect();
+            anyhow!("no vehicle has id {id}: {}: there are {}", self.scenario.path, ids.join(", "))
+        })
     }
 
     /// Where the centre of a vehicle's body is while it stands on its pad.
@@ -201,25 +225,43 @@ fn planner_mode(mission: &scenario::Mission) -> Mode {
     }
 }
 
-/// Height of a point over where a vehicle of this radius stands below it.
-fn height_over_ground(map: &VoxelMap, what: &str, point: &Point, radius_m: f32) -> anyhow::Result<f32> {
+/// Height of a start or goal over where a vehicle of this radius stands below it.
+fn height_over_ground(
+    scenario: &Scenario,
+    map: &VoxelMap,
+    what: &str,
+    point: &Point,
+    radius_m: f32,
+) -> anyhow::Result<f32> {
+    let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
+    if map.never_sample().is_blocked_at(point) {
+        bail!(
+            "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map\n  \
+             hint: `host-sim map info` tells the map's extent"
+        );
+    }
     let Some(ground_m) = map.ground_below(point) else {
-        bail!("{what} has no ground below it to stand on: choose a place over a floor");
+        bail!("{what} has no ground below it: {at} is over nothing\n  hint: choose a place over a floor");
     };
     let height_m = point.z - ground_m - radius_m;
     if height_m < 0.0 {
-        bail!("{what} is {:.2} m above the ground, less than the radius of {radius_m} m", point.z - ground_m);
+        bail!(
+            "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n  \
+             hint: give it a height of at least {:.2} m",
+            point.z - ground_m,
+            ground_m + radius_m
+        );
     }
     Ok(height_m)
 }
 
 fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |vehicle: &scenario::Vehicle| {
-        let what = format!("the start of vehicle {}", vehicle.id);
+        let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(map, &what, &vehicle.start, vehicle.radius_m)?,
+            climb_m: height_over_ground(scenario, map, &what, &vehicle.start, vehicle.radius_m)?,
             goal: vehicle.goal.map(|goal| goal as u16),
         })
     };
@@ -252,7 +294,11 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
             }
         }
     }
-    bail!("only {} of {wanted} vehicles find room {apart_m} m apart in sight of the single goal", slots.len())
+    bail!(
+        "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it",
+        scenario.path,
+        slots.len()
+    )
 }
 
 fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<(Roadmap, RoadmapHeader)> {
@@ -280,14 +326,4 @@ fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result
         goals: goals.len() as u16,
     };
     Ok((roadmap, header))
-}
-
-fn describe(error: &PlanError) -> anyhow::Error {
-    match error {
-        PlanError::Schedule(id, ScheduleError::Blocked) => {
-            anyhow!("vehicle {id} cannot pass the others: move its start or goal out of their way")
-        }
-        PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {error:?}"),
-        other => anyhow!("no plan: {other:?}"),
-    }
 }

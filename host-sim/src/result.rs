@@ -26,6 +26,17 @@ pub struct MissionResult {
     pub safety: Safety,
     /// The roadmap planned on.
     pub roadmap: RoadmapSize,
+    /// What the assignment could not serve.
+    pub left: Left,
+}
+
+/// What the assignment could not serve: more of one than of the other, or no way between them.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Left {
+    /// Goals, by index.
+    pub goals: Vec<u16>,
+    /// Vehicles, by id; they stay on their pads.
+    pub vehicles: Vec<u8>,
 }
 
 /// One vehicle.
