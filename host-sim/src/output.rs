@@ -14,7 +14,11 @@ use crate::swarm::Flight;
 use crate::swarm::monitor::Sample;
 
 /// The page without a flight: map, roadmap, paths.
-pub fn planned_page(mission: &Mission, plan: &SwarmPlan, result: &MissionResult) -> anyhow::Result<ReportData> {
+pub fn planned_page(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    result: &MissionResult,
+) -> anyhow::Result<ReportData> {
     let scenario = &mission.scenario;
     let vehicles = scenario
         .vehicles
@@ -80,7 +84,12 @@ pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyho
 }
 
 /// Writes `result.json`, `timing.json` and `report.html`.
-pub fn write(dir: &Path, result: &MissionResult, timing: &Timing, mut page: ReportData) -> anyhow::Result<()> {
+pub fn write(
+    dir: &Path,
+    result: &MissionResult,
+    timing: &Timing,
+    mut page: ReportData,
+) -> anyhow::Result<()> {
     std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     result::write_json(&dir.join("result.json"), result)?;
     result::write_json(&dir.join("timing.json"), timing)?;

@@ -56,7 +56,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
         println!("no --swarm link: vehicle {} flies as the only one", args.id);
-        config.roster = config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
+        config.roster =
+            config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
     }
     let mut companion = new_companion(config)?;
     let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];

@@ -58,7 +58,12 @@ pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     plan_and_fly(scenario, "demo", &args.out, false)
 }
 
-fn plan_and_fly(scenario: Scenario, command: &'static str, out: &Path, realtime: bool) -> anyhow::Result<ExitCode> {
+fn plan_and_fly(
+    scenario: Scenario,
+    command: &'static str,
+    out: &Path,
+    realtime: bool,
+) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;

@@ -43,7 +43,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out } => {
             let mission = Mission::prepare(load(scenario, None)?, &Progress::on_terminal())?;
-            std::fs::write(out, &mission.roadmap_file).with_context(|| format!("cannot write {}", out.display()))?;
+            std::fs::write(out, &mission.roadmap_file)
+                .with_context(|| format!("cannot write {}", out.display()))?;
             print(&mission.view());
         }
         Action::Info { file } => {
@@ -64,6 +65,9 @@ fn print(view: &RoadmapView<'_>) {
     println!("edges          {}", view.half_edge_count() / 2);
     println!("edge length    {} to {} m", header.edge_min_m, header.edge_max_m);
     println!("clearance      tested above {} m, narrowest edge {narrowest} m", header.tested_clearance_m);
-    println!("origin         {:.7}, {:.7}, {:.1} m", header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m);
+    println!(
+        "origin         {:.7}, {:.7}, {:.1} m",
+        header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m
+    );
     println!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }

@@ -170,7 +170,8 @@ fn log_entry(t_s: f64, id: u8, event: Event) -> Option<report::Event> {
         State::PilotControl | State::AutopilotSilent | State::PositionLost | State::Alone => Level::Warning,
         _ => Level::Info,
     };
-    let text = if text.is_empty() { format!("{from:?} → {to:?}") } else { format!("{from:?} → {to:?}: {text}") };
+    let text =
+        if text.is_empty() { format!("{from:?} → {to:?}") } else { format!("{from:?} → {to:?}: {text}") };
     Some(report::Event { t_s: t_s as f32, vehicle: Some(id), level, text })
 }
 
@@ -216,6 +217,7 @@ fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             };
             let config = autopilot::Config {
                 system_id: vehicle.id,
+                personality: vehicle.personality,
                 world_origin: scenario.map.origin,
                 // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
                 ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
@@ -243,8 +245,8 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
         scenario.vehicles.iter().map(|v| RosterEntry { system_id: v.id, start: v.start }).collect();
     roster.sort_unstable_by_key(|entry| entry.system_id);
     let mut config = Config::new(id, vehicle.start, scenario.map.origin);
-    config.roster = heapless::Vec::from_slice(&roster)
-        .map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
+    config.roster =
+        heapless::Vec::from_slice(&roster).map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
     config.mission_crc = mission.crc();
     config.cruise_mps = scenario.mission.cruise_mps.min(vehicle.speed_max_mps);
     config.climb_mps = VERTICAL_MPS;
@@ -262,6 +264,7 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
 /// # Errors
 /// The configuration names what is wrong.
 pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
-    let companion = DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
+    let companion =
+        DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
     Ok(Box::new(companion))
 }

@@ -91,7 +91,12 @@ pub struct Monitor<'a> {
 
 impl<'a> Monitor<'a> {
     /// Watches vehicles of these radii.
-    pub fn new(grid: VoxelGrid<'a>, field: &'a ClearanceField, safety_distance_m: f32, radii_m: &[f32]) -> Self {
+    pub fn new(
+        grid: VoxelGrid<'a>,
+        field: &'a ClearanceField,
+        safety_distance_m: f32,
+        radii_m: &[f32],
+    ) -> Self {
         let watched = |&radius_m: &f32| Watched {
             radius_m,
             last: None,
@@ -215,7 +220,11 @@ impl<'a> Monitor<'a> {
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
                     self.violations += 1;
-                    self.incidents.push((t_s, i, format!("nearer than the safety distance to vehicle no. {}", j + 1)));
+                    self.incidents.push((
+                        t_s,
+                        i,
+                        format!("nearer than the safety distance to vehicle no. {}", j + 1),
+                    ));
                 }
             }
         }
@@ -298,7 +307,8 @@ mod tests {
     #[test]
     fn a_near_pair_is_one_violation_unless_both_stand() {
         with_monitor(|mut monitor| {
-            let pair = |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
+            let pair =
+                |apart: f32, phase| [at(2.0, 2.0, 5.0, phase), at(2.0, 2.0 + apart, 5.0, Phase::Grounded)];
             monitor.observe(0.0, &pair(1.0, Phase::Grounded));
             assert_eq!(monitor.violations, 0);
             monitor.observe(0.1, &pair(1.4, Phase::Flying));
