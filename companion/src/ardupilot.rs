@@ -13,6 +13,10 @@ pub const BRAKE: u32 = 17;
 /// Position, with velocity as feed-forward. Acceleration is left out: 0xC00 was not seen to fly.
 pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
 
+/// How far ahead the velocity of a setpoint looks, seconds: Guided closes an error of velocity with `WPNAV_ACCEL` /
+/// `PSC_JERK_XY`, and the recording's circle is flown 0.6 s behind. Acceleration for so long replaces the one left out.
+pub const VELOCITY_LEAD_S: f32 = 0.5;
+
 /// Velocity alone: with zero, stop wherever that is.
 pub const MASK_VELOCITY: u16 = 0xDC7;
 

@@ -64,6 +64,14 @@ impl Kind {
         }
     }
 
+    /// By how many seconds of acceleration the velocity of a setpoint is ahead.
+    pub fn velocity_lead_s(self) -> f32 {
+        match self {
+            Self::Px4 => 0.0,
+            Self::ArduPilot => ardupilot::VELOCITY_LEAD_S,
+        }
+    }
+
     /// Mask of a setpoint to stop wherever that is.
     pub fn stop_mask(self) -> u16 {
         match self {

@@ -57,6 +57,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Setpoint::Stop => stop,
             Setpoint::Move(position, velocity, acceleration) => {
                 self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
+                    let velocity = velocity + acceleration * kind.velocity_lead_s();
                     let (velocity, acceleration) =
                         (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
                     (ned, velocity, acceleration, kind.move_mask())

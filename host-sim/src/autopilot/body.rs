@@ -76,7 +76,9 @@ pub struct Body {
 
 impl Body {
     pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
-        let mut vehicle = Vehicle::new(config.vehicle, config.start);
+        let mut limits = config.vehicle;
+        limits.drag_per_s *= config.personality.drag_share();
+        let mut vehicle = Vehicle::new(limits, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
         let projection = config.personality.projection();

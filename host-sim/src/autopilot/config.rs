@@ -16,6 +16,15 @@ pub enum Personality {
 }
 
 impl Personality {
+    /// Share of the airframe's drag: PX4's simulated quadrotor was flown 10 to 20 % slower than asked, ArduCopter's held
+    /// 3 m/s to 2 %.
+    pub(super) fn drag_share(self) -> f32 {
+        match self {
+            Self::Px4 => 1.0,
+            Self::Ardupilot => 0.2,
+        }
+    }
+
     /// How it flattens the earth about its EKF origin.
     pub fn projection(self) -> Projection {
         match self {
