@@ -313,11 +313,8 @@ fn vehicle(
     let personality = table.word(
         "personality",
         Personality::Px4,
-        &[("px4", Personality::Px4), ("ardupilot", Personality::ArduPilot)],
+        &[("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)],
     )?;
-    if let (Personality::ArduPilot, Some(value)) = (personality, table.get("personality")) {
-        unsupported.push(not_yet(table.text, &value.span, "personality \"ardupilot\""));
-    }
     let companion = match table.get("companion") {
         None => Companion::InProcess,
         Some(value) => match value.str()? {

@@ -218,6 +218,7 @@ fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             };
             let config = autopilot::Config {
                 system_id: vehicle.id,
+                personality: vehicle.personality,
                 world_origin: scenario.map.origin,
                 // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
                 ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
