@@ -266,6 +266,7 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out.path = flight.path.clone();
     out.climb_m = flight.climb_m;
     out.descent_m = flight.descent_m;
+    out.depart_s = flight.depart_s;
     out.plan_crc = plan.crc;
     let others = plan.flights.iter().enumerate().filter(|&(i, _)| i != index).map(|(_, f)| f);
     schedule::gates(cfg, flight, others, ws, &mut out.gates)

@@ -51,6 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let own = mission.own_plan(&plan, index).map(|mut own| {
         if args.swarm.is_none() {
             own.gates.clear();
+            own.depart_s = 0.0;
         }
         own
     });
