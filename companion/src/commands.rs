@@ -123,7 +123,7 @@ pub fn apply(wishes: &mut Wishes, state: State, command: &Command) -> Option<u8>
         START => (
             &mut wishes.start,
             Guard::StartCommanded,
-            &[Scheduled, Streaming, Engaging, Arming, Climb, Follow, Paused, Alone],
+            &[Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Paused, Alone],
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => (&mut wishes.pause, Guard::PauseCommanded, &[Paused]),
         PAUSE_CONTINUE if command.param1 == 1.0 && state == PilotControl => {

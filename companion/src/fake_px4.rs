@@ -1,5 +1,5 @@
-//! A scripted PX4 for unit tests: the modes, acks and streams the companion relies on, and a vehicle that goes where the
-//! setpoint says at a limited speed. The real closed loop is host-sim's.
+//! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams the companion relies on, and a
+//! vehicle that goes where the setpoint says at a limited speed. The real closed loop is host-sim's.
 
 extern crate std;
 use std::vec::Vec;
@@ -9,10 +9,11 @@ use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::frames::{self, Geodetic, Projection};
+use planner_core::frames::{self, Geodetic};
 use planner_core::path::Path;
 use planner_core::schedule::VehiclePlan;
 
+use crate::autopilot::Kind;
 use crate::frame::{self, Frame, Framer, Header, MAX_SENT};
 use crate::{Companion, Config, Duration, Event, Instant, Link, RosterEntry, px4};
 
@@ -27,6 +28,14 @@ pub const GOAL: Point = Point::new(16.0, 12.0, 3.5);
 
 /// The autopilot, the radio's other end, and the companion between them.
 pub struct Bench {
+    pub kind: Kind,
+    /// ArduCopter: message ids whose streams were asked for.
+    pub streams: Vec<u16>,
+    /// ArduCopter: flags of EKF_STATUS_REPORT.
+    pub ekf_flags: u16,
+    /// ArduCopter: NAV_TAKEOFF lifted it off.
+    pub took_off: bool,
+    pub timesyncs: Vec<(i64, i64)>,
     pub companion: Small,
     pub now: Instant,
     pub enu: Point,
@@ -48,6 +57,8 @@ pub struct Bench {
     pub texts: Vec<std::string::String>,
     pub swarm: Vec<Frame>,
     pub acks: Vec<(u16, u8, u8, u8)>,
+    /// ArduCopter: the height NAV_TAKEOFF asked for.
+    pub takeoff_m: f32,
     target: Option<Point>,
     framers: [Framer; 2],
     sequence: u8,
@@ -76,12 +87,17 @@ pub fn plan() -> VehiclePlan<16, 8> {
         path.push(point, 1.2).unwrap();
     }
     let gates = heapless::Vec::new();
-    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, gates, plan_crc: 5 }
+    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
 impl Bench {
     pub fn new(config: Config<4>) -> Self {
         Self {
+            kind: Kind::Px4,
+            streams: Vec::new(),
+            ekf_flags: 0x33F,
+            took_off: false,
+            timesyncs: Vec::new(),
             companion: Companion::new(config).unwrap(),
             now: Instant::ZERO,
             enu: Point::new(START.x, START.y, 0.0),
@@ -101,6 +117,7 @@ impl Bench {
             texts: Vec::new(),
             swarm: Vec::new(),
             acks: Vec::new(),
+            takeoff_m: 0.0,
             target: None,
             framers: [Framer::new(), Framer::new()],
             sequence: 0,
@@ -117,7 +134,7 @@ impl Bench {
 
     pub fn ned(&self) -> Vector3<f64> {
         let place = frames::enu_to_geodetic(&ORIGIN, &self.enu);
-        frames::geodetic_to_ned(Projection::Px4, &self.origin, &place)
+        frames::geodetic_to_ned(self.kind.projection(), &self.origin, &place)
     }
 
     pub fn bytes<M: MessageData>(&mut self, message: &M) -> Vec<u8> {
@@ -128,7 +145,7 @@ impl Bench {
         out[..len].to_vec()
     }
 
-    fn tell<M: MessageData>(&mut self, message: &M) {
+    pub fn tell<M: MessageData>(&mut self, message: &M) {
         let bytes = self.bytes(message);
         self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
         self.drain();
@@ -195,10 +212,15 @@ impl Bench {
             assert_eq!((s.target_system, s.target_component), (SYSTEM, 1));
             assert_eq!(s.coordinate_frame, MavFrame::MAV_FRAME_LOCAL_NED);
             let ned = Vector3::new(f64::from(s.x), f64::from(s.y), f64::from(s.z));
-            let place = frames::ned_to_geodetic(Projection::Px4, &self.origin, &ned);
+            let place = frames::ned_to_geodetic(self.kind.projection(), &self.origin, &ned);
             let enu = frames::geodetic_to_enu(&ORIGIN, &place);
-            self.target = (s.type_mask.bits() == px4::MASK_POSITION_VELOCITY_ACCELERATION).then_some(enu);
+            // ArduCopter gives a take-off up for a setpoint that comes before the lift-off.
+            self.took_off &= !self.on_ground();
+            self.target = (s.type_mask.bits() == self.kind.move_mask()).then_some(enu);
             self.setpoints.push((self.now, enu, s.type_mask.bits()));
+        }
+        if let Some(t) = frame.decode::<TIMESYNC_DATA>() {
+            self.timesyncs.push((t.tc1, t.ts1));
         }
         if let Some(c) = frame.decode::<COMMAND_LONG_DATA>() {
             assert_eq!((c.target_system, c.target_component), (SYSTEM, 1));
@@ -209,9 +231,18 @@ impl Bench {
             }
             match c.command {
                 MavCmd::MAV_CMD_DO_SET_MODE => {
-                    self.mode = (c.param2 as u32) << 16 | (c.param3 as u32) << 24;
+                    self.mode = match self.kind {
+                        Kind::Px4 => (c.param2 as u32) << 16 | (c.param3 as u32) << 24,
+                        Kind::ArduPilot => c.param2 as u32,
+                    };
                 }
                 MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0,
+                MavCmd::MAV_CMD_NAV_TAKEOFF => {
+                    assert!(self.kind == Kind::ArduPilot && self.armed);
+                    (self.took_off, self.takeoff_m) = (true, c.param7);
+                    self.target = Some(self.enu + Point::new(0.0, 0.0, c.param7 - 2.0));
+                }
+                MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => self.streams.push(c.param1 as u16),
                 MavCmd::MAV_CMD_REQUEST_MESSAGE if c.param1 == 49.0 => {
                     let origin = GPS_GLOBAL_ORIGIN_DATA {
                         latitude: (self.origin.lat_deg * 1e7).round() as i32,
@@ -228,10 +259,40 @@ impl Bench {
     pub fn heartbeat(&mut self) -> Vec<u8> {
         let armed = if self.armed { MavModeFlag::MAV_MODE_FLAG_SAFETY_ARMED } else { MavModeFlag::empty() };
         let mut data = HEARTBEAT_DATA { custom_mode: self.mode, base_mode: armed, ..Default::default() };
-        data.autopilot = MavAutopilot::MAV_AUTOPILOT_PX4;
+        data.autopilot = match self.kind {
+            Kind::Px4 => MavAutopilot::MAV_AUTOPILOT_PX4,
+            Kind::ArduPilot => MavAutopilot::MAV_AUTOPILOT_ARDUPILOTMEGA,
+        };
         data.system_status =
             if self.status >= 5 { MavState::MAV_STATE_CRITICAL } else { MavState::MAV_STATE_ACTIVE };
         self.bytes(&data)
+    }
+
+    /// An ArduCopter that has just booted.
+    pub fn ardupilot(config: Config<4>) -> Self {
+        Self { kind: Kind::ArduPilot, mode: 0, ..Self::new(config) }
+    }
+
+    /// Whether it lifts off, or has.
+    fn lifts(&self) -> bool {
+        self.kind == Kind::Px4 || self.took_off
+    }
+
+    /// PX4 says all unasked, ArduCopter nothing.
+    fn says(&self, id: u16) -> bool {
+        self.kind == Kind::Px4 || self.streams.contains(&id)
+    }
+
+    fn tell_ardupilot(&mut self) {
+        if self.says(193) {
+            let flags = EkfStatusFlags::from_bits_retain(self.ekf_flags);
+            self.tell(&EKF_STATUS_REPORT_DATA { flags, ..Default::default() });
+        }
+        if self.says(33) {
+            // Home lies two metres below the pad.
+            let relative_alt = ((self.enu.z + 2.0) * 1e3) as i32;
+            self.tell(&GLOBAL_POSITION_INT_DATA { relative_alt, ..Default::default() });
+        }
     }
 
     pub fn on_ground(&self) -> bool {
@@ -245,15 +306,17 @@ impl Bench {
         self.drain();
         let step = 0.1;
         let target = match self.mode {
-            px4::OFFBOARD => self.target,
-            px4::LAND if !self.never_lands => Some(Point::new(self.enu.x, self.enu.y, 0.0)),
+            mode if mode == self.kind.setpoint_mode() && self.lifts() => self.target,
+            mode if mode == self.kind.land_mode() && !self.never_lands => {
+                Some(Point::new(self.enu.x, self.enu.y, 0.0))
+            }
             _ => None,
         };
         if let Some(target) = target.filter(|_| self.armed && !self.stuck) {
             let way = target - self.enu;
             self.enu += way * (step / way.norm().max(step));
         }
-        let landing = self.mode == px4::LAND && self.on_ground() && self.armed;
+        let landing = self.mode == self.kind.land_mode() && self.on_ground() && self.armed;
         self.landed_at = if landing { self.landed_at.or(Some(self.now)) } else { None };
         if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200)) && !self.stays_armed {
             self.armed = false;
@@ -266,10 +329,12 @@ impl Bench {
             let bytes = self.heartbeat();
             self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
             self.drain();
-            let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
-            self.tell(&status);
+            if self.says(1) {
+                let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
+                self.tell(&status);
+            }
         }
-        if count.is_multiple_of(4) {
+        if count.is_multiple_of(4) && self.says(245) {
             let landed_state = if self.on_ground() {
                 MavLandedState::MAV_LANDED_STATE_ON_GROUND
             } else {
@@ -277,7 +342,10 @@ impl Bench {
             };
             self.tell(&EXTENDED_SYS_STATE_DATA { landed_state, ..Default::default() });
         }
-        if !self.no_position {
+        if count.is_multiple_of(4) && self.kind == Kind::ArduPilot {
+            self.tell_ardupilot();
+        }
+        if !self.no_position && self.says(32) {
             let ned = self.ned();
             self.tell(&LOCAL_POSITION_NED_DATA {
                 time_boot_ms: self.now.boot_ms(),

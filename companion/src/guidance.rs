@@ -313,7 +313,8 @@ impl Guidance {
     }
 }
 
-/// Whether setpoints go out in this state: from before Offboard until landed, never in a failsafe.
+/// Whether setpoints go out in this state: from before Offboard until landed, never in a failsafe, nor while an autopilot
+/// that has to be told takes off.
 pub fn setpoints_flow(state: State) -> bool {
     use State::*;
     matches!(

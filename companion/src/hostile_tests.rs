@@ -10,6 +10,7 @@ use super::tests::assert_no_gap;
 use super::*;
 use crate::fake_px4::*;
 use crate::intent::Intent;
+use crate::px4;
 
 /// Frames that must change nothing in the middle of a flight.
 fn nuisance(bench: &mut Bench, kind: u8, seed: u8) -> Vec<u8> {

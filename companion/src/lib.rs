@@ -9,10 +9,13 @@
 //! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`outbox::DEPTH`]; when it is full
 //! the newest is dropped and counted ([`Companion::dropped`]).
 //!
-//! The mission is the table of [`mission`]. PX4's numbers are in [`px4`]; another autopilot gets a module beside it.
+//! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`px4`] and
+//! [`ardupilot`]; [`autopilot::Kind`] chooses between them by HEARTBEAT.
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod ardupilot;
+pub mod autopilot;
 pub mod commands;
 pub mod config;
 mod events;
@@ -26,6 +29,7 @@ pub mod mission;
 pub mod neighbours;
 pub mod outbox;
 pub mod px4;
+mod requests;
 pub mod telemetry;
 pub mod time;
 mod transmit;

@@ -3,11 +3,13 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TUNNEL_DATA,
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TIMESYNC_DATA,
+    TUNNEL_DATA,
 };
 use planner_core::Point;
 use planner_core::schedule::VehiclePlan;
 
+use crate::autopilot::Kind;
 use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link};
@@ -17,7 +19,6 @@ use crate::intent::Intent;
 use crate::mission::{self, Action, Inputs, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
-use crate::px4;
 use crate::telemetry::{Change, Telemetry};
 use crate::time::{Duration, Instant};
 
@@ -27,15 +28,11 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 const SWARM_EVERY: Duration = Duration::from_millis(200);
-const RETRY_EVERY: Duration = Duration::from_millis(1000);
-const DISARM_AFTER: Duration = Duration::from_millis(4000);
-/// Streams asked for at each step while connecting.
-const SETUP_BURST: usize = 5;
+pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
 /// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
 const LANDING_DRIFT_M: f32 = 1.0;
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
-const GPS_GLOBAL_ORIGIN: u16 = 49;
 const EVENTS: usize = 16;
 
 /// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
@@ -61,9 +58,10 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     next_step: Instant,
     next_heartbeat: Instant,
     next_swarm: Instant,
-    retry_at: Instant,
-    origin_at: Instant,
-    setup: usize,
+    pub(crate) retry_at: Instant,
+    pub(crate) origin_at: Instant,
+    pub(crate) streams_at: Instant,
+    pub(crate) setup: usize,
     pub(crate) setpoint_due: bool,
     pub(crate) heartbeat_due: [bool; 2],
     pub(crate) version_due: [bool; 2],
@@ -101,7 +99,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             next_swarm: Instant::ZERO,
             retry_at: Instant::ZERO,
             origin_at: Instant::ZERO,
-            setup: px4::STREAMS.len(),
+            streams_at: Instant::ZERO,
+            setup: usize::MAX,
             setpoint_due: false,
             heartbeat_due: [false; 2],
             version_due: [false; 2],
@@ -120,6 +119,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// The autopilot as last heard.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry
+    }
+
+    /// Which autopilot flies the vehicle; PX4 while none was heard.
+    pub(crate) fn kind(&self) -> Kind {
+        self.telemetry.kind.unwrap_or_default()
     }
 
     /// System id of the vehicle waited for; 0 when free.
@@ -209,9 +213,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Finite, from our own start, and a path wherever there is a goal.
+    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
+    fn departure_due(&self) -> bool {
+        let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
+        (self.now - self.entered_at).secs_f32() >= depart_s
+    }
+
     fn is_sound(&self, plan: &VehiclePlan<W, G>) -> bool {
-        let heights = [plan.climb_m, plan.descent_m];
-        let finite = heights.iter().all(|h| h.is_finite() && *h >= 0.0)
+        let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
+        let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - self.start).norm() < 0.1);
@@ -232,11 +242,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
                     return false;
                 }
+                if let Some(request) = frame.decode::<TIMESYNC_DATA>()
+                    && request.tc1 == 0
+                {
+                    let answer = Outgoing::Timesync(self.now.micros() as i64 * 1000, request.ts1);
+                    self.outboxes[link as usize].push(answer);
+                    return false;
+                }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
                     // It may have been started anew and know nothing of the streams we asked for.
-                    self.setup = 0;
+                    self.ask_for_streams();
                 }
                 change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }
@@ -314,38 +331,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.next_step = if due > now { due } else { now + every };
     }
 
-    fn repeat_requests(&mut self) {
-        let now = self.now;
-        let heard = self.telemetry.heartbeat_at.is_some();
-        let autopilot = &mut self.outboxes[Link::Autopilot as usize];
-        if heard && self.telemetry.ekf_origin.is_none() && now >= self.origin_at {
-            self.origin_at = now + RETRY_EVERY;
-            autopilot.push(Outgoing::Request(GPS_GLOBAL_ORIGIN));
-        }
-        for _ in 0..SETUP_BURST {
-            if let Some(&(id, interval_us)) = px4::STREAMS.get(self.setup) {
-                autopilot.push(Outgoing::Interval(id, interval_us));
-                self.setup += 1;
-            }
-        }
-        if now < self.retry_at {
-            return;
-        }
-        self.retry_at = now + RETRY_EVERY;
-        match self.state {
-            State::Engaging => autopilot.push(Outgoing::Mode(px4::OFFBOARD)),
-            State::Arming => autopilot.push(Outgoing::Arm(true)),
-            State::Land if self.telemetry.custom_mode != px4::LAND => {
-                autopilot.push(Outgoing::Mode(px4::LAND));
-            }
-            State::Disarm => {
-                self.retry_at = now + DISARM_AFTER;
-                autopilot.push(Outgoing::Arm(false));
-            }
-            _ => {}
-        }
-    }
-
     fn run_table(&mut self) {
         for _ in 0..ROWS_AT_ONCE {
             let inputs = self.inputs();
@@ -356,11 +341,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn inputs(&self) -> Inputs {
         let (t, now, scene) = (&self.telemetry, self.now, self.scene());
-        let offboard = t.custom_mode == px4::OFFBOARD;
+        let kind = self.kind();
+        let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.state {
             State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
             // Disarming after a landing the autopilot chooses a mode of its own.
-            State::Land | State::Disarm => !offboard && t.custom_mode != px4::LAND && t.armed,
+            State::Land | State::Disarm => !offboard && t.custom_mode != kind.land_mode() && t.armed,
             _ => !offboard,
         };
         let away = t.position - self.start;
@@ -393,7 +379,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             critical: t.is_critical(),
             on_ground: t.on_ground == Some(true),
             airborne: t.armed && t.on_ground == Some(false),
-            gates_open: self.guidance.advice.stop_within_m > 0.05,
+            lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
+            gates_open: self.guidance.advice.stop_within_m > 0.05 && self.departure_due(),
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
             near_path: match self.state {
@@ -438,7 +425,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
-            Action::Connect => self.setup = 0,
+            Action::Connect => self.ask_for_streams(),
             Action::RequestPlan => {
                 self.plan = None;
                 self.plan_failure = None;
@@ -449,7 +436,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.mode_before = self.telemetry.custom_mode;
                 self.guidance.hold_at(position);
             }
-            Action::AskOffboard | Action::AskArm => self.retry_at = now,
+            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
             Action::AskLand => {
                 self.retry_at = now;
                 // Off the path, or not known to be on it: the reference may be beyond a wall.
@@ -484,6 +471,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 #[cfg(test)]
 #[path = "machine_tests.rs"]
 mod tests;
+
+#[cfg(test)]
+#[path = "ardupilot_tests.rs"]
+mod ardupilot_tests;
 
 #[cfg(test)]
 #[path = "scene_tests.rs"]

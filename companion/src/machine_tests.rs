@@ -7,6 +7,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::*;
 use crate::fake_px4::*;
+use crate::px4;
 
 /// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
 pub(super) fn assert_no_gap(bench: &Bench) {
@@ -33,7 +34,7 @@ fn flies_the_mission_and_lands_at_the_goal() {
     assert_eq!(bench.acks.pop(), Some((300, 0, 255, 190)));
     bench.until(State::Done, 60.0);
     use State::*;
-    let flown = [Scheduled, Streaming, Engaging, Arming, Climb, Follow, Land, Disarm, Done];
+    let flown = [Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Land, Disarm, Done];
     assert!(states(&bench).ends_with(&flown), "{:?}", states(&bench));
     assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
     assert!(!bench.armed);

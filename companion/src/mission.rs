@@ -20,12 +20,14 @@ pub enum State {
     Ready,
     /// Started; waits on the ground for its gates, disarmed (PX4 disarms after 10 s on the ground).
     Scheduled,
-    /// Setpoints at the current position, before Offboard is asked for.
+    /// Setpoints at the current position, before Offboard or Guided is asked for.
     Streaming,
-    /// Offboard was asked for.
+    /// Offboard or Guided was asked for.
     Engaging,
     /// Arming was asked for.
     Arming,
+    /// NAV_TAKEOFF was asked for, of an autopilot that lifts off by command only; the others pass at once.
+    TakeOff,
     /// Straight up to the start of the path.
     Climb,
     /// Along the path, slowed and stopped by the neighbours.
@@ -81,11 +83,11 @@ pub enum Guard {
     StartElsewhere,
     /// MISSION_START, but the motors are armed.
     StartArmed,
-    /// The neighbours leave room to take off.
+    /// The schedule's take-off is due, and the neighbours leave room.
     GatesOpen,
     /// The state has lasted as long as the limit.
     Elapsed,
-    /// The mode is Offboard.
+    /// The mode is the one that follows setpoints: Offboard (PX4) or Guided (ArduCopter).
     Offboard,
     /// The mode is neither the one before nor the one we asked for, and the autopilot reports no failsafe.
     ModeTaken,
@@ -95,6 +97,8 @@ pub enum Guard {
     Armed,
     /// Motors off.
     Disarmed,
+    /// In the air, or of an autopilot that needs no command to take off.
+    LiftedOff,
     /// At the altitude of the start point.
     ClimbDone,
     /// At the end of the path, and the neighbours leave room to land.
@@ -109,9 +113,9 @@ pub enum Guard {
     BackOnPath,
     /// A fresh position, but elsewhere than where it stopped on the path.
     BackOffPath,
-    /// Offboard again, DO_PAUSE_CONTINUE 1, and the way back to the path is free.
+    /// Offboard or Guided again, DO_PAUSE_CONTINUE 1, and the way back to the path is free.
     ResumedOnPath,
-    /// Offboard again, DO_PAUSE_CONTINUE 1, but too far from the path.
+    /// Offboard or Guided again, DO_PAUSE_CONTINUE 1, but too far from the path.
     ResumedOffPath,
     /// NAV_LAND.
     LandCommanded,
@@ -144,10 +148,12 @@ pub enum Action {
     ForgetStart,
     /// Hold here, from now on.
     HoldHere,
-    /// Ask for Offboard, again every second.
+    /// Ask for Offboard or Guided, again every second.
     AskOffboard,
     /// Ask to arm, again every second.
     AskArm,
+    /// Ask for NAV_TAKEOFF to the height of the climb, again every four seconds.
+    AskTakeOff,
     /// Begin the climb.
     BeginClimb,
     /// Let the reference run along the path.
@@ -158,7 +164,7 @@ pub enum Action {
     Rejoin,
     /// Fly the path flown so far back to the start.
     TurnBack,
-    /// Ask for AUTO.LAND, again every second.
+    /// Ask for AUTO.LAND or LAND, again every second.
     AskLand,
     /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
     AskDisarm,
@@ -222,7 +228,7 @@ pub struct Inputs {
     pub turn_back: bool,
     /// Motors on.
     pub armed: bool,
-    /// The mode is Offboard.
+    /// The mode is Offboard or Guided.
     pub offboard: bool,
     /// The mode is neither the one before nor the one asked for.
     pub mode_foreign: bool,
@@ -232,6 +238,8 @@ pub struct Inputs {
     pub on_ground: bool,
     /// Motors on, and the landing detector says air.
     pub airborne: bool,
+    /// The landing detector says air, or nobody waits for that.
+    pub lifted_off: bool,
     /// The neighbours leave room to go.
     pub gates_open: bool,
     /// At the altitude of the start.
@@ -279,6 +287,7 @@ impl Guard {
             Self::FailsafeActs => i.mode_foreign && i.critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
+            Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
             Self::PathDone => i.path_done,
             Self::Stalled => i.stalled >= limit,
@@ -342,13 +351,13 @@ use State::*;
 
 /// On the ground before arming.
 const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled];
-/// In the air under our setpoints.
-const FLYING: &[State] = &[Climb, Follow, Paused, Alone, AutopilotSilent, PositionLost];
+/// In the air, or about to be, under our setpoints.
+const FLYING: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, AutopilotSilent, PositionLost];
 /// In the air, with links and position as they should be.
-const SOUND: &[State] = &[Climb, Follow, Paused, Alone];
+const SOUND: &[State] = &[TakeOff, Climb, Follow, Paused, Alone];
 
 /// In the air, and the autopilot was heard.
-const LINKED: &[State] = &[Climb, Follow, Paused, Alone, PositionLost];
+const LINKED: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, PositionLost];
 
 /// The mission.
 #[rustfmt::skip]
@@ -379,11 +388,10 @@ pub static TABLE: &[Row] = &[
     warn(SOUND,               G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
     info(&[Follow, Paused, Alone], G::ReturnCommanded, NOW, Follow,         A::TurnBack,    "Flying back to the start"),
-    info(&[Climb],            G::ReturnCommanded,  NOW,    Land,            A::AskLand,     "Landing on the pad"),
+    info(&[TakeOff, Climb],   G::ReturnCommanded,  NOW,    Land,            A::AskLand,     "Landing on the pad"),
     // The mission in order.
     info(&[WaitAutopilot],    G::AutopilotHeard,   NOW,    WaitPosition,    A::Connect,     "Autopilot found"),
     info(&[WaitPosition],     G::PositionKnown,    NOW,    Planning,        A::RequestPlan, "Position known: planning"),
-    info(&[WaitPosition],     G::Elapsed,          s(2),   WaitPosition,    A::Connect,     ""),
     warn(&[Planning],         G::RoadmapBad,       NOW,    Aborted,         A::ForgetStart, "Roadmap missing or wrong: mission aborted"),
     warn(&[Planning],         G::PlanFailed,       NOW,    Aborted,         A::ForgetStart, "No plan: mission aborted"),
     info(&[Planning],         G::PlanReady,        NOW,    Ready,           A::None,        "Ready"),
@@ -396,10 +404,12 @@ pub static TABLE: &[Row] = &[
     info(&[Ready, Scheduled, Streaming, Engaging, Arming], G::ReturnCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
     info(&[Scheduled],        G::GatesOpen,        NOW,    Streaming,       A::HoldHere,    ""),
     info(&[Streaming],        G::Elapsed,          s(1),   Engaging,        A::AskOffboard, ""),
-    info(&[Engaging],         G::Offboard,         NOW,    Arming,          A::AskArm,      "Offboard: arming"),
-    warn(&[Engaging],         G::Elapsed,          s(5),   Aborted,         A::ForgetStart, "Offboard refused: mission aborted"),
-    info(&[Arming],           G::Armed,            NOW,    Climb,           A::BeginClimb,  "Taking off"),
+    info(&[Engaging],         G::Offboard,         NOW,    Arming,          A::AskArm,      "Setpoints followed: arming"),
+    warn(&[Engaging],         G::Elapsed,          s(5),   Aborted,         A::ForgetStart, "Setpoint mode refused: mission aborted"),
+    info(&[Arming],           G::Armed,            NOW,    TakeOff,         A::AskTakeOff,  "Taking off"),
     warn(&[Arming],           G::Elapsed,          s(8),   Aborted,         A::AskDisarm,   "Arming refused: mission aborted"),
+    info(&[TakeOff],          G::LiftedOff,        NOW,    Climb,           A::BeginClimb,  ""),
+    warn(&[TakeOff],          G::Elapsed,          s(12),  Land,            A::AskLand,     "Take-off takes too long: landing"),
     info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
     warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),

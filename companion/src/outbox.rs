@@ -4,11 +4,11 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavSeverity, STATUSTEXT_DATA,
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_SET_DATA, STATUSTEXT_DATA,
+    TIMESYNC_DATA,
 };
 
 use crate::frame::{self, Header};
-use crate::px4;
 
 /// Entries a link holds.
 pub const DEPTH: usize = 32;
@@ -20,8 +20,14 @@ pub enum Outgoing {
     Interval(u16, f32),
     /// REQUEST_MESSAGE: message id.
     Request(u16),
-    /// DO_SET_MODE to a `custom_mode`.
-    Mode(u32),
+    /// DO_SET_MODE: parameters 2 and 3.
+    Mode(f32, f32),
+    /// NAV_TAKEOFF to a height above home, metres.
+    TakeOff(f32),
+    /// PARAM_SET of a REAL32.
+    Parameter(&'static str, f32),
+    /// The answer to a TIMESYNC: our clock and the sender's, nanoseconds.
+    Timesync(i64, i64),
     /// COMPONENT_ARM_DISARM.
     Arm(bool),
     /// COMMAND_ACK.
@@ -94,9 +100,22 @@ impl Outbox {
                 command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, f32::from(id), us, 0.0)
             }
             Outgoing::Request(id) => command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0),
-            Outgoing::Mode(mode) => {
-                let (main, sub) = px4::mode_params(mode);
-                command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub)
+            Outgoing::Mode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
+            Outgoing::TakeOff(height_m) => {
+                COMMAND_LONG_DATA { param7: height_m, ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0) }
+            }
+            Outgoing::Parameter(name, param_value) => {
+                let set = PARAM_SET_DATA {
+                    param_value,
+                    target_system: system,
+                    target_component: crate::AUTOPILOT,
+                    param_id: name.into(),
+                    param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+                };
+                return frame::encode(header, &set, out);
+            }
+            Outgoing::Timesync(tc1, ts1) => {
+                return frame::encode(header, &TIMESYNC_DATA { tc1, ts1 }, out);
             }
             Outgoing::Arm(arm) => {
                 command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)

@@ -8,6 +8,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 use super::*;
 use crate::fake_px4::*;
 use crate::mission::Guard;
+use crate::px4;
 
 /// Every row of the table is taken in some scene below or above; `taken` collects them.
 #[test]
@@ -259,6 +260,12 @@ fn every_row_has_its_scene() {
         Aborted,
         3.0,
     );
+    // An autopilot that takes off by command, and does not.
+    let mut grounded = Bench::ardupilot(config());
+    grounded.refused = std::vec![22];
+    grounded.until(Ready, 6.0);
+    grounded.start();
+    scene(grounded, &|b| b.run(14.0), Done, 30.0);
     // After the pilot, after a failsafe.
     let piloted = || {
         let mut bench = flying();

@@ -6,18 +6,21 @@
 //! anew and [`SETTLE`] has passed without another jump.
 
 use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::{GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA};
+use mavlink::dialects::ardupilotmega::{
+    EKF_STATUS_REPORT_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA,
+    SYS_STATUS_DATA,
+};
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::frames::{self, Geodetic, Projection};
+use planner_core::frames::{self, Geodetic};
 
+use crate::ardupilot;
+use crate::autopilot::Kind;
 use crate::frame::Frame;
 use crate::time::{Duration, Instant};
 
 const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
-/// `MAV_AUTOPILOT_INVALID`: not a flight controller.
-const NOT_AN_AUTOPILOT: u8 = 8;
 const ARMED: u8 = 0x80;
 const CRITICAL: u8 = 5;
 const ON_GROUND: u8 = 1;
@@ -65,6 +68,8 @@ pub enum Change {
 #[derive(Clone, Debug, Default)]
 pub struct Telemetry {
     sequence: SequenceFilter,
+    /// Which autopilot it is, from its first HEARTBEAT on; others are then ignored.
+    pub kind: Option<Kind>,
     /// When HEARTBEAT was last heard.
     pub heartbeat_at: Option<Instant>,
     /// Flight mode, the autopilot's own number.
@@ -77,6 +82,8 @@ pub struct Telemetry {
     pub on_ground: Option<bool>,
     /// Battery charge in percent, −1 unknown.
     pub battery_percent: i8,
+    /// Height above home in metres, as ArduCopter's NAV_TAKEOFF counts it.
+    pub above_home_m: f32,
     /// EKF origin, once heard.
     pub ekf_origin: Option<Geodetic>,
     /// When the position below was heard; `None` while it is unknown.
@@ -89,6 +96,7 @@ pub struct Telemetry {
     /// When a position was last read, used or not.
     read_at: Option<Instant>,
     settled_at: Instant,
+    estimator_ready: bool,
 }
 
 impl Telemetry {
@@ -126,7 +134,8 @@ impl Telemetry {
             // By field: a vehicle type newer than the crate must not make the autopilot silent.
             HEARTBEAT => {
                 let p = frame.padded();
-                if p[5] == NOT_AN_AUTOPILOT {
+                let Some(kind) = Kind::from_heartbeat(p[5]) else { return Change::None };
+                if *self.kind.get_or_insert(kind) != kind {
                     return Change::None;
                 }
                 self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
@@ -151,6 +160,22 @@ impl Telemetry {
             },
             GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
                 Some(origin) => self.handle_origin(now, &origin),
+                None => Change::None,
+            },
+            EKF_STATUS_REPORT_DATA::ID => {
+                // By field: flags newer than the crate's must not hide the others.
+                let p = frame.padded();
+                self.estimator_ready = ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
+                if !self.estimator_ready && self.kind == Some(Kind::ArduPilot) {
+                    self.position_at = None;
+                }
+                Change::Updated
+            }
+            GLOBAL_POSITION_INT_DATA::ID => match frame.decode::<GLOBAL_POSITION_INT_DATA>() {
+                Some(global) => {
+                    self.above_home_m = global.relative_alt as f32 * 1e-3;
+                    Change::None
+                }
                 None => Change::None,
             },
             LOCAL_POSITION_NED_DATA::ID => match frame.decode::<LOCAL_POSITION_NED_DATA>() {
@@ -197,11 +222,14 @@ impl Telemetry {
             return Change::None;
         }
         self.boot_ms = d.time_boot_ms;
+        let Some(kind) = self.kind.filter(|kind| *kind == Kind::Px4 || self.estimator_ready) else {
+            return Change::None;
+        };
         let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
             return if rebooted { self.lose_position(now) } else { Change::None };
         };
         let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
-        let geodetic = frames::ned_to_geodetic(Projection::Px4, &ekf_origin, &ned);
+        let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
         if let Some(at) = self.read_at {
             let dt_s = (now - at).secs_f32();
@@ -231,7 +259,7 @@ impl Telemetry {
     /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.
     pub fn to_ned(&self, mission_origin: &Geodetic, point: &Point) -> Option<Vector3<f32>> {
         let geodetic = frames::enu_to_geodetic(mission_origin, point);
-        let ned = frames::geodetic_to_ned(Projection::Px4, &self.ekf_origin?, &geodetic);
+        let ned = frames::geodetic_to_ned(self.kind?.projection(), &self.ekf_origin?, &geodetic);
         Some(Vector3::new(ned.x as f32, ned.y as f32, ned.z as f32))
     }
 }

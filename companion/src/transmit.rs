@@ -14,7 +14,6 @@ use crate::guidance::Setpoint;
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
-use crate::px4;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
@@ -51,16 +50,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
-        let stop = (still, still, still, px4::MASK_VELOCITY);
+        let kind = self.kind();
+        let stop = (still, still, still, kind.stop_mask());
         let (position, velocity, acceleration, mask) = match self.guidance.setpoint(self.state, &self.scene())
         {
             Setpoint::None => return None,
             Setpoint::Stop => stop,
             Setpoint::Move(position, velocity, acceleration) => {
                 self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
+                    let velocity = velocity + acceleration * kind.velocity_lead_s();
                     let (velocity, acceleration) =
                         (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
-                    (ned, velocity, acceleration, px4::MASK_POSITION_VELOCITY_ACCELERATION)
+                    (ned, velocity, acceleration, kind.move_mask())
                 })
             }
         };
@@ -129,7 +130,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let on_plan = !self.guidance.returning
             && matches!(
                 self.state,
-                Ready | Scheduled | Streaming | Engaging | Arming | Climb | Follow | Paused
+                Ready | Scheduled | Streaming | Engaging | Arming | TakeOff | Climb | Follow | Paused
             )
             || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
         let plan = self.plan.as_ref();

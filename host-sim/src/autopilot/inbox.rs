@@ -1,14 +1,14 @@
 //! What the simulated autopilot does with each message that comes in.
 //!
 //! Read by field ([`Fields`]): offsets are those of the wire order. What is for another system or component, or of an id
-//! not listed here, changes nothing and is not answered, as on PX4.
+//! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
 
 use companion::frame::Frame;
 use mavlink::dialects::ardupilotmega as dialect;
 
+use super::command::Command;
+use super::params::Encoding;
 use super::port::AUTOPILOT_COMPONENT;
-use super::px4::params::{self, Params};
-use super::px4::setpoint;
 use super::wire::Fields;
 use super::{Autopilot, telemetry};
 
@@ -29,52 +29,34 @@ impl Sender {
 impl Autopilot {
     pub(super) fn handle_frame(&mut self, port: usize, frame: &Frame) {
         let fields = Fields::new(frame);
+        let system_id = self.body.config.system_id;
         let from = Sender { port, system: frame.system, component: frame.component };
         let for_us = |system: usize, component: usize| {
             let (system, component) = (fields.u8(system), fields.u8(component));
-            (system == 0 || system == self.config.system_id)
-                && (component == 0 || component == AUTOPILOT_COMPONENT)
+            (system == 0 || system == system_id) && (component == 0 || component == AUTOPILOT_COMPONENT)
         };
+        let (firmware, body) = (&mut self.firmware, &mut self.body);
         match frame.message_id {
+            0 => firmware.handle_heartbeat(body, from),
             4 if fields.u8(12) == 0 && fields.u8(13) == 0 => {
                 let answer = telemetry::ping(fields.u64(0), fields.u32(8), from.system, from.component);
-                self.ports[port].send_raw(4, &answer);
+                body.ports[port].send_raw(4, &answer);
             }
-            11 if fields.u8(4) == self.config.system_id => self.handle_set_mode(&fields),
+            11 if fields.u8(4) == system_id => firmware.handle_set_mode(body, from, &fields),
             20 if for_us(2, 3) => self.handle_param_read(port, &fields),
-            21 if for_us(0, 1) => self.ports[port].param_cursor = Some(0),
+            21 if for_us(0, 1) => body.ports[port].param_cursor = Some(0),
             23 if for_us(4, 5) => self.handle_param_set(port, &fields),
-            // No mission, geofence or rally points are stored: 0 of each kind; none is taken either.
-            43 if for_us(0, 1) => {
-                self.ports[port].send_raw(44, &[0, 0, from.system, from.component, fields.u8(2)]);
-            }
-            44 if for_us(2, 3) => {
-                let refused = if fields.u16(0) == 0 { 0 } else { 3 };
-                self.ports[port].send_raw(47, &[from.system, from.component, refused, fields.u8(4)]);
-            }
-            45 if for_us(0, 1) => {
-                self.ports[port].send_raw(47, &[from.system, from.component, 0, fields.u8(2)]);
-            }
-            75 if for_us(30, 31) => self.handle_command_int(from, &fields),
-            76 if for_us(30, 31) => self.handle_command_long(from, &fields),
-            84 | 86 if for_us(50, 51) => {
-                let context = setpoint::Context {
-                    frame: &self.frame,
-                    heading: self.vehicle.state().heading_rad,
-                    home_alt_m: self.home.alt_m,
-                };
-                let setpoint = if frame.message_id == 84 {
-                    setpoint::local_ned(&fields, &context)
-                } else {
-                    setpoint::global_int(&fields, &context)
-                };
-                if let Some(setpoint) = setpoint {
-                    self.commander.handle_setpoint(setpoint, self.time_us);
-                }
-            }
+            // Everything of the mission protocol that names its target first.
+            43 | 45 if for_us(0, 1) => body.handle_mission(from, frame.message_id, &fields),
+            40 | 41 | 44 | 47 | 51 if for_us(2, 3) => body.handle_mission(from, frame.message_id, &fields),
+            39 | 73 if for_us(32, 33) => body.handle_mission(from, frame.message_id, &fields),
+            66 if for_us(2, 3) => firmware.handle_stream_request(body, from, &fields),
+            75 if for_us(30, 31) => firmware.handle_command(body, from, &Command::int(&fields)),
+            76 if for_us(30, 31) => firmware.handle_command(body, from, &Command::long(&fields)),
+            84 | 86 if for_us(50, 51) => firmware.handle_setpoint(body, frame.message_id, &fields),
             111 if fields.i64(0) == 0 => {
-                let message = dialect::TIMESYNC_DATA { tc1: self.time_us as i64 * 1000, ts1: fields.i64(8) };
-                self.ports[port].send(&message);
+                let message = dialect::TIMESYNC_DATA { tc1: body.time_us as i64 * 1000, ts1: fields.i64(8) };
+                body.ports[port].send(&message);
             }
             _ => {}
         }
@@ -82,38 +64,40 @@ impl Autopilot {
 
     fn handle_param_read(&mut self, port: usize, fields: &Fields<'_>) {
         let index = fields.u16(0) as i16;
-        let index = match usize::try_from(index) {
-            Ok(index) => Some(index),
-            Err(_) => fields.text::<16>(4).and_then(Params::index),
-        };
-        if let Some(index) = index {
-            self.send_param(port, index);
+        match usize::try_from(index) {
+            Ok(index) => self.send_param(port, index, index as u16),
+            Err(_) => self.send_named_param(port, fields.text::<16>(4)),
         }
     }
 
     fn handle_param_set(&mut self, port: usize, fields: &Fields<'_>) {
-        let Some(name) = fields.text::<16>(6) else { return };
-        if self.params.set(name, fields.f32(0), fields.u8(22)).is_some() {
-            self.tuning = self.params.tuning();
+        let name = fields.text::<16>(6);
+        if let Some(name) = name {
+            self.firmware.set_param(name, fields.f32(0), fields.u8(22));
         }
         // What was refused is answered with the value that stands.
-        if let Some(index) = Params::index(name) {
-            self.send_param(port, index);
+        self.send_named_param(port, name);
+    }
+
+    /// A name that is not known is not answered. ArduPilot leaves the index out of the answer.
+    fn send_named_param(&mut self, port: usize, name: Option<&str>) {
+        let params = self.firmware.params();
+        if let Some(index) = name.and_then(|name| params.index(name)) {
+            let told = if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
+            self.send_param(port, index, told);
         }
     }
 
-    pub(super) fn send_param(&mut self, port: usize, index: usize) {
-        let Some((name, value)) = self.params.get(index) else { return };
-        let message = dialect::PARAM_VALUE_DATA {
-            param_value: value.wire(),
-            param_count: self.params.len() as u16,
-            param_index: index as u16,
-            param_id: name.into(),
-            param_type: match value {
-                params::Value::Int(_) => dialect::MavParamType::MAV_PARAM_TYPE_INT32,
-                params::Value::Real(_) => dialect::MavParamType::MAV_PARAM_TYPE_REAL32,
-            },
-        };
-        self.ports[port].send(&message);
+    pub(super) fn send_param(&mut self, port: usize, index: usize, told: u16) {
+        let params = self.firmware.params();
+        let Some((name, value)) = params.get(index) else { return };
+        // By field: value, count, index, name, type.
+        let mut payload = [0; 25];
+        payload[..4].copy_from_slice(&params.wire(value).to_le_bytes());
+        payload[4..6].copy_from_slice(&(params.len() as u16).to_le_bytes());
+        payload[6..8].copy_from_slice(&told.to_le_bytes());
+        payload[8..8 + name.len()].copy_from_slice(name.as_bytes());
+        payload[24] = value.wire_type();
+        self.body.ports[port].send_raw(22, &payload);
     }
 }

@@ -7,12 +7,17 @@ use super::port::Port;
 use super::telemetry::Snapshot;
 use super::vehicle::GRAVITY;
 
-/// What PX4 1.17 announced, without FTP (32), geofence (0x4000) and rally points (0x8000), which are not simulated.
-const CAPABILITIES: u64 = 0x28DF;
+/// What PX4 1.17 announced, without FTP (32), which is not simulated.
+const PX4_CAPABILITIES: u64 = 0xE8DF;
+/// What ArduCopter 4.6 announces, without FTP (32), terrain (0x200) and compass calibration (0x1000).
+const ARDUPILOT_CAPABILITIES: u64 = 0xE9CF;
 /// 1.17.0, release.
-const VERSION: u32 = 17_891_583;
+const PX4_VERSION: u32 = 17_891_583;
+/// 4.6.2, release.
+const ARDUPILOT_VERSION: u32 = 0x0406_02FF;
 /// Sensors present, enabled and healthy of SYS_STATUS.
-const SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
+const PX4_SENSORS: [u32; 3] = [50_348_079, 50_413_615, 52_480_063];
+const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343 & !PREARM];
 /// MAV_SYS_STATUS_PREARM_CHECK.
 const PREARM: u32 = 0x1000_0000;
 const POSITION_SENSORS: u32 = 0x4000;
@@ -29,15 +34,16 @@ impl Snapshot {
     }
 
     pub(super) fn send_heartbeat(&self, port: &mut Port) {
-        let (custom, base, status) = self.mode;
-        let [a, b, c, d] = custom.to_le_bytes();
-        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 12, protocol version 3.
-        port.send_raw(0, &[a, b, c, d, 2, 12, base, status, 3]);
+        let status = &self.status;
+        let [a, b, c, d] = status.custom_mode.to_le_bytes();
+        // Laid out by hand: MAV_TYPE_QUADROTOR 2, MAV_AUTOPILOT_PX4 or _ARDUPILOTMEGA, protocol version 3.
+        let autopilot = if self.is_px4() { 12 } else { 3 };
+        port.send_raw(0, &[a, b, c, d, 2, autopilot, status.flags, status.system_status, 3]);
     }
 
     pub(super) fn send_sys_status(&self, port: &mut Port) {
-        let [present, enabled, mut health] = SENSORS;
-        if self.armable {
+        let [present, enabled, mut health] = if self.is_px4() { PX4_SENSORS } else { ARDUPILOT_SENSORS };
+        if self.status.armable {
             health |= PREARM;
         }
         if !self.gps.2 {
@@ -91,14 +97,17 @@ impl Snapshot {
     }
 
     pub(super) fn send_global_position(&self, port: &mut Port) {
-        let (lat, lon, alt) = scaled(&self.geodetic);
+        let unknown = Geodetic::default();
+        let known = self.status.origin_known;
+        let (lat, lon, alt) = scaled(if known { &self.geodetic } else { &unknown });
+        let above_home = if known { self.geodetic.alt_m - self.home.0.alt_m } else { 0.0 };
         let centimetres = |v: f64| (100.0 * v) as i16;
         port.send(&dialect::GLOBAL_POSITION_INT_DATA {
             time_boot_ms: self.boot_ms(),
             lat,
             lon,
             alt,
-            relative_alt: libm::round(1000.0 * (self.geodetic.alt_m - self.home.0.alt_m)) as i32,
+            relative_alt: libm::round(1000.0 * above_home) as i32,
             vx: centimetres(self.velocity.x),
             vy: centimetres(self.velocity.y),
             vz: centimetres(self.velocity.z),
@@ -107,17 +116,19 @@ impl Snapshot {
     }
 
     pub(super) fn send_servos(&self, port: &mut Port) {
-        let motor = if self.armed { 1000 + (1000.0 * self.throttle()) as u16 } else { 900 };
+        let idle = if self.is_px4() { 900 } else { 1000 };
+        let motor = if self.armed { 1000 + (1000.0 * self.throttle()) as u16 } else { idle };
+        let unused = if self.is_px4() { 900 } else { 0 };
         port.send(&dialect::SERVO_OUTPUT_RAW_DATA {
             time_usec: self.time_us as u32,
             servo1_raw: motor,
             servo2_raw: motor,
             servo3_raw: motor,
             servo4_raw: motor,
-            servo5_raw: 900,
-            servo6_raw: 900,
-            servo7_raw: 900,
-            servo8_raw: 900,
+            servo5_raw: unused,
+            servo6_raw: unused,
+            servo7_raw: unused,
+            servo8_raw: unused,
             port: 0,
         });
     }
@@ -194,11 +205,16 @@ impl Snapshot {
 
     pub(super) fn send_version(&self, port: &mut Port) {
         let git = [0, 0, 0, 196, 209, 42, 241, 214];
+        let (capabilities, version) = if self.is_px4() {
+            (PX4_CAPABILITIES, PX4_VERSION)
+        } else {
+            (ARDUPILOT_CAPABILITIES, ARDUPILOT_VERSION)
+        };
         port.send(&dialect::AUTOPILOT_VERSION_DATA {
-            capabilities: dialect::MavProtocolCapability::from_bits_retain(CAPABILITIES),
+            capabilities: dialect::MavProtocolCapability::from_bits_retain(capabilities),
             uid: 5_283_920_058_631_409_000 + u64::from(self.system_id),
-            flight_sw_version: VERSION,
-            middleware_sw_version: VERSION,
+            flight_sw_version: version,
+            middleware_sw_version: version,
             os_sw_version: 101_854_463,
             board_version: 1,
             vendor_id: 0,
@@ -206,6 +222,17 @@ impl Snapshot {
             flight_custom_version: git,
             middleware_custom_version: git,
             os_custom_version: [0; 8],
+        });
+    }
+
+    pub(super) fn send_ekf_status(&self, port: &mut Port) {
+        port.send(&dialect::EKF_STATUS_REPORT_DATA {
+            velocity_variance: 0.01,
+            pos_horiz_variance: 0.02,
+            pos_vert_variance: 0.01,
+            compass_variance: 0.03,
+            terrain_alt_variance: 0.0,
+            flags: dialect::EkfStatusFlags::from_bits_retain(self.status.ekf_flags),
         });
     }
 
@@ -220,7 +247,8 @@ impl Snapshot {
             x: ned.x,
             y: ned.y,
             z: ned.z,
-            q: [1.0, 0.0, 0.0, 0.0],
+            // ArduCopter does not say how it stood.
+            q: if self.is_px4() { [1.0, 0.0, 0.0, 0.0] } else { [f32::NAN; 4] },
             approach_x: 0.0,
             approach_y: 0.0,
             approach_z: 0.0,

@@ -46,8 +46,10 @@ pub struct Port {
     /// Streams, fixed in number and order.
     pub streams: Vec<Stream>,
     next_due_us: u64,
-    /// Acks for the next step.
-    pub later: Vec<Ack>,
+    /// Acks, and when each is due.
+    pub later: Vec<(u64, Ack)>,
+    /// Messages to be sent once, in the next step.
+    pub once: Vec<u32>,
     /// The next parameter of a list being sent.
     pub param_cursor: Option<usize>,
     /// PING messages sent.
@@ -77,6 +79,7 @@ impl Port {
             streams,
             next_due_us: 0,
             later: Vec::new(),
+            once: Vec::new(),
             param_cursor: None,
             pings: 0,
         }
@@ -135,6 +138,28 @@ impl Port {
     pub fn send_ack(&mut self, ack: Ack) {
         let [low, high] = ack.command.to_le_bytes();
         self.send_raw(77, &[low, high, ack.result, 0, 0, 0, 0, 0, ack.to.0, ack.to.1]);
+    }
+
+    /// Queues a STATUSTEXT of at most 50 bytes.
+    pub fn send_text(&mut self, severity: u8, text: &str) {
+        let mut payload = [0; 54];
+        payload[0] = severity;
+        let len = text.len().min(50);
+        payload[1..=len].copy_from_slice(&text.as_bytes()[..len]);
+        self.send_raw(253, &payload);
+    }
+
+    /// Queues the acks that are due.
+    pub fn send_due_acks(&mut self, now_us: u64) {
+        let mut waiting = core::mem::take(&mut self.later);
+        waiting.retain(|&(due_us, ack)| {
+            let due = now_us >= due_us;
+            if due {
+                self.send_ack(ack);
+            }
+            !due
+        });
+        self.later = waiting;
     }
 
     /// Whether telemetry would be dropped now.

@@ -1,4 +1,5 @@
-//! What the simulated PX4 says unasked, and how often: the streams of an onboard link as PX4 1.17 was seen to send them.
+//! What the simulated autopilot says. PX4's streams of an onboard link are here as 1.17 was seen to send them unasked;
+//! ArduCopter's are with its personality.
 //!
 //! A message is put together only when it is due, from a [`Snapshot`] taken once for all that are due in the same step.
 
@@ -8,6 +9,9 @@ use mavlink::dialects::ardupilotmega as dialect;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
+use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
+use super::config::Personality;
+use super::firmware::Status;
 use super::messages::scaled;
 use super::port::Port;
 
@@ -42,14 +46,6 @@ pub const STREAMS: [(u32, u32); 27] = [
     (49, 0),          // GPS_GLOBAL_ORIGIN: when it changes
 ];
 
-const AUTOPILOT_VERSION: u32 = 148;
-const PROTOCOL_VERSION: u32 = 300;
-
-/// PX4's own interval of a stream, microseconds; 0 where it is off or unknown.
-pub fn default_interval(id: u32) -> u32 {
-    STREAMS.iter().find(|stream| stream.0 == id).map_or(0, |stream| stream.1)
-}
-
 /// Everything telemetry is made of, at one instant.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -59,16 +55,10 @@ pub struct Snapshot {
     pub unix_us: u64,
     /// System id.
     pub system_id: u8,
-    /// HEARTBEAT: custom mode, MAV_MODE_FLAG, MAV_STATE.
-    pub mode: (u32, u8, u8),
-    /// The mode that was asked for, as `custom_mode`.
-    pub intended_mode: u32,
-    /// Whether the vehicle could be armed.
-    pub armable: bool,
+    /// The firmware's state.
+    pub status: Status,
     /// Armed.
     pub armed: bool,
-    /// MAV_LANDED_STATE.
-    pub landed_state: u8,
     /// Estimated NED about the EKF origin, metres.
     pub ned: Vector3<f64>,
     /// Estimated NED velocity, m/s.
@@ -128,6 +118,10 @@ pub fn attitude(force: &Vector3<f32>, heading: f32) -> Attitude {
 impl Snapshot {
     pub(super) fn attitude(&self) -> &Attitude {
         self.attitude.get_or_init(|| attitude(&self.specific_force, self.heading.0))
+    }
+
+    pub(super) fn is_px4(&self) -> bool {
+        self.status.personality == Personality::Px4
     }
 
     pub(super) fn boot_ms(&self) -> u32 {
@@ -191,7 +185,7 @@ impl Snapshot {
                 });
             }
             // PX4 sends it only while the estimate is valid.
-            32 if !self.gps.2 => {}
+            32 if !self.status.position_known => {}
             32 => {
                 let (p, v) = (self.ned.cast::<f32>(), self.velocity.cast::<f32>());
                 port.send(&dialect::LOCAL_POSITION_NED_DATA {
@@ -207,6 +201,8 @@ impl Snapshot {
             33 => self.send_global_position(port),
             36 => self.send_servos(port),
             42 => port.send(&dialect::MISSION_CURRENT_DATA { seq: 0 }),
+            // Not before there is one.
+            49 if !self.status.origin_known => {}
             49 => {
                 let (latitude, longitude, altitude) = scaled(&self.ekf_origin);
                 port.send(&dialect::GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude });
@@ -231,6 +227,7 @@ impl Snapshot {
                 thrust: self.throttle(),
                 type_mask: dialect::AttitudeTargetTypemask::empty(),
             }),
+            85 if !self.status.guided => {}
             85 => self.send_target(port),
             105 => self.send_imu(port),
             111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
@@ -244,8 +241,10 @@ impl Snapshot {
                 altitude_terrain: -self.ned.z as f32 - self.height,
                 bottom_clearance: self.height,
             }),
+            62 => port.send(&dialect::NAV_CONTROLLER_OUTPUT_DATA::default()),
             147 => self.send_battery(port),
             AUTOPILOT_VERSION => self.send_version(port),
+            193 => self.send_ekf_status(port),
             230 => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
                 flags: dialect::EstimatorStatusFlags::from_bits_truncate(if self.gps.2 { 895 } else { 0x27 }),
@@ -269,8 +268,9 @@ impl Snapshot {
             }),
             242 => self.send_home(port),
             245 => {
-                // vtol_state 0 and the landed state; two bytes, the first of them MAV_VTOL_STATE_UNDEFINED.
-                port.send_raw(245, &[0, self.landed_state]);
+                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the landed state.
+                let vtol = if self.is_px4() { 0 } else { 3 };
+                port.send_raw(245, &[vtol, self.status.landed_state]);
             }
             PROTOCOL_VERSION => {
                 // Version 2.00, 1.00 at least, 2.00 at most; no hashes.
@@ -283,8 +283,8 @@ impl Snapshot {
             331 => self.send_odometry(port),
             436 => {
                 let mut payload = [0; 9];
-                payload[..4].copy_from_slice(&self.mode.0.to_le_bytes());
-                payload[4..8].copy_from_slice(&self.intended_mode.to_le_bytes());
+                payload[..4].copy_from_slice(&self.status.custom_mode.to_le_bytes());
+                payload[4..8].copy_from_slice(&self.status.intended_mode.to_le_bytes());
                 port.send_raw(436, &payload);
             }
             _ => return false,

@@ -11,6 +11,7 @@ use crate::mission::Mission;
 use crate::output;
 use crate::progress::Progress;
 use crate::report::Level;
+use crate::say;
 use crate::scenario::{self, Scenario};
 use crate::swarm;
 
@@ -58,7 +59,12 @@ pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     plan_and_fly(scenario, "demo", &args.out, false)
 }
 
-fn plan_and_fly(scenario: Scenario, command: &'static str, out: &Path, realtime: bool) -> anyhow::Result<ExitCode> {
+fn plan_and_fly(
+    scenario: Scenario,
+    command: &'static str,
+    out: &Path,
+    realtime: bool,
+) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;
@@ -71,9 +77,9 @@ fn plan_and_fly(scenario: Scenario, command: &'static str, out: &Path, realtime:
     output::print_summary(&flight.result, out);
     for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
         let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
-        println!("           {:.2} s{id}: {}", incident.t_s, incident.text);
+        say!("           {:.2} s{id}: {}", incident.t_s, incident.text);
     }
-    println!(
+    say!(
         "           {:.0} s simulated in {:.1} s, {:.0} × real time",
         flight.simulated_s,
         flight.took_s,

@@ -16,6 +16,7 @@ use std::path::{Path, PathBuf};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
+pub use crate::autopilot::Personality;
 use crate::map::Unknown;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
@@ -162,15 +163,6 @@ pub struct Vehicle {
     pub ekf_origin: Option<Geodetic>,
     /// Where its companion runs.
     pub companion: Companion,
-}
-
-/// What a simulated autopilot is like.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Personality {
-    /// PX4.
-    Px4,
-    /// ArduCopter.
-    ArduPilot,
 }
 
 /// Where a companion runs.

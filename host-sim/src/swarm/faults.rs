@@ -10,8 +10,8 @@
 //! | `origin-change` | the EKF origin moves by `offset_m`, [`ORIGIN_MOVES_M`] if not given | moves back |
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
-//! | `pilot-takeover` | Position mode by the pilot's switch | as `pilot-return` |
-//! | `pilot-return` | Offboard by the pilot's switch, and the ground station tells the companion to go on | |
+//! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
+//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station tells the companion to go on | |
 //! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
 //! | `companion-reset` | a new companion with a new clock | |
 //! | `late-plan` | who asks for a plan gets no answer | answered |
@@ -24,7 +24,6 @@ use planner_core::Point;
 use super::ground_station::GroundStation;
 use super::member::{Member, Planner};
 use super::radio::{Cut, Radio};
-use crate::autopilot::Mode;
 use crate::report::{Event, Level};
 use crate::scenario::{Fault, Scenario};
 
@@ -134,7 +133,7 @@ fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow:
         "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_MOVES_M)),
         "gps-loss" => member.autopilot.set_gps_ok(false),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
-        "pilot-takeover" => member.autopilot.set_pilot_mode(Mode::Position),
+        "pilot-takeover" => member.autopilot.pilot_takes_over(),
         "pilot-return" => give_back(i, now_us, world),
         "autopilot-reboot" => member.reboot_autopilot(spell_us),
         "companion-reset" => member.reset_companion(now_us)?,
@@ -161,6 +160,6 @@ fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: 
 }
 
 fn give_back(i: usize, now_us: u64, world: &mut World<'_>) {
-    world.members[i].autopilot.set_pilot_mode(Mode::Offboard);
+    world.members[i].autopilot.pilot_returns();
     world.ground_station.resume(now_us, i);
 }

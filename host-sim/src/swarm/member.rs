@@ -123,7 +123,7 @@ impl Member {
     fn cut_motors(&mut self) {
         let truth = self.autopilot.truth();
         self.wrecked |= truth.armed && !truth.touching;
-        self.autopilot.reboot();
+        self.autopilot.restart();
     }
 
     /// Starts the companion anew, its clock with it.

@@ -39,8 +39,6 @@ const AFTERMATH_S: f64 = 1.0;
 /// When all have stood still for this long after a fault, no one will fly any more, seconds: longer than from a gate's
 /// opening to the take-off.
 const STILL_S: f64 = 30.0;
-/// `COM_OBL_RC_ACT`, what PX4 does when setpoints stop: 4, land. Its default returns to launch, through the ceilings.
-const OFFBOARD_LOSS: (&str, i32) = ("COM_OBL_RC_ACT", 4);
 
 /// A flown mission.
 pub struct Flight {
@@ -181,6 +179,7 @@ pub fn fly(
             deadlocks: monitor.deadlocks,
         },
         roadmap: mission.roadmap_size(),
+        left: mission.left(plan),
     };
     log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
         t_s: *t_s as f32,
@@ -251,6 +250,7 @@ fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             };
             let config = autopilot::Config {
                 system_id: vehicle.id,
+                personality: vehicle.personality,
                 world_origin: scenario.map.origin,
                 // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
                 ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
@@ -265,7 +265,7 @@ fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             };
             let mut member =
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
-            member.autopilot.set_parameter(OFFBOARD_LOSS.0, OFFBOARD_LOSS.1)?;
+            member.autopilot.land_on_stream_loss();
             Ok(member)
         })
         .collect()

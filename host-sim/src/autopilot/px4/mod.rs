@@ -15,13 +15,18 @@ mod flight;
 pub mod params;
 pub mod setpoint;
 
+mod commands;
+
 use planner_core::Point;
 
 use self::params::Tuning;
 use self::setpoint::Setpoint;
-use crate::autopilot::vehicle::Demand;
-
-pub(crate) mod commands;
+use super::body::{Body, Order, Sense};
+use super::config::Personality;
+use super::firmware::Status;
+use super::params::Params;
+use super::vehicle::VehicleLimits;
+use super::wire::Fields;
 
 /// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
 const LOSS_REACTION_S: f32 = 0.15;
@@ -74,6 +79,11 @@ impl Mode {
             .map_or(0, |&(_, main, sub)| u32::from(main) << 16 | u32::from(sub) << 24)
     }
 
+    /// The mode of a `custom_mode`.
+    pub fn from_custom_mode(custom_mode: u32) -> Option<Self> {
+        Self::from_main_sub((custom_mode >> 16) as u8, (custom_mode >> 24) as u8)
+    }
+
     /// The mode of a main and a sub mode.
     pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
         MODES.iter().find(|&&(_, m, s)| m == main && (s == sub || main != 4)).map(|&(mode, ..)| mode)
@@ -93,25 +103,64 @@ impl Mode {
     }
 }
 
-/// What the commander perceives in one step.
-#[derive(Clone, Copy, Debug)]
-pub struct Sense {
-    /// Microseconds since boot.
-    pub now_us: u64,
-    /// Estimated position, ENU metres.
-    pub position: Point,
-    /// Estimated velocity, ENU m/s.
-    pub velocity: Point,
-    /// Heading, radians clockwise from north.
-    pub heading: f32,
-    /// The body touches the ground.
-    pub touching: bool,
-    /// Height of the body over its resting place, metres (the distance sensor).
-    pub height: f32,
-    /// Home, ENU metres.
-    pub home: Point,
-    /// Charge left, 0 to 1.
-    pub battery: f32,
+impl From<Mode> for u32 {
+    fn from(mode: Mode) -> Self {
+        mode.custom_mode()
+    }
+}
+
+/// The firmware: state machine and parameters.
+#[derive(Clone, Debug)]
+pub struct Px4 {
+    /// Arming, modes, failsafe.
+    pub commander: Commander,
+    /// The parameter table.
+    pub params: Params,
+    /// Those of them that act.
+    pub tuning: Tuning,
+}
+
+impl Px4 {
+    /// As PX4 boots, with the airframe's limits in its parameters.
+    pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
+        let params = params::params(system_id, limits);
+        Self { commander: Commander::new(), tuning: Tuning::new(&params), params }
+    }
+
+    /// What telemetry tells.
+    pub fn status(&self, body: &Body, sense: &Sense) -> Status {
+        let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
+        Status {
+            personality: Personality::Px4,
+            custom_mode: self.commander.mode().custom_mode(),
+            intended_mode: self.commander.intention().custom_mode(),
+            flags,
+            system_status,
+            armable: self.commander.armable(sense, &self.tuning),
+            landed_state: self.commander.landed_state(),
+            guided: true,
+            ekf_flags: 0,
+            origin_known: true,
+            position_known: true,
+        }
+    }
+
+    /// Takes a setpoint, if it counts.
+    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+        let context = setpoint::Context {
+            frame: &body.frame,
+            heading: body.vehicle.state().heading_rad,
+            home_alt_m: body.home.alt_m,
+        };
+        let setpoint = if id == 84 {
+            setpoint::local_ned(fields, &context)
+        } else {
+            setpoint::global_int(fields, &context)
+        };
+        if let Some(setpoint) = setpoint {
+            self.commander.handle_setpoint(setpoint, body.time_us);
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -127,17 +176,6 @@ enum ReturnLeg {
     Cross { up: f32 },
     Descend,
     Land,
-}
-
-/// What moves the vehicle in this step.
-#[derive(Clone, Copy, Debug)]
-pub struct Order {
-    /// Motors carry weight.
-    pub lift: bool,
-    /// The controller forgets its integral.
-    pub reset: bool,
-    /// What the mode asks for.
-    pub demand: Demand,
 }
 
 /// The state of the state machine.

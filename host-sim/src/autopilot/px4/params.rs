@@ -1,43 +1,9 @@
 //! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few that act.
-//!
-//! Integers travel bytewise in the float of PARAM_VALUE and PARAM_SET (`MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE`),
-//! unlike ArduPilot's, which casts them.
 
+use crate::autopilot::params::Encoding;
+use crate::autopilot::params::Params;
+use crate::autopilot::params::Value::{self, Int, Real};
 use crate::autopilot::vehicle::{Gains, VehicleLimits};
-
-/// MAV_PARAM_TYPE_INT32.
-pub const TYPE_INT32: u8 = 6;
-/// MAV_PARAM_TYPE_REAL32.
-pub const TYPE_REAL32: u8 = 9;
-
-/// A parameter's value.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Value {
-    /// INT32.
-    Int(i32),
-    /// REAL32.
-    Real(f32),
-}
-
-use Value::{Int, Real};
-
-impl Value {
-    /// The float it travels in.
-    pub fn wire(self) -> f32 {
-        match self {
-            Int(i) => f32::from_bits(i as u32),
-            Real(r) => r,
-        }
-    }
-
-    /// MAV_PARAM_TYPE.
-    pub fn wire_type(self) -> u8 {
-        match self {
-            Int(_) => TYPE_INT32,
-            Real(_) => TYPE_REAL32,
-        }
-    }
-}
 
 /// Sorted by name, as PX4 lists them.
 const DEFAULTS: &[(&str, Value)] = &[
@@ -133,117 +99,21 @@ const DEFAULTS: &[(&str, Value)] = &[
     ("SYS_HAS_MAG", Int(1)),
 ];
 
-/// The parameter table of one vehicle.
-#[derive(Clone, Debug)]
-pub struct Params {
-    values: Vec<Value>,
-}
-
-impl Params {
-    /// The defaults, with the airframe's limits in the parameters that carry them.
-    pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let mut params = Self { values: DEFAULTS.iter().map(|&(_, value)| value).collect() };
-        for (name, value) in [
-            ("MAV_SYS_ID", Int(i32::from(system_id))),
-            ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
-            ("MPC_Z_VEL_MAX_UP", Real(limits.climb_max_mps)),
-            ("MPC_Z_VEL_MAX_DN", Real(limits.descend_max_mps)),
-            ("MPC_TILTMAX_AIR", Real(limits.tilt_max_deg)),
-        ] {
-            let index = Self::index(name).expect("the names are in the table above");
-            params.values[index] = value;
-        }
-        params
-    }
-
-    /// How many there are.
-    pub fn len(&self) -> usize {
-        self.values.len()
-    }
-
-    /// Whether there are none.
-    pub fn is_empty(&self) -> bool {
-        self.values.is_empty()
-    }
-
-    /// Index of a name.
-    pub fn index(name: &str) -> Option<usize> {
-        DEFAULTS.binary_search_by(|&(known, _)| known.cmp(name)).ok()
-    }
-
-    /// Name and value at an index.
-    pub fn get(&self, index: usize) -> Option<(&'static str, Value)> {
-        Some((DEFAULTS.get(index)?.0, *self.values.get(index)?))
-    }
-
-    /// Takes what PARAM_SET brought, if the type is the parameter's own and a float is finite; tells the index.
-    pub fn set(&mut self, name: &str, wire: f32, wire_type: u8) -> Option<usize> {
-        let index = Self::index(name)?;
-        let value = match self.values[index] {
-            Int(_) if wire_type == TYPE_INT32 => Int(wire.to_bits() as i32),
-            Real(_) if wire_type == TYPE_REAL32 && wire.is_finite() => Real(wire),
-            _ => return None,
-        };
-        self.values[index] = value;
-        Some(index)
-    }
-
-    fn real(&self, name: &str) -> f32 {
-        match Self::index(name).and_then(|index| self.values.get(index)) {
-            Some(&Real(value)) => value,
-            _ => 0.0,
-        }
-    }
-
-    fn int(&self, name: &str) -> i32 {
-        match Self::index(name).and_then(|index| self.values.get(index)) {
-            Some(&Int(value)) => value,
-            _ => 0,
-        }
-    }
-
-    /// What acts, looked up once after each change.
-    pub fn tuning(&self) -> Tuning {
-        Tuning {
-            gains: Gains {
-                position: [self.real("MPC_XY_P"), self.real("MPC_Z_P")],
-                velocity_p: [self.real("MPC_XY_VEL_P_ACC"), self.real("MPC_Z_VEL_P_ACC")],
-                velocity_i: [self.real("MPC_XY_VEL_I_ACC"), self.real("MPC_Z_VEL_I_ACC")],
-                velocity_d: [self.real("MPC_XY_VEL_D_ACC"), self.real("MPC_Z_VEL_D_ACC")],
-                tilt_tan: libm::tanf(self.real("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
-                heading_rate_max: self.real("MPC_YAWRAUTO_MAX").to_radians(),
-            },
-            speed_max: self.real("MPC_XY_VEL_MAX"),
-            climb_max: self.real("MPC_Z_VEL_MAX_UP"),
-            descend_max: self.real("MPC_Z_VEL_MAX_DN"),
-            cruise: self.real("MPC_XY_CRUISE"),
-            auto_up: self.real("MPC_Z_V_AUTO_UP"),
-            auto_down: self.real("MPC_Z_V_AUTO_DN"),
-            land_speed: self.real("MPC_LAND_SPEED"),
-            land_slow_below: [self.real("MPC_LAND_ALT1"), self.real("MPC_LAND_ALT2")],
-            takeoff_speed: self.real("MPC_TKO_SPEED"),
-            takeoff_ramp_s: self.real("MPC_TKO_RAMP_T"),
-            takeoff_height: self.real("MIS_TAKEOFF_ALT"),
-            spool_up_s: self.real("COM_SPOOLUP_TIME"),
-            land_trigger_s: self.real("LNDMC_TRIG_TIME"),
-            offboard_loss_s: self.real("COM_OF_LOSS_T"),
-            offboard_loss_action: self.int("COM_OBL_RC_ACT"),
-            disarm_land_s: self.real("COM_DISARM_LAND"),
-            disarm_preflight_s: self.real("COM_DISARM_PRFLT"),
-            return_height: self.real("RTL_RETURN_ALT"),
-            return_descend_height: self.real("RTL_DESCEND_ALT"),
-            return_min_distance: self.real("RTL_MIN_DIST"),
-            return_cone_tan: libm::tanf((self.int("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
-            low_battery_action: self.int("COM_LOW_BAT_ACT"),
-            battery_critical: self.real("BAT_CRIT_THR"),
-            battery_low: self.real("BAT_LOW_THR"),
-        }
-    }
+/// The defaults, with the airframe's limits in the parameters that carry them.
+pub fn params(system_id: u8, limits: &VehicleLimits) -> Params {
+    let own = [
+        ("MAV_SYS_ID", Int(i32::from(system_id))),
+        ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
+        ("MPC_Z_VEL_MAX_UP", Real(limits.climb_max_mps)),
+        ("MPC_Z_VEL_MAX_DN", Real(limits.descend_max_mps)),
+        ("MPC_TILTMAX_AIR", Real(limits.tilt_max_deg)),
+    ];
+    Params::new(DEFAULTS, Encoding::Bytewise, &own)
 }
 
 /// The parameters that act, by what they do. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
-#[expect(missing_docs, reason = "each is the parameter it is read from, in `Params::tuning`")]
+#[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
 pub struct Tuning {
     pub gains: Gains,
     pub speed_max: f32,
@@ -272,6 +142,46 @@ pub struct Tuning {
     pub battery_low: f32,
 }
 
+impl Tuning {
+    /// What acts, looked up once after each change.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            gains: Gains {
+                position: [params.real("MPC_XY_P"), params.real("MPC_Z_P")],
+                velocity_p: [params.real("MPC_XY_VEL_P_ACC"), params.real("MPC_Z_VEL_P_ACC")],
+                velocity_i: [params.real("MPC_XY_VEL_I_ACC"), params.real("MPC_Z_VEL_I_ACC")],
+                velocity_d: [params.real("MPC_XY_VEL_D_ACC"), params.real("MPC_Z_VEL_D_ACC")],
+                tilt_tan: libm::tanf(params.real("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
+                heading_rate_max: params.real("MPC_YAWRAUTO_MAX").to_radians(),
+            },
+            speed_max: params.real("MPC_XY_VEL_MAX"),
+            climb_max: params.real("MPC_Z_VEL_MAX_UP"),
+            descend_max: params.real("MPC_Z_VEL_MAX_DN"),
+            cruise: params.real("MPC_XY_CRUISE"),
+            auto_up: params.real("MPC_Z_V_AUTO_UP"),
+            auto_down: params.real("MPC_Z_V_AUTO_DN"),
+            land_speed: params.real("MPC_LAND_SPEED"),
+            land_slow_below: [params.real("MPC_LAND_ALT1"), params.real("MPC_LAND_ALT2")],
+            takeoff_speed: params.real("MPC_TKO_SPEED"),
+            takeoff_ramp_s: params.real("MPC_TKO_RAMP_T"),
+            takeoff_height: params.real("MIS_TAKEOFF_ALT"),
+            spool_up_s: params.real("COM_SPOOLUP_TIME"),
+            land_trigger_s: params.real("LNDMC_TRIG_TIME"),
+            offboard_loss_s: params.real("COM_OF_LOSS_T"),
+            offboard_loss_action: params.int("COM_OBL_RC_ACT"),
+            disarm_land_s: params.real("COM_DISARM_LAND"),
+            disarm_preflight_s: params.real("COM_DISARM_PRFLT"),
+            return_height: params.real("RTL_RETURN_ALT"),
+            return_descend_height: params.real("RTL_DESCEND_ALT"),
+            return_min_distance: params.real("RTL_MIN_DIST"),
+            return_cone_tan: libm::tanf((params.int("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
+            low_battery_action: params.int("COM_LOW_BAT_ACT"),
+            battery_critical: params.real("BAT_CRIT_THR"),
+            battery_low: params.real("BAT_LOW_THR"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -285,7 +195,7 @@ mod tests {
     #[test]
     fn every_parameter_that_acts_is_in_the_table() {
         // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
-        let t = Params::new(3, &VehicleLimits::default()).tuning();
+        let t = Tuning::new(&params(3, &VehicleLimits::default()));
         for value in [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height] {
             assert!(value > 0.0);
         }
@@ -300,16 +210,5 @@ mod tests {
             assert!(value > 0.0);
         }
         assert_eq!((t.offboard_loss_action, t.low_battery_action), (0, 0));
-    }
-
-    #[test]
-    fn integers_travel_bytewise_and_the_wrong_type_is_refused() {
-        let mut params = Params::new(3, &VehicleLimits::default());
-        let index = params.set("COM_OBL_RC_ACT", f32::from_bits(5), TYPE_INT32).unwrap();
-        assert_eq!(params.get(index).unwrap().1, Int(5));
-        assert_eq!(params.get(index).unwrap().1.wire().to_bits(), 5);
-        assert_eq!(params.set("COM_OBL_RC_ACT", 4.0, TYPE_REAL32), None);
-        assert_eq!(params.set("MPC_XY_VEL_MAX", f32::NAN, TYPE_REAL32), None);
-        assert_eq!(params.set("NO_SUCH", 1.0, TYPE_REAL32), None);
     }
 }

@@ -1,0 +1,249 @@
+//! What every simulated autopilot has, whatever its firmware: airframe, estimator, ports, home, stored missions.
+
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic};
+
+use super::command::{ACCEPTED, Command, message_id};
+use super::config::Config;
+use super::geodesy::LocalFrame;
+use super::inbox::Sender;
+use super::mission::Missions;
+use super::noise::{self, Disturbance};
+use super::port::{Ack, Port};
+use super::vehicle::{Demand, Vehicle};
+
+const MESSAGE_INTERVAL: u32 = 244;
+const HOME_POSITION: u32 = 242;
+const GPS_GLOBAL_ORIGIN: u32 = 49;
+/// An answer leaves one step after the question: 4 ms, where PX4 was seen to take 1.3 to 16 and ArduCopter 2.5 to 7.
+pub const ANSWER_US: u64 = 4_000;
+/// From the command to reboot until it does.
+const REBOOT_US: u64 = 200_000;
+
+/// What a state machine perceives in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Sense {
+    /// Microseconds since boot.
+    pub now_us: u64,
+    /// Estimated position, ENU metres.
+    pub position: Point,
+    /// Estimated velocity, ENU m/s.
+    pub velocity: Point,
+    /// Heading, radians clockwise from north.
+    pub heading: f32,
+    /// The body touches the ground.
+    pub touching: bool,
+    /// Height of the body over its resting place, metres (the distance sensor).
+    pub height: f32,
+    /// Home, ENU metres.
+    pub home: Point,
+    /// Charge left, 0 to 1.
+    pub battery: f32,
+}
+
+/// What moves the vehicle in this step.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    /// Motors carry weight.
+    pub lift: bool,
+    /// The controller forgets its integral.
+    pub reset: bool,
+    /// What the mode asks for.
+    pub demand: Demand,
+}
+
+/// Airframe, estimator, ports, home and stored missions.
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub(super) config: Config,
+    pub(super) time_us: u64,
+    slot_us: u64,
+    pub(super) vehicle: Vehicle,
+    pub(super) disturbance: Disturbance,
+    pub(super) jump: Point,
+    pub(super) gps_ok: bool,
+    pub(super) frame: LocalFrame,
+    pub(super) home: Geodetic,
+    pub(super) home_enu: Point,
+    home_fixed: bool,
+    pub(super) height: f32,
+    pub(super) demand: Option<Demand>,
+    pub(super) ports: Vec<Port>,
+    pub(super) missions: Missions,
+    /// When to reboot, once that was commanded.
+    pub(super) reboot_us: Option<u64>,
+}
+
+impl Body {
+    pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
+        let mut limits = config.vehicle;
+        limits.drag_per_s *= config.personality.drag_share();
+        let mut vehicle = Vehicle::new(limits, config.start);
+        vehicle.set_heading(config.heading_rad);
+        let start = config.start.cast::<f64>();
+        let projection = config.personality.projection();
+        let frame = LocalFrame::new(projection, config.world_origin, config.ekf_origin, start);
+        let ports = (0..config.ports.max(1)).map(|_| Port::new(config.system_id, streams));
+        let home = config.home.unwrap_or_else(|| frame.geodetic(&start));
+        Self {
+            time_us: 0,
+            slot_us: 0,
+            disturbance: Disturbance::new(
+                config.wind,
+                config.gust_mps,
+                config.position_noise_m,
+                config.seed ^ (u64::from(config.system_id) << 32),
+            ),
+            jump: Point::zeros(),
+            gps_ok: true,
+            home,
+            home_enu: frames::geodetic_to_enu(&config.world_origin, &home),
+            home_fixed: config.home.is_some(),
+            height: 0.0,
+            demand: None,
+            ports: ports.collect(),
+            missions: Missions::default(),
+            reboot_us: None,
+            vehicle,
+            frame,
+            config: config.clone(),
+        }
+    }
+
+    /// Lets time pass, wind change, and the ground be where it is.
+    pub(super) fn advance_time(&mut self, dt_s: f32, ground_up_m: f32) {
+        self.time_us += libm::roundf(dt_s * 1e6) as u64;
+        if self.time_us >= self.slot_us {
+            self.slot_us += (noise::SLOT_S * 1e6) as u64;
+            self.disturbance.advance();
+        }
+        self.height = self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
+    }
+
+    pub(super) fn sense(&self) -> Sense {
+        let state = self.vehicle.state();
+        Sense {
+            now_us: self.time_us,
+            position: state.position + self.disturbance.position_error + self.jump,
+            velocity: state.velocity + self.disturbance.velocity_error,
+            heading: state.heading_rad,
+            touching: state.touching,
+            height: self.height,
+            home: self.home_enu,
+            battery: state.battery,
+        }
+    }
+
+    pub(super) fn set_fixed_home(&mut self, home: Geodetic) {
+        self.home = home;
+        self.home_enu = frames::geodetic_to_enu(&self.config.world_origin, &home);
+        self.home_fixed = true;
+        self.announce(HOME_POSITION);
+    }
+
+    /// Home where it stands, as both firmwares set it on arming.
+    pub(super) fn set_home_here(&mut self) {
+        if self.home_fixed {
+            return;
+        }
+        let position = self.sense().position;
+        self.home_enu = position;
+        self.home = self.frame.geodetic(&position.cast::<f64>());
+        self.announce(HOME_POSITION);
+    }
+
+    /// Reboots when the answer is out.
+    pub(super) fn reboot_soon(&mut self) {
+        self.reboot_us = Some(self.time_us + REBOOT_US);
+    }
+
+    pub(super) fn announce_origin(&mut self) {
+        self.announce(GPS_GLOBAL_ORIGIN);
+    }
+
+    /// Sends one message through every port in the next step.
+    pub(super) fn announce(&mut self, id: u32) {
+        self.ports.iter_mut().for_each(|port| port.once.push(id));
+    }
+
+    /// Sends STATUSTEXT through every port.
+    pub(super) fn say(&mut self, severity: u8, text: &str) {
+        self.ports.iter_mut().for_each(|port| port.send_text(severity, text));
+    }
+
+    pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
+        self.acknowledge_after(from, command, result, ANSWER_US);
+    }
+
+    pub(super) fn acknowledge_after(&mut self, from: Sender, command: u16, result: u8, after_us: u64) {
+        let ack = Ack { command, result, to: from.id() };
+        self.ports[from.port].later.push((self.time_us + after_us, ack));
+    }
+
+    /// Where DO_REPOSITION asks to go, ENU with NaN for what it leaves; `None` for no place on earth.
+    pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
+        let here = self.frame.geodetic(self.vehicle.position());
+        let [lat_deg, lon_deg] = command.place;
+        let base = if command.relative { self.home.alt_m } else { 0.0 };
+        let across = lat_deg.is_finite() && lon_deg.is_finite();
+        let asked = Geodetic {
+            lat_deg: if across { lat_deg } else { here.lat_deg },
+            lon_deg: if across { lon_deg } else { here.lon_deg },
+            alt_m: if command.z.is_finite() { f64::from(command.z) + base } else { here.alt_m },
+        };
+        if !asked.is_valid() {
+            return None;
+        }
+        let enu = self.frame.enu_of_geodetic(&asked).cast::<f32>();
+        let (east, north) = if across { (enu.x, enu.y) } else { (f32::NAN, f32::NAN) };
+        Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
+    }
+
+    /// DO_SET_HOME; whether the place is one.
+    pub(super) fn set_home(&mut self, command: &Command) -> bool {
+        let [lat_deg, lon_deg] = command.place;
+        let home = if command.param[0] == 1.0 {
+            self.frame.geodetic(self.vehicle.position())
+        } else {
+            Geodetic { lat_deg, lon_deg, alt_m: f64::from(command.z) }
+        };
+        let valid = home.is_valid();
+        if valid {
+            self.set_fixed_home(home);
+        }
+        valid
+    }
+
+    /// SET_MESSAGE_INTERVAL; 0 restores what `streams` says. `refused` is the firmware's answer to an id it has not.
+    pub(super) fn set_interval(
+        &mut self,
+        from: Sender,
+        command: &Command,
+        streams: &[(u32, u32)],
+        refused: u8,
+    ) -> u8 {
+        let Some(id) = message_id(command.param[0]) else { return refused };
+        let interval = match command.param[1] {
+            0.0 => streams.iter().find(|stream| stream.0 == id).map_or(0, |stream| stream.1),
+            us if us < 0.0 => 0,
+            us => us as u32,
+        };
+        let now = self.time_us;
+        if self.ports[from.port].set_interval(id, interval, now) { ACCEPTED } else { refused }
+    }
+
+    /// GET_MESSAGE_INTERVAL.
+    pub(super) fn report_interval(&mut self, from: Sender, id: f32, refused: u8) -> u8 {
+        let port = &mut self.ports[from.port];
+        let Some(stream) = message_id(id).and_then(|id| port.streams.iter().find(|stream| stream.id == id))
+        else {
+            return refused;
+        };
+        let interval_us = if stream.interval_us == 0 { -1 } else { stream.interval_us as i32 };
+        let mut payload = [0; 6];
+        payload[..4].copy_from_slice(&interval_us.to_le_bytes());
+        payload[4..].copy_from_slice(&(stream.id as u16).to_le_bytes());
+        port.send_raw(MESSAGE_INTERVAL, &payload);
+        ACCEPTED
+    }
+}

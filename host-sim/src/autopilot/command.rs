@@ -1,0 +1,58 @@
+//! COMMAND_LONG and COMMAND_INT, read alike, and the results they are answered with.
+
+use super::wire::Fields;
+
+pub const ACCEPTED: u8 = 0;
+pub const TEMPORARILY_REJECTED: u8 = 1;
+pub const DENIED: u8 = 2;
+pub const UNSUPPORTED: u8 = 3;
+pub const FAILED: u8 = 4;
+
+/// Parameter 2 of COMPONENT_ARM_DISARM that forces it.
+pub const FORCE: f32 = 21_196.0;
+/// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
+pub const CUSTOM_MODE: u8 = 1;
+pub const AUTOPILOT_VERSION: u32 = 148;
+pub const PROTOCOL_VERSION: u32 = 300;
+
+/// A command.
+pub struct Command {
+    /// MAV_CMD.
+    pub id: u16,
+    /// Parameters 1 to 4.
+    pub param: [f32; 4],
+    /// Latitude and longitude in degrees, where given.
+    pub place: [f64; 2],
+    /// Parameter 7.
+    pub z: f32,
+    /// z is above home, not above the sea.
+    pub relative: bool,
+}
+
+impl Command {
+    /// From COMMAND_LONG.
+    pub fn long(fields: &Fields<'_>) -> Self {
+        let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
+        Self { id: fields.u16(28), param: first_four(fields), place, z: fields.f32(24), relative: false }
+    }
+
+    /// From COMMAND_INT.
+    pub fn int(fields: &Fields<'_>) -> Self {
+        let degrees = |at: usize| match fields.i32(at) {
+            i32::MAX => f64::NAN,
+            scaled => f64::from(scaled) * 1e-7,
+        };
+        let relative = matches!(fields.u8(32), 3 | 6);
+        let place = [degrees(16), degrees(20)];
+        Self { id: fields.u16(28), param: first_four(fields), place, z: fields.f32(24), relative }
+    }
+}
+
+fn first_four(fields: &Fields<'_>) -> [f32; 4] {
+    [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
+}
+
+/// A message id that came in a float.
+pub fn message_id(value: f32) -> Option<u32> {
+    (0.0..16_777_216.0).contains(&value).then_some(value as u32)
+}

@@ -1,0 +1,205 @@
+//! The mission protocol: plans, geofences and rally points are stored and given back, not flown.
+//!
+//! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK. Download: REQUEST_LIST →
+//! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
+
+use super::body::Body;
+use super::inbox::Sender;
+use super::port::Port;
+use super::wire::Fields;
+
+const MISSION_ITEM: u32 = 39;
+const REQUEST: u32 = 40;
+const SET_CURRENT: u32 = 41;
+const CURRENT: u32 = 42;
+const REQUEST_LIST: u32 = 43;
+const COUNT: u32 = 44;
+const CLEAR_ALL: u32 = 45;
+const ACK: u32 = 47;
+const REQUEST_INT: u32 = 51;
+const MISSION_ITEM_INT: u32 = 73;
+
+/// MAV_MISSION_RESULT.
+const ACCEPTED: u8 = 0;
+const UNSUPPORTED: u8 = 3;
+const NO_SPACE: u8 = 4;
+const INVALID: u8 = 5;
+const INVALID_SEQUENCE: u8 = 13;
+
+/// Mission, geofence, rally points.
+const KINDS: usize = 3;
+/// ArduCopter keeps 724 on small boards; PX4 at least 500.
+const MOST: u16 = 724;
+const RETRY_US: u64 = 250_000;
+const RETRIES: u32 = 20;
+
+/// An item as it travels: 37 bytes of MISSION_ITEM_INT, less the kind.
+type Item = [u8; 37];
+
+/// An upload under way.
+#[derive(Clone, Debug)]
+struct Upload {
+    from: Sender,
+    kind: u8,
+    count: u16,
+    items: Vec<Item>,
+    asked_us: u64,
+    retries: u32,
+}
+
+/// What is stored.
+#[derive(Clone, Debug, Default)]
+pub struct Missions {
+    stored: [Vec<Item>; KINDS],
+    upload: Option<Upload>,
+    current: u16,
+}
+
+impl Missions {
+    /// Asks again for an item that does not come; gives up in the end.
+    pub(super) fn ask_again(&mut self, now_us: u64, index: usize, port: &mut Port) {
+        let Some(upload) = &mut self.upload else { return };
+        if upload.from.port != index || now_us < upload.asked_us + RETRY_US {
+            return;
+        }
+        upload.retries += 1;
+        if upload.retries > RETRIES {
+            self.upload = None;
+            return;
+        }
+        upload.ask(now_us, port);
+    }
+}
+
+impl Upload {
+    fn ask(&mut self, now_us: u64, port: &mut Port) {
+        self.asked_us = now_us;
+        let [low, high] = (self.items.len() as u16).to_le_bytes();
+        port.send_raw(REQUEST_INT, &[low, high, self.from.system, self.from.component, self.kind]);
+    }
+}
+
+impl Body {
+    /// Takes a message of the mission protocol.
+    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &Fields<'_>) {
+        let now_us = self.time_us;
+        let kind_at = match id {
+            REQUEST_LIST | CLEAR_ALL => 2,
+            COUNT | REQUEST | REQUEST_INT => 4,
+            MISSION_ITEM | MISSION_ITEM_INT => 37,
+            SET_CURRENT => return self.set_current(from, fields.u16(0)),
+            // An ACK ends a download.
+            _ => return,
+        };
+        let kind = fields.u8(kind_at);
+        let slot = usize::from(kind);
+        if slot >= KINDS && !(id == CLEAR_ALL && kind == u8::MAX) {
+            return self.answer_mission(from, UNSUPPORTED, kind);
+        }
+        let port = &mut self.ports[from.port];
+        match id {
+            REQUEST_LIST => {
+                let [low, high] = (self.missions.stored[slot].len() as u16).to_le_bytes();
+                port.send_raw(COUNT, &[low, high, from.system, from.component, kind]);
+            }
+            REQUEST | REQUEST_INT => match self.missions.stored[slot].get(usize::from(fields.u16(0))) {
+                Some(item) => {
+                    let mut payload = [0; 38];
+                    payload[..37].copy_from_slice(item);
+                    payload[32..34].copy_from_slice(&[from.system, from.component]);
+                    payload[37] = kind;
+                    port.send_raw(MISSION_ITEM_INT, &payload);
+                }
+                None => self.answer_mission(from, INVALID_SEQUENCE, kind),
+            },
+            COUNT if fields.u16(0) > MOST => self.answer_mission(from, NO_SPACE, kind),
+            COUNT if fields.u16(0) == 0 => {
+                self.missions.stored[slot].clear();
+                self.answer_mission(from, ACCEPTED, kind);
+            }
+            COUNT => {
+                let mut upload =
+                    Upload { from, kind, count: fields.u16(0), items: Vec::new(), asked_us: 0, retries: 0 };
+                upload.ask(now_us, port);
+                self.missions.upload = Some(upload);
+            }
+            CLEAR_ALL => {
+                let all = kind == u8::MAX;
+                for (k, stored) in self.missions.stored.iter_mut().enumerate() {
+                    if all || k == slot {
+                        stored.clear();
+                    }
+                }
+                self.answer_mission(from, ACCEPTED, kind);
+            }
+            _ => self.take_item(from, id, kind, fields),
+        }
+    }
+
+    fn take_item(&mut self, from: Sender, id: u32, kind: u8, fields: &Fields<'_>) {
+        let Some(upload) = &mut self.missions.upload else {
+            return self.answer_mission(from, INVALID_SEQUENCE, kind);
+        };
+        if upload.from.id() != from.id() || upload.kind != kind {
+            return self.answer_mission(from, INVALID_SEQUENCE, kind);
+        }
+        let sequence = usize::from(fields.u16(28));
+        if sequence < upload.items.len() {
+            // A repetition: the next one is already asked for.
+            return;
+        }
+        let Some(item) = read_item(id, fields) else {
+            self.missions.upload = None;
+            return self.answer_mission(from, INVALID, kind);
+        };
+        let port = &mut self.ports[from.port];
+        if sequence == upload.items.len() {
+            upload.items.push(item);
+            upload.retries = 0;
+        }
+        if upload.items.len() < usize::from(upload.count) {
+            upload.ask(self.time_us, port);
+        } else if let Some(done) = self.missions.upload.take() {
+            self.missions.stored[usize::from(kind)] = done.items;
+            self.missions.current = 0;
+            self.answer_mission(from, ACCEPTED, kind);
+        }
+    }
+
+    fn set_current(&mut self, from: Sender, sequence: u16) {
+        if usize::from(sequence) < self.missions.stored[0].len() {
+            self.missions.current = sequence;
+            self.ports[from.port].send_raw(CURRENT, &sequence.to_le_bytes());
+        } else {
+            self.answer_mission(from, INVALID_SEQUENCE, 0);
+        }
+    }
+
+    fn answer_mission(&mut self, from: Sender, result: u8, kind: u8) {
+        self.ports[from.port].send_raw(ACK, &[from.system, from.component, result, kind]);
+    }
+}
+
+/// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is none on earth.
+fn read_item(id: u32, fields: &Fields<'_>) -> Option<Item> {
+    let mut item = [0; 37];
+    for (at, byte) in item.iter_mut().enumerate() {
+        *byte = fields.u8(at);
+    }
+    if (0..4).any(|k| fields.f32(4 * k).is_infinite()) || !fields.f32(24).is_finite() {
+        return None;
+    }
+    // MISSION_ITEM carries degrees, or metres in a local frame, as floats.
+    if id == MISSION_ITEM {
+        let local = matches!(fields.u8(34), 1 | 4 | 7 | 8 | 9);
+        let scale = if local { 1e4 } else { 1e7 };
+        for at in [16, 20] {
+            let value = f64::from(fields.f32(at)) * scale;
+            if !value.is_finite() || value.abs() > f64::from(i32::MAX) {
+                return None;
+            }
+            item[at..at + 4].copy_from_slice(&(libm::round(value) as i32).to_le_bytes());
+        }
+    }
+    Some(item)
+}

@@ -1,0 +1,490 @@
+//! One test for each thing ArduCopter 4.6 was seen to do.
+
+use planner_core::frames::Projection;
+
+use super::super::ardupilot::Mode as Copter;
+use super::*;
+
+const GUIDED: f32 = 4.0;
+const LOITER: f32 = 5.0;
+const RTL: f32 = 6.0;
+const LAND: f32 = 9.0;
+const BRAKE: f32 = 17.0;
+const READY_S: f32 = 8.0;
+
+fn config() -> Config {
+    Config { personality: Personality::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
+}
+
+impl Bench {
+    fn copter() -> Self {
+        Self::with(&config())
+    }
+
+    fn ask(&mut self, id: u16, a: f32, b: f32) -> Vec<u8> {
+        self.command(id, [a, b, 0.0, 0.0, 0.0, 0.0, 0.0])
+    }
+
+    fn mode(&mut self, number: f32) -> Vec<u8> {
+        self.ask(176, 1.0, number)
+    }
+
+    fn take_off(&mut self, height: f32) -> Vec<u8> {
+        self.command(22, [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, height])
+    }
+
+    fn want(&mut self, id: u32) {
+        assert_eq!(self.ask(511, id as f32, 1e5), [0]);
+    }
+
+    fn texts(&self) -> Vec<String> {
+        let text = |f: &Frame| String::from_utf8_lossy(&f.padded()[1..51]).trim_end_matches('\0').to_owned();
+        self.of(253).map(|(_, frame)| text(frame)).collect()
+    }
+
+    /// Ready, in Guided and armed.
+    fn armed() -> Self {
+        let mut bench = Self::copter();
+        bench.want(245);
+        bench.run(f64::from(READY_S));
+        assert_eq!(bench.mode(GUIDED), [0]);
+        assert_eq!(bench.arm(), [0]);
+        bench
+    }
+
+    /// Hovering in Guided.
+    fn in_guided(up: f32) -> Self {
+        let mut bench = Self::armed();
+        assert_eq!(bench.take_off(up), [0]);
+        bench.until(20.0, |a| a.truth().position.z > up);
+        bench.run(3.0);
+        bench
+    }
+
+    fn at(&self) -> Point {
+        self.autopilot.truth().position
+    }
+}
+
+#[test]
+fn unasked_it_says_heartbeat_and_next_to_nothing() {
+    let mut bench = Bench::copter();
+    bench.run(30.0);
+    let count = |id| bench.of(id).count();
+    assert!((30..=31).contains(&count(0)));
+    assert_eq!((count(1), count(111)), (1, 3), "one SYS_STATUS, TIMESYNC every 10 s");
+    for (_, frame) in &bench.received {
+        assert!([0, 1, 111, 253, 49, 242].contains(&frame.message_id), "{} unasked", frame.message_id);
+    }
+    let beat = bench.of(0).last().unwrap().1.padded();
+    assert_eq!((beat[4], beat[5], beat[6]), (2, 3, 0x51), "quadrotor, ArduPilot, STABILIZE");
+}
+
+#[test]
+fn streams_come_when_asked_for_and_positions_when_the_estimator_is_ready() {
+    let mut bench = Bench::copter();
+    for id in [32, 33, 193, 245] {
+        bench.want(id);
+    }
+    let flags = |bench: &Bench| {
+        let (_, frame) = bench.of(193).last().unwrap();
+        u16::from_le_bytes([frame.padded()[20], frame.padded()[21]])
+    };
+    bench.run(2.0);
+    assert_eq!(flags(&bench), 0x400);
+    bench.run(5.0);
+    assert_eq!(flags(&bench), 0xA7);
+    assert_eq!(bench.of(32).count(), 0, "no LOCAL_POSITION_NED without a position");
+    bench.run(3.0);
+    assert_eq!(flags(&bench), 0x33F);
+    assert!(bench.of(32).count() > 10);
+    assert_eq!(bench.of(49).count(), 1, "the origin comes when it is set");
+    let before = bench.of(32).count();
+    assert_eq!(bench.ask(511, 32.0, -1.0), [0]);
+    bench.run(2.0);
+    assert!(bench.of(32).count() <= before + 1, "switched off");
+}
+
+#[test]
+fn ground_stations_may_ask_by_data_stream() {
+    let mut bench = Bench::copter();
+    bench.send(66, &[4, 0, 1, 1, 10, 1]);
+    bench.run(2.0);
+    assert!((7..=9).contains(&bench.of(30).count()), "ATTITUDE at 4 Hz");
+}
+
+#[test]
+fn it_flies_the_sequence_that_was_seen_to_fly() {
+    let mut bench = Bench::armed();
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat(), (4, 0xD9, 3), "armed on the ground is STANDBY");
+    assert_eq!(bench.take_off(10.0), [0]);
+    let start = bench.now();
+    bench.until(5.0, |a| !a.truth().landed);
+    let lifted = bench.now() - start;
+    assert!((2.2..2.5).contains(&lifted), "in the air after {lifted} s");
+    bench.run(0.2);
+    assert_eq!(bench.landed_state(), 3);
+    bench.until(15.0, |a| a.truth().position.z - 0.3 > 9.5);
+    let there = bench.now() - start;
+    assert!((8.0..8.8).contains(&there), "9.5 m after {there} s");
+    assert_eq!(bench.landed_state(), 3);
+    while bench.landed_state() == 3 {
+        bench.run(0.05);
+    }
+    let done = bench.now() - start;
+    assert!(bench.landed_state() == 2 && (8.9..9.8).contains(&done), "landed_state 2 after {done} s");
+    bench.run(1.0);
+    assert_eq!(bench.heartbeat(), (4, 0xD9, 4));
+    assert!((bench.at().z - 10.3).abs() < 0.15, "at {}", bench.at());
+}
+
+#[test]
+fn the_armed_bit_lags_the_ack() {
+    let mut latest = 0.0_f64;
+    for k in 0..8 {
+        let mut bench = Bench::copter();
+        bench.run(f64::from(READY_S) + 0.12 * f64::from(k));
+        bench.mode(GUIDED);
+        assert_eq!(bench.arm(), [0]);
+        let acked = bench.of(77).last().unwrap().0;
+        while bench.heartbeat().1 & 0x80 == 0 {
+            bench.run(0.02);
+        }
+        latest = latest.max(bench.of(0).last().unwrap().0 - acked);
+    }
+    assert!((0.45..=1.0).contains(&latest), "{latest} s at most: HEARTBEAT comes at 1 Hz");
+}
+
+#[test]
+fn acks_take_milliseconds() {
+    let mut bench = Bench::copter();
+    bench.run(1.0);
+    let asked = bench.now();
+    bench.mode(GUIDED);
+    let took = bench.of(77).last().unwrap().0 - asked;
+    assert!((0.0025..=0.007).contains(&took), "{took} s");
+}
+
+#[test]
+fn guided_is_accepted_before_the_estimator_is_ready_and_arming_refused() {
+    let mut bench = Bench::copter();
+    bench.run(3.0);
+    assert_eq!(bench.mode(GUIDED), [0]);
+    assert_eq!(bench.arm(), [4]);
+    assert!(bench.texts().iter().any(|text| text.contains("Need Position Estimate")), "{:?}", bench.texts());
+    bench.run(1.0);
+    assert_eq!(bench.heartbeat(), (4, 0x59, 3));
+}
+
+#[test]
+fn refusals_are_as_seen() {
+    let mut bench = Bench::copter();
+    bench.run(f64::from(READY_S));
+    assert_eq!(bench.mode(99.0), [4], "unknown mode");
+    assert_eq!(bench.mode(GUIDED), [0]);
+    assert_eq!(bench.take_off(5.0), [4], "take-off while disarmed");
+    assert_eq!(bench.ask(511, 9999.0, 1e5), [2], "bad message id");
+    assert_eq!(bench.ask(12_345, 0.0, 0.0), [3], "unknown command");
+    bench.mode(LAND);
+    assert_eq!(bench.arm(), [4], "LAND does not arm");
+    let mut bench = Bench::in_guided(5.0);
+    assert_eq!(bench.ask(400, 0.0, 0.0), [4], "disarm in the air");
+    assert_eq!(bench.take_off(10.0), [4], "take-off in the air");
+    assert_eq!(bench.ask(246, 1.0, 0.0), [4], "reboot in the air");
+    assert_eq!(bench.ask(400, 0.0, 21_196.0), [0]);
+    bench.run(2.0);
+    assert!(!bench.autopilot.truth().armed && bench.at().z < 0.31, "forced, it fell");
+}
+
+#[test]
+fn setpoints_before_take_off_do_not_lift_and_it_disarms_itself() {
+    let mut bench = Bench::armed();
+    bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+    let took = bench.until(12.0, |a| !a.truth().armed);
+    assert!((9.8..=10.0).contains(&took), "disarmed after {took} s");
+    assert!(bench.at().z < 0.31);
+}
+
+#[test]
+fn a_setpoint_before_the_lift_off_ends_the_take_off() {
+    let mut bench = Bench::armed();
+    bench.take_off(5.0);
+    bench.run(1.0);
+    bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
+    bench.run(8.0);
+    assert!(bench.at().z < 0.31);
+    // Once in the air setpoints take over.
+    let mut bench = Bench::armed();
+    bench.take_off(5.0);
+    bench.until(5.0, |a| !a.truth().landed);
+    bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -3.0], [0.0; 3], 0.0));
+    bench.run(8.0);
+    assert!((bench.at().z - 3.0).abs() < 0.15, "at {}", bench.at());
+    assert_eq!(bench.landed_state(), 2);
+}
+
+#[test]
+fn the_masks_that_work_move_it() {
+    let mut bench = Bench::in_guided(5.0);
+    bench.stream(20.0, setpoint(0xDF8, 1, [10.0, 4.0, -5.0], [0.0; 3], 0.0));
+    bench.run(12.0);
+    assert!((bench.at() - Point::new(4.0, 10.0, 5.0)).norm() < 0.2, "0xDF8 at {}", bench.at());
+    bench.stream(20.0, setpoint(0xDC7, 1, [0.0; 3], [0.0, 2.0, 0.0], 0.0));
+    bench.run(4.0);
+    let v = bench.autopilot.truth().velocity;
+    assert!((1.85..2.15).contains(&v.x) && v.y.abs() < 0.1, "0xDC7 flies {v}");
+    bench.stream(20.0, setpoint(0xDC0, 1, [3.0, 1.0, -6.0], [0.0; 3], 0.0));
+    bench.run(14.0);
+    assert!((bench.at() - Point::new(1.0, 3.0, 6.0)).norm() < 0.2, "0xDC0 at {}", bench.at());
+    bench.stream(20.0, setpoint(0x9F8, 1, [3.0, 1.0, -6.0], [0.0; 3], 1.57));
+    bench.run(5.0);
+    assert!((bench.autopilot.truth().heading_rad - 1.57).abs() < 0.02, "0x9F8 turns");
+    let mut turning = setpoint(0x5C7, 1, [0.0; 3], [1.0, 0.0, 0.0], 0.0);
+    turning[44..48].copy_from_slice(&0.5_f32.to_le_bytes());
+    bench.stream(20.0, turning);
+    bench.run(3.0);
+    let truth = bench.autopilot.truth();
+    assert!(truth.velocity.y > 0.8 && (truth.heading_rate - 0.5).abs() < 0.05, "0x5C7 {truth:?}");
+}
+
+#[test]
+fn frames_1_8_and_9_move_it_and_12_stops_it() {
+    for (frame, moves) in [(1, true), (8, true), (9, true), (12, false)] {
+        let mut bench = Bench::in_guided(5.0);
+        let texts = bench.texts().len();
+        bench.stream(20.0, setpoint(VELOCITY, frame, [0.0; 3], [2.0, 0.0, 0.0], 0.0));
+        bench.run(3.0);
+        let speed = bench.autopilot.truth().velocity.y;
+        assert_eq!(speed > 1.8, moves, "frame {frame}: {speed} m/s");
+        assert_eq!(bench.texts().len(), texts, "without a word");
+    }
+    // In the body's frames ahead is where the nose points, and positions are offsets.
+    let mut bench = Bench::with(&Config { heading_rad: core::f32::consts::FRAC_PI_2, ..config() });
+    bench.run(f64::from(READY_S));
+    bench.mode(GUIDED);
+    bench.arm();
+    bench.take_off(5.0);
+    bench.run(12.0);
+    bench.send(84, &setpoint(POSITION, 9, [4.0, 0.0, 0.0], [0.0; 3], 0.0));
+    bench.run(8.0);
+    assert!((bench.at() - Point::new(4.0, 0.0, 5.3)).norm() < 0.3, "at {}", bench.at());
+}
+
+#[test]
+fn a_velocity_is_held_three_seconds_then_it_brakes() {
+    let mut bench = Bench::in_guided(5.0);
+    bench.stream(20.0, setpoint(VELOCITY, 1, [0.0; 3], [2.0, 0.0, 0.0], 0.0));
+    bench.run(4.0);
+    let texts = bench.texts().len();
+    bench.stream = None;
+    let slower = bench.until(5.0, |a| a.truth().velocity.norm() < 1.8);
+    assert!((3.1..3.7).contains(&slower), "below 1.8 m/s after {slower} s");
+    let stopped = slower + bench.until(3.0, |a| a.truth().velocity.norm() < 0.2);
+    assert!((4.0..4.8).contains(&stopped), "below 0.2 m/s after {stopped} s");
+    bench.run(2.0);
+    assert_eq!((bench.heartbeat().0, bench.texts().len()), (4, texts), "still Guided, without a word");
+}
+
+#[test]
+fn guid_timeout_acts_on_position_with_velocity_too() {
+    let mut bench = Bench::in_guided(5.0);
+    bench.set_param("GUID_TIMEOUT", 0.5, 9);
+    for k in 0..80 {
+        bench.send(84, &setpoint(0xDC0, 1, [0.1 * k as f32, 0.0, -5.0], [2.0, 0.0, 0.0], 0.0));
+        bench.run(0.05);
+    }
+    bench.run(6.0);
+    // The last target, 7.9 m, ran on for half a second.
+    assert!((8.5..9.4).contains(&bench.at().y), "at {}", bench.at());
+}
+
+#[test]
+fn a_position_is_held_for_ever() {
+    let mut bench = Bench::in_guided(5.0);
+    bench.send(84, &setpoint(POSITION, 1, [8.0, 0.0, -5.0], [0.0; 3], 0.0));
+    bench.run(60.0);
+    assert!((bench.at() - Point::new(0.0, 8.0, 5.0)).norm() < 0.2, "at {}", bench.at());
+}
+
+#[test]
+fn outside_guided_setpoints_are_ignored_and_a_running_stream_takes_effect_at_once() {
+    let mut bench = Bench::in_guided(5.0);
+    assert_eq!(bench.mode(BRAKE), [0]);
+    bench.stream(20.0, setpoint(POSITION, 1, [8.0, 0.0, -5.0], [0.0; 3], 0.0));
+    bench.run(4.0);
+    assert!(bench.at().y.abs() < 0.1 && bench.heartbeat() == (17, 0xD9, 4));
+    bench.autopilot.set_pilot_mode(Copter::Guided);
+    bench.run(8.0);
+    assert!((bench.at().y - 8.0).abs() < 0.2, "at {}", bench.at());
+}
+
+#[test]
+fn loiter_with_a_low_stick_sinks_and_brake_holds() {
+    let mut bench = Bench::in_guided(20.0);
+    assert_eq!(bench.mode(LOITER), [0]);
+    bench.run(4.0);
+    let sink = bench.autopilot.truth().velocity.z;
+    assert!((-2.7..-2.2).contains(&sink), "{sink} m/s");
+    bench.autopilot.pilot_takes_over();
+    bench.run(5.0);
+    let up = bench.at().z;
+    bench.run(5.0);
+    assert!((bench.at().z - up).abs() < 0.1);
+    bench.autopilot.pilot_returns();
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat().0, 4);
+}
+
+#[test]
+fn the_ground_stations_silence_returns_it_only_if_told_so() {
+    let ground = Header { system: 255, component: 190, sequence: 0 };
+    let beat = |bench: &mut Bench| {
+        let mut out = [0; frame::MAX_SENT];
+        let extra = frame::extra_crc(0).unwrap();
+        let len = frame::encode_raw(ground, 0, extra, &[0, 0, 0, 0, 6, 8, 0, 4, 3], &mut out);
+        bench.autopilot.handle_bytes(&out[..len]);
+    };
+    for enabled in [false, true] {
+        let mut bench = Bench::in_guided(5.0);
+        bench.set_param("FS_GCS_ENABLE", f32::from(u8::from(enabled)), 2);
+        beat(&mut bench);
+        let start = bench.now();
+        for _ in 0..120 {
+            // A companion's heartbeats do not count.
+            bench.send(0, &[0, 0, 0, 0, 18, 8, 0, 4, 3]);
+            bench.run(0.05);
+            if bench.autopilot.in_failsafe() {
+                break;
+            }
+        }
+        assert_eq!(bench.autopilot.in_failsafe(), enabled);
+        if enabled {
+            let took = bench.now() - start;
+            assert!((5.0..5.3).contains(&took), "after {took} s");
+            bench.run(1.1);
+            assert_eq!(bench.heartbeat(), (6, 0xD9, 5));
+            assert_eq!(bench.texts().last().unwrap(), "GCS Failsafe");
+            beat(&mut bench);
+            bench.run(1.1);
+            assert_eq!(bench.heartbeat(), (6, 0xD9, 4), "it stays in RTL");
+            assert_eq!(bench.texts().last().unwrap(), "GCS Failsafe Cleared");
+        }
+    }
+}
+
+#[test]
+fn landing_takes_as_long_as_it_took() {
+    let mut bench = Bench::in_guided(10.0);
+    assert_eq!(bench.ask(21, 0.0, 0.0), [0]);
+    let start = bench.now();
+    bench.run(1.1);
+    assert_eq!((bench.heartbeat(), bench.landed_state()), ((9, 0xD9, 4), 4));
+    bench.until(40.0, |a| a.truth().landed);
+    let took = bench.now() - start;
+    assert!((21.0..23.2).contains(&took), "on the ground after {took} s");
+    let to_disarm = bench.until(3.0, |a| !a.truth().armed);
+    assert!((0.3..=0.8).contains(&to_disarm), "disarmed after {to_disarm} s");
+    bench.run(1.1);
+    assert_eq!(bench.heartbeat(), (9, 0x59, 3), "it stays in LAND");
+}
+
+#[test]
+fn high_above_home_it_lands_fast_though_a_floor_is_near() {
+    let mut bench = Bench::in_guided(20.0);
+    bench.ground = 15.0;
+    bench.mode(LAND);
+    let mut fastest = 0.0_f32;
+    bench.until(20.0, |a| {
+        fastest = fastest.min(a.truth().velocity.z);
+        a.truth().landed
+    });
+    assert!(fastest < -1.2, "{fastest} m/s: LAND_ALT_LOW counts from home");
+}
+
+#[test]
+fn return_climbs_comes_home_and_lands() {
+    let mut bench = Bench::in_guided(3.0);
+    bench.stream(20.0, setpoint(POSITION, 1, [25.0, 0.0, -3.0], [0.0; 3], 0.0));
+    bench.run(12.0);
+    assert_eq!(bench.mode(RTL), [0]);
+    let mut highest = 0.0_f32;
+    bench.until(120.0, |a| {
+        highest = highest.max(a.truth().position.z);
+        !a.truth().armed
+    });
+    assert!(bench.at().xy().norm() < 0.7 && highest > 14.0, "landed at {}, {highest} m", bench.at());
+}
+
+#[test]
+fn integers_are_cast_and_answers_to_names_carry_no_index() {
+    let mut bench = Bench::copter();
+    bench.set_param("FS_GCS_ENABLE", 1.0, 2);
+    let b = *bench.of(22).last().unwrap().1.padded();
+    let wire = f32::from_le_bytes([b[0], b[1], b[2], b[3]]);
+    assert_eq!((wire, u16::from_le_bytes([b[6], b[7]]), b[24]), (1.0, u16::MAX, 2));
+    bench.send(21, &[1, 1]);
+    bench.run(2.0);
+    let total = usize::from(u16::from_le_bytes([b[4], b[5]]));
+    let bench_total = bench.of(22).count() - 1;
+    assert_eq!(bench_total, total);
+    for (k, (_, frame)) in bench.of(22).skip(1).enumerate() {
+        assert_eq!(usize::from(u16::from_le_bytes([frame.padded()[6], frame.padded()[7]])), k);
+    }
+}
+
+#[test]
+fn without_a_position_it_lands_by_failsafe() {
+    let mut bench = Bench::in_guided(5.0);
+    bench.autopilot.set_gps_ok(false);
+    bench.run(3.0);
+    assert_eq!(bench.heartbeat(), (9, 0xD9, 5));
+    bench.until(30.0, |a| !a.truth().armed);
+}
+
+#[test]
+fn a_low_battery_acts_as_batt_fs_low_act_says() {
+    for (action, mode) in [(0.0, 4), (1.0, 9), (2.0, 6)] {
+        let mut bench = Bench::in_guided(5.0);
+        bench.set_param("BATT_LOW_MAH", 500.0, 9);
+        bench.set_param("BATT_FS_LOW_ACT", action, 2);
+        bench.autopilot.set_battery(0.1);
+        bench.run(1.2);
+        assert_eq!(bench.heartbeat().0, mode, "BATT_FS_LOW_ACT {action}");
+    }
+}
+
+#[test]
+fn a_reboot_forgets_streams_and_keeps_parameters_and_missions() {
+    let mut bench = Bench::copter();
+    bench.want(30);
+    bench.set_param("RTL_ALT", 900.0, 6);
+    bench.run(5.0);
+    assert_eq!(bench.ask(246, 1.0, 0.0), [0]);
+    bench.framer = Framer::new();
+    bench.until(1.0, |a| a.time_us() < 1_000_000);
+    bench.run(0.5);
+    let before = bench.of(30).count();
+    bench.run(2.0);
+    assert_eq!(bench.of(30).count(), before, "streams are forgotten");
+    bench.send(20, &[255, 255, 1, 1, b'R', b'T', b'L', b'_', b'A', b'L', b'T', 0]);
+    let b = bench.of(22).last().unwrap().1.padded();
+    assert_eq!(f32::from_le_bytes([b[0], b[1], b[2], b[3]]), 900.0);
+}
+
+#[test]
+fn ned_is_in_its_own_projection_about_its_own_origin() {
+    let world = Config::default().world_origin;
+    let ekf = frames::enu_to_geodetic(&world, &Point::new(1200.0, -700.0, 12.0));
+    let mut bench = Bench::with(&Config { ekf_origin: ekf, ..config() });
+    bench.want(32);
+    bench.run(f64::from(READY_S) + 1.0);
+    let b = *bench.of(32).last().unwrap().1.padded();
+    let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
+    let truth = frames::enu_to_geodetic(&world, &bench.at());
+    let expected = frames::geodetic_to_ned(Projection::ArduPilot, &ekf, &truth);
+    for (k, at) in [4, 8, 12].into_iter().enumerate() {
+        assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
+    }
+    assert!((expected - frames::geodetic_to_ned(Projection::Px4, &ekf, &truth)).norm() > 0.5);
+}
