@@ -51,8 +51,8 @@ fn recording(path: &Path) -> Vec<Recorded> {
 struct Story {
     /// Acknowledged: when, command, result.
     acks: Vec<(f64, u16, u8)>,
-    /// HEARTBEAT's custom mode and armed bit, each time either changed.
-    modes: Vec<(u32, bool)>,
+    /// HEARTBEAT's custom mode, each time it changed. The armed bit may be on and off between two heartbeats.
+    modes: Vec<u32>,
     /// MAV_LANDED_STATE, each time it changed.
     landed: Vec<u8>,
 }
@@ -63,7 +63,7 @@ impl Story {
         match frame.message_id {
             COMMAND_ACK => self.acks.push((t_s, u16::from_le_bytes([p[0], p[1]]), p[2])),
             HEARTBEAT => {
-                let mode = (u32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[6] & 0x80 != 0);
+                let mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
                 if self.modes.last() != Some(&mode) {
                     self.modes.push(mode);
                 }

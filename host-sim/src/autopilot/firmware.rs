@@ -105,7 +105,7 @@ impl Firmware {
 
     pub(super) fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
         match self {
-            Self::Px4(px4) => px4.commander.update(sense, &px4.tuning),
+            Self::Px4(px4) => px4.update(body, sense),
             Self::Copter(copter) => copter.update(body, sense, dt_s),
         }
     }
