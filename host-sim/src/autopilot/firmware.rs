@@ -174,6 +174,16 @@ impl Firmware {
         }
     }
 
+    /// Sets an integer parameter; false where there is none of that name.
+    pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
+        let params = self.params();
+        let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else { return false };
+        let Some(new) = old.with_integer(value) else { return false };
+        let wire = params.wire(new);
+        self.set_param(name, wire, new.wire_type());
+        true
+    }
+
     /// Takes over the parameters of the same firmware before a reboot.
     pub(super) fn keep_params(&mut self, before: &Self) {
         match (self, before) {

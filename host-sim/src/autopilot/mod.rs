@@ -247,7 +247,9 @@ impl Autopilot {
         }
     }
 
-    fn reboot(&mut self) {
+    /// Starts anew: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
+    /// falls.
+    pub fn reboot(&mut self) {
         let body = &self.body;
         let mut fresh = body.config.clone();
         fresh.start = body.vehicle.state().position;
@@ -289,11 +291,6 @@ impl Autopilot {
         });
     }
 
-    /// Restarts the firmware, in the air too: motors stop, streams and state are forgotten, parameters are kept.
-    pub fn restart(&mut self) {
-        self.reboot();
-    }
-
     /// Sets the charge left, 0 to 1.
     pub fn set_battery(&mut self, charge: f32) {
         self.body.vehicle.set_battery(charge);
@@ -308,6 +305,20 @@ impl Autopilot {
     pub fn set_ekf_origin(&mut self, origin: Geodetic) {
         self.body.frame.set_ekf_origin(origin);
         self.body.announce_origin();
+    }
+
+    /// The same, by ENU metres.
+    pub fn move_ekf_origin(&mut self, by: &Point) {
+        let origin = frames::enu_to_geodetic(self.body.frame.ekf_origin(), by);
+        self.set_ekf_origin(origin);
+    }
+
+    /// Sets an integer parameter as an installer does before the flight.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
+        if self.firmware.set_integer(name, value) { Ok(()) } else { Err(ConfigError::Parameter(name)) }
     }
 
     /// Takes the GPS fix away or gives it back; without it no position control flies.

@@ -153,7 +153,8 @@ impl Px4 {
             guided: true,
             ekf_flags: 0,
             origin_known: true,
-            position_known: true,
+            // LOCAL_POSITION_NED comes only while the estimate is valid.
+            position_known: body.gps_ok,
         }
     }
 
