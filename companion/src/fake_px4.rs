@@ -87,7 +87,7 @@ pub fn plan() -> VehiclePlan<16, 8> {
         path.push(point, 1.2).unwrap();
     }
     let gates = heapless::Vec::new();
-    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, gates, plan_crc: 5 }
+    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
 impl Bench {

@@ -9,8 +9,9 @@
 //! false and the search goes on one byte later. The same search follows a bad CRC, over bytes that are all still in
 //! the buffer, so no good frame behind a bad one is lost. Each byte costs O(1), and O(280) where starts are false.
 
+use crc::{CRC_16_MCRF4XX, Crc, Table};
 use mavlink::dialects::ardupilotmega::MavMessage;
-use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
+use mavlink::{MavlinkVersion, Message, MessageData};
 
 use crate::time::{Duration, Instant};
 
@@ -258,6 +259,16 @@ impl Framer {
 
 fn is_start(byte: u8) -> bool {
     byte == V1_START || byte == V2_START
+}
+
+/// The X.25 checksum of MAVLink over a frame without its start byte, closed by the seed of its message. By table, 16 bytes at
+/// a time (8 kB): checking is most of what a crowded radio costs, and the `mavlink` crate goes byte by byte.
+fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
+    const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
+    let mut digest = CRC.digest();
+    digest.update(frame);
+    digest.update(&[extra_crc]);
+    digest.finalize()
 }
 
 /// The CRC seed of a message id, or `None` where the dialect does not know the id. The crate answers 0 for those, which

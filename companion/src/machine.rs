@@ -234,9 +234,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Finite, from our own start, and a path wherever there is a goal.
+    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
+    fn departure_due(&self) -> bool {
+        let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
+        (self.now - self.entered_at).secs_f32() >= depart_s
+    }
+
     fn is_sound(&self, plan: &VehiclePlan<W, G>) -> bool {
-        let heights = [plan.climb_m, plan.descent_m];
-        let finite = heights.iter().all(|h| h.is_finite() && *h >= 0.0)
+        let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
+        let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - self.start).norm() < 0.1);
@@ -389,7 +395,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             critical: t.is_critical(),
             on_ground: t.on_ground == Some(true),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
-            gates_open: self.guidance.advice.stop_within_m > 0.05,
+            gates_open: self.guidance.advice.stop_within_m > 0.05 && self.departure_due(),
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
             near_path: self.state == State::PilotControl && self.guidance.near_path(&scene),

@@ -77,7 +77,7 @@ pub enum Guard {
     StartElsewhere,
     /// MISSION_START, but the motors are armed.
     StartArmed,
-    /// The neighbours leave room to take off.
+    /// The schedule's take-off is due, and the neighbours leave room.
     GatesOpen,
     /// The state has lasted as long as the limit.
     Elapsed,

@@ -8,7 +8,6 @@ pub mod link;
 pub mod map;
 pub mod mission;
 pub mod output;
-pub mod prm;
 pub mod progress;
 pub mod report;
 pub mod result;

@@ -37,7 +37,7 @@ const BAD_INPUT: u8 = 2;
 fn main() -> ExitCode {
     let done = match Cli::parse().command {
         Command::Demo(args) => commands::fly::demo(&args),
-        Command::Map(args) => map::command::run(&args).map(|()| ExitCode::SUCCESS).map_err(Into::into),
+        Command::Map(args) => map::command::run(&args).map(|()| ExitCode::SUCCESS),
         Command::Roadmap(args) => commands::roadmap::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Fly(args) => commands::fly::run(&args),

@@ -4,16 +4,17 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use planner_core::Point;
+use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::prm::Config;
 use planner_core::roadmap::{RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::segment::segment_is_clear;
 
-use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
+use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
-use crate::result::{RoadmapSize, Timing};
+use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
 use crate::scenario::{self, Scenario};
 
@@ -21,7 +22,7 @@ use crate::scenario::{self, Scenario};
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 /// One companion's part of it.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
-type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES>;
+type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
 
 /// Braking and accelerating that is planned with, m/s².
 pub const ACCEL_MPS2: f32 = 1.5;
@@ -46,6 +47,8 @@ pub struct Mission {
     pub roadmap: Roadmap,
     /// The roadmap as the file on the board.
     pub roadmap_file: Vec<u8>,
+    /// The CRC-32 at its end.
+    pub roadmap_crc: u32,
     /// The vehicles' tasks, in the order of the scenario.
     pub tasks: Vec<VehicleTask>,
     /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
@@ -84,13 +87,25 @@ impl Mission {
         let descents_m = goals
             .iter()
             .enumerate()
-            .map(|(i, goal)| height_over_ground(&map, &format!("goal {i}"), goal, largest_m))
+            .map(|(i, goal)| height_over_ground(&scenario, &map, &format!("goal {i}"), goal, largest_m))
             .collect::<anyhow::Result<_>>()?;
         let (roadmap, header) = build(&scenario, &map, &goals)?;
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
+        let roadmap_crc = parsed(&roadmap_file).crc();
         timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
-        Ok(Self { scenario, map, goals, roadmap, roadmap_file, tasks, descents_m, schedule, timing })
+        Ok(Self {
+            scenario,
+            map,
+            goals,
+            roadmap,
+            roadmap_file,
+            roadmap_crc,
+            tasks,
+            descents_m,
+            schedule,
+            timing,
+        })
     }
 
     /// Plans the whole swarm as every companion does.
@@ -103,11 +118,41 @@ impl Mission {
             mode: planner_mode(&self.scenario.mission),
             schedule: self.schedule,
         };
-        let mut workspace = Box::new(PlanWorkspace::new());
-        let mut plan = Box::new(SwarmPlan::new());
-        plan::plan_swarm(&view, &request, &mut workspace, &mut plan).map_err(|e| describe(&e))?;
+        let mut workspace = on_heap(PlanWorkspace::new);
+        let mut plan = on_heap(SwarmPlan::new);
+        let mut goals = plan::Goals::new();
+        // The steps of `plan_swarm`, each with its time.
+        let searching = Instant::now();
+        plan::costs(&view, &request, &mut workspace).map_err(|e| self.describe(&e))?;
+        let search_s = searching.elapsed().as_secs_f64();
+        let assigning = Instant::now();
+        plan::assign(&request, &mut workspace, &mut goals).map_err(|e| self.describe(&e))?;
+        let assignment_s = assigning.elapsed().as_secs_f64();
+        plan::schedule(&view, &request, &goals, &mut workspace, &mut plan).map_err(|e| self.describe(&e))?;
+        (self.timing.search_s, self.timing.assignment_s) = (search_s, assignment_s);
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)
+    }
+
+    fn describe(&self, error: &PlanError) -> anyhow::Error {
+        let path = &self.scenario.path;
+        match error {
+            PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
+                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\n  \
+                 hint: move its start or goal out of their way, or give the roadmap more nodes"
+            ),
+            PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {path}: {error:?}"),
+            other => anyhow!("no plan: {path}: {other:?}"),
+        }
+    }
+
+    /// Goals that no vehicle flies to, and vehicles that no goal is left for.
+    pub fn left(&self, plan: &SwarmPlan) -> Left {
+        let flown = |goal: &u16| plan.flights.iter().any(|f| f.goal == Some(*goal));
+        Left {
+            goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
+            vehicles: plan.flights.iter().filter(|f| f.goal.is_none()).map(|f| f.id).collect(),
+        }
     }
 
     /// One companion's part of the swarm's plan.
@@ -118,9 +163,9 @@ impl Mission {
         Ok(own)
     }
 
-    /// The roadmap as a board reads it.
+    /// The roadmap as a board reads it; the whole file is checked at each call.
     pub fn view(&self) -> RoadmapView<'_> {
-        RoadmapView::parse(&self.roadmap_file).expect("we wrote it ourselves")
+        parsed(&self.roadmap_file)
     }
 
     /// Its size.
@@ -138,14 +183,24 @@ impl Mission {
     /// No vehicle has this id.
     pub fn index_of(&self, id: u8) -> anyhow::Result<usize> {
         let index = self.tasks.iter().position(|task| task.id == id);
-        index.ok_or_else(|| anyhow!("no vehicle has id {id}: {}", self.scenario.path))
+        index.ok_or_else(|| {
+            let ids: Vec<String> = self.tasks.iter().map(|task| task.id.to_string()).collect();
+            anyhow!("no vehicle has id {id}: {}: there are {}", self.scenario.path, ids.join(", "))
+        })
+    }
+
+    /// Where the centre of a vehicle's body is while it stands on its pad.
+    pub fn pad(&self, index: usize) -> Geodetic {
+        let start = self.scenario.vehicles[index].start;
+        let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);
+        enu_to_geodetic(&self.scenario.map.origin, &pad)
     }
 
     /// CRC-32 of what all companions must agree on: roadmap, tasks, goals and separation.
     pub fn crc(&self) -> u32 {
         const CRC32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
         let mut digest = CRC32.digest();
-        digest.update(&self.view().crc().to_le_bytes());
+        digest.update(&self.roadmap_crc.to_le_bytes());
         for task in &self.tasks {
             digest.update(&[task.id]);
             digest.update(&task.goal.unwrap_or(u16::MAX).to_le_bytes());
@@ -158,6 +213,10 @@ impl Mission {
     }
 }
 
+fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {
+    RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
+}
+
 fn planner_mode(mission: &scenario::Mission) -> Mode {
     match (mission.mode, mission.objective) {
         (scenario::Mode::Labelled, _) => Mode::Labelled,
@@ -166,25 +225,43 @@ fn planner_mode(mission: &scenario::Mission) -> Mode {
     }
 }
 
-/// Height of a point over where a vehicle of this radius stands below it.
-fn height_over_ground(map: &VoxelMap, what: &str, point: &Point, radius_m: f32) -> anyhow::Result<f32> {
+/// Height of a start or goal over where a vehicle of this radius stands below it.
+fn height_over_ground(
+    scenario: &Scenario,
+    map: &VoxelMap,
+    what: &str,
+    point: &Point,
+    radius_m: f32,
+) -> anyhow::Result<f32> {
+    let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
+    if map.never_sample().is_blocked_at(point) {
+        bail!(
+            "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map\n  \
+             hint: `host-sim map info` tells the map's extent"
+        );
+    }
     let Some(ground_m) = map.ground_below(point) else {
-        bail!("{what} has no ground below it to stand on: choose a place over a floor");
+        bail!("{what} has no ground below it: {at} is over nothing\n  hint: choose a place over a floor");
     };
     let height_m = point.z - ground_m - radius_m;
     if height_m < 0.0 {
-        bail!("{what} is {:.2} m above the ground, less than the radius of {radius_m} m", point.z - ground_m);
+        bail!(
+            "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n  \
+             hint: give it a height of at least {:.2} m",
+            point.z - ground_m,
+            ground_m + radius_m
+        );
     }
     Ok(height_m)
 }
 
 fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
     let task = |vehicle: &scenario::Vehicle| {
-        let what = format!("the start of vehicle {}", vehicle.id);
+        let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(map, &what, &vehicle.start, vehicle.radius_m)?,
+            climb_m: height_over_ground(scenario, map, &what, &vehicle.start, vehicle.radius_m)?,
             goal: vehicle.goal.map(|goal| goal as u16),
         })
     };
@@ -217,7 +294,11 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
             }
         }
     }
-    bail!("only {} of {wanted} vehicles find room {apart_m} m apart in sight of the single goal", slots.len())
+    bail!(
+        "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it",
+        scenario.path,
+        slots.len()
+    )
 }
 
 fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<(Roadmap, RoadmapHeader)> {
@@ -245,14 +326,4 @@ fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result
         goals: goals.len() as u16,
     };
     Ok((roadmap, header))
-}
-
-fn describe(error: &PlanError) -> anyhow::Error {
-    match error {
-        PlanError::Schedule(id, ScheduleError::Blocked) => {
-            anyhow!("vehicle {id} cannot pass the others: move its start or goal out of their way")
-        }
-        PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {error:?}"),
-        other => anyhow!("no plan: {other:?}"),
-    }
 }

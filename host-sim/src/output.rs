@@ -9,7 +9,8 @@ use crate::mission::{Mission, SwarmPlan};
 use crate::report::{
     self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
 };
-use crate::result::{self, MissionResult, Timing};
+use crate::result::{self, Left, MissionResult, Timing};
+use crate::say;
 use crate::swarm::Flight;
 use crate::swarm::monitor::Sample;
 
@@ -105,10 +106,10 @@ pub fn write_points(path: &Path, points: impl Iterator<Item = Point>) -> anyhow:
 
 /// Prints what `result.json` holds, for a person.
 pub fn print_summary(result: &MissionResult, dir: &Path) {
-    println!("vehicle  goal  reached  landed   path m  flown m   time s  end");
+    say!("vehicle  goal  reached  landed   path m  flown m   time s  end");
     let yes = |b: bool| if b { "yes" } else { "no" };
     for v in &result.vehicles {
-        println!(
+        say!(
             "{:>7}  {:>4}  {:>7}  {:>6}  {:>7.1}  {:>7.1}  {:>7.1}  {}",
             v.id,
             v.goal.map_or("-".to_owned(), |g| g.to_string()),
@@ -120,22 +121,31 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
             v.end
         );
     }
+    let Left { goals, vehicles } = &result.left;
+    if !goals.is_empty() {
+        say!("left       goals {goals:?}: no vehicle is left for them, or no way leads there");
+    }
+    if !vehicles.is_empty() {
+        say!("left       vehicles {vehicles:?}: no goal is left for them, or no way leads to one");
+    }
     let safety = &result.safety;
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));
-    println!();
-    println!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
-    println!("walls      {} contacts, nearest {}", safety.wall_contacts, metres(safety.min_clearance_m));
-    println!(
+    say!();
+    say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
+    say!("walls      {} contacts, nearest {}", safety.wall_contacts, metres(safety.min_clearance_m));
+    say!(
         "vehicles   {} violations of {} m, nearest {}, {} deadlocks",
         safety.violations,
         safety.safety_distance_m,
         metres(safety.min_separation_m),
         safety.deadlocks
     );
-    println!(
+    say!(
         "roadmap    {} nodes, {} edges, {} bytes",
-        result.roadmap.nodes, result.roadmap.edges, result.roadmap.bytes
+        result.roadmap.nodes,
+        result.roadmap.edges,
+        result.roadmap.bytes
     );
-    println!("total      {:.1} m, makespan {:.1} s", result.totals.path_m, result.totals.makespan_s);
-    println!("report     {}", dir.join("report.html").display());
+    say!("total      {:.1} m, makespan {:.1} s", result.totals.path_m, result.totals.makespan_s);
+    say!("report     {}", dir.join("report.html").display());
 }

@@ -65,3 +65,12 @@ impl Drop for Stage {
         }
     }
 }
+
+/// Prints a line. A reader that has gone away, as in `host-sim plan … | head -1`, is no error of ours.
+#[macro_export]
+macro_rules! say {
+    ($($text:tt)*) => {{
+        use std::io::Write as _;
+        let _ = writeln!(std::io::stdout(), $($text)*);
+    }};
+}

@@ -26,6 +26,17 @@ pub struct MissionResult {
     pub safety: Safety,
     /// The roadmap planned on.
     pub roadmap: RoadmapSize,
+    /// What the assignment could not serve.
+    pub left: Left,
+}
+
+/// What the assignment could not serve: more of one than of the other, or no way between them.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Left {
+    /// Goals, by index.
+    pub goals: Vec<u16>,
+    /// Vehicles, by id; they stay on their pads.
+    pub vehicles: Vec<u8>,
 }
 
 /// One vehicle.
@@ -93,11 +104,11 @@ pub struct Timing {
     pub map_s: f64,
     /// Sampling, edges and their clearances.
     pub roadmap_s: f64,
-    /// Paths.
+    /// The shortest paths that tell what each goal would cost each vehicle.
     pub search_s: f64,
-    /// Cost matrix and assignment.
+    /// Who flies to which goal.
     pub assignment_s: f64,
-    /// The whole plan, schedule included.
+    /// The whole plan: search, assignment, schedule.
     pub plan_s: f64,
     /// Time that passed in the simulation.
     pub simulated_s: f64,

@@ -36,23 +36,42 @@ impl Geodetic {
     }
 
     fn ecef(&self) -> Vector3<f64> {
+        self.turn().ecef(self.alt_m)
+    }
+
+    fn turn(&self) -> Turn {
         let (lat, lon) = (self.lat_deg.to_radians(), self.lon_deg.to_radians());
-        let n = WGS84_A / sqrt(1.0 - WGS84_E2 * sin(lat) * sin(lat));
+        Turn { sin_lat: sin(lat), cos_lat: cos(lat), sin_lon: sin(lon), cos_lon: cos(lon) }
+    }
+}
+
+/// Sines and cosines of a latitude and a longitude, taken once: they cost more than all else here.
+struct Turn {
+    sin_lat: f64,
+    cos_lat: f64,
+    sin_lon: f64,
+    cos_lon: f64,
+}
+
+impl Turn {
+    fn ecef(&self, alt_m: f64) -> Vector3<f64> {
+        let n = WGS84_A / sqrt(1.0 - WGS84_E2 * self.sin_lat * self.sin_lat);
         Vector3::new(
-            (n + self.alt_m) * cos(lat) * cos(lon),
-            (n + self.alt_m) * cos(lat) * sin(lon),
-            (n * (1.0 - WGS84_E2) + self.alt_m) * sin(lat),
+            (n + alt_m) * self.cos_lat * self.cos_lon,
+            (n + alt_m) * self.cos_lat * self.sin_lon,
+            (n * (1.0 - WGS84_E2) + alt_m) * self.sin_lat,
         )
     }
 }
 
 /// ENU metres of `position` on the plane tangent at `origin`.
 pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
-    let d = position.ecef() - origin.ecef();
-    let (lat, lon) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
-    let east = -sin(lon) * d.x + cos(lon) * d.y;
-    let north = -sin(lat) * cos(lon) * d.x - sin(lat) * sin(lon) * d.y + cos(lat) * d.z;
-    let up = cos(lat) * cos(lon) * d.x + cos(lat) * sin(lon) * d.y + sin(lat) * d.z;
+    let turn = origin.turn();
+    let d = position.ecef() - turn.ecef(origin.alt_m);
+    let Turn { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
+    let east = -sin_lon * d.x + cos_lon * d.y;
+    let north = -sin_lat * cos_lon * d.x - sin_lat * sin_lon * d.y + cos_lat * d.z;
+    let up = cos_lat * cos_lon * d.x + cos_lat * sin_lon * d.y + sin_lat * d.z;
     Point::new(east as f32, north as f32, up as f32)
 }
 
@@ -60,11 +79,12 @@ pub fn geodetic_to_enu(origin: &Geodetic, position: &Geodetic) -> Point {
 /// millimetre within 8 km, 4 mm at 100 km.
 pub fn enu_to_geodetic(origin: &Geodetic, enu: &Point) -> Geodetic {
     let (e, n, u) = (f64::from(enu.x), f64::from(enu.y), f64::from(enu.z));
-    let (lat, lon) = (origin.lat_deg.to_radians(), origin.lon_deg.to_radians());
-    let o = origin.ecef();
-    let x = o.x - sin(lon) * e - sin(lat) * cos(lon) * n + cos(lat) * cos(lon) * u;
-    let y = o.y + cos(lon) * e - sin(lat) * sin(lon) * n + cos(lat) * sin(lon) * u;
-    let z = o.z + cos(lat) * n + sin(lat) * u;
+    let turn = origin.turn();
+    let o = turn.ecef(origin.alt_m);
+    let Turn { sin_lat, cos_lat, sin_lon, cos_lon } = turn;
+    let x = o.x - sin_lon * e - sin_lat * cos_lon * n + cos_lat * cos_lon * u;
+    let y = o.y + cos_lon * e - sin_lat * sin_lon * n + cos_lat * sin_lon * u;
+    let z = o.z + cos_lat * n + sin_lat * u;
     ecef_to_geodetic(x, y, z)
 }
 

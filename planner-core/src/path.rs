@@ -22,8 +22,10 @@ pub struct Waypoint {
     pub clearance_m: f32,
     /// Arc length from the first waypoint, metres.
     pub along_m: f32,
-    /// Label of the swarm's schedule: seconds after the start at nominal speed. Only its order matters in flight.
+    /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its order matters in flight.
     pub at_s: f32,
+    /// The same of the departure: later than `at_s` where the schedule lets somebody pass.
+    pub leave_s: f32,
 }
 
 /// Why a path was refused.
@@ -64,14 +66,22 @@ impl<const W: usize> Path<W> {
             }
             None => 0.0,
         };
-        let waypoint = Waypoint { position, clearance_m, along_m, at_s: 0.0 };
+        let waypoint = Waypoint { position, clearance_m, along_m, at_s: 0.0, leave_s: 0.0 };
         self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
     }
 
-    /// Labels every waypoint: the first at `depart_s`, the others after their arc length at `speed_mps`.
-    pub fn label(&mut self, depart_s: f32, speed_mps: f32) {
+    /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc length at `speed_mps`.
+    pub fn label(&mut self, first_s: f32, speed_mps: f32) {
         for waypoint in &mut self.waypoints {
-            waypoint.at_s = depart_s + waypoint.along_m / speed_mps;
+            waypoint.at_s = first_s + waypoint.along_m / speed_mps;
+            waypoint.leave_s = waypoint.at_s;
+        }
+    }
+
+    /// Labels the last waypoint.
+    pub fn label_last(&mut self, at_s: f32, leave_s: f32) {
+        if let Some(last) = self.waypoints.last_mut() {
+            (last.at_s, last.leave_s) = (at_s, leave_s);
         }
     }
 

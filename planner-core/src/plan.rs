@@ -5,16 +5,18 @@
 //! assignment of least total length over all pairs (unlabelled); what the paper leaves out is the order at shared stretches,
 //! which [`crate::schedule`] settles.
 //!
-//! Cost: one Dijkstra row per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A* and one pass
+//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A* and one pass
 //! over all scheduled pieces per vehicle.
+
+mod order;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 
-use crate::Point;
 use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::schedule::sipp::SippWorkspace;
 use crate::schedule::{self, Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
 use crate::search::{self, SearchError, SearchWorkspace};
 
@@ -102,20 +104,24 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
     }
 }
 
-/// Scratch of [`plan_swarm`] for roadmaps of `N` nodes and swarms of `V` vehicles and goals.
-pub struct PlanWorkspace<const N: usize, const V: usize> {
+/// Scratch of [`plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
+/// which one steps aside.
+pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     search: SearchWorkspace<N>,
+    sipp: SippWorkspace<N, P>,
     assignment: AssignmentWorkspace<V>,
+    /// Starts × goals, packed from the front.
     costs: [[f32; V]; V],
     /// Scratch of the schedule, also for [`vehicle_plan`].
     pub schedule: ScheduleWorkspace,
 }
 
-impl<const N: usize, const V: usize> PlanWorkspace<N, V> {
+impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
     /// All zeros.
     pub const fn new() -> Self {
         Self {
             search: SearchWorkspace::new(),
+            sipp: SippWorkspace::new(),
             assignment: AssignmentWorkspace::new(),
             costs: [[0.0; V]; V],
             schedule: ScheduleWorkspace::new(),
@@ -123,18 +129,35 @@ impl<const N: usize, const V: usize> PlanWorkspace<N, V> {
     }
 }
 
-impl<const N: usize, const V: usize> Default for PlanWorkspace<N, V> {
+impl<const N: usize, const V: usize, const P: usize> Default for PlanWorkspace<N, V, P> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-/// Plans the whole swarm. Vehicles and goals that cannot be served are left out, the rest is served as well as can be.
-pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
+/// Plans the whole swarm: [`costs`], then [`assign`], then [`schedule()`]. Vehicles and goals that cannot be served are
+/// left out, the rest is served as well as can be.
+pub fn plan_swarm<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
+    ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    let mut goals = Goals::new();
+    costs(view, request, ws)?;
+    assign(request, ws, &mut goals)?;
+    schedule(view, request, &goals, ws, out)
+}
+
+/// The goal of each vehicle of a request, `None` for one that stays on its pad.
+pub type Goals<const V: usize> = Vec<Option<u16>, V>;
+
+/// First step: the length of the shortest path from every start to every goal, into the workspace; labelled, only to
+/// the vehicle's own goal. One search a vehicle, or one cost matrix where all are of one size.
+pub fn costs<const N: usize, const V: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V, P>,
 ) -> Result<(), PlanError> {
     let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
     let header = view.header();
@@ -144,25 +167,88 @@ pub fn plan_swarm<const N: usize, const V: usize, const W: usize>(
     if starts > V || goals > V {
         return Err(PlanError::SwarmFull);
     }
-    let mut assigned: Vec<Option<u16>, V> = Vec::new();
-    assign(view, request, ws, &mut assigned)?;
-    out.flights.clear();
+    // Cannot overflow: both numbers are at most `V`.
+    let nodes: Vec<u16, V> = (0..starts as u16).collect();
+    let targets: Vec<u16, V> = (starts as u16..(starts + goals) as u16).collect();
+    let costs = &mut ws.costs.as_flattened_mut()[..starts * goals];
+    let Some(first) = request.vehicles.first() else { return Ok(()) };
+    let labelled = request.mode == Mode::Labelled;
+    if !labelled && request.vehicles.iter().all(|v| v.required_clearance_m == first.required_clearance_m) {
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, first.required_clearance_m);
+        return search::cost_matrix(view, &nodes, &targets, passable, &mut ws.search, costs)
+            .map_err(|e| PlanError::Search(first.id, e));
+    }
     for (i, vehicle) in request.vehicles.iter().enumerate() {
+        let row = &mut costs[i * goals..(i + 1) * goals];
+        let wanted = match (labelled, vehicle.goal.map(usize::from)) {
+            (false, _) => 0..goals,
+            (true, Some(goal)) if goal < goals => goal..goal + 1,
+            (true, Some(_)) => return Err(PlanError::BadGoal(vehicle.id)),
+            (true, None) => continue,
+        };
+        let (targets, row) = (&targets[wanted.clone()], &mut row[wanted]);
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
+        search::dijkstra_row(view, i as u16, targets, passable, &mut ws.search, row)
+            .map_err(|e| PlanError::Search(vehicle.id, e))?;
+    }
+    Ok(())
+}
+
+/// Second step: who flies to which goal, from the costs left in the workspace by [`costs`].
+pub fn assign<const N: usize, const V: usize, const P: usize>(
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    assigned: &mut Goals<V>,
+) -> Result<(), PlanError> {
+    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
+    if starts > V || goals > V {
+        return Err(PlanError::SwarmFull);
+    }
+    let costs = &ws.costs.as_flattened()[..starts * goals];
+    assigned.clear();
+    let _ = assigned.resize(starts, None);
+    let solve = match request.mode {
+        Mode::Unlabelled(Objective::TotalDistance) => assignment::assign,
+        Mode::Unlabelled(Objective::Makespan) => assignment::bottleneck,
+        Mode::Labelled => {
+            for (i, vehicle) in request.vehicles.iter().enumerate() {
+                let Some(goal) = vehicle.goal else { continue };
+                let row = &costs[i * goals..(i + 1) * goals];
+                let cost = row.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?;
+                assigned[i] = cost.is_finite().then_some(goal);
+            }
+            return Ok(());
+        }
+    };
+    solve(costs, starts, goals, &mut ws.assignment, assigned).map_err(PlanError::Assignment)?;
+    Ok(())
+}
+
+/// Third step: the paths to the `assigned` goals and their order at shared stretches.
+pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    assigned: &Goals<V>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    if assigned.len() != request.vehicles.len() || usize::from(view.header().starts) != assigned.len() {
+        return Err(PlanError::Terminals);
+    }
+    out.flights.clear();
+    for (i, (vehicle, &goal)) in request.vehicles.iter().zip(assigned).enumerate() {
         let mut path = Path::new();
         path.push(view.node(i as u16), 0.0).map_err(|e| PlanError::Path(vehicle.id, e))?;
-        let descent_m = assigned[i].map_or(0.0, |goal| request.descents_m[usize::from(goal)]);
-        let flight = Flight {
-            id: vehicle.id,
-            goal: assigned[i],
-            path,
-            climb_m: vehicle.climb_m,
-            descent_m,
-            depart_s: 0.0,
+        let descent_m = match goal {
+            Some(goal) => *request.descents_m.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?,
+            None => 0.0,
         };
-        // Cannot overflow: `starts` is at most `V`.
+        let (id, climb_m) = (vehicle.id, vehicle.climb_m);
+        let flight = Flight { id, goal, path, climb_m, descent_m, depart_s: 0.0 };
+        // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    schedule_all(view, request, ws, out)?;
+    order::schedule_all(view, request, ws, out)?;
     out.crc = crc(out);
     Ok(())
 }
@@ -180,213 +266,10 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out.path = flight.path.clone();
     out.climb_m = flight.climb_m;
     out.descent_m = flight.descent_m;
+    out.depart_s = flight.depart_s;
     out.plan_crc = plan.crc;
     let others = plan.flights.iter().enumerate().filter(|&(i, _)| i != index).map(|(_, f)| f);
     schedule::gates(cfg, flight, others, ws, &mut out.gates)
-}
-
-fn assign<const N: usize, const V: usize>(
-    view: &RoadmapView<'_>,
-    request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
-    assigned: &mut Vec<Option<u16>, V>,
-) -> Result<(), PlanError> {
-    let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
-    let mut targets: Vec<u16, V> = Vec::new();
-    // Cannot overflow: `goals` is at most `V`.
-    let _ = targets.extend_from_slice(&[0; V][..goals]);
-    for (g, target) in targets.iter_mut().enumerate() {
-        *target = (starts + g) as u16;
-    }
-    let _ = assigned.resize(starts, None);
-    for (i, vehicle) in request.vehicles.iter().enumerate() {
-        let row = &mut ws.costs[i][..goals];
-        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
-        search::dijkstra_row(view, i as u16, &targets, passable, &mut ws.search, row)
-            .map_err(|e| PlanError::Search(vehicle.id, e))?;
-        if request.mode == Mode::Labelled {
-            let Some(goal) = vehicle.goal else { continue };
-            let cost = row.get(usize::from(goal)).ok_or(PlanError::BadGoal(vehicle.id))?;
-            assigned[i] = cost.is_finite().then_some(goal);
-        }
-    }
-    let Mode::Unlabelled(objective) = request.mode else { return Ok(()) };
-    // Pack the rows: the assignment reads a dense matrix.
-    let costs = ws.costs.as_flattened_mut();
-    for i in 0..starts {
-        costs.copy_within(i * V..i * V + goals, i * goals);
-    }
-    let costs = &costs[..starts * goals];
-    let solve = match objective {
-        Objective::TotalDistance => assignment::assign,
-        Objective::Makespan => assignment::bottleneck,
-    };
-    solve(costs, starts, goals, &mut ws.assignment, assigned).map_err(PlanError::Assignment)?;
-    Ok(())
-}
-
-/// Schedules the longest path first; who cannot be fitted in goes first in the next round.
-fn schedule_all<const N: usize, const V: usize, const W: usize>(
-    view: &RoadmapView<'_>,
-    request: &PlanRequest<'_>,
-    ws: &mut PlanWorkspace<N, V>,
-    out: &mut SwarmPlan<V, W>,
-) -> Result<(), PlanError> {
-    let mut order: Vec<u16, V> = Vec::new();
-    let mut straight: Vec<f32, V> = Vec::new();
-    for (i, flight) in out.flights.iter().enumerate() {
-        let mut nodes: Vec<u16, W> = Vec::new();
-        let length = match flight.goal {
-            Some(goal) => {
-                let parked = Parked::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
-                find_path(view, request, i, goal, &parked, &mut ws.search, &mut nodes)?
-            }
-            None => f32::INFINITY,
-        };
-        // Cannot overflow: one entry per flight.
-        let _ = (order.push(i as u16), straight.push(length));
-    }
-    // Who stays on its pad comes first: it is in everybody's way. Then the longest; ties go to the higher id (P3D §3.4).
-    order.sort_unstable_by(|&a, &b| {
-        let (a, b) = (usize::from(a), usize::from(b));
-        straight[b].total_cmp(&straight[a]).then(out.flights[b].id.cmp(&out.flights[a].id))
-    });
-    let mut failed = Ok(());
-    for _ in 0..=order.len() {
-        let Err((place, error)) = schedule_round(view, request, &order, ws, out) else { return Ok(()) };
-        failed = Err(error);
-        let blocked = order.remove(place);
-        let front = order.iter().take_while(|&&i| out.flights[usize::from(i)].goal.is_none()).count();
-        let _ = order.insert(front, blocked);
-    }
-    failed
-}
-
-fn schedule_round<const N: usize, const V: usize, const W: usize>(
-    view: &RoadmapView<'_>,
-    request: &PlanRequest<'_>,
-    order: &[u16],
-    ws: &mut PlanWorkspace<N, V>,
-    out: &mut SwarmPlan<V, W>,
-) -> Result<(), (usize, PlanError)> {
-    for (place, &index) in order.iter().enumerate() {
-        let index = usize::from(index);
-        let Some(goal) = out.flights[index].goal else { continue };
-        let id = out.flights[index].id;
-        let mut failure = PlanError::Schedule(id, ScheduleError::Blocked);
-        let mut fitted = false;
-        for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
-            let parked = Parked::<V>::new(view, avoid, &out.flights, &order[place + 1..], index);
-            let mut nodes: Vec<u16, W> = Vec::new();
-            match find_path(view, request, index, goal, &parked, &mut ws.search, &mut nodes) {
-                Ok(length) if length.is_finite() => {}
-                Ok(_) => continue,
-                Err(error) => return Err((place, error)),
-            }
-            let path = path_of(view, &nodes).map_err(|e| (place, PlanError::Path(id, e)))?;
-            let flight = Flight { path, depart_s: 0.0, ..out.flights[index].clone() };
-            let scheduled = order[..place].iter().map(|&i| &out.flights[usize::from(i)]);
-            match schedule::earliest_departure(&request.schedule, &flight, scheduled, &mut ws.schedule) {
-                Ok(depart_s) => {
-                    let flight = Flight { depart_s, ..flight };
-                    let climb_s = flight.climb_m / request.schedule.vertical_mps;
-                    out.flights[index] = flight;
-                    out.flights[index].path.label(depart_s + climb_s, request.schedule.cruise_mps);
-                    fitted = true;
-                    break;
-                }
-                Err(error) => failure = PlanError::Schedule(id, error),
-            }
-        }
-        if !fitted {
-            return Err((place, failure));
-        }
-    }
-    Ok(())
-}
-
-/// What a path keeps clear of beyond obstacles.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Avoid {
-    /// The pads of vehicles that may still stand there.
-    WaitingPads,
-    /// The pads and landing places of all others: then waiting on the pad is always enough.
-    AllPlaces,
-    /// Nothing: somebody has to leave before.
-    Nothing,
-}
-
-/// Points on the ground where other vehicles stand, before and after their flights.
-struct Parked<const V: usize> {
-    pads: Vec<Point, V>,
-    landed: Vec<Point, V>,
-}
-
-impl<const V: usize> Parked<V> {
-    fn new<const W: usize>(
-        view: &RoadmapView<'_>,
-        avoid: Avoid,
-        flights: &[Flight<W>],
-        waiting: &[u16],
-        index: usize,
-    ) -> Self {
-        let mut parked = Self { pads: Vec::new(), landed: Vec::new() };
-        let below = |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
-        for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
-        {
-            // Cannot overflow: at most one entry of each kind per flight.
-            if avoid == Avoid::AllPlaces || flight.goal.is_none() || waiting.contains(&(j as u16)) {
-                let _ = parked.pads.push(below(j, flight.climb_m));
-            }
-            if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.goal) {
-                let _ = parked.landed.push(below(flights.len() + usize::from(goal), flight.descent_m));
-            }
-        }
-        parked
-    }
-
-    fn clears(&self, a: &Point, b: &Point, distance_m: f32) -> bool {
-        let along = b - a;
-        let near = |p: &Point| {
-            let share = ((p - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
-            (a + along * share - p).norm_squared() < distance_m * distance_m
-        };
-        !self.pads.iter().chain(&self.landed).any(near)
-    }
-}
-
-/// The shortest path from start `index` to `goal` for that vehicle, clear of `parked`; infinite without one.
-fn find_path<const N: usize, const V: usize, const W: usize>(
-    view: &RoadmapView<'_>,
-    request: &PlanRequest<'_>,
-    index: usize,
-    goal: u16,
-    parked: &Parked<V>,
-    search: &mut SearchWorkspace<N>,
-    nodes: &mut Vec<u16, W>,
-) -> Result<f32, PlanError> {
-    let vehicle = &request.vehicles[index];
-    let passable = |from: u16, edge: &HalfEdge| {
-        view.clears(edge, vehicle.required_clearance_m)
-            && parked.clears(&view.node(from), &view.node(edge.target), request.schedule.parked_separation_m)
-    };
-    let target = request.vehicles.len() as u16 + goal;
-    match search::astar(view, index as u16, target, passable, search, nodes) {
-        Ok(length_m) => Ok(length_m),
-        Err(SearchError::NoPath) => Ok(f32::INFINITY),
-        Err(error) => Err(PlanError::Search(vehicle.id, error)),
-    }
-}
-
-fn path_of<const W: usize>(view: &RoadmapView<'_>, nodes: &[u16]) -> Result<Path<W>, PathError> {
-    let mut path = Path::new();
-    for (i, &node) in nodes.iter().enumerate() {
-        let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));
-        // The first waypoint ends no leg.
-        let clearance_m = edge.map_or(view.header().max_clearance_m, |e| e.clearance_m);
-        path.push(view.node(node), clearance_m)?;
-    }
-    Ok(path)
 }
 
 fn crc<const V: usize, const W: usize>(plan: &SwarmPlan<V, W>) -> u32 {
@@ -398,6 +281,7 @@ fn crc<const V: usize, const W: usize>(plan: &SwarmPlan<V, W>) -> u32 {
         digest.update(&flight.depart_s.to_le_bytes());
         for waypoint in flight.path.waypoints() {
             waypoint.position.iter().for_each(|c| digest.update(&c.to_le_bytes()));
+            digest.update(&waypoint.leave_s.to_le_bytes());
         }
     }
     digest.finalize()

@@ -7,11 +7,15 @@
 //! Čáp et al. 2015).
 //!
 //! In flight only the *order* of the schedule counts. For each pair of conflicting pieces the later vehicle gets a
-//! [`Gate`]: it enters its piece once the earlier one has left its own. Then two vehicles are never in conflicting pieces
-//! at once, however late either runs; and nobody waits for ever, since every wait is for a vehicle with an earlier label
-//! and the vehicle with the earliest label waits for none.
+//! [`Gate`]: it enters its piece once the earlier one has come to the end of its own. So two vehicles are never in
+//! conflicting pieces at once, however late either runs; and nobody waits for ever, since every wait is for a vehicle with
+//! an earlier label, and the vehicle with the earliest label waits for none (the whole argument: ARCHITECTURE.md).
+//!
+//! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or step aside on its way.
 //!
 //! Cost: pieces of one path × pieces of all others, each a distance between two segments behind a cheap bound.
+
+pub mod sipp;
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
@@ -47,7 +51,7 @@ pub struct Flight<const W: usize> {
     pub id: u8,
     /// Index of the goal flown to; `None` stays on its pad.
     pub goal: Option<u16>,
-    /// Air part, start to goal, labelled with the schedule.
+    /// Air part, start to goal, labelled with seconds after take-off.
     pub path: Path<W>,
     /// Height of the start above the pad, metres.
     pub climb_m: f32,
@@ -79,6 +83,8 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub climb_m: f32,
     /// Height of the goal above the ground there, metres.
     pub descent_m: f32,
+    /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad instead of in the air.
+    pub depart_s: f32,
     /// Where to wait for whom.
     pub gates: Vec<Gate, G>,
     /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every gate.
@@ -113,7 +119,7 @@ struct Piece {
 pub struct ScheduleWorkspace {
     own: Vec<Piece, PIECES>,
     other: Vec<Piece, PIECES>,
-    forbidden: Vec<(f32, f32), INTERVALS>,
+    forbidden: Forbidden,
 }
 
 impl ScheduleWorkspace {
@@ -144,33 +150,41 @@ fn cut<const W: usize>(
         to_s,
         parked: true,
     };
-    let climb_s = flight.climb_m / cfg.vertical_mps;
     if flight.goal.is_none() {
         return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
     }
     push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, 0.0))?;
     let moving =
         |from, to, from_m, to_m, from_s, to_s| Piece { from, to, from_m, to_m, from_s, to_s, parked: false };
-    push(moving(pad, first.position, -flight.climb_m, 0.0, 0.0, climb_s))?;
-    for leg in waypoints.windows(2) {
-        let length = leg[1].along_m - leg[0].along_m;
-        let parts = fmaxf(libm::ceilf(length / PIECE_M), 1.0);
-        for part in 0..parts as u32 {
+    push(moving(pad, first.position, -flight.climb_m, 0.0, 0.0, first.at_s))?;
+    for (i, waypoint) in waypoints.iter().enumerate() {
+        if waypoint.leave_s > waypoint.at_s {
+            let hold = stay(waypoint.position, waypoint.along_m, waypoint.at_s, waypoint.leave_s);
+            push(Piece { parked: false, ..hold })?;
+        }
+        let Some(next) = waypoints.get(i + 1) else { break };
+        let parts = parts(next.along_m - waypoint.along_m);
+        for part in 0..parts {
             let at = |i: u32| {
-                let share = i as f32 / parts;
-                let along_m = leg[0].along_m + length * share;
-                let point = leg[0].position + (leg[1].position - leg[0].position) * share;
-                (point, along_m, climb_s + along_m / cfg.cruise_mps)
+                let share = i as f32 / parts as f32;
+                let mix = |a: f32, b: f32| a + (b - a) * share;
+                let point = waypoint.position + (next.position - waypoint.position) * share;
+                (point, mix(waypoint.along_m, next.along_m), mix(waypoint.leave_s, next.at_s))
             };
             let ((from, from_m, from_s), (to, to_m, to_s)) = (at(part), at(part + 1));
             push(moving(from, to, from_m, to_m, from_s, to_s))?;
         }
     }
     let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
-    let (end_m, arrive_s) = (last.along_m + flight.descent_m, climb_s + last.along_m / cfg.cruise_mps);
-    let landed_s = arrive_s + flight.descent_m / cfg.vertical_mps;
-    push(moving(last.position, ground, last.along_m, end_m, arrive_s, landed_s))?;
+    let end_m = last.along_m + flight.descent_m;
+    let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
+    push(moving(last.position, ground, last.along_m, end_m, last.leave_s, landed_s))?;
     push(stay(ground, end_m, landed_s, f32::INFINITY))
+}
+
+/// Pieces of a stretch of this length.
+fn parts(length_m: f32) -> u32 {
+    fmaxf(libm::ceilf(length_m / PIECE_M), 1.0) as u32
 }
 
 /// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
@@ -199,7 +213,10 @@ fn conflict(cfg: &ScheduleConfig, p: &Piece, q: &Piece) -> bool {
     middles.norm_squared() < reach * reach && segments_distance_sq(p, q) < apart * apart
 }
 
-fn forbid(forbidden: &mut Vec<(f32, f32), INTERVALS>, mut low: f32, mut high: f32) {
+/// Intervals of time that do not overlap.
+type Forbidden = Vec<(f32, f32), INTERVALS>;
+
+fn forbid(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
     // Swallow what overlaps; when full, swallow the nearest as well.
     while let Some(i) = forbidden.iter().position(|&(l, h)| l <= high && low <= h) {
         let (l, h) = forbidden.swap_remove(i);
@@ -215,10 +232,12 @@ fn forbid(forbidden: &mut Vec<(f32, f32), INTERVALS>, mut low: f32, mut high: f3
     }
 }
 
-/// The smallest take-off time ≥ 0 at which `flight` keeps clear of every flight in `scheduled`, seconds.
+/// The smallest take-off time ≥ `not_before_s` at which `flight`, labelled, keeps clear of every flight in `scheduled`,
+/// seconds.
 pub fn earliest_departure<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
+    not_before_s: f32,
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
@@ -237,16 +256,31 @@ pub fn earliest_departure<'a, const W: usize>(
             }
         }
     }
-    let mut depart_s = 0.0;
-    // Intervals are disjoint, so each can move the departure once.
-    for _ in 0..=ws.forbidden.len() {
-        match ws.forbidden.iter().find(|&&(low, high)| low < depart_s && depart_s < high) {
-            Some(&(_, f32::INFINITY)) => return Err(ScheduleError::Blocked),
-            Some(&(_, high)) => depart_s = high,
-            None => return Ok(depart_s),
+    first_allowed(&ws.forbidden, not_before_s).ok_or(ScheduleError::Blocked)
+}
+
+/// The smallest time ≥ `from_s` outside all of the intervals; `None` if there is none.
+fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
+    let mut time_s = from_s;
+    // Intervals are disjoint, so each can move the time once.
+    for _ in 0..=forbidden.len() {
+        match forbidden.iter().find(|&&(low, high)| low < time_s && time_s < high) {
+            Some(&(_, f32::INFINITY)) => return None,
+            Some(&(_, high)) => time_s = high,
+            None => return Some(time_s),
         }
     }
-    Err(ScheduleError::Blocked)
+    None
+}
+
+/// What a vehicle that stands at a place may stray from it along its path, metres.
+const STANDING_M: f32 = 0.25;
+
+/// The progress at which a vehicle counts as out of a piece. It may have to wait where the piece ends, for somebody whom it
+/// would block if that still counted as inside. The next piece begins there and is either in conflict too, and then
+/// counts by itself, or clear, and then so is the place between them.
+fn left_at_m(q: &Piece) -> f32 {
+    if q.to_m > q.from_m { q.to_m - STANDING_M } else { q.to_m + 0.01 }
 }
 
 /// Where `flight` waits for the `others`, in the order along its path. A gate that an earlier one implies is left out.
@@ -266,11 +300,10 @@ pub fn gates<'a, const W: usize, const G: usize>(
             let start_s = flight.depart_s + p.from_s;
             let earlier =
                 |q: &&Piece| other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && conflict(cfg, p, q);
-            let until = ws.other.iter().filter(earlier).map(|q| q.to_m).fold(highest, fmaxf);
-            if until > highest {
-                highest = until;
-                // A hair beyond: to stand at the end of a piece is to be in it still.
-                let gate = Gate { at_m: p.from_m, id: other.id, until_m: until + 0.01 };
+            let until_m = ws.other.iter().filter(earlier).map(left_at_m).fold(highest, fmaxf);
+            if until_m > highest {
+                highest = until_m;
+                let gate = Gate { at_m: p.from_m, id: other.id, until_m };
                 out.push(gate).map_err(|_| ScheduleError::GatesFull)?;
             }
         }
@@ -351,13 +384,14 @@ mod tests {
         for &(x, y) in points {
             path.push(Point::new(x, y, 1.5), 1.0).unwrap();
         }
+        path.label(1.5 / CFG.vertical_mps, CFG.cruise_mps);
         Flight { id, goal: Some(0), path, climb_m: 1.5, descent_m: 1.5, depart_s: 0.0 }
     }
 
     fn schedule(pair: &mut [Flight<8>; 2]) -> Result<(), ScheduleError> {
         let mut ws = ScheduleWorkspace::new();
         let [first, second] = pair;
-        second.depart_s = earliest_departure(&CFG, second, [&*first].into_iter(), &mut ws)?;
+        second.depart_s = earliest_departure(&CFG, second, 0.0, [&*first].into_iter(), &mut ws)?;
         Ok(())
     }
 

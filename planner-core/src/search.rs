@@ -13,7 +13,7 @@ use heapless::Vec;
 use crate::Point;
 use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 
-mod heap;
+pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
 /// Half-edges looked at together; a row is seldom longer.

@@ -1,13 +1,83 @@
 //! Helpers shared by the cross-crate tests.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, ExitStatus};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
 /// A file of the shared real data, or `None` with a line that says what is skipped.
 pub fn shared_data(name: &str) -> Option<PathBuf> {
-    let path = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")).join(name);
+    let path = workspace().join("../shared/data").join(name);
     if path.exists() {
         return Some(path);
     }
     println!("skipped: no shared data {name} beside the checkout");
     None
+}
+
+/// Root of the checkout.
+pub fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+}
+
+/// How a program is built.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Profile {
+    /// `cargo build`
+    Debug,
+    /// `cargo build --release`
+    Release,
+}
+
+/// Builds `host-sim` and tells where it is: cargo gives another package's binaries to no test.
+pub fn host_sim(profile: Profile) -> PathBuf {
+    let mut build = Command::new(env!("CARGO"));
+    build.current_dir(workspace()).args(["build", "--quiet", "--package", "host-sim", "--bin", "host-sim"]);
+    if profile == Profile::Release {
+        build.arg("--release");
+    }
+    assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
+    let test = std::env::current_exe().expect("a test knows its own path");
+    // TARGET/PROFILE/deps/TEST-HASH
+    let target = test.ancestors().nth(3).expect("tests lie three levels deep in the target directory");
+    target.join(if profile == Profile::Release { "release" } else { "debug" }).join("host-sim")
+}
+
+/// A child process that ends with the test, however that ends.
+pub struct Guard(pub Child);
+
+impl Guard {
+    /// Waits for the child to end by itself; `None` if it has not within the limit.
+    pub fn wait_for(&mut self, limit: Duration) -> Option<ExitStatus> {
+        let began = Instant::now();
+        while began.elapsed() < limit {
+            if let Some(status) = self.0.try_wait().expect("a child can be waited for") {
+                return Some(status);
+            }
+            sleep(Duration::from_millis(50));
+        }
+        None
+    }
+}
+
+impl Drop for Guard {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a line that says so.
+pub fn chromium() -> Option<PathBuf> {
+    if let Some(named) = std::env::var_os("FLOCKMATE_CHROMIUM") {
+        return Some(named.into());
+    }
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    let found = std::env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file());
+    if found.is_none() {
+        println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
+    }
+    found
 }

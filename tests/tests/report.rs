@@ -3,14 +3,13 @@
 //! Chromium is the one named by `FLOCKMATE_CHROMIUM`, else `chromium` or `google-chrome` of the path; without one the
 //! tests say so and pass.
 
-use std::env;
 use std::fs::{self, File};
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Command, Stdio};
-use std::thread::sleep;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+use flockmate_tests::{Guard, Profile, chromium, host_sim};
 use host_sim::report::{
     Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
     vehicle_color, write,
@@ -22,15 +21,6 @@ use serde_json::json;
 const WINDOW: (u32, u32) = (1280, 800);
 /// Software rendering on a busy machine takes seconds; a page that hangs would take for ever.
 const BROWSER_LIMIT: Duration = Duration::from_secs(120);
-
-fn chromium() -> Option<PathBuf> {
-    if let Some(named) = env::var_os("FLOCKMATE_CHROMIUM") {
-        return Some(named.into());
-    }
-    let path = env::var_os("PATH")?;
-    let names = ["chromium", "chromium-browser", "google-chrome"];
-    env::split_paths(&path).flat_map(|dir| names.map(|n| dir.join(n))).find(|p| p.is_file())
-}
 
 /// Two floors of two rooms, 12 × 8 × 6 m at 0.25 m, joined by doors and a shaft.
 fn building() -> MapSurface {
@@ -150,7 +140,7 @@ fn picture(chromium: &Path, page: &Path, hash: &str) -> Vec<[u8; 3]> {
 fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
     let profile = tempfile::tempdir().expect("a profile directory");
     let (out, err) = (profile.path().join("stdout"), profile.path().join("stderr"));
-    let mut child = Command::new(chromium)
+    let child = Command::new(chromium)
         .args([
             "--headless",
             "--no-sandbox",
@@ -169,18 +159,7 @@ fn browse(chromium: &Path, page: &Path, hash: &str, action: &str) -> String {
         .stderr(File::create(&err).expect("a file for stderr"))
         .spawn()
         .expect("Chromium starts");
-    let begun = Instant::now();
-    let status = loop {
-        if let Some(status) = child.try_wait().expect("the child can be waited for") {
-            break status;
-        }
-        if begun.elapsed() > BROWSER_LIMIT {
-            child.kill().expect("our own child can be killed");
-            child.wait().expect("a killed child ends");
-            panic!("Chromium did not end within {BROWSER_LIMIT:?}");
-        }
-        sleep(Duration::from_millis(50));
-    };
+    let status = Guard(child).wait_for(BROWSER_LIMIT).expect("Chromium ends in time");
     let log = String::from_utf8_lossy(&fs::read(&err).expect("stderr")).into_owned();
     assert!(status.success(), "Chromium failed: {log}");
     // Reading pixels back for the screenshot makes the driver itself complain.
@@ -218,10 +197,7 @@ impl Opened {
 
 #[test]
 fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
-    let Some(chromium) = chromium() else {
-        println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
-        return;
-    };
+    let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
     let page = dir.path().join("report.html");
     write(&page, &report()).expect("the page is written");
@@ -256,11 +232,27 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
 }
 
 #[test]
+fn page_of_the_demo_opens_clean_and_shows_every_vehicle_move() {
+    let Some(chromium) = chromium() else { return };
+    let dir = tempfile::tempdir().expect("a directory");
+    let demo = Command::new(host_sim(Profile::Release)).args(["demo", "--out"]).arg(dir.path()).output();
+    assert!(demo.expect("the demo runs").status.success());
+    let page = dir.path().join("report.html");
+    assert!(fs::metadata(&page).expect("the page is there").len() < 6_000_000);
+    let opened = open(&chromium, &page, "#t=12&view=iso");
+    assert_eq!((opened.count("ready"), opened.count("vehicles"), opened.count("paths")), (1.0, 10.0, 10.0));
+    assert!(opened.count("faces") > 1_000.0 && opened.count("roadmap-edges") > 10_000.0);
+    let later = picture(&chromium, &page, "#t=30&view=iso");
+    let moved = opened.pixels.iter().zip(&later).filter(|(a, b)| a != b).count();
+    assert!(moved > 500, "{moved} pixels differ between two times");
+    for index in 0..10 {
+        assert!(opened.places(vehicle_color(index), 3).len() > 20, "vehicle {index} cannot be seen");
+    }
+}
+
+#[test]
 fn map_style_and_roadmap_change_the_picture() {
-    let Some(chromium) = chromium() else {
-        println!("skipped: no chromium here; FLOCKMATE_CHROMIUM can name one");
-        return;
-    };
+    let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
     let whole = dir.path().join("whole.html");
     let bare = dir.path().join("bare.html");

@@ -3,7 +3,7 @@
 use flockmate_tests::shared_data;
 use host_sim::map::{self, Unknown, VoxelMap};
 use host_sim::roadmap;
-use planner_core::prm::{self, Config, Sampling};
+use planner_core::prm::{self, Config, Sampling, Workspace};
 
 const SEEDS: u64 = 20;
 
@@ -13,6 +13,7 @@ fn load(file: &str, resolution_m: f32) -> VoxelMap {
 
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let mut fewest = usize::MAX;
+    let mut workspace = Box::new(Workspace::<4096, 4096>::new());
     for seed in 1..=SEEDS {
         let config = Config {
             nodes,
@@ -23,7 +24,8 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
             sampling: Sampling::Uniform,
         };
         let nodes = roadmap::sample(map, &[], &config).expect("there is free space");
-        let mut indexed = roadmap::connect(map, &nodes, &config).expect("it connects");
+        let mut indexed =
+            roadmap::connect(&map.grid(), &nodes, &config, &mut workspace).expect("it connects");
         let mut all_pairs = Vec::new();
         prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))
             .expect("it connects");

@@ -16,7 +16,7 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
 }

@@ -15,7 +15,7 @@ use super::wire::Fields;
 #[derive(Clone, Debug)]
 pub enum Firmware {
     /// PX4 1.17.
-    Px4(Px4),
+    Px4(Box<Px4>),
     /// ArduCopter 4.6.
     Copter(Box<Copter>),
 }
@@ -50,7 +50,7 @@ pub struct Status {
 impl Firmware {
     pub(super) fn new(config: &Config) -> Self {
         match config.personality {
-            Personality::Px4 => Self::Px4(Px4::new(config.system_id, &config.vehicle)),
+            Personality::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
             Personality::Ardupilot => Self::Copter(Box::new(Copter::new(
                 config.system_id,
                 &config.vehicle,

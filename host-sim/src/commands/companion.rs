@@ -13,6 +13,7 @@ use super::load;
 use crate::link::{self, LinkUrl};
 use crate::mission::Mission;
 use crate::progress::Progress;
+use crate::say;
 use crate::swarm::ground_station::mission_start;
 use crate::swarm::member::is_finished;
 use crate::swarm::{companion_config, new_companion};
@@ -50,12 +51,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let own = mission.own_plan(&plan, index).map(|mut own| {
         if args.swarm.is_none() {
             own.gates.clear();
+            own.depart_s = 0.0;
         }
         own
     });
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
-        println!("no --swarm link: vehicle {} flies as the only one", args.id);
+        say!("no --swarm link: vehicle {} flies as the only one", args.id);
         config.roster =
             config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
     }
@@ -85,7 +87,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 (Event::PlanRequested, Ok(own)) => companion.handle_plan(now(), Ok(own)),
                 (Event::PlanRequested, Err(_)) => companion.handle_plan(now(), Err(PlanFailure::Capacity)),
                 (Event::StateChanged { from, to, text }, _) => {
-                    println!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
+                    say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
                         let mut frame = [0; MAX_SENT];
                         let length = mission_start(args.id, 0, &mut frame);

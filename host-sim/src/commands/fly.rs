@@ -11,6 +11,7 @@ use crate::mission::Mission;
 use crate::output;
 use crate::progress::Progress;
 use crate::report::Level;
+use crate::say;
 use crate::scenario::{self, Scenario};
 use crate::swarm;
 
@@ -76,9 +77,9 @@ fn plan_and_fly(
     output::print_summary(&flight.result, out);
     for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
         let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
-        println!("           {:.2} s{id}: {}", incident.t_s, incident.text);
+        say!("           {:.2} s{id}: {}", incident.t_s, incident.text);
     }
-    println!(
+    say!(
         "           {:.0} s simulated in {:.1} s, {:.0} × real time",
         flight.simulated_s,
         flight.took_s,

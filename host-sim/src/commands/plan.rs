@@ -10,6 +10,7 @@ use crate::mission::{Mission, SwarmPlan};
 use crate::output;
 use crate::progress::Progress;
 use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::say;
 
 /// Arguments of `host-sim plan`.
 #[derive(Debug, clap::Args)]
@@ -36,6 +37,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     output::write_points(&args.out.join("starts.txt"), mission.scenario.vehicles.iter().map(|v| v.start))?;
     output::write_points(&args.out.join("goals.txt"), mission.goals.iter().copied())?;
     output::print_summary(&result, &args.out);
+    say!("pads       where each stands, as `--home` of `host-sim autopilot`");
+    for (i, task) in mission.tasks.iter().enumerate() {
+        let pad = mission.pad(i);
+        say!("{:>7}  {:.8},{:.8},{:.3}", task.id, pad.lat_deg, pad.lon_deg, pad.alt_m);
+    }
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -78,5 +84,6 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
             deadlocks: 0,
         },
         roadmap: mission.roadmap_size(),
+        left: mission.left(plan),
     }
 }

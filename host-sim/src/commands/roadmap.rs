@@ -5,11 +5,12 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow};
 use clap::Subcommand;
-use planner_core::roadmap::RoadmapView;
+use planner_core::roadmap::{RoadmapError, RoadmapView};
 
 use super::load;
 use crate::mission::Mission;
 use crate::progress::Progress;
+use crate::say;
 
 /// Arguments of `host-sim roadmap`.
 #[derive(Debug, clap::Args)]
@@ -50,7 +51,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Action::Info { file } => {
             let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
             let view = RoadmapView::parse(&bytes)
-                .map_err(|error| anyhow!("not a roadmap: {}: {error:?}", file.display()))?;
+                .map_err(|error| anyhow!("not a roadmap: {}: {}", file.display(), why(&error)))?;
             print(&view);
         }
     }
@@ -61,13 +62,27 @@ fn print(view: &RoadmapView<'_>) {
     let header = view.header();
     let edges = || (0..view.node_count() as u16).flat_map(|n| view.half_edges(n));
     let narrowest = edges().map(|e| e.clearance_m).fold(f32::INFINITY, f32::min);
-    println!("nodes          {} ({} starts, {} goals)", view.node_count(), header.starts, header.goals);
-    println!("edges          {}", view.half_edge_count() / 2);
-    println!("edge length    {} to {} m", header.edge_min_m, header.edge_max_m);
-    println!("clearance      tested above {} m, narrowest edge {narrowest} m", header.tested_clearance_m);
-    println!(
+    say!("nodes          {} ({} starts, {} goals)", view.node_count(), header.starts, header.goals);
+    say!("edges          {}", view.half_edge_count() / 2);
+    say!("edge length    {} to {} m", header.edge_min_m, header.edge_max_m);
+    say!("clearance      tested above {} m, narrowest edge {narrowest} m", header.tested_clearance_m);
+    say!(
         "origin         {:.7}, {:.7}, {:.1} m",
-        header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m
+        header.origin.lat_deg,
+        header.origin.lon_deg,
+        header.origin.alt_m
     );
-    println!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
+    say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
+}
+
+fn why(error: &RoadmapError) -> String {
+    match error {
+        RoadmapError::Truncated => "it ends too early".to_owned(),
+        RoadmapError::Magic => "it does not begin as a roadmap file does".to_owned(),
+        RoadmapError::Version(version) => format!("its version {version} is not known here"),
+        RoadmapError::Length => "its lengths and counts contradict one another".to_owned(),
+        RoadmapError::Crc => "its CRC-32 does not match: it is damaged".to_owned(),
+        RoadmapError::Header(field) => format!("its header field {field} is out of range"),
+        other => format!("its contents are not sound: {other:?}"),
+    }
 }

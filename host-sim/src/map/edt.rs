@@ -82,8 +82,18 @@ impl ClearanceField {
 struct Scratch {
     line: Vec<u16>,
     out: Vec<u16>,
-    /// Lower envelope: (site, first place where its parabola is lowest).
-    envelope: Vec<(i64, i64)>,
+    /// The lower envelope.
+    envelope: Vec<Parabola>,
+}
+
+/// Squared distance from a site: `height + (x − site)²`. A side has at most 2¹⁵ cells, so squares fit.
+#[derive(Clone, Copy, Debug)]
+struct Parabola {
+    site: i32,
+    /// Its value at x = 0.
+    at_zero: i32,
+    /// The first place where it is the lowest.
+    from: i32,
 }
 
 trait CopyFrom {
@@ -106,38 +116,39 @@ impl Scratch {
     /// `out[x] = min over q of line[q] + max(|x − q| − 1, 0)²`, ending at the largest u16. Cost: O(length).
     fn transform(&mut self) {
         let n = self.line.len();
-        // Growing by one cell: the least of three neighbours.
-        let grown =
-            |q: usize| self.line[q.saturating_sub(1)..n.min(q + 2)].iter().copied().min().unwrap_or(u16::MAX);
-        let height = |q: i64| i64::from(grown(q as usize));
         self.envelope.clear();
-        for q in 0..n as i64 {
-            let h = height(q);
-            if h == i64::from(u16::MAX) {
+        for q in 0..n {
+            // Growing by one cell: the least of three neighbours.
+            let near = &self.line[q.saturating_sub(1)..n.min(q + 2)];
+            let height = near.iter().fold(u16::MAX, |a, &b| a.min(b));
+            if height == u16::MAX {
                 continue;
             }
+            let site = q as i32;
+            let at_zero = i32::from(height) + site * site;
             let mut from = 0;
-            while let Some(&(p, begin)) = self.envelope.last() {
-                // The first whole x where q's parabola is no higher than p's.
-                let cross = (h + q * q - height(p) - p * p + 2 * (q - p) - 1).div_euclid(2 * (q - p));
-                if cross > begin {
+            while let Some(last) = self.envelope.last() {
+                // The first whole x where this parabola is no higher than the last.
+                let width = 2 * (site - last.site);
+                let cross = (at_zero - last.at_zero + width - 1).div_euclid(width);
+                if cross > last.from {
                     from = cross;
                     break;
                 }
                 self.envelope.pop();
             }
-            if from < n as i64 {
-                self.envelope.push((q, from));
+            if from < n as i32 {
+                self.envelope.push(Parabola { site, at_zero, from });
             }
         }
         self.out.clear();
-        let mut at = 0;
-        for x in 0..n as i64 {
-            while at + 1 < self.envelope.len() && self.envelope[at + 1].1 <= x {
-                at += 1;
+        self.out.resize(n, u16::MAX);
+        for (i, parabola) in self.envelope.iter().enumerate() {
+            let to = self.envelope.get(i + 1).map_or(n as i32, |next| next.from);
+            for x in parabola.from..to {
+                let value = parabola.at_zero + x * (x - 2 * parabola.site);
+                self.out[x as usize] = value.min(i32::from(u16::MAX)) as u16;
             }
-            let value = self.envelope.get(at).map_or(i64::MAX, |&(q, _)| height(q) + (x - q) * (x - q));
-            self.out.push(value.min(i64::from(u16::MAX)) as u16);
         }
     }
 }

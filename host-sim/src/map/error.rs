@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file system said no.
-    #[error("cannot {action} the map: {}: {source}", file.display())]
+    #[error("cannot {action} the map: {}", file.display())]
     Io {
         /// What was tried: "read", "write".
         action: &'static str,

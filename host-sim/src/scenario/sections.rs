@@ -73,6 +73,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         unsupported.push(not_yet(text, span, "this mission.mode"));
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+    check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m)?;
     check_goals(text, &vehicles, &mission)?;
     let vehicles = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     let path = file.to_owned();
@@ -417,6 +418,25 @@ fn check_apart(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], safety_dist
                     other.id, vehicle.id
                 );
                 return Err(text.error(&spans.start, why));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Vehicles land below their goals: two goals too near would put two vehicles too near for good.
+fn check_goals_apart(table: &Table<'_>, mission: &Mission, safety_distance_m: f32) -> Result<()> {
+    let goals = &mission.goals;
+    for (i, goal) in goals.iter().enumerate() {
+        for (j, other) in goals[..i].iter().enumerate() {
+            let apart = (goal - other).norm();
+            if apart < safety_distance_m {
+                let span =
+                    table.get("goals").or(table.get("goals_file")).map_or(table.span.clone(), |v| v.span);
+                let why = format!(
+                    "goals {j} and {i} are {apart:.2} m apart, below the safety distance of {safety_distance_m} m"
+                );
+                return Err(table.text.error(&span, why));
             }
         }
     }

@@ -152,6 +152,7 @@ pub fn fly(
             deadlocks: monitor.deadlocks,
         },
         roadmap: mission.roadmap_size(),
+        left: mission.left(plan),
     };
     log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
         t_s: *t_s as f32,

@@ -57,6 +57,8 @@ struct Watched {
     last: Option<Point>,
     flown_m: f64,
     in_contact: bool,
+    /// Where its distance to the nearest obstacle was last measured, and that distance, metres.
+    measured: Option<(Point, f32)>,
     best_progress_m: f32,
     progressed_s: f64,
     stuck: bool,
@@ -102,6 +104,7 @@ impl<'a> Monitor<'a> {
             last: None,
             flown_m: 0.0,
             in_contact: false,
+            measured: None,
             best_progress_m: f32::NEG_INFINITY,
             progressed_s: 0.0,
             stuck: false,
@@ -164,9 +167,20 @@ impl<'a> Monitor<'a> {
         let flying = now.phase == Phase::Flying;
         // Only a distance that is a contact, or the smallest of its time, has to be exact.
         let wanted = if flying { self.window.clearance_m.max(radius_m) } else { radius_m };
-        let touches = if self.field.lower_bound_m(&now.position) < wanted {
+        // A distance changes by no more than the way flown since it was measured.
+        let (at_least_m, at_most_m) = match self.vehicles[i].measured {
+            Some((place, clearance_m)) => {
+                let moved_m = (now.position - place).norm() + TOUCH_M;
+                (clearance_m - moved_m, clearance_m + moved_m)
+            }
+            None => (0.0, f32::INFINITY),
+        };
+        let touches = if at_least_m < wanted && self.field.lower_bound_m(&now.position) < wanted {
             let reach = wanted.min(CLEARANCE_LOOK_M);
-            let clearance_m = point_clearance(&self.grid, &now.position, reach);
+            let clearance_m = point_clearance(&self.grid, &now.position, reach.min(at_most_m));
+            if clearance_m < reach {
+                self.vehicles[i].measured = Some((now.position, clearance_m));
+            }
             if flying && clearance_m < reach {
                 self.window.clearance_m = self.window.clearance_m.min(clearance_m);
                 self.min_clearance_m = self.min_clearance_m.min(clearance_m);

@@ -26,15 +26,16 @@ pub(super) fn free_rows(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Pa
 /// Each column is priced at its least cost and given to that row, if the row has none; then a row that is the least of
 /// one column only moves its slack into that column's price.
 fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
-    let least_row = &mut *paths.previous;
-    state.price.fill(f64::INFINITY);
-    for row in 0..costs.rows as u16 {
-        let line = costs.row(row, state.row);
-        for ((price, least_row), &cost) in state.price.iter_mut().zip(least_row.iter_mut()).zip(line) {
-            // Selects, as in the searches: which row is cheaper cannot be predicted.
-            let cheaper = f64::from(cost) < *price;
-            *price = if cheaper { f64::from(cost) } else { *price };
-            *least_row = if cheaper { row } else { *least_row };
+    // Eight columns at a time, the last eight perhaps partly again; fewer than eight one by one.
+    let cols = costs.cols;
+    let mut first = 0;
+    while first < cols {
+        if cols < LANES {
+            cheapest_rows::<1>(costs, first, state.price, paths.previous);
+            first += 1;
+        } else {
+            cheapest_rows::<LANES>(costs, first.min(cols - LANES), state.price, paths.previous);
+            first += LANES;
         }
     }
     if state.price.contains(&f64::INFINITY) {
@@ -67,6 +68,23 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
         }
     }
     Some(left)
+}
+
+/// Least cost and first cheapest row of `K` columns of a square matrix, which is never transposed.
+fn cheapest_rows<const K: usize>(costs: &Costs<'_>, first: usize, price: &mut [f64], least_row: &mut [u16]) {
+    let (mut least, mut rows) = ([f32::INFINITY; K], [0_u32; K]);
+    for (row, line) in (0..).zip(costs.data.chunks_exact(costs.cols)) {
+        let Some(line) = line[first..].first_chunk::<K>() else { return };
+        // Selects of one width, so that the lanes become vectors: which row is cheaper cannot be predicted.
+        for lane in 0..K {
+            let cheaper = (line[lane] < least[lane]) & (line[lane] <= costs.limit);
+            least[lane] = if cheaper { line[lane] } else { least[lane] };
+            rows[lane] = if cheaper { row } else { rows[lane] };
+        }
+    }
+    for lane in 0..K {
+        (price[first + lane], least_row[first + lane]) = (f64::from(least[lane]), rows[lane] as u16);
+    }
 }
 
 fn least_reduced(line: &[f32], price: &[f64]) -> f64 {

@@ -8,6 +8,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::*;
+use crate::Point;
 use crate::frames::Geodetic;
 use crate::roadmap::{self, Edge, RoadmapHeader};
 use crate::schedule::checker;
@@ -65,7 +66,7 @@ fn plan(
     mode: Mode,
 ) -> Result<SwarmPlan<16, 64>, PlanError> {
     let view = RoadmapView::parse(bytes).unwrap();
-    let mut ws = Box::new(PlanWorkspace::<1024, 16>::new());
+    let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
     let mut out = SwarmPlan::new();
     let descents = std::vec![HEIGHT_M; goals];
     let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE };
@@ -102,6 +103,74 @@ proptest! {
         prop_assert!(plan.flights.iter().all(|f| f.goal.is_some()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
         prop_assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{apart:?}");
+    }
+}
+
+/// A corridor along x with one side room off its middle; nodes by hand, every vehicle at one height.
+fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
+    let p = |x: f32, y: f32| Point::new(x, y, HEIGHT_M);
+    // Two starts, two goals over each other's pads, the corridor, the side room.
+    let mut nodes = std::vec![p(0.0, 0.0), p(length_m, 0.0), p(length_m, 0.0), p(0.0, 0.0)];
+    let steps = (length_m / 2.0) as usize;
+    nodes.extend((1..steps).map(|i| p(i as f32 * 2.0, 0.0)));
+    nodes.push(p(side_at_m, depth_m));
+    let mut edges = StdVec::new();
+    for a in 0..nodes.len() {
+        for b in a + 1..nodes.len() {
+            let d = nodes[b] - nodes[a];
+            let along = d.y == 0.0 && (0.1..2.5).contains(&d.x.abs());
+            let aside = d.x == 0.0 && d.y.abs() > 1.0;
+            if along || aside {
+                edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
+            }
+        }
+    }
+    let header = RoadmapHeader {
+        origin: Geodetic::default(),
+        edge_min_m: 0.1,
+        edge_max_m: 8.0,
+        tested_clearance_m: 0.0,
+        max_clearance_m: 4.0,
+        starts: 2,
+        goals: 2,
+    };
+    let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len()).unwrap()];
+    roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
+    bytes
+}
+
+#[test]
+fn head_on_in_a_corridor_one_steps_into_the_side_room() {
+    // Just deep enough to be out of the way, and deeper.
+    let depths = [2.1, 2.2, 2.4, 2.6, 2.8, 3.0, 3.2, 4.0];
+    for (side_at_m, depth_m) in
+        [8.0, 14.0, 16.0, 22.0].into_iter().flat_map(|at| depths.map(|depth| (at, depth)))
+    {
+        let bytes = corridor(30.0, side_at_m, depth_m);
+        let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
+        let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
+        assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
+        for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
+            let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 20_000);
+            let kept = apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3);
+            assert!(kept, "side room at {side_at_m}, {depth_m} deep: {apart:?}");
+        }
+    }
+}
+
+#[test]
+fn antipodal_swaps_over_a_circle_are_planned() {
+    // Ten pairs swap ends across a circle of 20 m radius.
+    let place = |i: usize| {
+        let angle = i as f32 * core::f32::consts::TAU / 10.0;
+        Point::new(20.0 + 20.0 * libm::cosf(angle), 20.0 + 20.0 * libm::sinf(angle), HEIGHT_M)
+    };
+    let terminals: StdVec<Point> = (0..10).map(place).chain((0..10).map(|i| place(i + 5))).collect();
+    for seed in 0..4 {
+        let bytes = open_roadmap(&terminals, 10, 400, seed);
+        let plan = plan(&bytes, &tasks(10, true), 10, Mode::Labelled).unwrap();
+        let apart = checker::fly(&SCHEDULE, &plan.flights, &[1.5; 10], 40_000);
+        assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{seed}: {apart:?}");
     }
 }
 

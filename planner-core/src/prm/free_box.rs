@@ -264,12 +264,20 @@ impl FreeBox {
             let high = (self.high[axis] - 1 - brick * 4).min(3);
             (0b1111 << low) & (0b1111 >> (3 - high))
         };
+        // Only the first and the last brick along `v` may reach beyond the box.
+        let (first, last) = (self.low[v] >> 2, (self.high[v] - 1) >> 2);
+        let (first_mask, last_mask) = (lane_mask(v, lanes(v, first)), lane_mask(v, lanes(v, last)));
         let mut all = 0;
         for brick_w in self.low[w] >> 2..=(self.high[w] - 1) >> 2 {
-            let mut row = 0;
-            for brick_v in self.low[v] >> 2..=(self.high[v] - 1) >> 2 {
-                let at = brick * strides[axis] + brick_v * strides[v] + brick_w * strides[w];
-                row |= grid.words()[at as usize] & lane_mask(v, lanes(v, brick_v));
+            let at =
+                |brick_v: i32| (brick * strides[axis] + brick_v * strides[v] + brick_w * strides[w]) as usize;
+            let mut row = grid.words()[at(first)] & first_mask | grid.words()[at(last)] & last_mask;
+            if last > first + 1 {
+                let between = &grid.words()[at(first + 1)..at(last)];
+                row |= match strides[v] {
+                    1 => between.iter().fold(0, |row, word| row | word),
+                    stride => between.iter().step_by(stride as usize).fold(0, |row, word| row | word),
+                };
             }
             all |= row & lane_mask(w, lanes(w, brick_w));
         }

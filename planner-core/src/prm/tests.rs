@@ -97,6 +97,47 @@ fn edges_are_those_of_all_pairs() {
     assert!(total > 50_000, "{total} edges are too few to mean much");
 }
 
+/// A thin wall full of holes, nodes a hair to either side of its faces: rays leave the empty box at shallow angles, often
+/// through a hole and into the cell beside it, which no shortcut may skip.
+#[test]
+fn rays_that_graze_a_wall_miss_no_cell_beside_them() {
+    let (mut edges, mut pairs) = (0, 0);
+    for seed in 0..15 {
+        let mut rng = Pcg32::seed_from_u64(seed);
+        let axis = seed as usize % 3;
+        let shape = GridShape { dims: [40, 36, 32], min: Point::new(-1.0, 2.0, 0.5), resolution_m: 0.25 };
+        let wall = shape.dims[axis] / 2;
+        let mut words = vec![0; shape.brick_count()];
+        for i in 0..shape.dims[0] {
+            for j in 0..shape.dims[1] {
+                for k in 0..shape.dims[2] {
+                    let in_wall = [i, j, k][axis] == wall && !rng.next_u32().is_multiple_of(3);
+                    if in_wall || rng.next_u32().is_multiple_of(2000) {
+                        let (word, mask) = shape.address([i, j, k]);
+                        words[word] |= mask;
+                    }
+                }
+            }
+        }
+        let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
+        const HAIRS: [f32; 8] =
+            [0.0, 1.0 / 16384.0, 1.0 / 1024.0, 1.0 / 512.0, 1.0 / 300.0, 1.0 / 64.0, 0.1, 0.5];
+        let nodes: Vec<Point> = (0..240)
+            .map(|_| {
+                let mut cells = uniform(&mut rng).component_mul(&Point::from(shape.dims.map(|d| d as f32)));
+                let (hair, draw) = (HAIRS[(rng.next_u32() % 8) as usize], rng.next_u32());
+                let face = (wall + (draw & 1)) as f32;
+                cells[axis] = if draw & 2 == 0 { face - hair } else { face + hair };
+                shape.min + cells * shape.resolution_m
+            })
+            .collect();
+        let config = Config { edge_max_m: 6.0, ..config(seed) };
+        edges += check_edges(&grid, &nodes, &config);
+        pairs += nodes.len() * (nodes.len() - 1) / 2;
+    }
+    assert!(edges > 10_000 && edges < pairs / 2, "{edges} of {pairs}: too few of one kind to mean much");
+}
+
 #[test]
 fn nodes_are_free_and_repeat_with_the_seed() {
     let (shape, words) = rooms(&mut Pcg32::seed_from_u64(3), 0.25);

@@ -3,11 +3,11 @@
 /// The node was not reached yet.
 const UNSEEN: u16 = 0;
 /// The node has left the heap: its distance is final.
-pub(super) const SETTLED: u16 = u16::MAX;
+pub(crate) const SETTLED: u16 = u16::MAX;
 
 const ARITY: usize = 4;
 
-pub(super) struct Heap<const N: usize> {
+pub(crate) struct Heap<const N: usize> {
     len: usize,
     /// Cost in the upper bits (non-negative f32, ordered as its bits), node in the lower sixteen: one comparison orders
     /// by cost, then by node.
@@ -40,24 +40,24 @@ fn least_of(entries: &[u64]) -> usize {
 }
 
 impl<const N: usize> Heap<N> {
-    pub(super) const fn new() -> Self {
+    pub(crate) const fn new() -> Self {
         Self { len: 0, entries: [0; N], places: [UNSEEN; N] }
     }
 
     /// Empties it for nodes below `nodes`.
-    pub(super) fn clear(&mut self, nodes: usize) {
+    pub(crate) fn clear(&mut self, nodes: usize) {
         self.len = 0;
         self.places[..nodes].fill(UNSEEN);
     }
 
     #[inline]
-    pub(super) fn place(&self, node: u16) -> u16 {
+    pub(crate) fn place(&self, node: u16) -> u16 {
         self.places[usize::from(node)]
     }
 
     /// Puts a node in, or lowers its cost if it is in. `cost` is finite and not negative.
     #[inline]
-    pub(super) fn push(&mut self, node: u16, cost: f32) {
+    pub(crate) fn push(&mut self, node: u16, cost: f32) {
         let mut at = match self.places[usize::from(node)] {
             UNSEEN => {
                 self.len += 1;
@@ -79,7 +79,7 @@ impl<const N: usize> Heap<N> {
 
     /// Takes out the node of least cost and settles it.
     #[inline]
-    pub(super) fn pop(&mut self) -> Option<u16> {
+    pub(crate) fn pop(&mut self) -> Option<u16> {
         let top = *self.entries[..self.len].first()?;
         self.places[node_of(top)] = SETTLED;
         self.len -= 1;
@@ -91,7 +91,7 @@ impl<const N: usize> Heap<N> {
     }
 
     /// Gives every node in it a new cost. O(length).
-    pub(super) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
+    pub(crate) fn reorder(&mut self, cost: impl Fn(u16) -> f32) {
         for at in (0..self.len).rev() {
             let node = node_of(self.entries[at]) as u16;
             self.sift_down(at, entry_of(node, cost(node)));

@@ -1,9 +1,11 @@
 //! `cargo xtask bench`: our times beside those of the programs we are compared to, measured alternately in one run.
 //!
-//! Prints a table; `--out FILE` writes the rows as JSON, `[{ "name", "ours", "theirs", "ratio", "unit", "n" }]`.
+//! Prints a table; `--out FILE` writes the rows as JSON,
+//! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.
 
 mod assignment;
 mod roadmap;
+mod swarm;
 
 use std::path::PathBuf;
 
@@ -22,6 +24,8 @@ pub struct Row {
     pub theirs: f64,
     /// theirs / ours.
     pub ratio: f64,
+    /// What `ratio` must be at least.
+    pub required: f64,
     /// Unit of both.
     pub unit: &'static str,
     /// Size of the problem.
@@ -34,7 +38,7 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
@@ -54,17 +58,12 @@ fn main() -> Result<()> {
     if "assignment".contains(&args.only) {
         rows.extend(assignment::rows());
     }
-    println!("{:28} {:>7} {:>12} {:>12} {:>8}", "name", "n", "ours", "theirs", "ratio");
-    for row in &rows {
-        println!(
-            "{:28} {:>7} {:>9.3} {unit} {:>9.3} {unit} {:>7.2}x",
-            row.name,
-            row.n,
-            row.ours,
-            row.theirs,
-            row.ratio,
-            unit = row.unit
-        );
+    if "swarm".contains(&args.only) {
+        rows.extend(swarm::rows()?);
+    }
+    println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
+    for Row { name, ours, theirs, ratio, required, unit, n } in &rows {
+        println!("{name:24} {n:>5} {ours:>10.3} {unit} {theirs:>10.3} {unit} {ratio:>7.2}x {required:>8}x");
     }
     if let Some(out) = &args.out {
         std::fs::write(out, serde_json::to_string_pretty(&rows)?)

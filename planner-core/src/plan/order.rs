@@ -1,0 +1,254 @@
+//! The order of the swarm: each vehicle in turn gets its path and its place in the schedule.
+//!
+//! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the pad where that is enough,
+//! stepping aside on the way ([`sipp`]) where it is not. Who cannot be fitted in goes first in the next round; when that
+//! does not help, the others leave it a head start. Rounds are bounded.
+
+use heapless::Vec;
+
+use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
+use crate::Point;
+use crate::path::{Path, PathError};
+use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::schedule::sipp::{self, Route};
+use crate::schedule::{self, Flight, ScheduleError};
+use crate::search::{self, SearchError, SearchWorkspace};
+
+/// Schedules the longest path first; who cannot be fitted in goes first in the next round, or later gets a head start.
+pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    let mut order: Vec<u16, V> = Vec::new();
+    let mut straight: Vec<f32, V> = Vec::new();
+    for (i, flight) in out.flights.iter().enumerate() {
+        let mut nodes: Vec<u16, W> = Vec::new();
+        let length = match flight.goal {
+            Some(goal) => {
+                let parked = Parked::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
+                find_path(view, request, i, goal, &parked, &mut ws.search, &mut nodes)?
+            }
+            None => f32::INFINITY,
+        };
+        // Cannot overflow: one entry per flight.
+        let _ = (order.push(i as u16), straight.push(length));
+    }
+    // Who stays on its pad comes first: it is in everybody's way. Then the longest; ties go to the higher id (P3D §3.4).
+    order.sort_unstable_by(|&a, &b| {
+        let (a, b) = (usize::from(a), usize::from(b));
+        straight[b].total_cmp(&straight[a]).then(out.flights[b].id.cmp(&out.flights[a].id))
+    });
+    let mut failed = Ok(());
+    let mut rush = Rush { count: 0, head_start_s: 0.0 };
+    let reorderings = order.len().min(REORDERINGS);
+    for round in 0..=reorderings + HEAD_STARTS {
+        let Err((place, error)) = schedule_round(view, request, &order, &rush, ws, out) else {
+            return Ok(());
+        };
+        failed = Err(error);
+        let blocked = order.remove(place);
+        // Cannot overflow: one was just removed.
+        if round < reorderings {
+            let front = order.iter().take_while(|&&i| out.flights[usize::from(i)].goal.is_none()).count();
+            let _ = order.insert(front, blocked);
+        } else {
+            rush.count = rush.count.max(order.len() + 1 - place);
+            rush.head_start_s += HEAD_START_S;
+            let _ = order.push(blocked);
+        }
+    }
+    failed
+}
+
+/// Rounds in which who cannot be fitted in goes first, before others are held back for it instead.
+const REORDERINGS: usize = 16;
+/// Rounds in which others are held back, each by [`HEAD_START_S`] more.
+const HEAD_STARTS: usize = 8;
+/// What two vehicles head-on need to clear a side room, seconds.
+const HEAD_START_S: f32 = 3.0;
+
+/// The last `count` in the order may leave at once, all others only after a head start.
+struct Rush {
+    count: usize,
+    head_start_s: f32,
+}
+
+fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    order: &[u16],
+    rush: &Rush,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), (usize, PlanError)> {
+    for (place, &index) in order.iter().enumerate() {
+        let index = usize::from(index);
+        if out.flights[index].goal.is_none() {
+            continue;
+        }
+        let (before, waiting) = (&order[..place], &order[place + 1..]);
+        let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
+        let waits = wait_on_pad(view, request, index, before, waiting, not_before_s, ws, out);
+        let flight = match waits.map_err(|error| (place, error))? {
+            Some(flight) => flight,
+            None => step_aside(view, request, index, before, waiting, not_before_s, ws, out)
+                .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
+        };
+        out.flights[index] = flight;
+    }
+    Ok(())
+}
+
+/// The flight along a shortest path, after a wait on the pad; `None` if no wait is long enough.
+#[expect(clippy::too_many_arguments, reason = "the state of one round")]
+fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    index: usize,
+    before: &[u16],
+    waiting: &[u16],
+    not_before_s: f32,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &SwarmPlan<V, W>,
+) -> Result<Option<Flight<W>>, PlanError> {
+    let flight = &out.flights[index];
+    let Some(goal) = flight.goal else { return Ok(None) };
+    for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
+        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let mut nodes: Vec<u16, W> = Vec::new();
+        if find_path(view, request, index, goal, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
+            continue;
+        }
+        let mut path = path_of(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
+        path.label(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
+        let flight = Flight { path, depart_s: 0.0, ..flight.clone() };
+        let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
+        let cfg = &request.schedule;
+        match schedule::earliest_departure(cfg, &flight, not_before_s, scheduled, &mut ws.schedule) {
+            Ok(depart_s) => return Ok(Some(Flight { depart_s, ..flight })),
+            Err(ScheduleError::Blocked) => {}
+            Err(error) => return Err(PlanError::Schedule(flight.id, error)),
+        }
+    }
+    Ok(None)
+}
+
+/// The flight that arrives earliest, waiting and stepping aside on its way.
+#[expect(clippy::too_many_arguments, reason = "the state of one round")]
+fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    index: usize,
+    before: &[u16],
+    waiting: &[u16],
+    not_before_s: f32,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &SwarmPlan<V, W>,
+) -> Result<Flight<W>, ScheduleError> {
+    let mut flight = out.flights[index].clone();
+    let Some(goal) = flight.goal else { return Ok(flight) };
+    let required_m = request.vehicles[index].required_clearance_m;
+    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, required_m);
+    let mut found = Err(ScheduleError::Blocked);
+    for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
+        let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
+        let route = Route {
+            from: index as u16,
+            to: request.vehicles.len() as u16 + goal,
+            not_before_s,
+            parked: &parked.pads,
+        };
+        let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
+        found = sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight);
+        if found != Err(ScheduleError::Blocked) {
+            break;
+        }
+    }
+    found.map(|()| flight)
+}
+
+/// What a path keeps clear of beyond obstacles.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Avoid {
+    /// The pads of vehicles that may still stand there.
+    WaitingPads,
+    /// The pads and landing places of all others: then waiting on the pad is always enough.
+    AllPlaces,
+    /// Nothing: somebody has to leave before.
+    Nothing,
+}
+
+/// Points on the ground where other vehicles stand, before and after their flights.
+struct Parked<const V: usize> {
+    pads: Vec<Point, V>,
+    landed: Vec<Point, V>,
+}
+
+impl<const V: usize> Parked<V> {
+    fn new<const W: usize>(
+        view: &RoadmapView<'_>,
+        avoid: Avoid,
+        flights: &[Flight<W>],
+        waiting: &[u16],
+        index: usize,
+    ) -> Self {
+        let mut parked = Self { pads: Vec::new(), landed: Vec::new() };
+        let below = |node: usize, height: f32| view.node(node as u16) - Point::new(0.0, 0.0, height);
+        for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
+        {
+            // Cannot overflow: at most one entry of each kind per flight.
+            if avoid == Avoid::AllPlaces || flight.goal.is_none() || waiting.contains(&(j as u16)) {
+                let _ = parked.pads.push(below(j, flight.climb_m));
+            }
+            if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.goal) {
+                let _ = parked.landed.push(below(flights.len() + usize::from(goal), flight.descent_m));
+            }
+        }
+        parked
+    }
+
+    fn clears(&self, a: &Point, b: &Point, distance_m: f32) -> bool {
+        let along = b - a;
+        let near = |p: &Point| {
+            let share = ((p - a).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+            (a + along * share - p).norm_squared() < distance_m * distance_m
+        };
+        !self.pads.iter().chain(&self.landed).any(near)
+    }
+}
+
+/// The shortest path from start `index` to `goal` for that vehicle, clear of `parked`; infinite without one.
+fn find_path<const N: usize, const V: usize, const W: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    index: usize,
+    goal: u16,
+    parked: &Parked<V>,
+    search: &mut SearchWorkspace<N>,
+    nodes: &mut Vec<u16, W>,
+) -> Result<f32, PlanError> {
+    let vehicle = &request.vehicles[index];
+    let passable = |from: u16, edge: &HalfEdge| {
+        view.clears(edge, vehicle.required_clearance_m)
+            && parked.clears(&view.node(from), &view.node(edge.target), request.schedule.parked_separation_m)
+    };
+    let target = request.vehicles.len() as u16 + goal;
+    match search::astar(view, index as u16, target, passable, search, nodes) {
+        Ok(length_m) => Ok(length_m),
+        Err(SearchError::NoPath) => Ok(f32::INFINITY),
+        Err(error) => Err(PlanError::Search(vehicle.id, error)),
+    }
+}
+
+fn path_of<const W: usize>(view: &RoadmapView<'_>, nodes: &[u16]) -> Result<Path<W>, PathError> {
+    let mut path = Path::new();
+    for (i, &node) in nodes.iter().enumerate() {
+        let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));
+        // The first waypoint ends no leg.
+        let clearance_m = edge.map_or(view.header().max_clearance_m, |e| e.clearance_m);
+        path.push(view.node(node), clearance_m)?;
+    }
+    Ok(path)
+}

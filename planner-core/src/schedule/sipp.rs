@@ -1,0 +1,304 @@
+//! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the earliest way past flights that are
+//! already scheduled, with waiting and stepping aside at nodes.
+//!
+//! A node's time falls into *safe intervals*, in which hovering there is clear of every scheduled piece. One search state
+//! is a node with one of its intervals; reaching it earlier is always better, so A* over these states finds the earliest
+//! arrival. Flying an edge is clear from departures outside the intervals that the pieces near it forbid.
+//!
+//! Cost: states reached × their edges × scheduled pieces, each a cheap bound. When the states are used up the search
+//! ends without a way, as if there were none.
+
+use heapless::Vec;
+use libm::{fmaxf, fminf};
+
+use super::{
+    Flight, Forbidden, Piece, ScheduleConfig, ScheduleError, conflict, cut, first_allowed, forbid, parts,
+};
+use crate::Point;
+use crate::path::Path;
+use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::search::heap::{Heap, SETTLED};
+
+/// One node in one of its safe intervals.
+#[derive(Clone, Copy)]
+struct State {
+    node: u16,
+    /// The next state of the same node, plus one; 0 ends the list.
+    next: u16,
+    /// The state flown from; its own index at the start.
+    parent: u16,
+    /// When the parent was left, seconds.
+    left_parent_s: f32,
+    /// Earliest arrival, seconds; infinite while unreached.
+    arrive_s: f32,
+    /// End of the safe interval, seconds.
+    until_s: f32,
+    /// Begin of the safe interval, seconds.
+    from_s: f32,
+}
+
+const NO_STATE: State =
+    State { node: 0, next: 0, parent: 0, left_parent_s: 0.0, arrive_s: 0.0, until_s: 0.0, from_s: 0.0 };
+
+/// Scratch for roadmaps of up to `N` nodes, as many states, and `P` scheduled pieces. All zero when new.
+pub struct SippWorkspace<const N: usize, const P: usize> {
+    /// Times are absolute here.
+    pieces: Vec<Piece, P>,
+    states: [State; N],
+    len: usize,
+    /// First state of each node, plus one.
+    first: [u16; N],
+    heap: Heap<N>,
+    cut: Vec<Piece, { super::PIECES }>,
+    forbidden: Forbidden,
+}
+
+impl<const N: usize, const P: usize> SippWorkspace<N, P> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self {
+            pieces: Vec::new(),
+            states: [NO_STATE; N],
+            len: 0,
+            first: [0; N],
+            heap: Heap::new(),
+            cut: Vec::new(),
+            forbidden: Vec::new(),
+        }
+    }
+}
+
+impl<const N: usize, const P: usize> Default for SippWorkspace<N, P> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What to route.
+#[derive(Clone, Copy, Debug)]
+pub struct Route<'a> {
+    /// Node above the pad.
+    pub from: u16,
+    /// Node of the goal.
+    pub to: u16,
+    /// Take-off no earlier than this, seconds.
+    pub not_before_s: f32,
+    /// Places where others stand all the time.
+    pub parked: &'a [Point],
+}
+
+/// Finds the earliest way for `flight` (its climb and descent are taken, its path and departure are written) that keeps
+/// clear of `scheduled`.
+pub fn route<'a, const N: usize, const P: usize, const W: usize>(
+    cfg: &ScheduleConfig,
+    view: &RoadmapView<'_>,
+    route: &Route<'_>,
+    passable: impl Fn(u16, &HalfEdge) -> bool,
+    scheduled: impl Iterator<Item = &'a Flight<W>>,
+    ws: &mut SippWorkspace<N, P>,
+    flight: &mut Flight<W>,
+) -> Result<(), ScheduleError> {
+    if view.node_count() > N {
+        return Err(ScheduleError::PiecesFull);
+    }
+    load(cfg, route.parked, scheduled, ws)?;
+    ws.first[..view.node_count()].fill(0);
+    ws.heap.clear(N);
+    ws.len = 0;
+
+    let start = view.node(route.from);
+    let pad = start - Point::new(0.0, 0.0, flight.climb_m);
+    let goal = view.node(route.to);
+    let ground = goal - Point::new(0.0, 0.0, flight.descent_m);
+    let climb_s = flight.climb_m / cfg.vertical_mps;
+    let descent_s = flight.descent_m / cfg.vertical_mps;
+    // Held from −∞, so that it is no conflict with another pad.
+    let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
+    let leave_pad_by_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+    let land_after_s = ws.near(cfg, &standing(ground, true)).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
+    if land_after_s == f32::INFINITY {
+        return Err(ScheduleError::Blocked);
+    }
+
+    ws.add_states(cfg, view, route.from);
+    ws.forbid_departures(cfg, &pad, &start, climb_s);
+    ws.relax(route.from, None, route.not_before_s, leave_pad_by_s, climb_s, &goal, &start, cfg);
+    while let Some(state) = ws.heap.pop() {
+        let reached = ws.states[usize::from(state)];
+        if reached.node == route.to {
+            ws.forbid_departures(cfg, &goal, &ground, descent_s);
+            let from_s = fmaxf(reached.arrive_s, land_after_s - descent_s);
+            let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
+            if let Some(land_s) = land_s {
+                return write(view, ws, state, land_s, climb_s, flight);
+            }
+        }
+        let here = view.node(reached.node);
+        for edge in view.half_edges(reached.node) {
+            if !passable(reached.node, &edge) {
+                continue;
+            }
+            let there = view.node(edge.target);
+            let duration_s = (there - here).norm() / cfg.cruise_mps;
+            ws.add_states(cfg, view, edge.target);
+            ws.forbid_departures(cfg, &here, &there, duration_s);
+            let (from_s, until_s) = (reached.arrive_s, reached.until_s);
+            ws.relax(edge.target, Some(state), from_s, until_s, duration_s, &goal, &there, cfg);
+        }
+    }
+    Err(ScheduleError::Blocked)
+}
+
+/// Cuts all scheduled flights into pieces with absolute times.
+fn load<'a, const N: usize, const P: usize, const W: usize>(
+    cfg: &ScheduleConfig,
+    parked: &[Point],
+    scheduled: impl Iterator<Item = &'a Flight<W>>,
+    ws: &mut SippWorkspace<N, P>,
+) -> Result<(), ScheduleError> {
+    ws.pieces.clear();
+    for other in scheduled {
+        cut(cfg, other, &mut ws.cut)?;
+        for q in &ws.cut {
+            let absolute = Piece { from_s: q.from_s + other.depart_s, to_s: q.to_s + other.depart_s, ..*q };
+            ws.pieces.push(absolute).map_err(|_| ScheduleError::PiecesFull)?;
+        }
+    }
+    for &place in parked {
+        let for_ever = Piece { from_s: f32::NEG_INFINITY, to_s: f32::INFINITY, ..standing(place, true) };
+        ws.pieces.push(for_ever).map_err(|_| ScheduleError::PiecesFull)?;
+    }
+    Ok(())
+}
+
+/// A vehicle at one place; the times are for the caller.
+fn standing(at: Point, parked: bool) -> Piece {
+    Piece { from: at, to: at, from_m: 0.0, to_m: 0.0, from_s: 0.0, to_s: 0.0, parked }
+}
+
+impl<const N: usize, const P: usize> SippWorkspace<N, P> {
+    fn near<'s>(&'s self, cfg: &'s ScheduleConfig, own: &'s Piece) -> impl Iterator<Item = &'s Piece> {
+        self.pieces.iter().filter(|q| conflict(cfg, own, q))
+    }
+
+    /// Makes the states of a node, one for each safe interval, unless they are there.
+    fn add_states(&mut self, cfg: &ScheduleConfig, view: &RoadmapView<'_>, node: u16) {
+        if self.first[usize::from(node)] != 0 {
+            return;
+        }
+        let hover = standing(view.node(node), false);
+        self.forbidden.clear();
+        for q in self.pieces.iter().filter(|q| conflict(cfg, &hover, q)) {
+            forbid(&mut self.forbidden, q.from_s, q.to_s);
+        }
+        self.forbidden.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let mut from_s = f32::NEG_INFINITY;
+        for i in 0..=self.forbidden.len() {
+            let (low, high) = self.forbidden.get(i).copied().unwrap_or((f32::INFINITY, f32::INFINITY));
+            if low > from_s && self.len < N {
+                let first = &mut self.first[usize::from(node)];
+                let state =
+                    State { node, next: *first, arrive_s: f32::INFINITY, from_s, until_s: low, ..NO_STATE };
+                self.states[self.len] = state;
+                self.len += 1;
+                *first = self.len as u16;
+            }
+            from_s = high;
+        }
+    }
+
+    /// Collects the departures from `a` that would meet somebody on the way to `b`.
+    fn forbid_departures(&mut self, cfg: &ScheduleConfig, a: &Point, b: &Point, duration_s: f32) {
+        self.forbidden.clear();
+        let length_m = (b - a).norm();
+        let stretch = |from: f32, to: f32| Piece {
+            from: a + (b - a) * from,
+            to: a + (b - a) * to,
+            from_m: length_m * from,
+            to_m: length_m * to,
+            from_s: duration_s * from,
+            to_s: duration_s * to,
+            parked: false,
+        };
+        let (whole, parts) = (stretch(0.0, 1.0), parts(length_m));
+        for q in self.pieces.iter().filter(|q| conflict(cfg, &whole, q)) {
+            for part in 0..parts {
+                let p = stretch(part as f32 / parts as f32, (part + 1) as f32 / parts as f32);
+                if conflict(cfg, &p, q) {
+                    forbid(&mut self.forbidden, q.from_s - p.to_s, q.to_s - p.from_s);
+                }
+            }
+        }
+    }
+
+    /// Reaches every interval of `node` as early as it can be, leaving between `from_s` and `until_s`.
+    #[expect(clippy::too_many_arguments, reason = "one call site for edges, one for the climb")]
+    fn relax(
+        &mut self,
+        node: u16,
+        parent: Option<u16>,
+        from_s: f32,
+        until_s: f32,
+        duration_s: f32,
+        goal: &Point,
+        there: &Point,
+        cfg: &ScheduleConfig,
+    ) {
+        let mut at = self.first[usize::from(node)];
+        while at != 0 {
+            let index = at - 1;
+            let state = self.states[usize::from(index)];
+            at = state.next;
+            if self.heap.place(index) == SETTLED {
+                continue;
+            }
+            let leave_s = first_allowed(&self.forbidden, fmaxf(from_s, state.from_s - duration_s));
+            let Some(leave_s) = leave_s.filter(|&t| t <= until_s && t + duration_s <= state.until_s) else {
+                continue;
+            };
+            let arrive_s = leave_s + duration_s;
+            if arrive_s < state.arrive_s {
+                let reached = &mut self.states[usize::from(index)];
+                reached.parent = parent.unwrap_or(index);
+                (reached.left_parent_s, reached.arrive_s) = (leave_s, arrive_s);
+                self.heap.push(index, arrive_s + (goal - there).norm() / cfg.cruise_mps);
+            }
+        }
+    }
+}
+
+/// Writes the way that ends in `state`, labelled with seconds after take-off.
+fn write<const N: usize, const P: usize, const W: usize>(
+    view: &RoadmapView<'_>,
+    ws: &SippWorkspace<N, P>,
+    state: u16,
+    land_s: f32,
+    climb_s: f32,
+    flight: &mut Flight<W>,
+) -> Result<(), ScheduleError> {
+    let mut way: Vec<(u16, f32), W> = Vec::new();
+    let (mut at, mut leave_s) = (state, land_s);
+    loop {
+        way.push((at, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
+        let State { parent, left_parent_s, .. } = ws.states[usize::from(at)];
+        leave_s = left_parent_s;
+        if parent == at {
+            break;
+        }
+        at = parent;
+    }
+    // What is left is the departure from the pad.
+    flight.depart_s = leave_s;
+    flight.path = Path::new();
+    let mut before = None;
+    for &(index, leave_s) in way.iter().rev() {
+        let State { node, arrive_s, .. } = ws.states[usize::from(index)];
+        let edge = before.and_then(|before| view.edge_between(before, node));
+        let clearance_m = edge.map_or(view.header().max_clearance_m, |edge| edge.clearance_m);
+        flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::PiecesFull)?;
+        let at_s = if before.is_none() { climb_s } else { arrive_s - flight.depart_s };
+        flight.path.label_last(at_s, fmaxf(leave_s - flight.depart_s, at_s));
+        before = Some(node);
+    }
+    Ok(())
+}
