@@ -7,86 +7,14 @@ Prints one `ok ...` line for each thing that held; the first that does not ends 
 frame that does not parse. Ends itself after 90 seconds.
 """
 
-import os
 import signal
 import struct
 import sys
-import time
 
-os.environ["MAVLINK20"] = "1"
-os.environ["MAVLINK_DIALECT"] = "ardupilotmega"
-from pymavlink import mavutil  # noqa: E402
+from pilot import Pilot, check
 
 OFFBOARD, LAND = 0x00060000, 0x06040000
 MASK_POSITION, MASK_VELOCITY = 0xDF8, 0xDC7
-ARMED = 128
-
-
-def check(what, holds, seen=""):
-    if not holds:
-        print(f"FAILED {what}: {seen}", flush=True)
-        sys.exit(1)
-    print(f"ok {what} {seen}".rstrip(), flush=True)
-
-
-class Pilot:
-    """One connection: keeps setpoints going, counts messages, keeps the last of each type."""
-
-    def __init__(self, url):
-        self.link = mavutil.mavlink_connection(url, source_system=1, source_component=191)
-        self.last = {}
-        self.count = {}
-        self.acks = []
-        self.bad = 0
-        self.setpoint = None
-        self.next_setpoint = 0.0
-        self.next_beat = 0.0
-
-    def spin(self, seconds, done=lambda: False):
-        """Runs until `done` or the time is over; whether it is done."""
-        end = time.monotonic() + seconds
-        while time.monotonic() < end:
-            if done():
-                return True
-            now = time.monotonic()
-            if now >= self.next_beat:
-                self.next_beat = now + 1.0
-                self.link.mav.heartbeat_send(18, 8, 0, 0, 4)
-            if self.setpoint and now >= self.next_setpoint:
-                self.next_setpoint = now + 0.05
-                mask, position, velocity = self.setpoint
-                self.link.mav.set_position_target_local_ned_send(
-                    0, 1, 1, 1, mask, *position, *velocity, 0, 0, 0, 0, 0)
-            message = self.link.recv_match(blocking=True, timeout=0.01)
-            if message is None:
-                continue
-            kind = message.get_type()
-            if kind == "BAD_DATA":
-                self.bad += 1
-                continue
-            self.last[kind] = message
-            self.count[kind] = self.count.get(kind, 0) + 1
-            if kind == "COMMAND_ACK":
-                self.acks.append((message.command, message.result))
-        return done()
-
-    def command(self, command, *params):
-        """Sends a command; the results acknowledged within half a second."""
-        self.acks.clear()
-        params = list(params) + [0.0] * (7 - len(params))
-        self.link.mav.command_long_send(1, 1, command, 0, *params)
-        self.spin(0.5)
-        return [result for acked, result in self.acks if acked == command]
-
-    def position(self):
-        p = self.last["LOCAL_POSITION_NED"]
-        return p.x, p.y, p.z
-
-    def near(self, target, within):
-        return sum((a - b) ** 2 for a, b in zip(self.position(), target)) < within**2
-
-    def armed(self):
-        return bool(self.last["HEARTBEAT"].base_mode & ARMED)
 
 
 def main():

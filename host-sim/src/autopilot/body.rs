@@ -16,7 +16,7 @@ const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
 const GPS_GLOBAL_ORIGIN: u32 = 49;
 /// An answer leaves one step after the question: 4 ms, where PX4 was seen to take 1.3 to 16 and ArduCopter 2.5 to 7.
-pub const ANSWER_US: u64 = 4_000;
+const ANSWER_US: u64 = 4_000;
 /// From the command to reboot until it does.
 const REBOOT_US: u64 = 200_000;
 
@@ -172,12 +172,8 @@ impl Body {
     }
 
     pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
-        self.acknowledge_after(from, command, result, ANSWER_US);
-    }
-
-    pub(super) fn acknowledge_after(&mut self, from: Sender, command: u16, result: u8, after_us: u64) {
         let ack = Ack { command, result, to: from.id() };
-        self.ports[from.port].later.push((self.time_us + after_us, ack));
+        self.ports[from.port].later.push((self.time_us + ANSWER_US, ack));
     }
 
     /// Where DO_REPOSITION asks to go, ENU with NaN for what it leaves; `None` for no place on earth.

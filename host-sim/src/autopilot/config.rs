@@ -103,6 +103,9 @@ pub enum ConfigError {
     /// A number that is not finite, or not positive where it must be.
     #[error("{0} must be finite and not negative")]
     Number(&'static str),
+    /// A parameter that the autopilot does not have.
+    #[error("no integer parameter `{0}`")]
+    Parameter(&'static str),
     /// System id 0 is broadcast.
     #[error("system id 0 means everybody: choose 1 to 255")]
     SystemId,

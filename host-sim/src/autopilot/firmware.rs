@@ -105,7 +105,7 @@ impl Firmware {
 
     pub(super) fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
         match self {
-            Self::Px4(px4) => px4.commander.update(sense, &px4.tuning),
+            Self::Px4(px4) => px4.update(body, sense),
             Self::Copter(copter) => copter.update(body, sense, dt_s),
         }
     }
@@ -172,6 +172,16 @@ impl Firmware {
                 copter.tuning = ardupilot::params::Tuning::new(&copter.params);
             }
         }
+    }
+
+    /// Sets an integer parameter; false where there is none of that name.
+    pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
+        let params = self.params();
+        let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else { return false };
+        let Some(new) = old.with_integer(value) else { return false };
+        let wire = params.wire(new);
+        self.set_param(name, wire, new.wire_type());
+        true
     }
 
     /// Takes over the parameters of the same firmware before a reboot.

@@ -247,7 +247,9 @@ impl Autopilot {
         }
     }
 
-    fn reboot(&mut self) {
+    /// Starts anew: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
+    /// falls.
+    pub fn reboot(&mut self) {
         let body = &self.body;
         let mut fresh = body.config.clone();
         fresh.start = body.vehicle.state().position;
@@ -289,11 +291,6 @@ impl Autopilot {
         });
     }
 
-    /// Restarts the firmware, in the air too: motors stop, streams and state are forgotten, parameters are kept.
-    pub fn restart(&mut self) {
-        self.reboot();
-    }
-
     /// Sets the charge left, 0 to 1.
     pub fn set_battery(&mut self, charge: f32) {
         self.body.vehicle.set_battery(charge);
@@ -317,12 +314,19 @@ impl Autopilot {
     }
 
     /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights under a ceiling: its default
-    /// is to climb and return. ArduCopter brakes, whatever is set.
+    /// is to climb and return. ArduCopter has no such parameter and brakes.
     pub fn land_on_stream_loss(&mut self) {
         if self.body.config.personality == Personality::Px4 {
-            // Integers travel bytewise as MAV_PARAM_TYPE_INT32.
-            self.firmware.set_param("COM_OBL_RC_ACT", f32::from_bits(4), 6);
+            self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
+    }
+
+    /// Sets an integer parameter as an installer does before the flight.
+    ///
+    /// # Errors
+    /// There is none of this name.
+    pub fn set_parameter(&mut self, name: &'static str, value: i32) -> Result<(), ConfigError> {
+        if self.firmware.set_integer(name, value) { Ok(()) } else { Err(ConfigError::Parameter(name)) }
     }
 
     /// Takes the GPS fix away or gives it back; without it no position control flies.

@@ -49,6 +49,11 @@ impl Value {
         }
     }
 
+    /// A value of the same integer type; `None` of a float.
+    pub fn with_integer(self, integer: i32) -> Option<Self> {
+        self.integer().map(|_| self.like(integer))
+    }
+
     /// A value of the same type from a whole number, kept within the type's range.
     fn like(self, integer: i32) -> Self {
         match self {

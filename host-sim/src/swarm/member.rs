@@ -123,7 +123,7 @@ impl Member {
     fn cut_motors(&mut self) {
         let truth = self.autopilot.truth();
         self.wrecked |= truth.armed && !truth.touching;
-        self.autopilot.restart();
+        self.autopilot.reboot();
     }
 
     /// Starts the companion anew, its clock with it.
@@ -277,7 +277,13 @@ impl Member {
         let truth = self.autopilot.truth();
         let state = self.companion.state();
         let phase = match (truth.touching, on_path(state)) {
-            (touching, _) if self.wrecked => if touching { Phase::Wreck } else { Phase::Falling },
+            (touching, _) if self.wrecked => {
+                if touching {
+                    Phase::Wreck
+                } else {
+                    Phase::Falling
+                }
+            }
             (true, _) if !truth.armed => Phase::Grounded,
             (false, true) => Phase::Flying,
             _ => Phase::TakeOffOrLanding,

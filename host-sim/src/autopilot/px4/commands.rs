@@ -3,7 +3,7 @@
 use planner_core::frames::Geodetic;
 
 use super::{Mode, Px4};
-use crate::autopilot::body::{ANSWER_US, Body};
+use crate::autopilot::body::Body;
 use crate::autopilot::command::{
     ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, FAILED, FORCE, PROTOCOL_VERSION,
     TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
@@ -12,17 +12,17 @@ use crate::autopilot::inbox::Sender;
 use crate::autopilot::telemetry;
 use crate::autopilot::wire::Fields;
 
+pub(super) const DO_SET_MODE: u16 = 176;
+
 impl Px4 {
     /// Takes a command and acknowledges it.
     pub(in crate::autopilot) fn handle_command(&mut self, body: &mut Body, from: Sender, command: &Command) {
         let result = match command.id {
             // DO_SET_MODE is acknowledged twice: that it was understood, then whether the mode changed.
-            176 => {
+            DO_SET_MODE => {
                 let mode = mode_of(command.param[0] as u8, command.param[1] as u8, command.param[2] as u8);
-                body.acknowledge(from, 176, ACCEPTED);
-                let changed = mode.is_some_and(|mode| self.change_mode(body, mode));
-                let result = if changed { ACCEPTED } else { TEMPORARILY_REJECTED };
-                body.acknowledge_after(from, 176, result, 2 * ANSWER_US);
+                body.acknowledge(from, DO_SET_MODE, ACCEPTED);
+                self.asked = Some((from, mode));
                 return;
             }
             400 => self.arm_or_disarm(body, command),
@@ -125,7 +125,7 @@ impl Px4 {
     }
 }
 
-fn accept(done: bool) -> u8 {
+pub(super) fn accept(done: bool) -> u8 {
     if done { ACCEPTED } else { TEMPORARILY_REJECTED }
 }
 

@@ -24,6 +24,7 @@ use self::setpoint::Setpoint;
 use super::body::{Body, Order, Sense};
 use super::config::Personality;
 use super::firmware::Status;
+use super::inbox::Sender;
 use super::params::Params;
 use super::vehicle::VehicleLimits;
 use super::wire::Fields;
@@ -118,13 +119,24 @@ pub struct Px4 {
     pub params: Params,
     /// Those of them that act.
     pub tuning: Tuning,
+    /// DO_SET_MODE understood and not yet decided: who asked, for which mode if it is one.
+    asked: Option<(Sender, Option<Mode>)>,
 }
 
 impl Px4 {
     /// As PX4 boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
         let params = params::params(system_id, limits);
-        Self { commander: Commander::new(), tuning: Tuning::new(&params), params }
+        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
+    }
+
+    /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
+    pub(super) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
+        if let Some((from, mode)) = self.asked.take() {
+            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
+            body.acknowledge(from, commands::DO_SET_MODE, commands::accept(changed));
+        }
+        self.commander.update(sense, &self.tuning)
     }
 
     /// What telemetry tells.
@@ -141,7 +153,8 @@ impl Px4 {
             guided: true,
             ekf_flags: 0,
             origin_known: true,
-            position_known: true,
+            // LOCAL_POSITION_NED comes only while the estimate is valid.
+            position_known: body.gps_ok,
         }
     }
 

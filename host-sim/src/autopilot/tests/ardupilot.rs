@@ -488,3 +488,14 @@ fn ned_is_in_its_own_projection_about_its_own_origin() {
     }
     assert!((expected - frames::geodetic_to_ned(Projection::Px4, &ekf, &truth)).norm() > 0.5);
 }
+
+#[test]
+fn an_installer_sets_integers_of_either_firmware() {
+    for (config, name) in [(config(), "RTL_ALT"), (Config::default(), "COM_OBL_RC_ACT")] {
+        let mut bench = Bench::with(&config);
+        bench.autopilot.set_parameter(name, 5).unwrap();
+        assert_eq!(bench.autopilot.firmware.params().int(name), 5);
+        assert!(bench.autopilot.set_parameter("NO_SUCH", 5).is_err());
+        assert!(bench.autopilot.set_parameter("GUID_TIMEOUT", 5).is_err(), "no integer");
+    }
+}
