@@ -120,6 +120,8 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, vehicle: u8) -> Outcome {
     let said = |text: &str| log.iter().any(|e| e.text.contains(text));
     // Under the autopilot's own failsafe the vehicle struck drifts as that lets it.
     let own_contacts_count = !said(STOPPED) && !said(FOUND);
+    // Before take-off a mode that the pilot changes cancels the start for good.
+    let goes_on = case.then == GoesOn && !said("start cancelled");
     let mut too_near = 0;
     for e in &flight.log {
         let by_or_at_struck =
@@ -128,7 +130,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, vehicle: u8) -> Outcome {
         let near = e.text.contains("nearer than") || e.text.contains("is hit by falling");
         let is_wrong = if near {
             too_near += 1;
-            case.then == GoesOn || !by_or_at_struck
+            goes_on || !by_or_at_struck
         } else {
             e.text.contains("touches") && (!own_wall || own_contacts_count)
         };
@@ -142,7 +144,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, vehicle: u8) -> Outcome {
         held_up += usize::from(v.id != vehicle);
         let state = v.end.split(':').next().unwrap_or_default();
         let known = if v.id == vehicle { RESTS } else { WAITS };
-        if case.then == GoesOn || !known.contains(&state) {
+        if goes_on || !known.contains(&state) {
             wrong.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
     }
