@@ -16,15 +16,30 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm; or the deconfliction suite.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
+    /// Seeds of each case of the deconfliction suite.
+    #[arg(long, value_name = "N")]
+    seeds: Option<u64>,
 }
 
 /// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be built.
 pub fn run_bench(args: &Args) -> Result<()> {
+    let run_release = ["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin"];
     let mut bench = cargo();
-    bench.args(["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin", "bench", "--"]);
+    bench.args(run_release);
+    if args.only.as_deref() == Some("deconfliction") {
+        bench.args(["deconfliction", "--"]);
+        if let Some(seeds) = args.seeds {
+            bench.arg("--seeds").arg(seeds.to_string());
+        }
+        if let Some(out) = &args.out {
+            bench.arg("--out").arg(std::path::absolute(out)?);
+        }
+        return run(&mut bench);
+    }
+    bench.args(["bench", "--"]);
     match peer() {
         Ok(peer) => {
             bench.arg("--peer").arg(peer);
