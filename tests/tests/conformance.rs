@@ -5,48 +5,18 @@
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
-use std::time::{Duration, Instant};
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use flockmate_tests::{Guard, Profile, host_sim, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(120);
-
-/// Ended when the test is, however it ends.
-struct Guard(Child);
-
-impl Drop for Guard {
-    fn drop(&mut self) {
-        // It may have ended by itself.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
-    }
-}
-
-fn workspace() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
-}
-
-/// Builds and finds `host-sim`: cargo gives another package's binaries to no test.
-fn host_sim() -> PathBuf {
-    let mut build = Command::new(env!("CARGO"));
-    build.current_dir(workspace()).args(["build", "--quiet", "--package", "host-sim", "--bin", "host-sim"]);
-    let mut directory = std::env::current_exe().expect("a test knows its own path");
-    // target/PROFILE/deps/conformance-HASH
-    directory.pop();
-    directory.pop();
-    if directory.ends_with("release") {
-        build.arg("--release");
-    }
-    assert!(build.status().expect("cargo runs").success(), "host-sim does not build");
-    directory.join("host-sim")
-}
-
 /// ArduCopter, whose estimator is ready sooner than the real one's.
 const ARDUPILOT: &[&str] = &["--personality", "ardupilot", "--ready-after", "5"];
 
 /// Starts the autopilot on `listen`; its first line tells the address it got.
 fn autopilot(listen: &str, options: &[&str]) -> (Guard, String) {
-    let mut child = Command::new(host_sim())
+    let mut child = Command::new(host_sim(Profile::Debug))
         .args(["autopilot", "--listen", listen])
         .args(options)
         .stdout(Stdio::piped())
@@ -83,16 +53,7 @@ fn run(python: &str, script: &str, arguments: &[&str]) {
     let mut child = Guard(child);
     let output = BufReader::new(child.0.stdout.take().expect("stdout is piped"));
     let reader = std::thread::spawn(move || output.lines().map_while(Result::ok).collect::<Vec<_>>());
-    let start = Instant::now();
-    let status = loop {
-        if let Some(status) = child.0.try_wait().expect("a child can be waited for") {
-            break Some(status);
-        }
-        if start.elapsed() > TIME_LIMIT {
-            break None;
-        }
-        std::thread::sleep(Duration::from_millis(50));
-    };
+    let status = child.wait_for(TIME_LIMIT);
     drop(child);
     let lines = reader.join().expect("the reader does not panic").join("\n");
     assert!(status.is_some_and(|status| status.success()), "{script}: {status:?}\n{lines}");
