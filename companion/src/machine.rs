@@ -212,13 +212,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Finite, from our own start, and a path wherever there is a goal.
     /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
     fn departure_due(&self) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
         (self.now - self.entered_at).secs_f32() >= depart_s
     }
 
+    /// Finite, from our own start, and a path wherever there is a goal.
     fn is_sound(&self, plan: &VehiclePlan<W, G>) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
