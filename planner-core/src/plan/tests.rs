@@ -88,7 +88,7 @@ fn spread(count: usize, seed: u64) -> StdVec<Point> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(24))]
+    #![proptest_config(ProptestConfig::with_cases(150))]
     /// Ten vehicles over open ground, at any speeds: all arrive, none comes near another.
     #[test]
     fn swarms_arrive_apart_at_any_speeds(
