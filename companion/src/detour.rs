@@ -210,6 +210,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.around =
             Around { left: true, flying: true, left_at_m: self.around.left_at_m, ..Around::default() };
         self.around.ready = true;
+        self.neighbours.avoid(self.now);
     }
 
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {

@@ -47,6 +47,8 @@ struct Contact {
     flags: u8,
     hears_us_at: Option<Instant>,
     points: Vec<Point, POINTS>,
+    /// Where it rested when a way around was planned.
+    avoided: Option<Point>,
     state: Neighbour,
 }
 
@@ -151,6 +153,7 @@ impl<const V: usize> Neighbours<V> {
             flags: 0,
             hears_us_at: None,
             points: Vec::new(),
+            avoided: None,
             state,
         };
         self.contacts.push(contact).ok()?;
@@ -268,9 +271,18 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
     }
 
-    /// What lies, stands or hovers where the plan did not put it: `apart_m` away from it is far enough.
+    /// A way around what rests now was planned.
+    pub fn avoid(&mut self, now: Instant) {
+        for contact in &mut self.contacts {
+            contact.avoided = contact.is_out(now).then_some(contact.state.position);
+        }
+    }
+
+    /// What lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it is far
+    /// enough.
     pub fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.is_out(now));
+        let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
+        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.is_out(now) && !avoided(c));
         placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
     }
 
