@@ -226,7 +226,11 @@ fn vehicle_result(
     }
 }
 
-fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
+/// The vehicles of a mission, each on its pad, in the order of the scenario.
+///
+/// # Errors
+/// The configuration of a vehicle names what is wrong.
+pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let serial = SerialConfig {
