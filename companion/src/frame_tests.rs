@@ -1,9 +1,9 @@
-//! Framing against recordings' shapes: noise, false starts, unknown ids, cuts, and random damage.
+//! Framing against noise, false starts, unknown ids, cuts, and random damage.
 
 extern crate std;
 use std::vec::Vec;
 
-use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, SYSTEM_TIME_DATA};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, SYSTEM_TIME_DATA};
 use proptest::prelude::*;
 
 use super::*;
@@ -127,45 +127,6 @@ fn every_id_of_the_dialect_is_known() {
         assert!(extra_crc(*id).is_some(), "id {id}");
     }
     assert_eq!(extra_crc(0x00F0_F0F0), None);
-}
-
-/// The frames of a .tlog without the 8-byte stamp before each, and their number.
-fn without_stamps(mut log: &[u8]) -> (Vec<u8>, usize) {
-    let (mut bytes, mut count) = (Vec::new(), 0);
-    while let Some([start, len, incompat]) = log.get(8..11) {
-        let whole = match *start {
-            V1_START => 8 + usize::from(*len),
-            _ => 12 + usize::from(*len) + if incompat & SIGNED != 0 { SIGNATURE_LEN } else { 0 },
-        };
-        let Some(frame) = log.get(8..8 + whole) else { break };
-        bytes.extend_from_slice(frame);
-        log = &log[8 + whole..];
-        count += 1;
-    }
-    (bytes, count)
-}
-
-#[test]
-fn every_frame_of_the_recordings_is_read() {
-    for name in ["px4-1.17-offboard.tlog", "arducopter-4.6-guided.tlog", "mavlink-v2-3412-packets.bin"] {
-        let path = std::format!("{}/../../shared/data/mavlink/{name}", env!("CARGO_MANIFEST_DIR"));
-        let Ok(file) = std::fs::read(&path) else {
-            std::println!("skipped: {path} is absent");
-            continue;
-        };
-        let (bytes, count) = if name.ends_with(".tlog") { without_stamps(&file) } else { (file, 3412) };
-        // In pieces as a serial port gives them.
-        let mut framer = Framer::new();
-        let mut frames: Vec<Frame> =
-            bytes.chunks(61).flat_map(|c| drain(&mut framer, Instant::ZERO, c)).collect();
-        frames.extend(drain(&mut framer, Instant::from_millis(200), &[]));
-        let counters = framer.counters();
-        std::println!("{name}: {count} frames, {counters:?}");
-        assert_eq!(frames.len() + counters.unknown as usize, count, "{name}");
-        assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0), "{name}");
-        let mut positions = frames.iter().filter(|f| f.message_id == LOCAL_POSITION_NED_DATA::ID);
-        assert!(positions.all(|f| f.decode::<LOCAL_POSITION_NED_DATA>().is_some()));
-    }
 }
 
 proptest! {

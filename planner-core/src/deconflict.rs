@@ -35,7 +35,7 @@ pub struct DeconflictConfig {
 }
 
 /// A vehicle as last heard.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Neighbour {
     /// MAVLink system id.
     pub id: u8,
@@ -88,17 +88,17 @@ impl Advice {
     pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
 }
 
-/// How far ahead a neighbour without a known plan is looked for, in seconds of flight at the nominal speed.
-const LOOK_AHEAD_S: f32 = 4.0;
-/// Spacing of the looks along the own path, metres.
-const LOOK_STEP_M: f32 = 0.5;
+/// A neighbour without a known plan is looked for this often along the own path: four seconds of flight at the nominal
+/// speed.
+const LOOKS: usize = 16;
+/// Time of flight from one look to the next, seconds.
+const LOOK_EVERY_S: f32 = 0.25;
 
 /// A reference this little beyond a gate still stands at it: rounding must not carry it through.
 const AT_GATE_M: f32 = 0.01;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
-/// each gate within reach, and for each neighbour without a plan [`LOOK_AHEAD_S`] · cruise / [`LOOK_STEP_M`] points of the
-/// own path.
+/// each gate within reach, and for each neighbour without a plan [`LOOKS`] points of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &Own<'_, W>,
@@ -140,15 +140,17 @@ fn priority<const W: usize>(
         }
     };
     // A gate beyond twice the braking distance asks for nothing yet.
-    let horizon_m = own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + LOOK_STEP_M;
-    let ahead = gates.iter().skip_while(|gate| gate.at_m < own.along_m - AT_GATE_M);
-    for gate in ahead.take_while(|gate| gate.at_m <= horizon_m) {
+    let horizon_m =
+        own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * LOOK_EVERY_S;
+    let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - AT_GATE_M)..];
+    for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
         let passed = neighbours
             .iter()
             .find(|n| n.id == gate.id)
             .is_some_and(|n| n.out || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m));
         if !passed {
             stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
+            break;
         }
     }
     let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
@@ -166,12 +168,13 @@ fn priority<const W: usize>(
 /// heard; `None` if not within the look-ahead, or if flying on only takes us further apart.
 fn first_contact<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>, n: &Neighbour) -> Option<f32> {
     let now = (n.position + n.velocity * n.age_s - own.position).norm();
-    let looks = (cfg.cruise_mps * LOOK_AHEAD_S / LOOK_STEP_M) as u32;
-    (1..=looks).map(|look| look as f32 * LOOK_STEP_M).find_map(|distance| {
-        let there = own.path.point_at(fmaxf(own.along_m, 0.0) + distance)?;
-        let at = n.position + n.velocity * (n.age_s + distance / cfg.cruise_mps);
-        let apart = (at - there).norm();
-        (apart < cfg.safety_distance_m && apart < now).then_some(fmaxf(distance - LOOK_STEP_M, 0.0))
+    let step_m = cfg.cruise_mps * LOOK_EVERY_S;
+    let looks = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(LOOKS);
+    looks.zip(1u8..).find_map(|(there, look)| {
+        let after_s = f32::from(look) * LOOK_EVERY_S;
+        let apart = (n.position + n.velocity * (n.age_s + after_s) - there).norm();
+        let before_m = f32::from(look - 1) * step_m;
+        (apart < cfg.safety_distance_m && apart < now).then_some(before_m)
     })
 }
 

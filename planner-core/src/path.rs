@@ -97,17 +97,39 @@ impl<const W: usize> Path<W> {
 
     /// The point at an arc length, clamped to the path; `None` on an empty path.
     pub fn point_at(&self, along_m: f32) -> Option<Point> {
-        let first = self.waypoints.first()?;
-        let legs = self.waypoints.windows(2);
-        let leg = legs.into_iter().find(|leg| along_m <= leg[1].along_m);
-        Some(match leg {
-            _ if along_m <= 0.0 => first.position,
-            Some(leg) => {
-                let share = (along_m - leg[0].along_m) / (leg[1].along_m - leg[0].along_m);
-                leg[0].position + (leg[1].position - leg[0].position) * share
+        self.point_on(self.leg_at(along_m), along_m)
+    }
+
+    /// The points at `from_m`, `from_m + step_m` and so on (a positive step), each as [`Self::point_at`] has it, in one
+    /// walk along the path; none on an empty path.
+    pub fn points_from(&self, from_m: f32, step_m: f32) -> impl Iterator<Item = Point> {
+        let mut leg = self.leg_at(from_m);
+        let mut steps = 0u16;
+        core::iter::from_fn(move || {
+            let along_m = from_m + f32::from(steps) * step_m;
+            steps = steps.saturating_add(1);
+            while leg < self.waypoints.len() && along_m > self.waypoints[leg].along_m {
+                leg += 1;
             }
-            None => self.waypoints[self.waypoints.len() - 1].position,
+            self.point_on(leg, along_m)
         })
+    }
+
+    /// Index of the waypoint that ends the leg on which an arc length lies; beyond the last waypoint there is none.
+    fn leg_at(&self, along_m: f32) -> usize {
+        self.waypoints.partition_point(|w| w.along_m < along_m)
+    }
+
+    /// The point at an arc length on the leg that ends at a waypoint.
+    fn point_on(&self, leg: usize, along_m: f32) -> Option<Point> {
+        let (first, last) = (self.waypoints.first()?, self.waypoints.last()?);
+        let Some(to) = self.waypoints.get(leg) else { return Some(last.position) };
+        if leg == 0 || along_m <= 0.0 {
+            return Some(first.position);
+        }
+        let from = &self.waypoints[leg - 1];
+        let share = (along_m - from.along_m) / (to.along_m - from.along_m);
+        Some(from.position + (to.position - from.position) * share)
     }
 
     /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how far a vehicle has
@@ -277,6 +299,18 @@ mod tests {
             path.push(Point::new(x, y, 1.0), clearance_m).unwrap();
         }
         path
+    }
+
+    #[test]
+    fn a_walk_along_the_path_sees_what_single_looks_see() {
+        let path = corner_path(0.8);
+        for (from_m, step_m) in [(0.0, 0.5), (-1.0, 0.7), (5.9, 0.1), (6.0, 3.0), (11.0, 0.4), (20.0, 1.0)] {
+            for (k, point) in path.points_from(from_m, step_m).take(20).enumerate() {
+                assert_eq!(Some(point), path.point_at(from_m + k as f32 * step_m), "{from_m} {step_m} {k}");
+            }
+        }
+        assert_eq!(Path::<4>::new().points_from(0.0, 1.0).next(), None);
+        assert_eq!(Path::<4>::new().point_at(0.0), None);
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! Helpers shared by the cross-crate tests.
 
+pub mod logs;
+
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::thread::sleep;
@@ -27,6 +29,17 @@ pub enum Profile {
     Debug,
     /// `cargo build --release`
     Release,
+}
+
+/// The Python with pymavlink and mavsdk that `FLOCKMATE_PYTHON` names, or `None` with a line that says what is skipped.
+pub fn python() -> Option<String> {
+    let python = std::env::var("FLOCKMATE_PYTHON").ok();
+    if python.is_none() {
+        println!(
+            "skipped: FLOCKMATE_PYTHON names no Python with pymavlink and mavsdk (`cargo xtask test` makes one)"
+        );
+    }
+    python
 }
 
 /// Builds `host-sim` and tells where it is: cargo gives another package's binaries to no test.

@@ -8,7 +8,7 @@ use std::net::UdpSocket;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::{Guard, Profile, host_sim, workspace};
+use flockmate_tests::{Guard, Profile, host_sim, python, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(120);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -29,16 +29,6 @@ fn autopilot(listen: &str, options: &[&str]) -> (Guard, String) {
     let guard = Guard(child);
     let address = line.trim().rsplit_once("127.0.0.1:").map(|(_, port)| format!("127.0.0.1:{port}"));
     (guard, address.unwrap_or_else(|| panic!("no address in {line:?}")))
-}
-
-fn python() -> Option<String> {
-    let python = std::env::var("FLOCKMATE_PYTHON").ok();
-    if python.is_none() {
-        println!(
-            "skipped: FLOCKMATE_PYTHON names no Python with pymavlink and mavsdk (`cargo xtask test` makes one)"
-        );
-    }
-    python
 }
 
 /// Runs a script to its end and shows what it printed if it fails.

@@ -1,14 +1,13 @@
 //! Recordings of real autopilots: what was said to them is said to the simulated one, and its answers are compared.
 //!
-//! A `.tlog` holds, for each frame of either direction, the time as big-endian microseconds and the frame. What the autopilot
-//! (component 1 of system 1) did not send is sent to the simulated one at the same times; its acks must be the same results for
+//! A `.tlog` holds the frames of both directions with their times. What the autopilot (component 1 of system 1) did not send is sent to the simulated one at the same times; its acks must be the same results for
 //! the same commands in the same order, and it must have gone through the same modes and landed states.
 
 use std::path::Path;
 
 use companion::Instant;
 use companion::frame::{Frame, Framer};
-use flockmate_tests::shared_data;
+use flockmate_tests::{logs, shared_data};
 use host_sim::autopilot::{Autopilot, Config, Personality};
 use planner_core::frames::Geodetic;
 
@@ -17,7 +16,7 @@ const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
 const STEP_S: f64 = 0.004;
 
-/// One recorded frame: seconds since the first, its bytes, and who sent it.
+/// One recorded frame: seconds since the first, its bytes, and what they say if the dialect knows it.
 struct Recorded {
     t_s: f64,
     bytes: Vec<u8>,
@@ -25,25 +24,13 @@ struct Recorded {
 }
 
 fn recording(path: &Path) -> Vec<Recorded> {
-    let bytes = std::fs::read(path).unwrap();
-    let mut rest = bytes.as_slice();
-    let mut out = Vec::new();
-    let mut first_us = None;
-    while rest.len() > 8 + 8 {
-        let at_us = u64::from_be_bytes(rest[..8].try_into().unwrap());
-        let frame = &rest[8..];
-        let len = match frame[0] {
-            0xFE => 8 + usize::from(frame[1]),
-            0xFD => 12 + usize::from(frame[1]) + if frame[2] & 1 == 0 { 0 } else { 13 },
-            other => panic!("no frame begins with {other:#x}"),
-        };
-        let mut input = &frame[..len];
-        let decoded = Framer::new().next(Instant::ZERO, &mut input);
-        let t_s = (at_us - *first_us.get_or_insert(at_us)) as f64 * 1e-6;
-        out.push(Recorded { t_s, bytes: frame[..len].to_vec(), frame: decoded });
-        rest = &rest[8 + len..];
-    }
-    out
+    let records = logs::read(path);
+    let first_us = records.first().map_or(0, |record| record.at_us);
+    let decoded = |record: logs::Recorded| {
+        let frame = Framer::new().next(Instant::ZERO, &mut record.bytes.as_slice());
+        Recorded { t_s: (record.at_us - first_us) as f64 * 1e-6, bytes: record.bytes, frame }
+    };
+    records.into_iter().map(decoded).collect()
 }
 
 /// What an autopilot did, as far as the two are compared.

@@ -16,7 +16,7 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm; or the deconfliction suite.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps; or the deconfliction suite.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// Seeds of each case of the deconfliction suite.
@@ -39,6 +39,7 @@ pub fn run_bench(args: &Args) -> Result<()> {
         }
         return run(&mut bench);
     }
+    install::debian(install::COUNTER)?;
     bench.args(["bench", "--"]);
     match peer() {
         Ok(peer) => {

@@ -29,6 +29,8 @@ pub const PEER: &[Package] = &[
     Package { name: "liboctomap-dev", file: "/usr/include/octomap/octomap.h" },
     Package { name: "g++", file: "/usr/bin/g++" },
 ];
+/// What counts instructions.
+pub const COUNTER: &[Package] = &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
 const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink"];
 
 /// Installs what is missing of `packages`, as root on Debian; else says in one line what to install.

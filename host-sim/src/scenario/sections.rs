@@ -49,6 +49,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let mission_value = root.get("mission");
     let vehicles = vehicles(
         &root.need("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
+        origin.as_ref(),
         &mut unsupported,
     )?;
     let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
@@ -206,7 +207,7 @@ fn mission(table: &Table<'_>, folder: &Path, origin: Option<&Geodetic>) -> Resul
         (Some(_), Some(file)) => {
             return Err(file.error("cannot stand beside mission.goals: give one of them"));
         }
-        (Some(list), None) => list.items()?.iter().map(|v| goal(v, origin)).collect::<Result<Vec<_>>>()?,
+        (Some(list), None) => list.items()?.iter().map(|v| place(v, origin)).collect::<Result<Vec<_>>>()?,
         (None, Some(file)) => goals_file(file, folder)?,
         (None, None) => Vec::new(),
     };
@@ -226,7 +227,8 @@ fn mission(table: &Table<'_>, folder: &Path, origin: Option<&Geodetic>) -> Resul
     Ok((Mission { mode, objective, cruise_mps, goals, geofence }, mode_span))
 }
 
-fn goal(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
+/// A point of the mission frame, in metres or by latitude and longitude about the origin that was given.
+fn place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
     if !value.is_table() {
         return point(value);
     }
@@ -286,7 +288,11 @@ struct VehicleSpans {
     table: Span,
 }
 
-fn vehicles(value: &Value<'_>, unsupported: &mut Vec<ScenarioError>) -> Result<Vec<(Vehicle, VehicleSpans)>> {
+fn vehicles(
+    value: &Value<'_>,
+    origin: Option<&Geodetic>,
+    unsupported: &mut Vec<ScenarioError>,
+) -> Result<Vec<(Vehicle, VehicleSpans)>> {
     let mut vehicles: Vec<(Vehicle, VehicleSpans)> = Vec::new();
     for item in value.items()? {
         let table = item.table()?;
@@ -295,7 +301,7 @@ fn vehicles(value: &Value<'_>, unsupported: &mut Vec<ScenarioError>) -> Result<V
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
         }
-        vehicles.push(vehicle(&table, id, unsupported)?);
+        vehicles.push(vehicle(&table, id, origin, unsupported)?);
     }
     if vehicles.is_empty() {
         return Err(value.error("must hold at least one vehicle"));
@@ -306,9 +312,13 @@ fn vehicles(value: &Value<'_>, unsupported: &mut Vec<ScenarioError>) -> Result<V
 fn vehicle(
     table: &Table<'_>,
     id: u8,
+    origin: Option<&Geodetic>,
     unsupported: &mut Vec<ScenarioError>,
 ) -> Result<(Vehicle, VehicleSpans)> {
-    let start = table.need("start", "where the vehicle stands: [east, north, up] in metres")?;
+    let start = table.need(
+        "start",
+        "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
+    )?;
     let goal = table.get("goal");
     let personality = table.word(
         "personality",
@@ -328,7 +338,7 @@ fn vehicle(
     };
     let vehicle = Vehicle {
         id,
-        start: point(&start)?,
+        start: place(&start, origin)?,
         goal: goal.as_ref().map(|v| v.whole(0..=1_000_000).map(|g| g as usize)).transpose()?,
         radius_m: table.f32("radius_m", 0.3, 0.001..=100.0)?,
         altitude_m: table.optional_f32("altitude_m", -1000.0..=20_000.0)?,

@@ -232,12 +232,16 @@ fn what_is_not_built_yet_is_refused_by_name() {
 }
 
 #[test]
-fn geodetic_goals_are_metres_about_the_origin() {
+fn geodetic_goals_and_starts_are_metres_about_the_origin() {
+    let place = "{ lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 712.5 }";
     let origin = "origin = { lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 700.0 }\n[mission]";
-    let text = changed("[mission]", origin);
-    let text = text.replace("[38.5, 19.0, 7.3]", "{ lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 712.5 }");
-    let goal = parse(&text, "geo.toml").unwrap().mission.goals[0];
+    let with_origin = changed("[mission]", origin);
+    let scenario = parse(&with_origin.replace("[38.5, 19.0, 7.3]", place), "geo.toml").unwrap();
+    let goal = scenario.mission.goals[0];
     assert!((goal - Point::new(0.0, 0.0, 12.5)).norm() < 1e-4, "{goal}");
+    let text = with_origin.replace("start = [8.0, 12.0, 1.5]", &format!("start = {place}"));
+    let start = parse(&text, "geo.toml").unwrap().vehicles[0].start;
+    assert!((start - Point::new(0.0, 0.0, 12.5)).norm() < 1e-4, "{start}");
 }
 
 #[test]

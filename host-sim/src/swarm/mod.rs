@@ -26,7 +26,6 @@ use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
-use crate::map::edt::ClearanceField;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
 use crate::progress::Progress;
 use crate::report::{self, Level};
@@ -76,10 +75,9 @@ pub fn fly(
         members.len(),
         scenario.seed,
     );
-    let field = ClearanceField::new(&mission.map.grid());
     let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
-    let mut monitor = Monitor::new(mission.map.grid(), &field, safety_distance_m, &radii);
+    let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
     let mut ground_station = GroundStation::new();
     let mut script = Script::new(scenario);
     let mut log = Vec::new();
@@ -228,7 +226,11 @@ fn vehicle_result(
     }
 }
 
-fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
+/// The vehicles of a mission, each on its pad, in the order of the scenario.
+///
+/// # Errors
+/// The configuration of a vehicle names what is wrong.
+pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let serial = SerialConfig {

@@ -5,6 +5,7 @@
 
 mod assignment;
 mod roadmap;
+mod steps;
 mod swarm;
 
 use std::path::PathBuf;
@@ -38,16 +39,23 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
     #[arg(long, value_name = "PROGRAM")]
     peer: Option<PathBuf>,
+    /// What the steps are counted under: only the work itself, with this many neighbours.
+    #[arg(long, value_name = "N", hide = true)]
+    steps_beside: Option<usize>,
 }
 
 fn main() -> Result<()> {
     let args = Args::parse();
+    if let Some(neighbours) = args.steps_beside {
+        steps::run(neighbours);
+        return Ok(());
+    }
     let mut rows = Vec::new();
     if "roadmap".contains(&args.only) {
         match &args.peer {
@@ -60,6 +68,9 @@ fn main() -> Result<()> {
     }
     if "swarm".contains(&args.only) {
         rows.extend(swarm::rows()?);
+    }
+    if "steps".contains(&args.only) {
+        rows.extend(steps::rows()?);
     }
     println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
     for Row { name, ours, theirs, ratio, required, unit, n } in &rows {

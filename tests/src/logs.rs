@@ -1,0 +1,51 @@
+//! Recorded MAVLink: `.tlog` files, where big-endian microseconds precede each frame, and plain streams of frames.
+
+use std::path::{Path, PathBuf};
+
+use crate::shared_data;
+
+/// One record: when, and the bytes of its frame as its header tells their number.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// Microseconds; 0 in a plain stream.
+    pub at_us: u64,
+    /// The frame; its checksum is not looked at.
+    pub bytes: Vec<u8>,
+}
+
+/// All logs of the shared data, by name; empty, with a line that says so, where they are absent.
+pub fn all() -> Vec<PathBuf> {
+    let Some(folder) = shared_data("mavlink") else { return Vec::new() };
+    let entries = std::fs::read_dir(folder).expect("a folder can be read");
+    let mut logs: Vec<_> = entries.map(|entry| entry.expect("its entries too").path()).collect();
+    logs.sort();
+    logs
+}
+
+/// The records of a log, up to the first that is not whole.
+///
+/// # Panics
+/// The file cannot be read.
+pub fn read(path: &Path) -> Vec<Recorded> {
+    let file = std::fs::read(path).expect("a log can be read");
+    let stamp = if path.extension().is_some_and(|extension| extension == "tlog") { 8 } else { 0 };
+    let mut rest = file.as_slice();
+    let mut records = Vec::new();
+    while let Some(length) = rest.get(stamp..).and_then(frame_length)
+        && let Some(bytes) = rest.get(stamp..stamp + length)
+    {
+        let at_us = rest[..stamp].iter().fold(0, |us, &byte| us << 8 | u64::from(byte));
+        records.push(Recorded { at_us, bytes: bytes.to_vec() });
+        rest = &rest[stamp + length..];
+    }
+    records
+}
+
+/// What the header of a frame says about its length.
+fn frame_length(bytes: &[u8]) -> Option<usize> {
+    match *bytes {
+        [0xFE, payload, ..] => Some(8 + usize::from(payload)),
+        [0xFD, payload, flags, ..] => Some(12 + usize::from(payload) + if flags & 1 == 0 { 0 } else { 13 }),
+        _ => None,
+    }
+}

@@ -1,0 +1,170 @@
+//! Missions by latitude and longitude, anywhere on earth, flown by autopilots that share neither origin nor home nor
+//! projection: everybody is where the mission frame says, and goes where it says.
+//!
+//! Seeds are the numbers of the missions; a failing one is named.
+
+use companion::Instant;
+use companion::frame::Framer;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario;
+use host_sim::swarm::ground_station::GroundStation;
+use host_sim::swarm::member::{Member, STEP_US, is_finished};
+use host_sim::swarm::members;
+use host_sim::swarm::radio::{Radio, RadioConfig};
+use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
+use planner_core::Point;
+use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+const MISSIONS: u64 = 200;
+/// Right to this, metres.
+const RIGHT_M: f32 = 0.1;
+/// A broadcast position is the last one heard of the autopilot, and the radio takes its time: no older than this, µs.
+const AGE_US: u64 = 200_000;
+/// Simulated time given to a mission, seconds: ArduCopter's estimator takes 40 of it.
+const LIMIT_S: u64 = 120;
+
+fn uniform(rng: &mut Pcg32, low: f64, high: f64) -> f64 {
+    low + f64::from(rng.next_u32()) * 2f64.powi(-32) * (high - low)
+}
+
+/// A place up to `reach_m` away, and up to 60 m higher or lower.
+fn around(rng: &mut Pcg32, of: &Geodetic, reach_m: f64) -> Geodetic {
+    let (bearing, far) = (uniform(rng, 0.0, std::f64::consts::TAU), reach_m * uniform(rng, 0.0, 1.0).sqrt());
+    let up = uniform(rng, -60.0, 60.0);
+    enu_to_geodetic(of, &Point::new((far * bearing.cos()) as f32, (far * bearing.sin()) as f32, up as f32))
+}
+
+fn toml(place: &Geodetic) -> String {
+    let Geodetic { lat_deg, lon_deg, alt_m } = place;
+    format!("{{ lat_deg = {lat_deg:.10}, lon_deg = {lon_deg:.10}, alt_m = {alt_m:.4} }}")
+}
+
+/// Two vehicles cross the lobby of the building, wherever on earth it stands.
+fn scenario_text(rng: &mut Pcg32) -> String {
+    let origin = Geodetic {
+        lat_deg: uniform(rng, -65.0, 65.0),
+        lon_deg: uniform(rng, -180.0, 180.0),
+        alt_m: uniform(rng, -50.0, 2500.0),
+    };
+    let by_degrees = |point: Point| toml(&enu_to_geodetic(&origin, &point));
+    let mut text = format!(
+        "seed = {}\n[map]\nfile = 'builtin:building'\nresolution_m = 0.5\norigin = {}\n[roadmap]\nnodes = 200\n",
+        rng.next_u32(),
+        toml(&origin)
+    );
+    let lanes = [3.0, 6.0];
+    let shift = |rng: &mut Pcg32| uniform(rng, -0.5, 0.5) as f32;
+    let goals = lanes.map(|y| by_degrees(Point::new(14.0 + shift(rng), y + shift(rng), 1.8)));
+    text += &format!("[mission]\ngoals = [{}]\n", goals.join(", "));
+    let first = 1 + rng.next_u32() % 250;
+    let ids = [first, 1 + (first + rng.next_u32() % 249) % 250];
+    for (lane, id) in lanes.iter().zip(ids) {
+        let start = by_degrees(Point::new(10.0 + shift(rng), lane + shift(rng), 1.5));
+        let (ekf_origin, home) = (around(rng, &origin, 2000.0), around(rng, &origin, 1000.0));
+        let personality = if rng.next_u32() % 2 == 0 { "px4" } else { "ardupilot" };
+        text += &format!(
+            "[[vehicles]]\nid = {id}\nstart = {start}\npersonality = '{personality}'\nekf_origin = {}\nhome = {}\n",
+            toml(&ekf_origin),
+            toml(&home)
+        );
+    }
+    text
+}
+
+/// What one mission came to: worst errors, metres.
+#[derive(Clone, Copy, Debug, Default)]
+struct Errors {
+    /// Of a position as the companion has it, the moment it hears it.
+    known_m: f32,
+    /// Of a position as a companion broadcasts it, beside where the vehicle was lately.
+    broadcast_m: f32,
+    /// From a vehicle's place where it flies over its goal, beside the goal.
+    goal_m: f32,
+}
+
+impl Errors {
+    fn worst(self, other: Self) -> Self {
+        Self {
+            known_m: self.known_m.max(other.known_m),
+            broadcast_m: self.broadcast_m.max(other.broadcast_m),
+            goal_m: self.goal_m.max(other.goal_m),
+        }
+    }
+}
+
+fn fly(seed: u64) -> Errors {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let text = scenario_text(&mut rng);
+    let scenario = scenario::parse(&text, "mixed frames").unwrap_or_else(|e| panic!("mission {seed}: {e}"));
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).expect("the lobby is free");
+    let plan = mission.plan().expect("they fly side by side");
+    let mut members = members(&mission).expect("good vehicles");
+    // One station more than vehicles: it listens.
+    let listener = members.len();
+    let mut radio = Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
+    let (mut framer, mut ground_station, mut log) = (Framer::new(), GroundStation::new(), Vec::new());
+    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
+    places.push(Point::zeros());
+    let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); members.len()];
+    let mut nearest_m = vec![f32::INFINITY; members.len()];
+    let (mut errors, mut heard) = (Errors::default(), 0);
+    let origin = mission.scenario.map.origin;
+    for step in 0..LIMIT_S * 1_000_000 / STEP_US {
+        let now_us = (step + 1) * STEP_US;
+        for (i, member) in members.iter_mut().enumerate() {
+            member.step(step, i, &mission.map, &mut radio, &places, &mut log);
+            if member.wants_plan {
+                let own = mission.own_plan(&plan, i).expect("few gates");
+                member.answer_plan(now_us, Ok(&own));
+            }
+            let truth = member.autopilot.truth().position;
+            places[i] = truth;
+            tracks[i].push(truth);
+            let telemetry = member.companion.telemetry();
+            if telemetry.position_at == Some(Instant::from_micros(now_us)) {
+                errors.known_m = errors.known_m.max((telemetry.position - truth).norm());
+            }
+            let goal = mission.goals[usize::from(plan.flights[i].goal.expect("a goal for each"))];
+            nearest_m[i] = nearest_m[i].min((truth - goal).norm());
+        }
+        ground_station.step(now_us, &members, &mut radio, &places);
+        while let Some(packet) = radio.receive(now_us, listener) {
+            let mut bytes = &packet[..];
+            while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut bytes) {
+                let Some(said) = frame.decode::<GLOBAL_POSITION_INT_DATA>() else { continue };
+                let i = members.iter().position(|m| m.system_id() == frame.system).expect("one of ours");
+                let place = Geodetic {
+                    lat_deg: f64::from(said.lat) * 1e-7,
+                    lon_deg: f64::from(said.lon) * 1e-7,
+                    alt_m: f64::from(said.alt) * 1e-3,
+                };
+                let place = geodetic_to_enu(&origin, &place);
+                let lately = tracks[i].iter().rev().take((AGE_US / STEP_US) as usize);
+                let error_m = lately.map(|was| (was - place).norm()).fold(f32::INFINITY, f32::min);
+                errors.broadcast_m = errors.broadcast_m.max(error_m);
+                heard += 1;
+            }
+        }
+        if members.iter().all(|m| is_finished(m.companion.state())) {
+            break;
+        }
+    }
+    errors.goal_m = nearest_m.into_iter().fold(0.0, f32::max);
+    let log: Vec<_> = log.iter().map(|e| format!("{:.1} s {:?}: {}", e.t_s, e.vehicle, e.text)).collect();
+    let ends: Vec<_> = members.iter().map(Member::end).collect();
+    assert!(ends.iter().all(|end| end == "Done"), "mission {seed}: {ends:?}\n{text}\n{}", log.join("\n"));
+    assert!(heard > 100, "mission {seed}: {heard} positions heard");
+    assert!(errors.known_m < RIGHT_M && errors.broadcast_m < RIGHT_M, "mission {seed}: {errors:?}\n{text}");
+    errors
+}
+
+#[test]
+fn every_vehicle_is_where_the_mission_frame_says() {
+    let worst = (0..MISSIONS).into_par_iter().map(fly).reduce(Errors::default, Errors::worst);
+    println!("{MISSIONS} missions: {worst:?}");
+    assert!(worst.goal_m < RIGHT_M, "{worst:?}");
+}
