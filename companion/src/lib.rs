@@ -31,6 +31,7 @@ pub mod neighbours;
 pub mod outbox;
 pub mod px4;
 mod requests;
+mod retreat;
 pub mod telemetry;
 pub mod time;
 mod transmit;

@@ -12,7 +12,7 @@ use planner_core::schedule::VehiclePlan;
 use crate::autopilot::Kind;
 use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
-use crate::detour::Around;
+use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
 use crate::guidance::{Guidance, LOST_WINDOW_M, REJOIN_WINDOW_M, Scene, setpoints_flow};
@@ -51,6 +51,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) plan: Option<VehiclePlan<W, G>>,
     pub(crate) plan_failure: Option<PlanFailure>,
     pub(crate) around: Around,
+    pub(crate) obstacles: Obstacles,
     pub(crate) state: State,
     pub(crate) entered_at: Instant,
     wishes: Wishes,
@@ -91,6 +92,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: None,
             plan_failure: None,
             around: Around::default(),
+            obstacles: Obstacles::default(),
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             wishes: Wishes::default(),
@@ -304,6 +306,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let result = match commands::apply(&mut self.wishes, self.state, command) {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, command.param1),
+            None if command.command == commands::EXCLUDE => self.exclude(command),
             // To all components: another one's.
             None if !command.to_component => return,
             None => UNSUPPORTED,
@@ -458,6 +461,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.plan = None;
                 self.plan_failure = None;
                 self.around = Around { left: self.around.left, ..Around::default() };
+                self.obstacles.avoided = 0;
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }

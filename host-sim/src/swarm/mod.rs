@@ -92,8 +92,12 @@ pub fn fly(
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
         t_s = now_us as f64 * 1e-6;
-        let mut world =
-            World { members: &mut members, radio: &mut radio, ground_station: &mut ground_station };
+        let mut world = World {
+            members: &mut members,
+            radio: &mut radio,
+            ground_station: &mut ground_station,
+            obstacles: &mut monitor.obstacles,
+        };
         script.step(now_us, &mut world, &mut log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission.map, &mut radio, &places, &mut log);

@@ -82,6 +82,8 @@ pub struct Monitor<'a> {
     too_near: Vec<bool>,
     recorded_s: f64,
     window: Sample,
+    /// Spheres that are on no map: centre and radius, metres.
+    pub obstacles: Vec<(Point, f32)>,
     /// Bodies that reached into an obstacle.
     pub wall_contacts: u32,
     /// Pairs that came nearer than the safety distance.
@@ -125,6 +127,7 @@ impl<'a> Monitor<'a> {
             too_near: vec![false; radii_m.len() * radii_m.len()],
             recorded_s: f64::NEG_INFINITY,
             window: NOTHING,
+            obstacles: Vec::new(),
             wall_contacts: 0,
             violations: 0,
             deadlocks: 0,
@@ -197,6 +200,9 @@ impl<'a> Monitor<'a> {
         } else {
             false
         };
+        let inside =
+            |&(centre, extent_m): &(Point, f32)| (now.position - centre).norm() < radius_m + extent_m;
+        let touches = touches || self.obstacles.iter().any(inside);
         let was_touching = std::mem::replace(&mut self.vehicles[i].in_contact, touches);
         if touches && !was_touching {
             self.wall_contacts += 1;
