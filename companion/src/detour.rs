@@ -69,7 +69,7 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found in a row.
     pub(crate) failed: u8,
-    /// Where it was before its position became doubtful.
+    /// Where it was before its position jumped.
     pub(crate) lost_at: Option<Point>,
     pub(crate) quiet_since: Option<Instant>,
     pub(crate) looked_at: Instant,
@@ -114,10 +114,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, vague }
     }
 
-    /// Remembers where the position became doubtful, on entering a state.
+    /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.
     pub(crate) fn mark_place(&mut self, to: State) {
         match to {
-            State::PositionLost if self.around.lost_at.is_none() => {
+            State::PositionLost if self.around.lost_at.is_none() && self.telemetry.is_settling(self.now) => {
                 let path = self.plan.as_ref().map(|plan| &plan.path);
                 let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
                 self.around.lost_at = Some(on_path.unwrap_or(self.telemetry.position));
@@ -147,7 +147,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let astray = self.around.left && !self.around.flying;
         self.around.blocked = !self.guidance.returning && (stuck || astray || self.is_in_the_way(on_ground));
         if !self.neighbours.all_stand(now) {
-            self.around.quiet_since = None;
+            // Somebody moved: what stood in the way may have gone.
+            (self.around.quiet_since, self.around.failed) = (None, 0);
         } else if self.around.quiet_since.is_none() {
             self.around.quiet_since = Some(now);
         }

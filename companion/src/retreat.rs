@@ -18,7 +18,7 @@ const BELOW_M: f32 = 15.0;
 /// A vehicle this little below may yet be above in a moment, metres.
 const LEVEL_M: f32 = 1.0;
 /// What two may stray together, metres.
-const FOLLOWER_M: f32 = 0.3;
+const FOLLOWER_M: f32 = 0.6;
 /// Spacing and number of the places looked at.
 const STEP_M: f32 = 0.25;
 const STEPS: u16 = 48;

@@ -136,8 +136,8 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, vehicle: u8) -> Outcome {
     let said = |text: &str| log.iter().any(|e| e.text.contains(text));
     // Under the autopilot's own failsafe the vehicle struck drifts as that lets it.
     let own_contacts_count = !said(STOPPED) && !said(FOUND);
-    // Before take-off a mode that the pilot changes cancels the start for good.
-    let goes_on = case.then == GoesOn && !said("start cancelled");
+    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet up, the autopilot disarms.
+    let goes_on = case.then == GoesOn && !said("start cancelled") && !said("Disarmed in flight");
     let mut too_near = 0;
     for e in &flight.log {
         let by_or_at_struck =
