@@ -78,6 +78,7 @@ pub fn fly(
     let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
     let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
+    monitor.waits_end = !scenario.faults.is_empty();
     let mut ground_station = GroundStation::new();
     let mut script = Script::new(scenario);
     let mut log = Vec::new();
