@@ -10,7 +10,7 @@ use planner_core::{Point, frames};
 
 use crate::events::Link;
 use crate::frame;
-use crate::guidance::Setpoint;
+use crate::guidance::{self, Setpoint};
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
@@ -58,7 +58,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Setpoint::Stop => stop,
             Setpoint::Move(position, velocity, acceleration) => {
                 self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
-                    let velocity = velocity + acceleration * kind.velocity_lead_s();
+                    let lead = acceleration * kind.velocity_lead_s();
+                    let flies = self.telemetry.on_ground == Some(false);
+                    let acceleration = if flies && self.state != State::PilotControl {
+                        acceleration + guidance::correction(&position, &velocity, &self.telemetry)
+                    } else {
+                        acceleration
+                    };
+                    let velocity = velocity + lead;
                     let (velocity, acceleration) =
                         (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
                     (ned, velocity, acceleration, kind.move_mask())

@@ -1,5 +1,6 @@
 //! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request every companion plans.
 
+use std::sync::OnceLock;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
@@ -12,7 +13,7 @@ use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::segment::segment_is_clear;
 
 use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
-use crate::map::{self, VoxelMap};
+use crate::map::{self, ClearanceField, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
@@ -57,6 +58,7 @@ pub struct Mission {
     pub schedule: ScheduleConfig,
     /// What the clock said so far.
     pub timing: Timing,
+    clearance_field: OnceLock<ClearanceField>,
 }
 
 impl Mission {
@@ -105,7 +107,13 @@ impl Mission {
             descents_m,
             schedule,
             timing,
+            clearance_field: OnceLock::new(),
         })
+    }
+
+    /// The map's distance field, made when first asked for: only a flight needs it.
+    pub fn clearance_field(&self) -> &ClearanceField {
+        self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
     }
 
     /// Plans the whole swarm as every companion does.

@@ -6,11 +6,12 @@
 use anyhow::{anyhow, bail};
 use planner_core::Point;
 use planner_core::prm::{self, Config, PrmError, Workspace};
-use planner_core::roadmap::{self, Edge, RoadmapError, RoadmapHeader};
+use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
+use planner_core::search::SearchWorkspace;
 use planner_core::voxel::VoxelGrid;
 use rayon::prelude::*;
 
-use crate::capacity::{ROADMAP_CUBES, ROADMAP_NODES};
+use crate::capacity::{ROADMAP_CUBES, ROADMAP_NODES, on_heap};
 use crate::map::VoxelMap;
 
 /// Where the clearance stored with an edge saturates, metres: beyond it no vehicle of ours is any wider.
@@ -92,9 +93,11 @@ fn annotate(grid: &VoxelGrid<'_>, nodes: &[Point], edges: &[prm::Edge]) -> Vec<E
 /// The roadmap as the file that is uploaded to a board.
 pub fn encode(roadmap: &Roadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
-    let length = roadmap::encoded_len(roadmap.nodes.len(), roadmap.edges.len()).ok_or_else(too_large)?;
+    let length =
+        roadmap::encoded_len(roadmap.nodes.len(), roadmap.edges.len(), LANDMARKS).ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
-    roadmap::write(header, &roadmap.nodes, &roadmap.edges, &mut bytes)
+    let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
+    roadmap::write_with_landmarks(header, &roadmap.nodes, &roadmap.edges, &mut workspace, &mut bytes)
         .map_err(|e: RoadmapError| anyhow!("the roadmap cannot be written: {e:?}"))?;
     Ok(bytes)
 }

@@ -18,6 +18,8 @@ use heap::{Heap, SETTLED};
 
 /// Half-edges looked at together; a row is seldom longer.
 const CHUNK: usize = 64;
+/// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
+type Gains = [u8; 256];
 
 /// Up to so many targets the search is drawn to each in turn: a board's 32 vehicles.
 const FEW_TARGETS: usize = 32;
@@ -100,14 +102,14 @@ pub trait Graph {
     ///
     /// Most do not: the target is settled, or reached more cheaply. They are told apart by selects, since which they are
     /// cannot be predicted.
-    fn gains(
+    fn gains<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
         here: &Point,
         reached: f32,
-        distance: &[f32],
-        out: &mut [u8; CHUNK],
+        distance: &[f32; N],
+        out: &mut Gains,
     ) -> usize;
 }
 
@@ -122,27 +124,26 @@ impl Graph for RoadmapView<'_> {
     }
 
     #[inline]
-    fn gains(
+    fn gains<const N: usize>(
         &self,
         _first: usize,
         half_edges: &[[u8; 4]],
         here: &Point,
         reached: f32,
-        distance: &[f32],
-        out: &mut [u8; CHUNK],
+        distance: &[f32; N],
+        out: &mut Gains,
     ) -> usize {
         // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
         // is eight times the rounding of the three products.
         const SLACK: f32 = 1.0 + 1e-6;
-        let mut count = 0;
+        let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
-            let target = target_of(half_edge);
-            let room = distance[usize::from(target)] - reached;
-            let squared = (self.node(target) - here).norm_squared();
-            out[count % CHUNK] = place as u8;
-            count += usize::from(squared <= room * libm::fabsf(room) * SLACK);
+            let room = distance[target_index::<N>(half_edge)] - reached;
+            let squared = (self.node(target_of(half_edge)) - here).norm_squared();
+            out[usize::from(count)] = place as u8;
+            count = count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * SLACK));
         }
-        count
+        usize::from(count)
     }
 }
 
@@ -178,22 +179,23 @@ impl Graph for WithLengths<'_> {
     }
 
     #[inline]
-    fn gains(
+    fn gains<const N: usize>(
         &self,
         first: usize,
         half_edges: &[[u8; 4]],
         _here: &Point,
         reached: f32,
-        distance: &[f32],
-        out: &mut [u8; CHUNK],
+        distance: &[f32; N],
+        out: &mut Gains,
     ) -> usize {
-        let mut count = 0;
+        let mut count = 0_u8;
         let lengths = &self.lengths[first..first + half_edges.len()];
         for (place, (half_edge, length)) in half_edges.iter().zip(lengths).enumerate() {
-            out[count % CHUNK] = place as u8;
-            count += usize::from(reached + length < distance[usize::from(target_of(half_edge))]);
+            out[usize::from(count)] = place as u8;
+            let gain = reached + length < distance[target_index::<N>(half_edge)];
+            count = count.wrapping_add(u8::from(gain));
         }
-        count
+        usize::from(count)
     }
 }
 
@@ -234,6 +236,20 @@ pub fn dijkstra_row<const N: usize>(
     search(graph, from, targets, passable, ws)?;
     for (length, &target) in out.iter_mut().zip(targets) {
         *length = ws.distance_m(target);
+    }
+    Ok(())
+}
+
+/// Settles every node that can be reached from `from` over any edge.
+pub(crate) fn ways_from<const N: usize>(
+    view: &RoadmapView<'_>,
+    from: u16,
+    ws: &mut SearchWorkspace<N>,
+) -> Result<(), SearchError> {
+    begin(view, from, ws)?;
+    let mut gains = [0; 256];
+    while let Some(node) = ws.heap.pop() {
+        relax(view, node, &|_, _| true, |_| 0.0, ws, &mut gains);
     }
     Ok(())
 }
@@ -290,6 +306,14 @@ fn spread(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     ((low + high) / 2.0, libm::sqrtf((high - low).norm_squared()))
 }
 
+/// Where the values of a half-edge's target lie. No target of a checked roadmap is beyond `N`; where `N` is a power of two
+/// the compiler sees it too and leaves out the check.
+#[inline(always)]
+fn target_index<const N: usize>(half_edge: &[u8; 4]) -> usize {
+    let target = u32::from_le_bytes(*half_edge) as usize & 0xffff;
+    if N.is_power_of_two() { target & (N - 1) } else { target }
+}
+
 fn check_node(view: &RoadmapView<'_>, node: u16) -> Result<(), SearchError> {
     if usize::from(node) < view.node_count() { Ok(()) } else { Err(SearchError::BadNode(node)) }
 }
@@ -303,25 +327,21 @@ fn search<const N: usize>(
     ws: &mut SearchWorkspace<N>,
 ) -> Result<(), SearchError> {
     let view = graph.view();
-    if view.node_count() > N {
-        return Err(SearchError::WorkspaceTooSmall);
-    }
-    check_node(view, from)?;
     for &target in targets {
         check_node(view, target)?;
     }
-    ws.heap.clear(view.node_count());
-    let distance = &mut ws.distance[..view.node_count()];
-    distance.fill(f32::INFINITY);
-    distance[usize::from(from)] = 0.0;
-    ws.parent[usize::from(from)] = from;
-    ws.heap.push(from, 0.0);
+    begin(view, from, ws)?;
+    let mut gains = [0; 256];
     let informed = targets.len() <= FEW_TARGETS;
     for &target in targets {
-        let goal = view.node(target);
-        let heuristic = |node: u16| match informed {
-            true => libm::sqrtf((view.node(node) - goal).norm_squared()),
-            false => 0.0,
+        let (goal, [goal_a, goal_b]) = (view.node(target), view.ways_to_landmarks_m(target));
+        let heuristic = |node: u16| {
+            if !informed {
+                return 0.0;
+            }
+            let [a, b] = view.ways_to_landmarks_m(node);
+            let straight = libm::sqrtf((view.node(node) - goal).norm_squared());
+            straight.max(libm::fabsf(a - goal_a)).max(libm::fabsf(b - goal_b))
         };
         if informed && ws.heap.place(target) != SETTLED {
             let distance = &ws.distance;
@@ -330,9 +350,28 @@ fn search<const N: usize>(
         while ws.heap.place(target) != SETTLED
             && let Some(node) = ws.heap.pop()
         {
-            relax(graph, node, &passable, heuristic, ws);
+            relax(graph, node, &passable, heuristic, ws, &mut gains);
         }
     }
+    Ok(())
+}
+
+/// Empties the workspace but for `from`.
+fn begin<const N: usize>(
+    view: &RoadmapView<'_>,
+    from: u16,
+    ws: &mut SearchWorkspace<N>,
+) -> Result<(), SearchError> {
+    if view.node_count() > N {
+        return Err(SearchError::WorkspaceTooSmall);
+    }
+    check_node(view, from)?;
+    ws.heap.clear(view.node_count());
+    let distance = &mut ws.distance[..view.node_count()];
+    distance.fill(f32::INFINITY);
+    distance[usize::from(from)] = 0.0;
+    ws.parent[usize::from(from)] = from;
+    ws.heap.push(from, 0.0);
     Ok(())
 }
 
@@ -344,15 +383,15 @@ fn relax<const N: usize>(
     passable: &impl Fn(u16, &HalfEdge) -> bool,
     heuristic: impl Fn(u16) -> f32,
     ws: &mut SearchWorkspace<N>,
+    gains: &mut Gains,
 ) {
     let view = graph.view();
-    let distance = &mut ws.distance[..view.node_count()];
+    let distance = &mut ws.distance;
     let (here, reached) = (view.node(node), distance[usize::from(node)]);
     let (first, row) = view.row(node);
     for (chunk, half_edges) in row.chunks(CHUNK).enumerate() {
         let first = first + chunk * CHUNK;
-        let mut gains = [0; CHUNK];
-        let count = graph.gains(first, half_edges, &here, reached, distance, &mut gains);
+        let count = graph.gains(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
             let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));
             let length = reached + graph.length(k, &here, target);

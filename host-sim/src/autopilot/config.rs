@@ -55,7 +55,7 @@ pub struct Config {
     pub vehicle: VehicleLimits,
     /// Mean wind, ENU m/s.
     pub wind: Point,
-    /// Standard deviation of gusts, m/s.
+    /// Peak of gusts over the mean wind, m/s.
     pub gust_mps: f32,
     /// Standard deviation of the position estimate, metres.
     pub position_noise_m: f32,

@@ -2,6 +2,9 @@
 //!
 //! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these along each axis with
 //! τ = L / V). They advance in slots of 20 ms and are held between: nothing they model moves faster.
+//!
+//! A gust is told by its peak over the mean wind, as weather reports and MIL-F-8785C's discrete gust tell it, not by a
+//! standard deviation: the peak lies [`PEAK_FACTOR`] deviations out, and nothing goes beyond it.
 
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -12,6 +15,11 @@ use planner_core::Point;
 pub const SLOT_S: f32 = 0.02;
 /// Time constant of gusts: a turbulence length of 20 m met at 8 m/s.
 const GUST_TAU_S: f32 = 2.5;
+/// Peak of gusts over their standard deviation: about 3 for gusts of 3 s in 10 minutes (WMO, Harper, Kepert and Ginger,
+/// Guidelines for converting between various wind averaging periods, 2010, §2).
+const PEAK_FACTOR: f32 = 3.0;
+/// Vertical gusts are half the horizontal ones near the ground (MIL-F-8785C, low altitude).
+const VERTICAL_SHARE: f32 = 0.5;
 /// Slow wander of the position estimate, seconds: GPS multipath and ionosphere.
 const BIAS_TAU_S: f32 = 60.0;
 /// Quick wander of the position estimate, seconds: what the filter lets through of GPS noise.
@@ -68,6 +76,7 @@ impl Wander {
 pub struct Disturbance {
     random: Gaussian,
     gust: Option<Wander>,
+    gust_peak_mps: f32,
     errors: Option<[Wander; 3]>,
     mean_wind: Point,
     /// Wind, m/s, ENU.
@@ -79,12 +88,13 @@ pub struct Disturbance {
 }
 
 impl Disturbance {
-    /// Mean wind (m/s, ENU), standard deviation of gusts (m/s) and of the position estimate (m); 0 switches one off.
-    pub fn new(mean_wind: Point, gust_mps: f32, position_noise_m: f32, seed: u64) -> Self {
+    /// Mean wind (m/s, ENU), peak of gusts over it (m/s) and standard deviation of the position estimate (m); 0 switches
+    /// one off.
+    pub fn new(mean_wind: Point, gust_peak_mps: f32, position_noise_m: f32, seed: u64) -> Self {
         let mut random = Gaussian::new(seed);
-        // Vertical gusts are half the horizontal ones near the ground (MIL-F-8785C, low altitude).
-        let gust = (gust_mps > 0.0)
-            .then(|| Wander::new(Point::new(gust_mps, gust_mps, 0.5 * gust_mps), GUST_TAU_S, &mut random));
+        let sigma = gust_peak_mps / PEAK_FACTOR;
+        let sigma = Point::new(sigma, sigma, VERTICAL_SHARE * sigma);
+        let gust = (gust_peak_mps > 0.0).then(|| Wander::new(sigma, GUST_TAU_S, &mut random));
         let errors = (position_noise_m > 0.0).then(|| {
             let half = position_noise_m * core::f32::consts::FRAC_1_SQRT_2;
             let all = |s: f32| Point::new(s, s, s);
@@ -97,6 +107,7 @@ impl Disturbance {
         let mut new = Self {
             random,
             gust,
+            gust_peak_mps,
             errors,
             mean_wind,
             wind: mean_wind,
@@ -120,7 +131,7 @@ impl Disturbance {
 
     fn publish(&mut self) {
         if let Some(gust) = &self.gust {
-            self.wind = self.mean_wind + gust.value;
+            self.wind = self.mean_wind + bounded(&gust.value, self.gust_peak_mps);
         }
         if let Some([bias, jitter, velocity]) = &self.errors {
             self.position_error = bias.value + jitter.value;
@@ -132,6 +143,14 @@ impl Disturbance {
     pub fn sensor(&mut self) -> f32 {
         self.random.sample()
     }
+}
+
+/// A gust no stronger than its peak.
+fn bounded(gust: &Point, peak_mps: f32) -> Point {
+    let across = libm::sqrtf(gust.x * gust.x + gust.y * gust.y);
+    let share = if across > peak_mps { peak_mps / across } else { 1.0 };
+    let up = VERTICAL_SHARE * peak_mps;
+    Point::new(gust.x * share, gust.y * share, gust.z.clamp(-up, up))
 }
 
 #[cfg(test)]
@@ -179,6 +198,22 @@ mod tests {
         assert_eq!(run(1), run(1));
         assert_ne!(run(1), run(2));
         assert_ne!(run(1), Point::new(3.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn gusts_come_to_their_peak_and_never_beyond() {
+        let peak = 3.0;
+        let mut d = Disturbance::new(Point::zeros(), peak, 0.0, 5);
+        let (mut strongest, mut squares) = (0.0_f32, 0.0_f64);
+        let n = 60_000;
+        for _ in 0..n {
+            d.advance();
+            strongest = strongest.max(d.wind.xy().norm());
+            squares += f64::from(d.wind.x).powi(2);
+        }
+        assert!((0.99 * peak..1.001 * peak).contains(&strongest), "strongest {strongest}");
+        let sigma = (squares / f64::from(n)).sqrt();
+        assert!((0.8..1.1).contains(&sigma), "standard deviation {sigma}");
     }
 
     #[test]

@@ -44,7 +44,9 @@ pub struct VehicleLimits {
 }
 
 impl Default for VehicleLimits {
-    /// PX4's quadrotor defaults, and a drag that makes it track velocity as its SITL was seen to.
+    /// PX4's quadrotor defaults, and a drag that makes it track velocity as its SITL was seen to. That is at the upper end of
+    /// real ones, so wind moves it rather too much: PX4's estimator assumes 0.17 1/s at 3 m/s (`EKF2_MCOEF` 0.15 1/s beside
+    /// `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39 and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
     fn default() -> Self {
         Self {
             radius_m: 0.3,

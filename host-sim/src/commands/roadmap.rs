@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 use anyhow::{Context, anyhow};
 use clap::Subcommand;
-use planner_core::roadmap::{RoadmapError, RoadmapView};
+use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
 use super::load;
 use crate::mission::Mission;
@@ -72,6 +72,7 @@ fn print(view: &RoadmapView<'_>) {
         header.origin.lon_deg,
         header.origin.alt_m
     );
+    say!("landmarks      {}", if view.has_landmarks() { LANDMARKS } else { 0 });
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
 

@@ -29,7 +29,6 @@ use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
-use crate::map::edt::ClearanceField;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
 use crate::progress::Progress;
 use crate::report::{self, Level};
@@ -107,10 +106,9 @@ fn simulate(
     if let Some(gateway) = &gateway {
         gateway.attach(&mut members, &mut radio);
     }
-    let field = ClearanceField::new(&mission.map.grid());
     let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
-    let mut monitor = Monitor::new(mission.map.grid(), &field, safety_distance_m, &radii);
+    let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
     let mut ground_station = GroundStation::new();
     let mut script = Script::new(scenario);
     let mut log = Vec::new();

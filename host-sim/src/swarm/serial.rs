@@ -3,6 +3,7 @@
 //! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART without flow control.
 
 use std::collections::VecDeque;
+use std::io::Read;
 
 use rand_core::Rng;
 use rand_pcg::Pcg32;
@@ -80,7 +81,9 @@ impl SerialLink {
                 break;
             }
             self.writes.pop_front();
-            out.extend(self.bytes.drain(..length));
+            let start = out.len();
+            out.resize(start + length, 0);
+            self.bytes.read_exact(&mut out[start..]).expect("a write is as long as its bytes");
         }
     }
 

@@ -3,6 +3,9 @@
 use super::augment::{LANES, Paths};
 use super::{Costs, NONE, State};
 
+/// Columns of a large matrix that are reduced together: four cache lines of each row.
+const WIDE: usize = 64;
+
 /// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left over), then two
 /// rounds of augmenting row reduction. Returns how many rows are left in `state.free`, or `None` if some row or, in a
 /// square matrix, some column has no finite cost, so that not every row can be served.
@@ -26,17 +29,12 @@ pub(super) fn free_rows(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Pa
 /// Each column is priced at its least cost and given to that row, if the row has none; then a row that is the least of
 /// one column only moves its slack into that column's price.
 fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> Option<usize> {
-    // Eight columns at a time, the last eight perhaps partly again; fewer than eight one by one.
-    let cols = costs.cols;
-    let mut first = 0;
-    while first < cols {
-        if cols < LANES {
-            cheapest_rows::<1>(costs, first, state.price, paths.previous);
-            first += 1;
-        } else {
-            cheapest_rows::<LANES>(costs, first.min(cols - LANES), state.price, paths.previous);
-            first += LANES;
-        }
+    // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a large matrix, the fewer
+    // cache misses. A small one has no room for so many.
+    match costs.cols {
+        0..LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
+        LANES..WIDE => cheapest_rows_by::<LANES>(costs, state.price, paths.previous),
+        _ => cheapest_rows_by::<WIDE>(costs, state.price, paths.previous),
     }
     if state.price.contains(&f64::INFINITY) {
         return None;
@@ -68,6 +66,12 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
         }
     }
     Some(left)
+}
+
+fn cheapest_rows_by<const K: usize>(costs: &Costs<'_>, price: &mut [f64], least_row: &mut [u16]) {
+    for first in (0..costs.cols).step_by(K) {
+        cheapest_rows::<K>(costs, first.min(costs.cols - K), price, least_row);
+    }
 }
 
 /// Least cost and first cheapest row of `K` columns of a square matrix, which is never transposed.

@@ -43,7 +43,7 @@ fn open_roadmap(terminals: &[Point], starts: usize, nodes: usize, seed: u64) -> 
         starts: starts as u16,
         goals: (terminals.len() - starts) as u16,
     };
-    let mut bytes = std::vec![0; roadmap::encoded_len(points.len(), edges.len()).unwrap()];
+    let mut bytes = std::vec![0; roadmap::encoded_len(points.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &points, &edges, &mut bytes).unwrap();
     bytes
 }
@@ -134,7 +134,7 @@ fn corridor(length_m: f32, side_at_m: f32, depth_m: f32) -> StdVec<u8> {
         starts: 2,
         goals: 2,
     };
-    let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len()).unwrap()];
+    let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
     roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
     bytes
 }

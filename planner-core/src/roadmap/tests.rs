@@ -5,6 +5,7 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
+use crate::search::SearchWorkspace;
 
 pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {
     RoadmapHeader {
@@ -19,8 +20,15 @@ pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {
 }
 
 pub(crate) fn encode(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Vec<u8> {
-    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len()).unwrap()];
+    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), 0).unwrap()];
     assert_eq!(write(header, nodes, edges, &mut out), Ok(out.len()));
+    out
+}
+
+pub(crate) fn encode_with_landmarks(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Vec<u8> {
+    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS).unwrap()];
+    let mut ws = SearchWorkspace::<32>::new();
+    assert_eq!(write_with_landmarks(header, nodes, edges, &mut ws, &mut out), Ok(out.len()));
     out
 }
 
@@ -158,7 +166,7 @@ fn what_follows_the_roadmap_in_its_slot_is_ignored() {
 
 #[test]
 fn the_default_board_fits_its_slot() {
-    assert!(encoded_len(4096, 65536 / 2).unwrap() <= 384 * 1024);
+    assert!(encoded_len(4096, 65536 / 2, LANDMARKS).unwrap() <= 384 * 1024);
 }
 
 #[test]
@@ -194,4 +202,28 @@ fn the_order_of_edges_does_not_change_the_bytes() {
     let (nodes, edges) = small();
     let turned: Vec<_> = edges.iter().rev().map(|e| Edge { a: e.b, b: e.a, ..*e }).collect();
     assert_eq!(encode(&header(1, 1), &nodes, &edges), encode(&header(1, 1), &nodes, &turned));
+}
+
+#[test]
+fn ways_to_landmarks_are_written_and_checked() {
+    let (nodes, edges) = small();
+    let mut out = encode_with_landmarks(&header(1, 1), &nodes, &edges);
+    let view = RoadmapView::parse(&out).unwrap();
+    assert!(view.has_landmarks());
+    assert_eq!(view.byte_len(), out.len());
+    // Node 0, and node 1, five metres away; from there node 2 is reached through node 0.
+    let aside = 2.0f32.sqrt();
+    for (node, ways) in [(0, [0.0, 5.0]), (1, [5.0, 0.0]), (2, [aside, 5.0 + aside])] {
+        assert_eq!(view.ways_to_landmarks_m(node), ways, "node {node}");
+    }
+    let first = out.len() - 4 - 3 * LANDMARKS_LEN;
+    for wrong in [f32::NAN, f32::INFINITY, -1.0, 5.01] {
+        let mut changed = out.clone();
+        changed[first..first + 4].copy_from_slice(&wrong.to_le_bytes());
+        let refused = RoadmapView::parse(&sealed(changed)).map(|_| ());
+        assert!(matches!(refused, Err(RoadmapError::Landmark(_))), "{wrong}: {refused:?}");
+    }
+    let small =
+        write_with_landmarks(&header(1, 1), &nodes, &edges, &mut SearchWorkspace::<2>::new(), &mut out);
+    assert_eq!(small, Err(RoadmapError::WorkspaceTooSmall));
 }

@@ -1,10 +1,11 @@
 //! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
 
 use super::{
-    CRC, HEADER_LEN, MAGIC, MAX_NODES, NODE_LEN, RoadmapError, RoadmapHeader, VERSION, WORD_LEN, in_range,
-    target_of,
+    CRC, HEADER_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, NODE_LEN, RoadmapError, RoadmapHeader,
+    RoadmapView, VERSION, WORD_LEN, in_range, target_of,
 };
 use crate::Point;
+use crate::search::{SearchWorkspace, ways_from};
 
 /// An undirected edge to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,9 +19,11 @@ pub struct Edge {
     pub clearance_m: f32,
 }
 
-/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length.
-pub fn encoded_len(nodes: usize, edges: usize) -> Option<usize> {
-    let words = nodes.checked_mul(4)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
+/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `landmarks` is 0, or [`LANDMARKS`] for
+/// [`write_with_landmarks`].
+pub fn encoded_len(nodes: usize, edges: usize, landmarks: usize) -> Option<usize> {
+    let a_node = landmarks.checked_add(4)?;
+    let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
     let bytes = words.checked_mul(WORD_LEN)?.checked_add(HEADER_LEN)?;
     u32::try_from(bytes).ok().map(|_| bytes)
 }
@@ -35,26 +38,73 @@ pub fn write(
     edges: &[Edge],
     out: &mut [u8],
 ) -> Result<usize, RoadmapError> {
+    let out = write_graph(header, nodes, edges, 0, out)?;
+    Ok(seal(out))
+}
+
+/// As [`write`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
+/// where there are any, and the node farthest from it. Adds a search from each.
+pub fn write_with_landmarks<const N: usize>(
+    header: &RoadmapHeader,
+    nodes: &[Point],
+    edges: &[Edge],
+    ws: &mut SearchWorkspace<N>,
+    out: &mut [u8],
+) -> Result<usize, RoadmapError> {
+    let out = write_graph(header, nodes, edges, LANDMARKS, out)?;
+    let body = &mut out[HEADER_LEN..];
+    let (graph, rest) = body.split_at_mut(body.len() - WORD_LEN - nodes.len() * LANDMARKS_LEN);
+    let view = RoadmapView::over(*header, 0, graph, nodes.len(), 2 * edges.len());
+    let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
+    let mut landmark = 0;
+    for column in 0..LANDMARKS.min(nodes.len()) {
+        ways_from(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
+        let mut farthest_m = 0.0;
+        for (node, ways) in (0..).zip(ways.chunks_exact_mut(LANDMARKS)) {
+            let reached = Some(ws.distance_m(node)).filter(|way| way.is_finite());
+            let way_m = reached.unwrap_or(0.0);
+            ways[column] = way_m.to_le_bytes();
+            if way_m > farthest_m {
+                (landmark, farthest_m) = (node, way_m);
+            }
+        }
+    }
+    Ok(seal(out))
+}
+
+/// Everything but the ways to the landmarks and the CRC; the bytes of the whole roadmap are returned.
+fn write_graph<'a>(
+    header: &RoadmapHeader,
+    nodes: &[Point],
+    edges: &[Edge],
+    landmarks: usize,
+    out: &'a mut [u8],
+) -> Result<&'a mut [u8], RoadmapError> {
     if nodes.len() > MAX_NODES {
         return Err(RoadmapError::TooManyNodes);
     }
-    let needed = encoded_len(nodes.len(), edges.len()).ok_or(RoadmapError::Length)?;
+    let needed = encoded_len(nodes.len(), edges.len(), landmarks).ok_or(RoadmapError::Length)?;
     let out = out.get_mut(..needed).ok_or(RoadmapError::RoadmapFull { needed })?;
     header.check(nodes.len())?;
     check_edges(nodes, edges)?;
 
-    let (body, stored_crc) = out.split_at_mut(needed - WORD_LEN);
-    let (head, rest) = body.split_at_mut(HEADER_LEN);
-    write_header(header, nodes.len(), edges.len(), needed, head);
+    let (head, rest) = out.split_at_mut(HEADER_LEN);
+    write_header(header, [nodes.len(), 2 * edges.len(), landmarks], needed, head);
     let (node_bytes, rest) = rest.split_at_mut(nodes.len() * NODE_LEN);
     let scalars = nodes.iter().flat_map(|p| [p.x, p.y, p.z]);
     for (bytes, value) in node_bytes.as_chunks_mut::<4>().0.iter_mut().zip(scalars) {
         *bytes = value.to_le_bytes();
     }
-    let (offsets, half_edges) = rest.as_chunks_mut::<WORD_LEN>().0.split_at_mut(nodes.len() + 1);
-    write_rows(header, edges, offsets, half_edges)?;
-    stored_crc.copy_from_slice(&CRC.checksum(body).to_le_bytes());
-    Ok(needed)
+    let (offsets, rest) = rest.as_chunks_mut::<WORD_LEN>().0.split_at_mut(nodes.len() + 1);
+    write_rows(header, edges, offsets, &mut rest[..2 * edges.len()])?;
+    Ok(out)
+}
+
+/// Closes the roadmap with its CRC; its length.
+fn seal(out: &mut [u8]) -> usize {
+    let (body, crc) = out.split_at_mut(out.len() - WORD_LEN);
+    crc.copy_from_slice(&CRC.checksum(body).to_le_bytes());
+    out.len()
 }
 
 fn check_edges(nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
@@ -80,7 +130,8 @@ fn check_edges(nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
     Ok(())
 }
 
-fn write_header(header: &RoadmapHeader, nodes: usize, edges: usize, total: usize, head: &mut [u8]) {
+/// `counts` are those of nodes, half-edges and landmarks.
+fn write_header(header: &RoadmapHeader, counts: [usize; 3], total: usize, head: &mut [u8]) {
     let mut at = 0;
     let mut put = |bytes: &[u8]| {
         head[at..at + bytes.len()].copy_from_slice(bytes);
@@ -98,9 +149,9 @@ fn write_header(header: &RoadmapHeader, nodes: usize, edges: usize, total: usize
     }
     put(&header.starts.to_le_bytes());
     put(&header.goals.to_le_bytes());
-    put(&(nodes as u32).to_le_bytes());
-    put(&(2 * edges as u32).to_le_bytes());
-    put(&[0; 4]);
+    for count in counts {
+        put(&(count as u32).to_le_bytes());
+    }
 }
 
 /// Fills the compressed rows: the offsets first count the degrees, then serve as cursors, then are moved back by one.

@@ -7,7 +7,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::Point;
-use crate::roadmap::tests::{encode, header};
+use crate::roadmap::tests::{encode, encode_with_landmarks, header};
 use crate::roadmap::{Edge, RoadmapView};
 
 const CAPACITY: usize = 32;
@@ -50,6 +50,13 @@ fn brute_force(view: &RoadmapView<'_>, passable: impl Fn(u16, &HalfEdge) -> bool
     d
 }
 
+fn encode_either(nodes: &[Point], edges: &[Edge], landmarks: bool) -> StdVec<u8> {
+    match landmarks {
+        true => encode_with_landmarks(&header(1, 1), nodes, edges),
+        false => encode(&header(1, 1), nodes, edges),
+    }
+}
+
 /// The checker of paths: joins its ends over passable edges, visits no node twice, is as long as it says.
 fn check_path(view: &RoadmapView<'_>, path: &[u16], ends: (u16, u16), length: f32) {
     assert_eq!((path[0], path[path.len() - 1]), ends);
@@ -72,8 +79,8 @@ fn close(a: f64, b: f64) -> bool {
 
 proptest! {
     #[test]
-    fn astar_and_dijkstra_equal_brute_force((nodes, edges) in graphs()) {
-        let bytes = encode(&header(1, 1), &nodes, &edges);
+    fn astar_and_dijkstra_equal_brute_force((nodes, edges) in graphs(), landmarks: bool) {
+        let bytes = encode_either(&nodes, &edges, landmarks);
         let view = RoadmapView::parse(&bytes).unwrap();
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, REQUIRED_M);
         let expected = brute_force(&view, passable);
@@ -179,8 +186,9 @@ proptest! {
         picks in proptest::collection::vec(any::<u16>(), 1..9),
         split in any::<proptest::sample::Index>(),
         one_way in 0u16..4,
+        landmarks: bool,
     ) {
-        let bytes = encode(&header(1, 1), &nodes, &edges);
+        let bytes = encode_either(&nodes, &edges, landmarks);
         let view = RoadmapView::parse(&bytes).unwrap();
         let picks: StdVec<u16> = picks.iter().map(|pick| pick % nodes.len() as u16).collect();
         let (starts, goals) = picks.split_at(split.index(picks.len() + 1));

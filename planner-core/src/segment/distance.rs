@@ -227,15 +227,17 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
     let mut reach = 1.0_f32;
     loop {
         let tried = reach.min(limit);
-        let mut nearest = tried * tried;
+        // Beyond the sphere around a cell nothing of it is nearer.
+        let around = |reach: f32| (reach + CELL_RADIUS) * (reach + CELL_RADIUS) * (1.0 + 1e-5);
+        let (mut nearest, mut bound) = (tried * tried, around(tried));
         let mut found = false;
         let _ = segment.walk(grid, tried, |word, brick| {
             for low in corners(word, brick) {
-                let bound = libm::sqrtf(nearest) + CELL_RADIUS;
-                if segment.square_to_point(&low.add_scalar(0.5)) <= bound * bound * (1.0 + 1e-5) {
+                if segment.square_to_point(&low.add_scalar(0.5)) <= bound {
                     let square = segment.square_to_cell(&low);
                     if square <= nearest {
                         (nearest, found) = (square, true);
+                        bound = around(libm::sqrtf(nearest));
                     }
                 }
             }

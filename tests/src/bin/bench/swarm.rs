@@ -1,8 +1,8 @@
 //! The swarm simulation beside the clock: simulated seconds for each second on one core.
 //!
 //! In these rows "ours" is the time [`swarm::fly`] took, "theirs" the time that passed in it, and the ratio how many times
-//! faster than the clock it ran. The simulation is one thread, so this is one core, whatever the machine has. Planning is
-//! not in it; how long it took is printed. A flight that is not complete and clean is an error.
+//! faster than the clock it ran. The simulation is one thread, so this is one core, whatever the machine has. Planning
+//! and the map's distance field are not in it; how long they took is printed. A flight that is not complete and clean is an error.
 
 use std::path::Path;
 use std::time::Instant;
@@ -65,6 +65,7 @@ fn fly(text: &str, name: &str) -> Result<(f64, f64)> {
     let began = Instant::now();
     let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
     let plan = mission.plan()?;
+    mission.clearance_field();
     let planned_s = began.elapsed().as_secs_f64();
     let began = Instant::now();
     let flight = swarm::fly(&mission, &plan, "bench", false, &Progress::hidden())?;

@@ -1,4 +1,4 @@
-//! The cases: maps of corridors and open halls, and who swaps places with whom.
+//! The meetings: maps of corridors and open halls, who swaps places with whom, and the disturbances each is flown under.
 
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
@@ -9,81 +9,101 @@ use host_sim::map::{Occupancy, OccupancyMap, bt};
 use planner_core::Point;
 use planner_core::voxel::GridShape;
 
-/// Nominal speed, m/s.
-pub const CRUISE_MPS: f32 = 2.0;
+const CRUISE_MPS: f32 = 2.0;
 const RESOLUTION_M: f32 = 0.25;
 /// Height of starts and goals over the floor's top, metres.
 const HEIGHT_M: f32 = 1.5;
+/// The gusts of every case.
+const GUSTS: &str = "gust_mps = 3.0\n";
 
-/// One case.
-pub struct Case {
-    /// Its name in the table.
-    pub name: String,
+/// A map and who flies on it: planned once a seed, flown once for each disturbance and method.
+pub struct Meeting {
+    /// What is flown, one row of the table each: the name, and more lines of `[simulation]`.
+    pub cases: Vec<(&'static str, &'static str)>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
+    /// Stand on their pads all the time.
+    parked: Vec<Point>,
     nodes: usize,
+    edge_max_m: f32,
     safety_distance_m: f32,
-    safety_margin_m: f32,
-    /// Lines of `[simulation]`.
-    simulation: &'static str,
+    time_limit_s: f32,
 }
 
-impl Case {
-    /// The scenario's text.
-    pub fn scenario(&self, method: &str, seed: u64) -> String {
+impl Meeting {
+    /// The scenario's text, flown with `method` under the disturbances of one case.
+    pub fn scenario(&self, method: &str, simulation: &str, seed: u64) -> String {
         let mut text =
             format!("seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {RESOLUTION_M}\n", self.map);
         let goals: Vec<String> =
             self.vehicles.iter().map(|(_, g)| format!("[{:.3}, {:.3}, {:.3}]", g.x, g.y, g.z)).collect();
         let _ = write!(
             text,
-            "[roadmap]\nnodes = {}\nedge_min_m = 0.3\nedge_max_m = 6.0\nsafety_margin_m = {}\n\
+            "[roadmap]\nnodes = {}\nedge_min_m = 0.3\nedge_max_m = {}\nsafety_margin_m = 0.5\n\
              [mission]\nmode = \"labelled\"\ncruise_mps = {CRUISE_MPS}\ngoals = [{}]\n\
              [deconfliction]\nmethod = {method:?}\nsafety_distance_m = {}\n\
-             [simulation]\ntime_limit_s = 400.0\n{}\n",
+             [simulation]\ntime_limit_s = {}\n{simulation}\n",
             self.nodes,
-            self.safety_margin_m,
+            self.edge_max_m,
             goals.join(", "),
             self.safety_distance_m,
-            self.simulation
+            self.time_limit_s,
         );
-        for (i, (start, _)) in self.vehicles.iter().enumerate() {
+        let starts = self.vehicles.iter().map(|(start, _)| start).chain(&self.parked);
+        for (i, start) in starts.enumerate() {
+            let [x, y, z] = (*start).into();
             let _ = write!(
                 text,
-                "[[vehicles]]\nid = {}\nstart = [{:.3}, {:.3}, {:.3}]\nradius_m = 0.3\ngoal = {i}\n",
-                i + 1,
-                start.x,
-                start.y,
-                start.z
+                "[[vehicles]]\nid = {}\nstart = [{x:.3}, {y:.3}, {z:.3}]\nradius_m = 0.3\n",
+                i + 1
             );
+            if i < self.vehicles.len() {
+                let _ = writeln!(text, "goal = {i}");
+            }
         }
         text
     }
 }
 
-/// All cases; maps go to `dir`.
-pub fn all(dir: &Path) -> Result<Vec<Case>> {
-    let gusts = "gust_mps = 3.0";
-    let lossy = "gust_mps = 3.0\nradio_loss = 0.3";
-    let late = "gust_mps = 3.0\nradio_delay_s = 0.3";
-    let corridor = corridor(dir)?;
-    let crossing = crossing(dir)?;
-    let small_hall = hall(dir, 24.0, "hall.bt")?;
-    let field = hall(dir, 66.0, "field.bt")?;
+/// Every case comes calm but for the gusts, with radio losses and with late radio.
+const THREE: [&str; 3] =
+    [GUSTS, "gust_mps = 3.0\nradio_loss = 0.3\n", "gust_mps = 3.0\nradio_delay_s = 0.3\n"];
+
+fn three(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
+    names.into_iter().zip(THREE).collect()
+}
+
+/// What most meetings have in common; no map and nobody yet.
+fn indoors() -> Meeting {
+    Meeting {
+        cases: Vec::new(),
+        map: PathBuf::new(),
+        vehicles: Vec::new(),
+        parked: Vec::new(),
+        nodes: 250,
+        edge_max_m: 5.0,
+        safety_distance_m: 1.5,
+        time_limit_s: 400.0,
+    }
+}
+
+/// All meetings; maps go to `dir`.
+pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     let z = RESOLUTION_M + HEIGHT_M;
     let ends = [Point::new(1.5, 2.0, z), Point::new(28.5, 2.0, z)];
-    let swap = vec![(ends[0], ends[1]), (ends[1], ends[0])];
-    let arm = |i: usize, along: f32| {
-        // Twice per arm, at two distances from the middle of the crossing at (15, 15).
-        let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][i % 4];
-        Point::new(15.0 + x * along, 15.0 + y * along, z)
+    let corridor = Meeting {
+        cases: three(["corridor, head-on", "corridor, 30 % radio loss", "corridor, 300 ms radio delay"]),
+        map: corridor(dir)?,
+        vehicles: vec![(ends[0], ends[1]), (ends[1], ends[0])],
+        ..indoors()
     };
-    let cross = (0..8)
-        .map(|i| {
-            let along = if i < 4 { 13.0 } else { 9.5 };
-            (arm(i, along), arm(i + 2, along))
-        })
-        .collect::<Vec<_>>();
+    let crossing = Meeting {
+        cases: three(["crossing, 8", "crossing, 30 % radio loss", "crossing, 300 ms radio delay"]),
+        map: crossing(dir)?,
+        vehicles: crossing_vehicles(z),
+        nodes: 400,
+        ..indoors()
+    };
     let circle = |count: usize, radius_m: f32, middle_m: f32| {
         let place = move |i: usize| {
             let angle = i as f32 * TAU / count as f32;
@@ -91,28 +111,38 @@ pub fn all(dir: &Path) -> Result<Vec<Case>> {
         };
         (0..count).map(|i| (place(i), place(i + count / 2))).collect::<Vec<_>>()
     };
-    let case = |name: &str, map: &PathBuf, vehicles: &[(Point, Point)], nodes, simulation| Case {
-        name: name.to_owned(),
-        map: map.clone(),
-        vehicles: vehicles.to_vec(),
-        nodes,
-        safety_distance_m: 1.5,
-        safety_margin_m: 0.5,
-        simulation,
+    let twenty = Meeting {
+        cases: three(["circle, 20", "circle, 30 % radio loss", "circle, 300 ms radio delay"]),
+        map: hall(dir, 24.0, "hall.bt")?,
+        vehicles: circle(20, 20.0, 24.0),
+        nodes: 700,
+        ..indoors()
     };
-    let twenty = circle(20, 20.0, 24.0);
-    let mut cases = vec![
-        case("head-on, corridor, side room", &corridor, &swap, 300, gusts),
-        case("crossing of four corridors, 8", &crossing, &cross, 600, gusts),
-        case("circle of 20 m, 20 swap", &small_hall, &twenty, 1500, gusts),
-        case("circle, 30 % radio loss", &small_hall, &twenty, 1500, lossy),
-        case("circle, 300 ms radio delay", &small_hall, &twenty, 1500, late),
-        case("corridor, 30 % radio loss", &corridor, &swap, 300, lossy),
-        case("corridor, 300 ms radio delay", &corridor, &swap, 300, late),
-    ];
-    let hundred = case("circle of 60 m, 100 swap at 3 m", &field, &circle(100, 60.0, 66.0), 3000, gusts);
-    cases.push(Case { safety_distance_m: 3.0, ..hundred });
-    Ok(cases)
+    let hundred = Meeting {
+        cases: vec![("circle, 100, 3 m apart", GUSTS)],
+        map: hall(dir, 66.0, "field.bt")?,
+        vehicles: circle(100, 60.0, 66.0),
+        nodes: 2000,
+        edge_max_m: 8.0,
+        safety_distance_m: 3.0,
+        time_limit_s: 900.0,
+        ..indoors()
+    };
+    Ok(vec![corridor, crossing, twenty, hundred])
+}
+
+/// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
+/// Whoever stands in front crosses straight to the far goal, whoever stands behind turns left to the near one: so
+/// everybody crosses the way of everybody else from another arm.
+fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
+    let place = |arm: usize, along: f32, left: f32| {
+        let (x, y) = [(1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0)][arm % 4];
+        Point::new(15.0 + x * along - y * left, 15.0 + y * along + x * left, z)
+    };
+    let (far, near, aside) = (13.0, 9.5, 1.0);
+    let front = (0..4).map(|arm| (place(arm, near, -aside), place(arm + 2, far, aside)));
+    let behind = (0..4).map(|arm| (place(arm, far, -aside), place(arm + 1, near, aside)));
+    front.chain(behind).collect()
 }
 
 /// A map of `size`, solid but for what `free` says of cell centres; its floor is one cell thick.

@@ -1,21 +1,29 @@
 //! The deconfliction suite: meetings that are hard, flown over many seeds with each method. Prints one line per case and
 //! method; `cargo xtask bench --only deconfliction` runs it.
 //!
-//! Every case is a map made here, written as OctoMap and read back like any other, and a scenario's text, so that each can
-//! be flown again alone.
+//! Every meeting is a map made here, written as OctoMap and read back like any other, and a scenario's text, so that each
+//! can be flown again alone. A meeting is planned once a seed; every case of it and both methods fly that plan.
 
 mod cases;
 
 use std::path::Path;
+use std::time::Instant;
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use host_sim::mission::Mission;
+use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
+use host_sim::report::Level;
 use host_sim::result::MissionResult;
 use host_sim::{scenario, swarm};
 use rayon::prelude::*;
 use serde::Serialize;
+
+use cases::Meeting;
+
+const METHODS: [&str; 2] = ["priority", "algorithm2"];
+/// A separation at which nobody is in anybody's way, metres.
+const ALONE_M: f32 = 1e-3;
 
 #[derive(Parser)]
 #[command(about = "Hard meetings of vehicles, flown over many seeds")]
@@ -23,21 +31,24 @@ struct Args {
     /// Seeds flown of each case.
     #[arg(long, value_name = "N", default_value_t = 100)]
     seeds: u64,
+    /// The first seed.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    first: u64,
     /// Only the cases whose name contains this.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<std::path::PathBuf>,
-    /// Keep the maps and scenarios in this directory.
+    /// Keep the maps and the scenarios that went wrong in this directory.
     #[arg(long, value_name = "DIR")]
     keep: Option<std::path::PathBuf>,
 }
 
 /// What one method did in one case, over all seeds.
-#[derive(Debug, Default, Serialize)]
+#[derive(Clone, Debug, Serialize)]
 struct Row {
-    name: String,
+    name: &'static str,
     method: &'static str,
     seeds: u64,
     /// Missions that ended complete and clean.
@@ -49,8 +60,15 @@ struct Row {
     deadlocks: u32,
     /// Smallest separation seen, metres.
     min_separation_m: f64,
-    /// Mean share by which flights take longer than the same paths flown at the nominal speed.
-    extra_time: f64,
+    /// Mean share by which flights, from take-off to landing, take longer than alone.
+    extra_flight: f64,
+    /// Mean share by which the last landing is later than if everybody flew alone, all at once.
+    extra_makespan: f64,
+    /// What went wrong: seed, seconds, vehicle and what.
+    #[serde(skip)]
+    incidents: Vec<String>,
+    #[serde(skip)]
+    flights: u32,
 }
 
 fn main() -> Result<()> {
@@ -59,15 +77,19 @@ fn main() -> Result<()> {
     let dir = args.keep.as_deref().unwrap_or(scratch.path());
     std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     println!(
-        "{:34} {:10} {:>9} {:>9} {:>10} {:>9} {:>9} {:>8} {:>7}",
-        "case", "method", "complete", "unplanned", "violations", "contacts", "deadlocks", "nearest", "extra"
+        "{:30} {:10} {:>9} {:>9} {:>10} {:>8} {:>9} {:>9} {:>7} {:>8}",
+        "case", "method", "complete", "unplanned", "violations", "contacts", "deadlocks", "nearest", "flight", "makespan"
     );
     let mut rows = Vec::new();
-    for case in cases::all(dir)?.iter().filter(|case| case.name.contains(&args.only)) {
-        for method in ["priority", "algorithm2"] {
-            let row = fly_all(case, method, args.seeds, dir)?;
+    for mut meeting in cases::all(dir)? {
+        meeting.cases.retain(|(name, _)| name.contains(&args.only));
+        if meeting.cases.is_empty() {
+            continue;
+        }
+        let began = Instant::now();
+        for row in fly_all(&meeting, &args, dir)? {
             println!(
-                "{:34} {:10} {:>5}/{:<3} {:>9} {:>10} {:>9} {:>9} {:>6.2} m {:>5.0} %",
+                "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7.2} m {:>5.0} % {:>6.0} %",
                 row.name,
                 row.method,
                 row.complete,
@@ -77,10 +99,15 @@ fn main() -> Result<()> {
                 row.wall_contacts,
                 row.deadlocks,
                 row.min_separation_m,
-                row.extra_time * 100.0
+                row.extra_flight * 100.0,
+                row.extra_makespan * 100.0,
             );
+            if row.method == METHODS[0] {
+                row.incidents.iter().for_each(|incident| println!("    {incident}"));
+            }
             rows.push(row);
         }
+        println!("    {:.0} s", began.elapsed().as_secs_f64());
     }
     if let Some(out) = &args.out {
         std::fs::write(out, serde_json::to_string_pretty(&rows)?)
@@ -89,40 +116,112 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn fly_all(case: &cases::Case, method: &'static str, seeds: u64, dir: &Path) -> Result<Row> {
-    let flown: Vec<Option<MissionResult>> = (1..=seeds)
-        .into_par_iter()
-        .map(|seed| fly(&case.scenario(method, seed), dir))
-        .collect::<Result<_>>()?;
-    let mut row =
-        Row { name: case.name.clone(), method, seeds, min_separation_m: f64::INFINITY, ..Row::default() };
-    let (mut extra, mut flights) = (0.0, 0);
-    for result in &flown {
-        let Some(result) = result else {
-            row.unplanned += 1;
-            continue;
-        };
-        row.complete += u64::from(result.complete);
-        row.violations += result.safety.violations;
-        row.wall_contacts += result.safety.wall_contacts;
-        row.deadlocks += result.safety.deadlocks;
-        row.min_separation_m =
-            row.min_separation_m.min(result.safety.min_separation_m.unwrap_or(f64::INFINITY));
-        for vehicle in result.vehicles.iter().filter(|v| v.landed && v.path_m > 0.0) {
-            // Two metres up, two metres down at 1 m/s, the path at the nominal speed.
-            extra += vehicle.flight_time_s / (vehicle.path_m / f64::from(cases::CRUISE_MPS) + 4.0) - 1.0;
-            flights += 1;
-        }
+/// The rows of a meeting: its cases, each with both methods.
+fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
+    let seeds: Vec<u64> = (args.first..args.first + args.seeds).collect();
+    let flown: Vec<Vec<Row>> =
+        seeds.into_par_iter().map(|seed| fly_seed(meeting, seed, dir)).collect::<Result<_>>()?;
+    let mut sums = rows(meeting);
+    for (sum, row) in flown.into_iter().flat_map(|rows| rows.into_iter().enumerate()) {
+        let sum = &mut sums[sum];
+        sum.seeds += row.seeds;
+        sum.complete += row.complete;
+        sum.unplanned += row.unplanned;
+        sum.violations += row.violations;
+        sum.wall_contacts += row.wall_contacts;
+        sum.deadlocks += row.deadlocks;
+        sum.min_separation_m = sum.min_separation_m.min(row.min_separation_m);
+        sum.extra_flight += row.extra_flight;
+        sum.extra_makespan += row.extra_makespan;
+        sum.flights += row.flights;
+        sum.incidents.extend(row.incidents);
     }
-    row.extra_time = extra / f64::from(flights.max(1));
-    Ok(row)
+    for sum in &mut sums {
+        sum.extra_flight /= f64::from(sum.flights.max(1));
+        sum.extra_makespan /= (sum.seeds - sum.unplanned).max(1) as f64;
+    }
+    Ok(sums)
 }
 
-/// Flies one mission; `None` if it cannot be planned.
-fn fly(text: &str, dir: &Path) -> Result<Option<MissionResult>> {
+/// Rows without a seed.
+fn rows(meeting: &Meeting) -> Vec<Row> {
+    let row = |name, method| Row {
+        name,
+        method,
+        seeds: 0,
+        complete: 0,
+        unplanned: 0,
+        violations: 0,
+        wall_contacts: 0,
+        deadlocks: 0,
+        min_separation_m: f64::INFINITY,
+        extra_flight: 0.0,
+        extra_makespan: 0.0,
+        incidents: Vec::new(),
+        flights: 0,
+    };
+    meeting.cases.iter().flat_map(|&(name, _)| METHODS.map(|method| row(name, method))).collect()
+}
+
+/// All cases of a meeting with one seed.
+fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
+    let mut rows = rows(meeting);
+    rows.iter_mut().for_each(|row| row.seeds = 1);
+    let mut mission = Mission::prepare(parsed(meeting, "off", "", seed, dir)?, &Progress::hidden())?;
+    let plan = match mission.plan() {
+        Ok(plan) => plan,
+        Err(error) => {
+            for row in &mut rows {
+                row.unplanned = 1;
+                row.incidents = vec![format!("seed {seed}: {error}")];
+            }
+            return Ok(rows);
+        }
+    };
+    let apart = mission.schedule;
+    (mission.schedule.separation_m, mission.schedule.parked_separation_m) = (ALONE_M, ALONE_M);
+    let shortest = mission.plan()?;
+    let alone = fly(&mission, &shortest)?.result;
+    mission.schedule = apart;
+    let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
+    for (row, (&(_, simulation), method)) in rows.iter_mut().zip(cases) {
+        mission.scenario = parsed(meeting, method, simulation, seed, dir)?;
+        let flight = fly(&mission, &plan)?;
+        count(row, &flight.result, &alone);
+        let errors = flight.log.iter().filter(|event| event.level == Level::Error);
+        row.incidents
+            .extend(errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)));
+    }
+    Ok(rows)
+}
+
+fn parsed(
+    meeting: &Meeting,
+    method: &str,
+    simulation: &str,
+    seed: u64,
+    dir: &Path,
+) -> Result<scenario::Scenario> {
     // Map files are named by their whole path, so the name only serves errors.
-    let scenario = scenario::parse(text, &dir.join("case.toml").display().to_string())?;
-    let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
-    let Ok(plan) = mission.plan() else { return Ok(None) };
-    Ok(Some(swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())?.result))
+    let name = dir.join("case.toml").display().to_string();
+    Ok(scenario::parse(&meeting.scenario(method, simulation, seed), &name)?)
+}
+
+fn fly(mission: &Mission, plan: &SwarmPlan) -> Result<swarm::Flight> {
+    swarm::fly(mission, plan, "fly", false, &Progress::hidden())
+}
+
+fn count(row: &mut Row, result: &MissionResult, alone: &MissionResult) {
+    row.complete = u64::from(result.complete);
+    row.violations = result.safety.violations;
+    row.wall_contacts = result.safety.wall_contacts;
+    row.deadlocks = result.safety.deadlocks;
+    row.min_separation_m = result.safety.min_separation_m.unwrap_or(f64::INFINITY);
+    row.extra_makespan = result.totals.makespan_s / alone.totals.makespan_s - 1.0;
+    for (vehicle, alone) in result.vehicles.iter().zip(&alone.vehicles) {
+        if vehicle.landed && alone.landed {
+            row.extra_flight += vehicle.flight_time_s / alone.flight_time_s - 1.0;
+            row.flights += 1;
+        }
+    }
 }
