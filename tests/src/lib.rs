@@ -2,8 +2,10 @@
 
 pub mod logs;
 
+use std::io::{BufRead, BufReader};
+use std::net::UdpSocket;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus};
+use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -79,6 +81,37 @@ impl Drop for Guard {
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
+}
+
+/// Starts `host-sim autopilot` on these links; it tells the address each got, `127.0.0.1:PORT` or a path.
+///
+/// # Panics
+/// It does not start.
+pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
+    let mut command = Command::new(host_sim(Profile::Debug));
+    command.arg("autopilot").args(options).stdout(Stdio::piped());
+    for url in listen {
+        command.args(["--listen", url]);
+    }
+    let mut child = command.spawn().expect("host-sim starts");
+    let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
+    let guard = Guard(child);
+    let address = |line: std::io::Result<String>| {
+        let line = line.expect("it prints a line for each link");
+        let url = line.strip_prefix("listening ").unwrap_or_else(|| panic!("no link in {line:?}"));
+        url.split_once(':').map_or(url, |(_, address)| address).to_owned()
+    };
+    let addresses: Vec<_> = lines.take(listen.len()).map(address).collect();
+    assert_eq!(addresses.len(), listen.len(), "not every link was opened");
+    (guard, addresses)
+}
+
+/// A UDP port that nobody has now.
+///
+/// # Panics
+/// There is none.
+pub fn free_udp_port() -> u16 {
+    UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port").port()
 }
 
 /// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a line that says so.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::{Guard, Profile, host_sim, shared_data, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, host_sim, shared_data, workspace};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -83,25 +83,14 @@ fn four_vehicles_fly_the_manufacturing_hall() {
 
 #[test]
 fn companion_and_autopilot_fly_in_two_processes() {
-    let program = host_sim(Profile::Debug);
     let path = scenario_path("host-sim/scenarios/demo.toml");
     let mission = Mission::prepare(scenario::load(&path).expect("the scenario is good"), &Progress::hidden())
         .expect("the mission can be prepared");
     let pad = mission.pad(mission.index_of(7).expect("the demo has a vehicle 7"));
     let home = format!("{:.8},{:.8},{:.3}", pad.lat_deg, pad.lon_deg, pad.alt_m);
-    let autopilot = Command::new(&program)
-        .args(["autopilot", "--listen", "udp-listen:127.0.0.1:0", "--sysid", "7", "--home", &home])
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("the autopilot starts");
-    let mut autopilot = Guard(autopilot);
-    let mut line = String::new();
-    let output = autopilot.0.stdout.take().expect("stdout is piped");
-    std::io::BufRead::read_line(&mut std::io::BufReader::new(output), &mut line)
-        .expect("it says where it listens");
-    let port = line.trim().rsplit_once(':').map(|(_, port)| port).expect("the address ends with the port");
-    let companion = Command::new(&program)
-        .args(["companion", "--autopilot", &format!("udp:127.0.0.1:{port}"), "--id", "7", "--start"])
+    let (_autopilot, addresses) = autopilot(&["udp-listen:127.0.0.1:0"], &["--sysid", "7", "--home", &home]);
+    let companion = Command::new(host_sim(Profile::Debug))
+        .args(["companion", "--autopilot", &format!("udp:{}", addresses[0]), "--id", "7", "--start"])
         .arg(&path)
         .stdout(Stdio::null())
         .spawn()

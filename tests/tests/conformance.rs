@@ -4,32 +4,14 @@
 //! (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights are in real time: half a minute each.
 
 use std::io::{BufRead, BufReader};
-use std::net::UdpSocket;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::{Guard, Profile, host_sim, python, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, python, workspace};
 
-const TIME_LIMIT: Duration = Duration::from_secs(120);
+const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
 const ARDUPILOT: &[&str] = &["--personality", "ardupilot", "--ready-after", "5"];
-
-/// Starts the autopilot on `listen`; its first line tells the address it got.
-fn autopilot(listen: &str, options: &[&str]) -> (Guard, String) {
-    let mut child = Command::new(host_sim(Profile::Debug))
-        .args(["autopilot", "--listen", listen])
-        .args(options)
-        .stdout(Stdio::piped())
-        .spawn()
-        .expect("host-sim starts");
-    let mut line = String::new();
-    BufReader::new(child.stdout.take().expect("stdout is piped"))
-        .read_line(&mut line)
-        .expect("it prints a line");
-    let guard = Guard(child);
-    let address = line.trim().rsplit_once("127.0.0.1:").map(|(_, port)| format!("127.0.0.1:{port}"));
-    (guard, address.unwrap_or_else(|| panic!("no address in {line:?}")))
-}
 
 /// Runs a script to its end and shows what it printed if it fails.
 fn run(python: &str, script: &str, arguments: &[&str]) {
@@ -55,16 +37,15 @@ fn run(python: &str, script: &str, arguments: &[&str]) {
 /// Runs a pymavlink script against an autopilot that listens.
 fn pymavlink(script: &str, scheme: &str, listen: &str, options: &[&str]) {
     let Some(python) = python() else { return };
-    let (_autopilot, address) = autopilot(listen, options);
-    run(&python, script, &[&format!("{scheme}:{address}")]);
+    let (_autopilot, addresses) = autopilot(&[listen], options);
+    run(&python, script, &[&format!("{scheme}:{}", addresses[0])]);
 }
 
 /// Runs a MAVSDK script: it listens and the autopilot speaks first, as PX4's SITL does on 14540.
 fn mavsdk(script: &str, arguments: &[&str], options: &[&str]) {
     let Some(python) = python() else { return };
-    let port =
-        UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port").port();
-    let (_autopilot, address) = autopilot(&format!("udp:127.0.0.1:{port}"), options);
+    let address = format!("127.0.0.1:{}", free_udp_port());
+    let _autopilot = autopilot(&[&format!("udp:{address}")], options);
     run(&python, script, &[&[format!("udpin://{address}").as_str()], arguments].concat());
 }
 
@@ -101,4 +82,20 @@ fn mavsdk_uses_the_simulated_px4s_parameters_and_missions() {
 #[test]
 fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
     mavsdk("mavsdk_services.py", &["FS_GCS_TIMEOUT", "FS_GCS_ENABLE"], ARDUPILOT);
+}
+
+#[test]
+fn pymavlink_watches_the_swarm_and_talks_to_each_vehicle() {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("a directory");
+    let address = format!("udp:127.0.0.1:{}", free_udp_port());
+    let fly = Command::new(host_sim(Profile::Debug))
+        .arg("fly")
+        .arg(workspace().join("host-sim/scenarios/demo.toml"))
+        .args(["--qgc", &address, "--out"])
+        .arg(out.path())
+        .spawn()
+        .expect("host-sim starts");
+    let _fly = Guard(fly);
+    run(&python, "ground_station.py", &[&address.replace("udp:", "udpin:")]);
 }

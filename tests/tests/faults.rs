@@ -230,7 +230,7 @@ fn a_struck_flight_is_the_same_each_time() {
     mission.scenario.simulation.serial_corruption = 1e-4;
     mission.scenario.simulation.radio_loss = 0.1;
     let some = CASES.iter().filter(|case| !case.on_ground()).step_by(2);
-    mission.scenario.faults = some.zip(1..).flat_map(|(case, id)| case.faults(12.0, id, &plan)).collect();
+    mission.scenario.faults = some.zip(1..=10).flat_map(|(case, id)| case.faults(12.0, id, &plan)).collect();
     let once = || {
         let flight = fly(&mission, &plan);
         let log: Vec<_> = flight.log.iter().map(|e| (e.t_s, e.vehicle, e.text.clone())).collect();

@@ -84,6 +84,7 @@ impl Body {
         let projection = config.personality.projection();
         let frame = LocalFrame::new(projection, config.world_origin, config.ekf_origin, start);
         let ports = (0..config.ports.max(1)).map(|_| Port::new(config.system_id, streams));
+        let ground = config.ground_port.then(|| Port::for_ground(config.system_id, streams));
         let home = config.home.unwrap_or_else(|| frame.geodetic(&start));
         Self {
             time_us: 0,
@@ -101,7 +102,7 @@ impl Body {
             home_fixed: config.home.is_some(),
             height: 0.0,
             demand: None,
-            ports: ports.collect(),
+            ports: ports.chain(ground).collect(),
             missions: Missions::default(),
             reboot_us: None,
             vehicle,

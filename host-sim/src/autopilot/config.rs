@@ -67,6 +67,8 @@ pub struct Config {
     pub estimator_ready_s: f32,
     /// MAVLink ports, at least one, each with its own stream settings.
     pub ports: usize,
+    /// Whether it has one more port, with a ground station's rates.
+    pub ground_port: bool,
 }
 
 impl Default for Config {
@@ -90,6 +92,7 @@ impl Default for Config {
             boot_unix_us: 1_767_225_600_000_000,
             estimator_ready_s: 40.0,
             ports: 1,
+            ground_port: false,
         }
     }
 }

@@ -135,6 +135,29 @@ impl Autopilot {
         self.body.ports.get_mut(port).map_or(0, |port| port.poll_transmit(out))
     }
 
+    /// Adds the port for a ground station, which comes after the others and stays through a reboot.
+    pub fn add_ground_port(&mut self) {
+        let config = &mut self.body.config;
+        if !config.ground_port {
+            config.ground_port = true;
+            let streams = Firmware::streams(config.personality);
+            self.body.ports.push(Port::for_ground(config.system_id, streams));
+        }
+    }
+
+    /// Takes bytes that arrived at the port for a ground station, if there is one.
+    pub fn handle_ground_bytes(&mut self, bytes: &[u8]) {
+        if self.body.config.ground_port {
+            self.handle_bytes_on(self.body.ports.len() - 1, bytes);
+        }
+    }
+
+    /// As [`Autopilot::poll_transmit`], of the port for a ground station.
+    pub fn poll_ground_transmit(&mut self, out: &mut [u8]) -> usize {
+        let last = self.body.ports.len() - 1;
+        if self.body.config.ground_port { self.poll_transmit_from(last, out) } else { 0 }
+    }
+
     /// Advances time by `dt_s` (0.004) over ground at `ground_up_m` below the vehicle, in the mission frame.
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
         self.body.advance_time(dt_s, ground_up_m);

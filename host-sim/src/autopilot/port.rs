@@ -8,6 +8,20 @@ use mavlink::MessageData;
 pub const AUTOPILOT_COMPONENT: u8 = 1;
 /// Telemetry is dropped while more than this waits to be sent, as PX4 drops it when its buffer is full; bytes.
 const TELEMETRY_QUEUE: usize = 4096;
+/// Rates of the port for a ground station: message id and interval in µs. A real one asks for about these itself.
+pub const GROUND_STREAMS: [(u32, u32); 11] = [
+    (0, 1_000_000),   // HEARTBEAT
+    (1, 1_000_000),   // SYS_STATUS
+    (24, 1_000_000),  // GPS_RAW_INT
+    (30, 100_000),    // ATTITUDE
+    (32, 200_000),    // LOCAL_POSITION_NED
+    (33, 200_000),    // GLOBAL_POSITION_INT
+    (74, 250_000),    // VFR_HUD
+    (141, 250_000),   // ALTITUDE
+    (147, 2_000_000), // BATTERY_STATUS
+    (242, 2_000_000), // HOME_POSITION
+    (245, 500_000),   // EXTENDED_SYS_STATE
+];
 /// Nothing is queued beyond this, bytes: a port that nobody drains does not grow.
 const QUEUE: usize = 65_536;
 
@@ -83,6 +97,13 @@ impl Port {
             param_cursor: None,
             pings: 0,
         }
+    }
+
+    /// A port with the same messages at a ground station's rates.
+    pub fn for_ground(system_id: u8, streams: &[(u32, u32)]) -> Self {
+        let rate = |id| GROUND_STREAMS.iter().find(|ground| ground.0 == id).map_or(0, |ground| ground.1);
+        let streams: Vec<_> = streams.iter().map(|&(id, _)| (id, rate(id))).collect();
+        Self::new(system_id, &streams)
     }
 
     /// Frames that came in so far, good and bad.

@@ -24,7 +24,8 @@ const DATAGRAM: usize = 1400;
 /// Arguments of `host-sim autopilot`.
 #[derive(Args, Clone, Debug)]
 pub struct AutopilotArgs {
-    /// Link to serve: tcp:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT or udp-listen:HOST:PORT; may be repeated
+    /// Link to serve: tcp:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT, udp-listen:HOST:PORT or serial:PATH:BAUD; may
+    /// be repeated
     #[arg(long, value_name = "URL", required = true)]
     pub listen: Vec<LinkUrl>,
     /// Which autopilot to be

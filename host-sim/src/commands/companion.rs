@@ -23,7 +23,8 @@ use crate::swarm::{companion_config, new_companion};
 pub struct Args {
     /// The mission of the whole swarm
     scenario: PathBuf,
-    /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT or tcp-listen:HOST:PORT
+    /// Link to the autopilot: udp:HOST:PORT, udp-listen:HOST:PORT, tcp:HOST:PORT, tcp-listen:HOST:PORT or
+    /// serial:PATH:BAUD
     #[arg(long, value_name = "URL")]
     autopilot: LinkUrl,
     /// Link to the other companions; without it this vehicle flies as the only one

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::Context;
 
 use super::load;
+use crate::link::LinkUrl;
 use crate::mission::Mission;
 use crate::output;
 use crate::progress::Progress;
@@ -14,6 +15,7 @@ use crate::report::Level;
 use crate::say;
 use crate::scenario::{self, Scenario};
 use crate::swarm;
+use crate::swarm::gateway::Gateway;
 
 /// The demo's scenario, in the program itself: nothing to find on the machine.
 const DEMO: &str = include_str!("../../scenarios/demo.toml");
@@ -29,6 +31,9 @@ pub struct FlyArgs {
     /// Fly at the speed of the clock instead of as fast as it goes
     #[arg(long)]
     realtime: bool,
+    /// Show the swarm to a ground station behind this link, at the speed of the clock: udp:HOST:14550 for QGroundControl
+    #[arg(long, value_name = "URL")]
+    qgc: Option<LinkUrl>,
     /// Take this seed instead of the scenario's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -47,7 +52,7 @@ pub struct DemoArgs {
 /// # Errors
 /// Bad input, by name and place.
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
-    plan_and_fly(load(&args.scenario, args.seed)?, "fly", &args.out, args.realtime)
+    plan_and_fly(load(&args.scenario, args.seed)?, "fly", &args.out, args.realtime, args.qgc.as_ref())
 }
 
 /// Runs `demo`.
@@ -56,7 +61,7 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
 /// The output cannot be written.
 pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let scenario = scenario::parse(DEMO, "demo.toml").context("the demo's own scenario")?;
-    plan_and_fly(scenario, "demo", &args.out, false)
+    plan_and_fly(scenario, "demo", &args.out, false, None)
 }
 
 fn plan_and_fly(
@@ -64,12 +69,17 @@ fn plan_and_fly(
     command: &'static str,
     out: &Path,
     realtime: bool,
+    qgc: Option<&LinkUrl>,
 ) -> anyhow::Result<ExitCode> {
+    let gateway = qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
-    let flight = swarm::fly(&mission, &plan, command, realtime, &progress)?;
+    let flight = match gateway {
+        Some(gateway) => swarm::fly_shown(&mission, &plan, command, gateway, &progress)?,
+        None => swarm::fly(&mission, &plan, command, realtime, &progress)?,
+    };
     let page = output::flown_page(&mission, &plan, &flight)?;
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();

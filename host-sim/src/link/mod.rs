@@ -1,4 +1,4 @@
-//! Byte links between processes: URLs, and nonblocking TCP and UDP behind one small trait.
+//! Byte links between processes and devices: URLs, and nonblocking TCP, UDP and serial ports behind one small trait.
 //!
 //! | URL | is |
 //! |---|---|
@@ -6,10 +6,14 @@
 //! | `tcp-listen:HOST:PORT` | a TCP server of one client at a time; a new client replaces the old |
 //! | `udp:HOST:PORT` | sends to that peer and hears it, as PX4's SITL does |
 //! | `udp-listen:HOST:PORT` | hears everybody and sends to all who spoke in the last minute |
-//! | `serial:PATH:BAUD` | parsed; not opened by this build |
+//! | `serial:PATH:BAUD` | a serial port, for itself alone |
+//!
+//! A TCP client and a serial port that are lost are opened again, tried once a second.
 //!
 //! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream may cut anywhere.
 
+mod lasting;
+mod serial;
 mod tcp;
 mod udp;
 
@@ -17,13 +21,18 @@ use std::fmt;
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
+use std::time::Duration;
+
+/// The longest wait for a TCP server at the start.
+const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 /// A nonblocking link.
 pub trait Link: Send {
     /// Moves bytes that have arrived into `buffer` (2 kB fit any datagram of ours); 0 where none have.
     ///
     /// # Errors
-    /// When the link is gone for good. A server without a client, or a peer that does not listen, is no error.
+    /// When the link is gone for good. A server without a client, a peer that does not listen, a connection or device that is
+    /// lost for now are no errors.
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
 
     /// Sends whole frames. What nobody takes in time is dropped.
@@ -65,11 +74,6 @@ pub enum LinkError {
     /// The link could not be opened.
     #[error("cannot open link: {0}: {1}")]
     Open(LinkUrl, io::Error),
-    /// Serial ports are not opened by this build.
-    #[error(
-        "cannot open link: {0}: serial ports are not supported yet; use tcp, tcp-listen, udp or udp-listen"
-    )]
-    Serial(LinkUrl),
 }
 
 impl FromStr for LinkUrl {
@@ -122,10 +126,18 @@ impl LinkUrl {
     /// # Errors
     /// Names the URL and why: an unknown host, a port in use, nobody listening.
     pub fn open(&self) -> Result<Box<dyn Link>, LinkError> {
+        let link = self.open_once(CONNECT_TIMEOUT)?;
+        Ok(match self {
+            Self::Tcp(_) | Self::Serial { .. } => Box::new(lasting::Lasting::new(self.clone(), link)),
+            _ => link,
+        })
+    }
+
+    fn open_once(&self, timeout: Duration) -> Result<Box<dyn Link>, LinkError> {
         let failed = |why| LinkError::Open(self.clone(), why);
         match self {
             Self::Tcp(at) => {
-                Ok(Box::new(tcp::Client::connect(resolve(at).map_err(failed)?).map_err(failed)?))
+                Ok(Box::new(tcp::Client::connect(resolve(at).map_err(failed)?, timeout).map_err(failed)?))
             }
             Self::TcpListen(at) => {
                 Ok(Box::new(tcp::Server::bind(resolve(at).map_err(failed)?).map_err(failed)?))
@@ -134,7 +146,7 @@ impl LinkUrl {
             Self::UdpListen(at) => {
                 Ok(Box::new(udp::Hub::bind(resolve(at).map_err(failed)?).map_err(failed)?))
             }
-            Self::Serial { .. } => Err(LinkError::Serial(self.clone())),
+            Self::Serial { path, baud } => Ok(Box::new(serial::Port::open(path, *baud).map_err(failed)?)),
         }
     }
 }
@@ -154,9 +166,9 @@ fn is_quiet(error: &io::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::{Duration, Instant};
+    use std::time::Instant;
 
-    fn hear(link: &mut dyn Link) -> Vec<u8> {
+    pub(super) fn hear(link: &mut dyn Link) -> Vec<u8> {
         let mut buffer = [0; 2048];
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(5) {
@@ -195,8 +207,6 @@ mod tests {
             let error = text.parse::<LinkUrl>().unwrap_err().to_string();
             assert!(error.contains(why) && error.contains(text), "{text}: {error}");
         }
-        let serial = "serial:/dev/null:9600".parse::<LinkUrl>().unwrap().open();
-        assert!(serial.err().unwrap().to_string().contains("not supported"));
     }
 
     #[test]
@@ -214,6 +224,26 @@ mod tests {
         std::thread::sleep(Duration::from_millis(20));
         assert_eq!(server.receive(&mut [0; 16]).unwrap(), 0);
         server.send(b"to nobody").unwrap();
+    }
+
+    #[test]
+    fn a_tcp_client_comes_back_to_a_server_that_restarts() {
+        let server = open("tcp-listen:127.0.0.1:0");
+        let at = server.local_address().unwrap();
+        let mut client = open(&format!("tcp:{at}"));
+        drop(server);
+        let start = Instant::now();
+        while client.local_address().is_some() {
+            assert_eq!(client.receive(&mut [0; 16]).unwrap(), 0, "lost, and no error");
+            assert!(start.elapsed() < Duration::from_secs(5));
+        }
+        let mut server = open(&format!("tcp-listen:{at}"));
+        while client.local_address().is_none() {
+            client.send(b"dropped").unwrap();
+            assert!(start.elapsed() < Duration::from_secs(20));
+        }
+        client.send(b"ping").unwrap();
+        assert!(hear(&mut *server).ends_with(b"ping"));
     }
 
     #[test]

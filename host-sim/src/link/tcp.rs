@@ -8,7 +8,6 @@ use super::{Link, is_quiet};
 
 /// About ten seconds of PX4's flood.
 const QUEUE: usize = 256 * 1024;
-const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
 struct Connection {
     stream: TcpStream,
@@ -56,9 +55,9 @@ impl Connection {
 pub struct Client(Connection);
 
 impl Client {
-    /// Connects; waits five seconds at most.
-    pub fn connect(to: SocketAddr) -> io::Result<Self> {
-        Ok(Self(Connection::new(TcpStream::connect_timeout(&to, CONNECT_TIMEOUT)?)?))
+    /// Connects; waits for `timeout` at most.
+    pub fn connect(to: SocketAddr, timeout: Duration) -> io::Result<Self> {
+        Ok(Self(Connection::new(TcpStream::connect_timeout(&to, timeout)?)?))
     }
 }
 

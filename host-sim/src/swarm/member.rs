@@ -217,6 +217,24 @@ impl Member {
         }
     }
 
+    /// Takes what a ground station sent.
+    pub fn hear_ground(&mut self, now_us: u64, bytes: &[u8]) {
+        if !self.is_mute(now_us) {
+            self.autopilot.handle_ground_bytes(bytes);
+        }
+    }
+
+    /// Moves what a ground station is told into `out`, whole frames; the bytes moved.
+    pub fn tell_ground(&mut self, now_us: u64, out: &mut [u8]) -> usize {
+        let length = self.autopilot.poll_ground_transmit(out);
+        if self.is_mute(now_us) { 0 } else { length }
+    }
+
+    /// Without power, or booting.
+    fn is_mute(&self, now_us: u64) -> bool {
+        self.killed || now_us < self.boots_until_us
+    }
+
     fn note(&mut self, from: State, to: State, text: &'static str, warning: bool) {
         if warning && !text.is_empty() {
             self.cause = Some(text);

@@ -5,6 +5,7 @@
 //! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and tells nobody.
 
 pub mod faults;
+pub mod gateway;
 pub mod ground_station;
 pub mod member;
 pub mod monitor;
@@ -13,12 +14,14 @@ pub mod serial;
 
 use std::time::{Duration, Instant as Clock};
 
+use anyhow::Context;
 use companion::{Config, PlanFailure, RosterEntry, State};
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
 
 use self::faults::{Script, World};
+use self::gateway::Gateway;
 use self::ground_station::GroundStation;
 use self::member::{DeskCompanion, Member, Planner, STEP_US, is_finished};
 use self::monitor::{Monitor, Sample};
@@ -63,6 +66,31 @@ pub fn fly(
     realtime: bool,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
+    simulate(mission, plan, command, realtime, None, progress)
+}
+
+/// The same at the speed of the clock, with a ground station looking on.
+///
+/// # Errors
+/// The link to the ground station is gone.
+pub fn fly_shown(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    command: &'static str,
+    gateway: Gateway,
+    progress: &Progress,
+) -> anyhow::Result<Flight> {
+    simulate(mission, plan, command, true, Some(gateway), progress)
+}
+
+fn simulate(
+    mission: &Mission,
+    plan: &SwarmPlan,
+    command: &'static str,
+    realtime: bool,
+    mut gateway: Option<Gateway>,
+    progress: &Progress,
+) -> anyhow::Result<Flight> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
     let mut members = members(mission)?;
@@ -75,6 +103,9 @@ pub fn fly(
         members.len(),
         scenario.seed,
     );
+    if let Some(gateway) = &gateway {
+        gateway.attach(&mut members, &mut radio);
+    }
     let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
     let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
@@ -116,6 +147,9 @@ pub fn fly(
             }
         }
         ground_station.step(now_us, &members, &mut radio, &places);
+        if let Some(gateway) = &mut gateway {
+            gateway.step(now_us, &mut members, &mut radio, &places).context("link lost: --qgc")?;
+        }
         let seen: Vec<_> = members.iter().map(Member::observation).collect();
         monitor.observe(t_s, &seen);
         if step % 250 == 0 {

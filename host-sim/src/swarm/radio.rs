@@ -35,6 +35,8 @@ pub struct Radio {
     rng: Pcg32,
     cuts: Vec<Cut>,
     under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
+    /// What stations sent since it was last asked for, if anybody overhears.
+    overheard: Option<Vec<Rc<[u8]>>>,
 }
 
 impl Radio {
@@ -42,7 +44,17 @@ impl Radio {
     pub fn new(config: RadioConfig, stations: usize, seed: u64) -> Self {
         let under_way = (0..stations).map(|_| VecDeque::new()).collect();
         let cuts = vec![Cut::default(); stations];
-        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way }
+        Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way, overheard: None }
+    }
+
+    /// From now on keeps what stations send for [`Self::overheard`].
+    pub fn overhear(&mut self) {
+        self.overheard = Some(Vec::new());
+    }
+
+    /// What stations sent since this was last asked, at once and without loss.
+    pub fn overheard(&mut self) -> Vec<Rc<[u8]>> {
+        self.overheard.as_mut().map(core::mem::take).unwrap_or_default()
     }
 
     /// Cuts a station off, or joins it again.
@@ -56,6 +68,9 @@ impl Radio {
             return;
         }
         let packet: Rc<[u8]> = packet.into();
+        if let (Some(overheard), Some(_)) = (&mut self.overheard, from) {
+            overheard.push(Rc::clone(&packet));
+        }
         let hears_us = now_us + (self.config.delay_s * 1e6) as u64;
         for (to, queue) in self.under_way.iter_mut().enumerate() {
             let in_range = |from: usize| (places[from] - places[to]).norm() <= self.config.range_m;

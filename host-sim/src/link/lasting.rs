@@ -1,0 +1,64 @@
+//! A link that is opened again when it was lost: a simulator that restarts, an adapter that is plugged in again.
+
+use std::io;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use super::{Link, LinkUrl};
+
+/// Between two tries.
+const RETRY: Duration = Duration::from_secs(1);
+
+/// Nothing is heard while it is lost, and what is sent is dropped.
+pub struct Lasting {
+    url: LinkUrl,
+    link: Option<Box<dyn Link>>,
+    retry_at: Instant,
+}
+
+impl Lasting {
+    /// Keeps a link that was opened by this URL.
+    pub fn new(url: LinkUrl, link: Box<dyn Link>) -> Self {
+        Self { url, link: Some(link), retry_at: Instant::now() }
+    }
+
+    fn reopen(&mut self) -> Option<&mut Box<dyn Link>> {
+        if self.link.is_none() && Instant::now() >= self.retry_at {
+            self.link = self.url.open_once(RETRY / 4).ok();
+            self.retry_at = Instant::now() + RETRY;
+            if self.link.is_some() {
+                eprintln!("link is back: {}", self.url);
+            }
+        }
+        self.link.as_mut()
+    }
+
+    fn lose(&mut self, why: &io::Error) {
+        eprintln!("link lost: {}: {why}; trying again every second", self.url);
+        self.link = None;
+        self.retry_at = Instant::now() + RETRY;
+    }
+}
+
+impl Link for Lasting {
+    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        match self.reopen().map_or(Ok(0), |link| link.receive(buffer)) {
+            Err(why) => {
+                self.lose(&why);
+                Ok(0)
+            }
+            received => received,
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        if let Err(why) = self.reopen().map_or(Ok(()), |link| link.send(bytes)) {
+            self.lose(&why);
+        }
+        Ok(())
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        self.link.as_ref().and_then(|link| link.local_address())
+    }
+}

@@ -1,0 +1,101 @@
+//! The swarm seen from a ground station: `fly --qgc URL`.
+//!
+//! Each autopilot has one more port for it, with a ground station's rates ([`crate::autopilot::port::GROUND_STREAMS`]); of what
+//! companions send by radio their heartbeats, texts and answers go along. What comes back goes to every autopilot and by
+//! radio to every companion; each heeds what is addressed to it, as behind a real telemetry radio.
+
+use std::io;
+
+use companion::frame::Framer;
+use companion::time::Instant;
+use planner_core::Point;
+
+use super::member::Member;
+use super::radio::Radio;
+use crate::link::Link;
+
+/// HEARTBEAT, COMMAND_ACK, STATUSTEXT.
+const FROM_COMPANIONS: [u32; 3] = [0, 77, 253];
+/// Small enough for any path's datagrams.
+const DATAGRAM: usize = 1400;
+
+/// A link to a ground station.
+pub struct Gateway {
+    link: Box<dyn Link>,
+    datagram: Vec<u8>,
+}
+
+impl Gateway {
+    /// A gateway on an open link.
+    pub fn new(link: Box<dyn Link>) -> Self {
+        Self { link, datagram: Vec::new() }
+    }
+
+    /// Gives the vehicles their port for it, and has it hear the radio.
+    pub fn attach(&self, members: &mut [Member], radio: &mut Radio) {
+        members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
+        radio.overhear();
+    }
+
+    /// What came in since the last step, then what is to go out.
+    ///
+    /// # Errors
+    /// The link is gone for good.
+    pub fn step(
+        &mut self,
+        now_us: u64,
+        members: &mut [Member],
+        radio: &mut Radio,
+        places: &[Point],
+    ) -> io::Result<()> {
+        let mut buffer = [0; 2048];
+        loop {
+            let length = self.link.receive(&mut buffer)?;
+            if length == 0 {
+                break;
+            }
+            let bytes = &buffer[..length];
+            members.iter_mut().for_each(|member| member.hear_ground(now_us, bytes));
+            radio.broadcast(now_us, None, places, bytes);
+        }
+        for packet in radio.overheard() {
+            if is_for_ground(&packet) {
+                self.send(&packet)?;
+            }
+        }
+        for member in members {
+            loop {
+                let length = member.tell_ground(now_us, &mut buffer[..DATAGRAM]);
+                if length == 0 {
+                    break;
+                }
+                self.send(&buffer[..length])?;
+            }
+        }
+        self.flush()
+    }
+
+    /// Whole frames, gathered up to the size of a datagram.
+    fn send(&mut self, frames: &[u8]) -> io::Result<()> {
+        if self.datagram.len() + frames.len() > DATAGRAM {
+            self.flush()?;
+        }
+        self.datagram.extend_from_slice(frames);
+        Ok(())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        if !self.datagram.is_empty() {
+            self.link.send(&self.datagram)?;
+            self.datagram.clear();
+        }
+        Ok(())
+    }
+}
+
+/// A companion sends one frame a packet.
+fn is_for_ground(packet: &[u8]) -> bool {
+    let mut input = packet;
+    let frame = Framer::new().next(Instant::ZERO, &mut input);
+    frame.is_some_and(|frame| FROM_COMPANIONS.contains(&frame.message_id))
+}
