@@ -78,7 +78,16 @@ fn main() -> Result<()> {
     std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     println!(
         "{:30} {:10} {:>9} {:>9} {:>10} {:>8} {:>9} {:>9} {:>7} {:>8}",
-        "case", "method", "complete", "unplanned", "violations", "contacts", "deadlocks", "nearest", "flight", "makespan"
+        "case",
+        "method",
+        "complete",
+        "unplanned",
+        "violations",
+        "contacts",
+        "deadlocks",
+        "nearest",
+        "flight",
+        "makespan"
     );
     let mut rows = Vec::new();
     for mut meeting in cases::all(dir)? {
