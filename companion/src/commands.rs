@@ -123,7 +123,20 @@ pub fn apply(wishes: &mut Wishes, state: State, command: &Command) -> Option<u8>
         START => (
             &mut wishes.start,
             Guard::StartCommanded,
-            &[Scheduled, Streaming, Engaging, Arming, TakeOff, Climb, Follow, Paused, Alone],
+            &[
+                Scheduled,
+                PadReplanning,
+                Streaming,
+                Engaging,
+                Arming,
+                TakeOff,
+                Climb,
+                Follow,
+                Paused,
+                Alone,
+                Blocked,
+                Replanning,
+            ],
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => (&mut wishes.pause, Guard::PauseCommanded, &[Paused]),
         PAUSE_CONTINUE if command.param1 == 1.0 && state == PilotControl => {
@@ -131,10 +144,10 @@ pub fn apply(wishes: &mut Wishes, state: State, command: &Command) -> Option<u8>
             return Some(ACCEPTED);
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
-            (&mut wishes.resume, Guard::ResumeCommanded, &[Climb, Follow])
+            (&mut wishes.resume, Guard::ResumeCommanded, &[Climb, Follow, Blocked, Replanning])
         }
         PAUSE_CONTINUE => return Some(DENIED),
-        LAND => (&mut wishes.land, Guard::LandCommanded, &[Land, Disarm, Done, Aborted]),
+        LAND => (&mut wishes.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done, Aborted]),
         RETURN => (&mut wishes.turn_back, Guard::ReturnCommanded, &[Land, Disarm, Done, Aborted]),
         _ => return None,
     };

@@ -126,6 +126,8 @@ pub enum PlanFailure {
     Unreachable,
     /// No departure keeps clear of the other vehicles.
     Blocked,
+    /// No answer came in time.
+    Late,
     /// The plan is larger than this board's memory.
     Capacity,
     /// The plan does not begin at this vehicle's start, or holds a number that is not finite.

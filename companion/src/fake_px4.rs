@@ -15,6 +15,7 @@ use planner_core::schedule::VehiclePlan;
 
 use crate::autopilot::Kind;
 use crate::frame::{self, Frame, Framer, Header, MAX_SENT};
+use crate::intent::{self, Intent};
 use crate::{Companion, Config, Duration, Event, Instant, Link, RosterEntry, px4};
 
 pub type Small = Companion<4, 16, 8>;
@@ -66,6 +67,11 @@ pub struct Bench {
     landed_at: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
+    /// Whether there is a way around: by y = 16.
+    pub answer_detour: Option<Result<(), crate::PlanFailure>>,
+    /// Vehicle 77 as it tells itself five times a second: place, flags of its intent, progress, CRC of its plan.
+    pub neighbour: Option<(Point, u8, f32, u32)>,
+    told: u8,
 }
 
 pub fn config() -> Config<4> {
@@ -125,6 +131,9 @@ impl Bench {
             landed_at: None,
             origin: EKF_ORIGIN,
             answer_plan: Some(Ok(plan())),
+            answer_detour: Some(Ok(())),
+            neighbour: None,
+            told: 0,
         }
     }
 
@@ -188,7 +197,20 @@ impl Bench {
         }
         while let Some(event) = self.companion.poll_event() {
             self.events.push(event);
-            if event == Event::PlanRequested
+            if let Some(request) = self.companion.detour(|_| {}) {
+                let answer = self.answer_detour.map(|answer| {
+                    answer.map(|()| {
+                        let mut path = Path::new();
+                        path.push(request.here, 1.2).unwrap();
+                        path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
+                        path.push(GOAL, 1.2).unwrap();
+                        VehiclePlan { path, ..plan() }
+                    })
+                });
+                if let (Event::PlanRequested, Some(answer)) = (event, answer) {
+                    self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+                }
+            } else if event == Event::PlanRequested
                 && let Some(answer) = self.answer_plan.clone()
             {
                 self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
@@ -301,6 +323,7 @@ impl Bench {
 
     /// 50 ms of flight and telemetry.
     pub fn tick(&mut self) {
+        self.tell_neighbour();
         self.now = self.now + Duration::from_millis(50);
         self.companion.handle_timeout(self.now);
         self.drain();
@@ -357,6 +380,41 @@ impl Bench {
         }
     }
 
+    fn tell_neighbour(&mut self) {
+        let Some((place, flags, progress_m, plan_crc)) = self.neighbour else { return };
+        self.told = self.told.wrapping_add(1);
+        if self.told % 4 != 0 {
+            return;
+        }
+        let intent = Intent {
+            system_id: 77,
+            flags,
+            mission_crc: 0xC0FFEE,
+            plan_crc,
+            progress_m,
+            speed_mps: 0.0,
+            heard: u32::MAX,
+            points: heapless::Vec::new(),
+        };
+        let mut payload = [0; 133];
+        let len = intent.encode(&mut payload);
+        let place = frames::enu_to_geodetic(&ORIGIN, &place);
+        let place = GLOBAL_POSITION_INT_DATA {
+            time_boot_ms: self.now.boot_ms(),
+            lat: (place.lat_deg * 1e7) as i32,
+            lon: (place.lon_deg * 1e7) as i32,
+            alt: (place.alt_m * 1e3) as i32,
+            ..Default::default()
+        };
+        let head = |sequence| Header { system: 77, component: crate::COMPONENT, sequence };
+        let mut out = [0; MAX_SENT];
+        let (id, seed) = (TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC);
+        let n = frame::encode_raw(head(self.told), id, seed, &payload[..len], &mut out);
+        self.companion.handle_bytes(Link::Swarm, self.now, &out[..n]);
+        let n = frame::encode(head(self.told.wrapping_add(1)), &place, &mut out);
+        self.companion.handle_bytes(Link::Swarm, self.now, &out[..n]);
+    }
+
     pub fn run(&mut self, seconds: f32) {
         for _ in 0..(seconds * 20.0) as u32 {
             self.tick();
@@ -372,6 +430,15 @@ impl Bench {
             self.tick();
         }
         assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
+    }
+
+    /// The same with vehicle 77 standing on its pad, from where it follows the plan.
+    pub fn accompanied(config: Config<4>) -> Self {
+        let mut bench = Self::new(config);
+        bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));
+        bench.until(crate::State::Ready, 6.0);
+        bench.start();
+        bench
     }
 
     /// A bench in the middle of its path.

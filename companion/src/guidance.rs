@@ -16,6 +16,8 @@ use crate::time::Instant;
 const ARRIVED_M: f32 = 0.35;
 /// Slower than this counts as standing at the end of the path, m/s.
 const STANDING_MPS: f32 = 0.5;
+/// A reference slower than this stands, m/s.
+const STANDING_REFERENCE_MPS: f32 = 0.05;
 /// This near its top the climb is done, metres.
 const CLIMBED_M: f32 = 0.12;
 /// The climb ends no slower than this, m/s.
@@ -82,6 +84,8 @@ pub struct Scene<'a, const W: usize, const G: usize> {
     pub telemetry: &'a Telemetry,
     /// Rank in the roster.
     pub rank: u16,
+    /// Whether the path is one of its own around something.
+    pub detours: bool,
 }
 
 impl Guidance {
@@ -139,6 +143,22 @@ impl Guidance {
         self.progress_at = now;
     }
 
+    /// Where on the path the reference is; −∞ before it runs.
+    pub fn along_m(&self) -> f32 {
+        if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
+    }
+
+    /// Whether the reference stands.
+    pub fn stands(&self) -> bool {
+        self.tracker.speed_mps < STANDING_REFERENCE_MPS
+    }
+
+    /// Begins another path.
+    pub fn begin_path(&mut self, now: Instant) {
+        self.tracker = Tracker::default();
+        self.run(now);
+    }
+
     /// Stops the reference within its braking distance; off the path, where the vehicle is.
     pub fn brake(&mut self, position: &Point) {
         if self.on_path {
@@ -172,9 +192,8 @@ impl Guidance {
             clearance_m = waypoint.clearance_m;
         }
         *path = back;
-        self.tracker = Tracker::default();
         self.returning = true;
-        self.run(now);
+        self.begin_path(now);
     }
 
     /// Arc length told to neighbours and gates: negative before and in the climb, beyond the path's length in the
@@ -222,7 +241,13 @@ impl Guidance {
         let position = &scene.telemetry.position;
         let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
         if matches!(state, State::Scheduled | State::Follow) {
-            let own = Own { rank: scene.rank, position: *position, along_m, path: &plan.path };
+            let own = Own {
+                rank: scene.rank,
+                position: *position,
+                along_m,
+                path: &plan.path,
+                detours: scene.detours,
+            };
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
         }
         if state == State::Climb {
@@ -343,6 +368,9 @@ pub fn setpoints_flow(state: State) -> bool {
             | Follow
             | Paused
             | Alone
+            | Blocked
+            | Replanning
+            | Stopping
             | AutopilotSilent
             | PositionLost
             | Land

@@ -91,23 +91,11 @@ fn an_origin_that_moves_is_asked_for_and_at_most_one_setpoint_is_wrong() {
 
 #[test]
 fn a_neighbour_heard_again_lets_it_go_on() {
-    let mut bench = Bench::following(two_vehicles());
-    bench.stuck = true;
-    bench.until(State::Alone, 15.0);
-    bench.stuck = false;
-    let place = GLOBAL_POSITION_INT_DATA {
-        time_boot_ms: 9,
-        lat: 403_400_000,
-        lon: -37_659_000,
-        ..Default::default()
-    };
-    let mut out = [0; crate::frame::MAX_SENT];
-    let n = crate::frame::encode(
-        crate::frame::Header { system: 77, component: 191, sequence: 0 },
-        &place,
-        &mut out,
-    );
-    bench.companion.handle_bytes(Link::Swarm, bench.now, &out[..n]);
+    let mut bench = Bench::accompanied(two_vehicles());
+    bench.until(State::Follow, 20.0);
+    let neighbour = bench.neighbour.take();
+    bench.until(State::Alone, 5.0);
+    bench.neighbour = neighbour;
     bench.until(State::Done, 60.0);
     assert!(bench.texts.iter().any(|t| t == "Neighbours heard again"));
 }

@@ -4,15 +4,16 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 1 |
+//! | 0 | u8 | version, 2 |
 //! | 1 | u8 | system id |
-//! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan |
+//! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
 //! | 3 | u8 | number of path points, 0…8 |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
 //! | 16 | f32 | speed, m/s |
-//! | 20 | 12 × n | next path points, f32 east, north, up in the mission frame |
+//! | 20 | u32 | whom it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
+//! | 24 | 12 × n | next path points, f32 east, north, up in the mission frame |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
@@ -24,8 +25,8 @@ pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points told.
 pub const POINTS: usize = 8;
 /// Version of the layout.
-pub const VERSION: u8 = 1;
-const HEAD: usize = 20;
+pub const VERSION: u8 = 2;
+const HEAD: usize = 24;
 const TUNNEL_HEAD: usize = 5;
 
 /// Stands on the ground.
@@ -36,6 +37,14 @@ pub const FLYING: u8 = 2;
 pub const LANDED: u8 = 4;
 /// Its progress counts on the shared plan.
 pub const ON_PLAN: u8 = 8;
+/// Has left the plan and rests where it is, or a pilot keeps it: it opens all gates and is an obstacle.
+pub const OUT: u8 = 16;
+/// Stands, and will until somebody else moves.
+pub const WAITING: u8 = 32;
+/// Its path is blocked; it waits for all to stand, and flies around.
+pub const BLOCKED: u8 = 64;
+/// Flies a path of its own, or will; its progress is where it left the plan.
+pub const DETOURS: u8 = 128;
 
 /// One vehicle's intent.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +61,8 @@ pub struct Intent {
     pub progress_m: f32,
     /// Speed, m/s.
     pub speed_mps: f32,
+    /// Whom it heard lately, a bit for each rank.
+    pub heard: u32,
     /// Next points of the path.
     pub points: Vec<Point, POINTS>,
 }
@@ -68,6 +79,7 @@ impl Intent {
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
         body[16..20].copy_from_slice(&self.speed_mps.to_le_bytes());
+        body[20..24].copy_from_slice(&self.heard.to_le_bytes());
         for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
             to.copy_from_slice(&value.to_le_bytes());
         }
@@ -100,6 +112,7 @@ impl Intent {
             plan_crc: u32::from_le_bytes(word(8)),
             progress_m: float(12)?,
             speed_mps: float(16)?,
+            heard: u32::from_le_bytes(word(20)),
             points,
         })
     }
@@ -119,6 +132,7 @@ mod tests {
             plan_crc: 7,
             progress_m: -1.25,
             speed_mps: 2.0,
+            heard: 0x8000_0005,
             points,
         }
     }
@@ -137,7 +151,7 @@ mod tests {
             assert_eq!(Intent::decode(&padded(&sample(count)), 9), Some(sample(count)));
         }
         assert_eq!(Intent::decode(&padded(&sample(2)), 8), None, "another sender");
-        for (at, value) in [(0, 0), (4, 19), (5, 2), (8, 9)] {
+        for (at, value) in [(0, 0), (4, 23), (5, 1), (8, 9)] {
             let mut bad = padded(&sample(2));
             bad[at] = value;
             assert_eq!(Intent::decode(&bad, 9), None, "byte {at}");

@@ -18,6 +18,7 @@ pub mod ardupilot;
 pub mod autopilot;
 pub mod commands;
 pub mod config;
+mod detour;
 mod events;
 #[cfg(test)]
 mod fake_px4;

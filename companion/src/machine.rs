@@ -12,6 +12,7 @@ use planner_core::schedule::VehiclePlan;
 use crate::autopilot::Kind;
 use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
+use crate::detour::Around;
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
 use crate::guidance::{Guidance, LOST_WINDOW_M, REJOIN_WINDOW_M, Scene, setpoints_flow};
@@ -26,6 +27,8 @@ use crate::time::{Duration, Instant};
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
+/// A hovering vehicle sways more slowly, m/s.
+pub(crate) const STANDING_MPS: f32 = 0.3;
 const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 const SWARM_EVERY: Duration = Duration::from_millis(200);
 pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
@@ -39,16 +42,17 @@ const EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
-    rank: u16,
-    start: Point,
+    pub(crate) rank: u16,
+    pub(crate) start: Point,
     framers: [Framer; 2],
     pub(crate) outboxes: [Outbox; 2],
     pub(crate) telemetry: Telemetry,
-    neighbours: Neighbours<V>,
+    pub(crate) neighbours: Neighbours<V>,
     pub(crate) plan: Option<VehiclePlan<W, G>>,
-    plan_failure: Option<PlanFailure>,
+    pub(crate) plan_failure: Option<PlanFailure>,
+    pub(crate) around: Around,
     pub(crate) state: State,
-    entered_at: Instant,
+    pub(crate) entered_at: Instant,
     wishes: Wishes,
     repeats: Repeats,
     pub(crate) guidance: Guidance,
@@ -67,7 +71,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) version_due: [bool; 2],
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
-    events: Deque<Event, EVENTS>,
+    pub(crate) events: Deque<Event, EVENTS>,
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -86,6 +90,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             neighbours: Neighbours::new(&config.roster, config.system_id),
             plan: None,
             plan_failure: None,
+            around: Around::default(),
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             wishes: Wishes::default(),
@@ -131,9 +136,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.advice.waiting_for
     }
 
-    /// Progress told to the swarm, metres along the own path.
+    /// Way made along the own path, metres.
     pub fn progress_m(&self) -> f32 {
-        self.guidance.progress_m(self.state, &self.scene())
+        // What is flown around comes on top of where the plan was left.
+        let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
+        self.guidance.progress_m(self.state, &self.scene()) + left_at_m.max(0.0)
     }
 
     /// What a link's framer counted.
@@ -180,16 +187,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Takes the planner's answer in. Ignored unless a plan was asked for.
+    /// Takes the planner's answer in: the mission's plan, or the way around asked for by [`Self::detour`]. Ignored unless one
+    /// was asked for.
     pub fn handle_plan(&mut self, now: Instant, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
         self.now = now;
-        if self.state != State::Planning {
-            return;
-        }
-        match outcome {
-            Ok(plan) if self.is_sound(plan) => self.plan = Some(plan.clone()),
-            Ok(_) => self.plan_failure = Some(PlanFailure::Invalid),
-            Err(failure) => self.plan_failure = Some(failure),
+        match (self.state, outcome) {
+            (State::Planning, Ok(plan)) if self.begins_at(plan, &self.start) => {
+                self.plan = Some(plan.clone())
+            }
+            (State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
+            (State::Planning, Ok(_)) => self.plan_failure = Some(PlanFailure::Invalid),
+            (State::Planning, Err(failure)) => self.plan_failure = Some(failure),
+            (State::Replanning | State::PadReplanning, Err(failure)) => self.miss_detour(failure),
+            _ => return,
         }
         self.run_table();
     }
@@ -209,6 +219,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
             telemetry: &self.telemetry,
             rank: self.rank,
+            detours: self.around.flying,
         }
     }
 
@@ -218,13 +229,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         (self.now - self.entered_at).secs_f32() >= depart_s
     }
 
-    /// Finite, from our own start, and a path wherever there is a goal.
-    fn is_sound(&self, plan: &VehiclePlan<W, G>) -> bool {
+    /// Finite, from `place`, and a path wherever there is a goal.
+    pub(crate) fn begins_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
         let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
-        let begins = first.is_some_and(|w| (w.position - self.start).norm() < 0.1);
+        let begins = first.is_some_and(|w| (w.position - place).norm() < 0.1);
         finite && (begins || plan.goal.is_none())
     }
 
@@ -276,7 +287,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if frame.message_id == TUNNEL_DATA::ID {
             if let Some(intent) = Intent::decode(frame.padded(), id) {
                 let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
-                self.neighbours.handle_intent(self.now, &intent, self.config.mission_crc, plan_crc);
+                self.neighbours.handle_intent(
+                    self.now,
+                    self.rank,
+                    &intent,
+                    self.config.mission_crc,
+                    plan_crc,
+                );
             }
         } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
             self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
@@ -319,8 +336,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
             telemetry: &self.telemetry,
             rank: self.rank,
+            detours: self.around.flying,
         };
         self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s);
+        self.look_around();
         self.run_table();
         self.repeat_requests();
         let flows = setpoints_flow(self.state);
@@ -362,7 +381,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             jumped: t.is_settling(now),
             stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
             neighbour_age: self.neighbours.silence(now, self.entered_at),
-            neighbour_heard: self.neighbours.heard_within(now, HEARTBEAT_EVERY),
+            neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
             plan_ready: self.plan.is_some(),
             plan_failed: self.plan_failure.is_some(),
             roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
@@ -380,7 +399,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             on_ground: t.on_ground == Some(true),
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
-            gates_open: self.guidance.advice.stop_within_m > 0.05 && self.departure_due(),
+            gates_open: self.guidance.advice.stop_within_m > 0.05
+                && self.departure_due()
+                && !self.around.blocked
+                && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
             near_path: match self.state {
@@ -394,6 +416,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 .neighbours
                 .any_below(&t.position, self.config.safety_distance_m + LANDING_DRIFT_M),
             outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
+            blocked: self.around.blocked,
+            our_turn: self.is_our_turn(),
+            detour_ready: self.around.ready,
+            detours_failed: self.around.failed,
+            standing: self.guidance.stands() && t.velocity.norm() < STANDING_MPS,
         }
     }
 
@@ -422,6 +449,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn act(&mut self, from: State, row: &Row) {
         let now = self.now;
+        self.mark_place(row.to);
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
@@ -429,6 +457,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestPlan => {
                 self.plan = None;
                 self.plan_failure = None;
+                self.around = Around { left: self.around.left, ..Around::default() };
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }
@@ -450,6 +479,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::AskDisarm => self.outboxes[Link::Autopilot as usize].push(Outgoing::Arm(false)),
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
+            Action::RequestDetour => self.request_detour(),
+            Action::MissDetour => self.miss_detour(PlanFailure::Late),
+            Action::FlyDetour => self.guidance.begin_path(now),
             Action::BrakeOnPath => self.guidance.brake(&position),
             Action::Rejoin => {
                 if let Some(plan) = &self.plan {

@@ -238,50 +238,17 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     bench.answer_plan = Some(Ok(gated));
     bench.until(State::Ready, 6.0);
     bench.start();
-    let mut other = Bench::new(two_vehicles());
-    let hear = |bench: &mut Bench, other: &mut Bench, progress_m: f32, crc: u32| {
-        let mut payload = [0; 133];
-        let points = heapless::Vec::new();
-        let flags = crate::intent::ON_PLAN | crate::intent::FLYING;
-        let intent = Intent {
-            system_id: 77,
-            flags,
-            mission_crc: 0xC0FFEE,
-            plan_crc: crc,
-            progress_m,
-            speed_mps: 1.0,
-            points,
-        };
-        let len = intent.encode(&mut payload);
-        let place = GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: bench.now.boot_ms(),
-            lat: 403_330_000,
-            lon: -37_659_000,
-            alt: 710_000,
-            ..Default::default()
-        };
-        let mut out = [0; crate::frame::MAX_SENT];
-        let head = |sequence| crate::frame::Header { system: 77, component: 191, sequence };
-        let sequence = (bench.now.boot_ms() / 50 * 2) as u8;
-        let n = crate::frame::encode_raw(
-            head(sequence),
-            TUNNEL_DATA::ID,
-            TUNNEL_DATA::EXTRA_CRC,
-            &payload[..len],
-            &mut out,
-        );
-        bench.companion.handle_bytes(Link::Swarm, bench.now, &out[..n]);
-        let n = crate::frame::encode(head(sequence.wrapping_add(1)), &place, &mut out);
-        bench.companion.handle_bytes(Link::Swarm, bench.now, &out[..n]);
-        other.run(0.05);
-        bench.run(0.5);
-    };
     bench.run(20.0);
+    let flags = crate::intent::ON_PLAN | crate::intent::FLYING;
+    let hear = |bench: &mut Bench, progress_m: f32, crc: u32| {
+        bench.neighbour = Some((Point::new(8.0, 60.0, 10.0), flags, progress_m, crc));
+        bench.run(1.0);
+    };
     for (progress_m, crc) in [(1.0, 5), (5.9, 5), (6.5, 6)] {
-        hear(&mut bench, &mut other, progress_m, crc);
+        hear(&mut bench, progress_m, crc);
         assert_eq!((bench.state(), bench.armed), (State::Scheduled, false), "{progress_m} on plan {crc}");
     }
     assert_eq!(bench.companion.waiting_for(), 77);
-    hear(&mut bench, &mut other, 6.5, 5);
+    hear(&mut bench, 6.5, 5);
     bench.until(State::Follow, 20.0);
 }

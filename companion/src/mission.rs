@@ -52,6 +52,14 @@ pub enum State {
     Done,
     /// Given up; MISSION_START plans again.
     Aborted,
+    /// Stopped on the path: what left the plan is in its way. Waits until all others stand.
+    Blocked,
+    /// Hovers; the shell was asked for a way around.
+    Replanning,
+    /// The same on the ground.
+    PadReplanning,
+    /// Brakes along the path, then lands.
+    Stopping,
 }
 
 /// What must hold for a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
@@ -133,6 +141,20 @@ pub enum Guard {
     NeighbourHeard,
     /// On the ground.
     OnGround,
+    /// Something that left the plan is in the way, or we left it ourselves.
+    PathBlocked,
+    /// Nothing is in the way any more.
+    PathClear,
+    /// The path is blocked, all others stand, and it is this vehicle's turn.
+    OurTurn,
+    /// The way around has come.
+    DetourReady,
+    /// There is no way around.
+    DetourFailed,
+    /// There was none several times.
+    NoWayAround,
+    /// Standing still.
+    Standing,
 }
 
 /// What a row does beside changing the state.
@@ -166,6 +188,12 @@ pub enum Action {
     TurnBack,
     /// Ask for AUTO.LAND or LAND, again every second.
     AskLand,
+    /// Ask the shell for a way around, from here.
+    RequestDetour,
+    /// Give the shell up, this time.
+    MissDetour,
+    /// Fly it.
+    FlyDetour,
     /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
     AskDisarm,
 }
@@ -256,7 +284,20 @@ pub struct Inputs {
     pub room_below: bool,
     /// Outside the geofence.
     pub outside: bool,
+    /// The path is blocked.
+    pub blocked: bool,
+    /// All others stand, and it is this vehicle's turn to fly around.
+    pub our_turn: bool,
+    /// The way around has come.
+    pub detour_ready: bool,
+    /// Ways around that were not found, in a row.
+    pub detours_failed: u8,
+    /// Slower than a hovering vehicle sways.
+    pub standing: bool,
 }
+
+/// So many ways around that are not found are enough.
+const DETOURS_TRIED: u8 = 4;
 
 const NOW: Duration = Duration::from_millis(0);
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
@@ -305,6 +346,13 @@ impl Guard {
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground,
+            Self::PathBlocked => i.blocked,
+            Self::PathClear => !i.blocked,
+            Self::OurTurn => i.our_turn,
+            Self::DetourReady => i.detour_ready,
+            Self::DetourFailed => i.plan_failed,
+            Self::NoWayAround => i.detours_failed >= DETOURS_TRIED,
+            Self::Standing => i.standing,
         }
     }
 }
@@ -350,14 +398,18 @@ use Guard as G;
 use State::*;
 
 /// On the ground before arming.
-const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled];
+const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
 /// In the air, or about to be, under our setpoints.
-const FLYING: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, AutopilotSilent, PositionLost];
+const FLYING: &[State] =
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, AutopilotSilent, PositionLost];
 /// In the air, with links and position as they should be.
-const SOUND: &[State] = &[TakeOff, Climb, Follow, Paused, Alone];
+const SOUND: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping];
+/// The same, on its path under way or stopped: it can stop along it.
+const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning];
 
 /// In the air, and the autopilot was heard.
-const LINKED: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, PositionLost];
+const LINKED: &[State] =
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, PositionLost];
 
 /// The mission.
 #[rustfmt::skip]
@@ -377,17 +429,21 @@ pub static TABLE: &[Row] = &[
     warn(&[Streaming, Engaging, Arming], G::NoHeartbeat, s(3), Aborted,     A::ForgetStart, "Autopilot silent: start cancelled"),
     warn(LINKED,              G::NoHeartbeat,      s(3),   AutopilotSilent, A::BrakeOnPath, "Autopilot silent: stopping"),
     warn(&[Land, Disarm, PilotControl, Failsafe], G::NoHeartbeat, s(60), Aborted, A::ForgetStart, "Autopilot lost"),
-    warn(&[Planning, Ready, Scheduled], G::NoPosition, s(2), WaitPosition,  A::ForgetStart, "Position lost: start cancelled"),
+    warn(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, s(2), WaitPosition,  A::ForgetStart, "Position lost: start cancelled"),
     warn(&[Streaming, Engaging, Arming], G::NoPosition, s(1), Aborted,      A::ForgetStart, "Position lost: start cancelled"),
     warn(SOUND,               G::PositionJumped,   NOW,    PositionLost,    A::BrakeOnPath, "Position jumped: stopping"),
     warn(SOUND,               G::NoPosition,       s(1),   PositionLost,    A::BrakeOnPath, "Position lost: stopping"),
     // Orders and limits in flight.
-    info(SOUND,               G::LandCommanded,    NOW,    Land,            A::AskLand,     "Landing as commanded"),
-    info(&[PositionLost, AutopilotSilent], G::LandCommanded, NOW, Land,     A::AskLand,     "Landing as commanded"),
-    warn(SOUND,               G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
-    warn(SOUND,               G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
+    info(ON_PATH,             G::LandCommanded,    NOW,    Stopping,        A::BrakeOnPath, "Landing as commanded"),
+    info(&[TakeOff, Climb, PositionLost, AutopilotSilent], G::LandCommanded, NOW, Land, A::AskLand, "Landing as commanded"),
+    warn(ON_PATH,             G::BatteryCritical,  NOW,    Stopping,        A::BrakeOnPath, "Battery critical: landing"),
+    warn(ON_PATH,             G::BatteryLow,       NOW,    Stopping,        A::BrakeOnPath, "Battery low: landing"),
+    warn(&[TakeOff, Climb],   G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
+    warn(&[TakeOff, Climb],   G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
-    info(&[Follow, Paused, Alone], G::ReturnCommanded, NOW, Follow,         A::TurnBack,    "Flying back to the start"),
+    info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
+    info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
+    info(ON_PATH,             G::ReturnCommanded,  NOW,    Follow,          A::TurnBack,    "Flying back to the start"),
     info(&[TakeOff, Climb],   G::ReturnCommanded,  NOW,    Land,            A::AskLand,     "Landing on the pad"),
     // The mission in order.
     info(&[WaitAutopilot],    G::AutopilotHeard,   NOW,    WaitPosition,    A::Connect,     "Autopilot found"),
@@ -400,8 +456,12 @@ pub static TABLE: &[Row] = &[
     warn(&[Ready],            G::StartElsewhere,   NOW,    Aborted,         A::ForgetStart, "Not at its start: start refused"),
     warn(&[Ready],            G::StartArmed,       NOW,    Aborted,         A::ForgetStart, "Armed by someone else: start refused"),
     info(&[Ready],            G::StartCommanded,   NOW,    Scheduled,       A::None,        "Started"),
-    info(&[Ready, Scheduled, Streaming, Engaging, Arming], G::LandCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
-    info(&[Ready, Scheduled, Streaming, Engaging, Arming], G::ReturnCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
+    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::LandCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
+    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::ReturnCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
+    info(&[Scheduled],        G::OurTurn,          NOW,    PadReplanning,   A::RequestDetour, "All others stand: planning around"),
+    info(&[PadReplanning],    G::DetourReady,      NOW,    Scheduled,       A::None,        "A way around is found"),
+    warn(&[PadReplanning],    G::DetourFailed,     NOW,    Scheduled,       A::None,        "No way around yet"),
+    warn(&[PadReplanning],    G::Elapsed,          s(5),   Scheduled,       A::MissDetour,  "The way around is late"),
     info(&[Scheduled],        G::GatesOpen,        NOW,    Streaming,       A::HoldHere,    ""),
     info(&[Streaming],        G::Elapsed,          s(1),   Engaging,        A::AskOffboard, ""),
     info(&[Engaging],         G::Offboard,         NOW,    Arming,          A::AskArm,      "Setpoints followed: arming"),
@@ -413,13 +473,21 @@ pub static TABLE: &[Row] = &[
     info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
     warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
-    info(&[Climb, Follow, Alone], G::PauseCommanded,   NOW,    Paused,          A::BrakeOnPath, "Paused"),
-    warn(&[Follow],           G::NeighboursSilent, s(10),  Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
-    warn(&[Follow],           G::Stalled,          s(300), Land,            A::AskLand,     "No progress for 5 min: landing"),
+    info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
+    warn(&[Follow, Blocked],  G::NeighboursSilent, s(2),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
+    warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
+    warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
+    info(&[Blocked],          G::PathClear,        NOW,    Follow,          A::RunPath,     "Path clear again"),
+    warn(&[Blocked],          G::NoWayAround,      NOW,    Land,            A::AskLand,     "No way around: landing"),
+    warn(&[Blocked],          G::Elapsed,          s(600), Land,            A::AskLand,     "Path blocked for 10 min: landing"),
+    info(&[Blocked],          G::OurTurn,          NOW,    Replanning,      A::RequestDetour, "All others stand: planning around"),
+    info(&[Replanning],       G::DetourReady,      NOW,    Follow,          A::FlyDetour,   "Flying around"),
+    warn(&[Replanning],       G::DetourFailed,     NOW,    Blocked,         A::None,        "No way around yet"),
+    warn(&[Replanning],       G::Elapsed,          s(5),   Blocked,         A::MissDetour,  "The way around is late"),
     info(&[Paused],           G::ResumeCommanded,  NOW,    Follow,          A::RunPath,     "Resumed"),
     warn(&[Paused],           G::Elapsed,          s(600), Land,            A::AskLand,     "Paused for 10 min: landing"),
     info(&[Alone],            G::NeighbourHeard,   NOW,    Follow,          A::RunPath,     "Neighbours heard again"),
-    warn(&[Alone],            G::Elapsed,          s(30),  Land,            A::AskLand,     "Neighbours still silent: landing"),
+    warn(&[Alone],            G::Elapsed,          s(20),  Land,            A::AskLand,     "Neighbours still silent: landing"),
     info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    PositionLost,    A::BrakeOnPath, "Autopilot heard again"),
     warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Aborted,         A::ForgetStart, "Autopilot lost"),
     info(&[PositionLost],     G::BackOnPath,       NOW,    Follow,          A::Rejoin,      "Position known again"),

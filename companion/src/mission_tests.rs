@@ -29,6 +29,10 @@ const ALL: &[State] = &[
     Failsafe,
     Done,
     Aborted,
+    Blocked,
+    Replanning,
+    PadReplanning,
+    Stopping,
 ];
 
 /// The table as Markdown.
@@ -121,6 +125,13 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::NeighboursSilent => i.neighbour_age = long,
         G::NeighbourHeard => i.neighbour_heard = true,
         G::OnGround => i.on_ground = true,
+        G::PathBlocked => i.blocked = true,
+        G::PathClear => {}
+        G::OurTurn => i.our_turn = true,
+        G::DetourReady => i.detour_ready = true,
+        G::DetourFailed => i.plan_failed = true,
+        G::NoWayAround => i.detours_failed = 9,
+        G::Standing => i.standing = true,
     }
     i
 }
@@ -137,6 +148,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
                 (PositionLost | WaitPosition, _) => inputs.position_age = FRESH,
                 (AutopilotSilent, _) => inputs.heartbeat_age = HEARD,
                 (Arming, _) => inputs.armed = false,
+                (Blocked, guard) => inputs.blocked = guard != G::PathClear,
                 _ => {}
             }
             if row.guard == G::Armed {

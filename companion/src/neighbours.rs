@@ -9,17 +9,34 @@ use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
+use planner_core::detour::KeepOff;
 use planner_core::frames::{self, Geodetic};
 
 use crate::config::RosterEntry;
-use crate::intent::{GROUNDED, Intent, LANDED, ON_PLAN};
+use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
 use crate::telemetry::SequenceFilter;
 use crate::time::{Duration, Instant};
 
 /// A position older than the one held by less than this is late; by more, the sender was started anew.
 const RESTART_MS: u32 = 10_000;
+/// Heard within this time counts as heard: four positions and intents.
+const LATELY: Duration = Duration::from_millis(800);
+/// After this silence a vehicle counts as dead. One that is unheard stops within 4 s (row `NeighboursSilent`) and lands
+/// 20 s later; this leaves it 20 s to come down.
+const DEAD: Duration = Duration::from_secs(45);
+/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 2 s, and stops.
+const STRETCH_M: f32 = 8.0;
+/// Spacing of the places on that stretch below which it may lie, metres.
+const STRETCH_STEP_M: f32 = 1.0;
+/// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
+/// ground.
+const COLUMN_M: f32 = 60.0;
+/// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
+const VAGUE_M: f32 = 0.5;
+/// What two vehicles in the air may stray together, one of which hovers, metres.
+const SWAY_M: f32 = 0.1;
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 struct Contact {
     id: u8,
     rank: u16,
@@ -27,8 +44,62 @@ struct Contact {
     heard_at: Option<Instant>,
     position_at: Option<Instant>,
     boot_ms: u32,
-    landed: bool,
+    flags: u8,
+    hears_us_at: Option<Instant>,
+    points: Vec<Point, POINTS>,
+    /// Where it rested when a way around was planned.
+    avoided: Option<Point>,
     state: Neighbour,
+}
+
+impl Contact {
+    fn heard_within(&self, now: Instant, span: Duration) -> bool {
+        self.heard_at.is_some_and(|at| now - at < span)
+    }
+
+    fn is_dead(&self, now: Instant) -> bool {
+        self.heard_at.is_some_and(|at| now - at >= DEAD)
+    }
+
+    fn tells(&self, flag: u8) -> bool {
+        self.flags & flag != 0
+    }
+
+    fn is_out(&self, now: Instant) -> bool {
+        self.tells(OUT) || self.is_dead(now)
+    }
+
+    /// Where it may be from now on, with `margin_m` beyond `apart_m`.
+    fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let here = self.state.position;
+        let mut column = |from: Point, radius_m: f32| {
+            tell(KeepOff { from, to: from - Point::new(0.0, 0.0, COLUMN_M), radius_m });
+        };
+        if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
+            tell(KeepOff { from: here, to: here, radius_m: apart_m });
+        } else if self.tells(OUT) {
+            column(here, apart_m + VAGUE_M);
+        } else if self.is_dead(now) {
+            let (mut at, mut left_m) = (here, STRETCH_M);
+            column(at, apart_m + VAGUE_M);
+            for next in &self.points {
+                let leg_m = (next - at).norm();
+                let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
+                for step in 1..=steps {
+                    let along_m = step as f32 * STRETCH_STEP_M;
+                    column(at + (next - at) * (along_m / leg_m), apart_m + VAGUE_M);
+                }
+                if leg_m >= left_m {
+                    break;
+                }
+                left_m -= leg_m;
+                at = *next;
+                column(at, apart_m + VAGUE_M);
+            }
+        } else {
+            tell(KeepOff { from: here, to: here, radius_m: apart_m + SWAY_M });
+        }
+    }
 }
 
 /// The table. Vehicles of the roster have their slot from the start; others get one while there is room.
@@ -69,6 +140,8 @@ impl<const V: usize> Neighbours<V> {
             age_s: 0.0,
             progress_m: None,
             grounded: false,
+            out: false,
+            detours: false,
         };
         let contact = Contact {
             id,
@@ -77,7 +150,10 @@ impl<const V: usize> Neighbours<V> {
             heard_at: None,
             position_at: None,
             boot_ms: 0,
-            landed: false,
+            flags: 0,
+            hears_us_at: None,
+            points: Vec::new(),
+            avoided: None,
             state,
         };
         self.contacts.push(contact).ok()?;
@@ -133,14 +209,26 @@ impl<const V: usize> Neighbours<V> {
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
     }
 
-    /// A neighbour's intent. Its progress counts only where mission and plan are ours.
-    pub fn handle_intent(&mut self, now: Instant, intent: &Intent, mission_crc: u32, plan_crc: Option<u32>) {
+    /// A neighbour's intent. Its progress counts only where mission and plan are ours. `rank` is our own.
+    pub fn handle_intent(
+        &mut self,
+        now: Instant,
+        rank: u16,
+        intent: &Intent,
+        mission_crc: u32,
+        plan_crc: Option<u32>,
+    ) {
         let Some(contact) = self.slot(intent.system_id) else { return };
-        let shared = intent.flags & ON_PLAN != 0
-            && intent.mission_crc == mission_crc
-            && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        let same_mission = intent.mission_crc == mission_crc;
+        let shared =
+            same_mission && intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         contact.heard_at = Some(now);
-        contact.landed = intent.flags & LANDED != 0;
+        contact.flags = intent.flags;
+        // Ranks beyond the bitmap are not told.
+        if rank >= 32 || intent.heard & (1 << rank) != 0 {
+            contact.hears_us_at = Some(now);
+        }
+        contact.points.clone_from(&intent.points);
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m = shared.then_some(intent.progress_m);
     }
@@ -150,7 +238,14 @@ impl<const V: usize> Neighbours<V> {
         self.heard.clear();
         for contact in &self.contacts {
             if let Some(at) = contact.position_at {
-                let state = Neighbour { age_s: (now - at).secs_f32(), rank: contact.rank, ..contact.state };
+                let state = Neighbour {
+                    age_s: (now - at).secs_f32(),
+                    rank: contact.rank,
+                    grounded: contact.state.grounded || contact.is_dead(now),
+                    out: contact.is_out(now),
+                    detours: contact.tells(DETOURS),
+                    ..contact.state
+                };
                 // As many slots as contacts.
                 let _ = self.heard.push(state);
             }
@@ -158,10 +253,50 @@ impl<const V: usize> Neighbours<V> {
         &self.heard
     }
 
-    /// Whether a neighbour of the roster was heard within `span`.
-    pub fn heard_within(&self, now: Instant, span: Duration) -> bool {
-        let roster = self.contacts.iter().filter(|c| c.rank != u16::MAX);
-        roster.filter_map(|c| c.heard_at).any(|at| now - at < span)
+    /// Whom we heard lately, a bit for each rank.
+    pub fn heard_bits(&self, now: Instant) -> u32 {
+        let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, LATELY));
+        heard.fold(0, |bits, c| bits | 1 << c.rank)
+    }
+
+    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand and wait.
+    pub fn all_stand(&self, now: Instant) -> bool {
+        let stands =
+            |c: &Contact| c.is_out(now) || (c.tells(WAITING | LANDED) && c.heard_within(now, LATELY));
+        self.contacts[..self.roster].iter().all(stands)
+    }
+
+    /// How many blocked vehicles have a lower system id than `id`.
+    pub fn blocked_before(&self, id: u8) -> u64 {
+        self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
+    }
+
+    /// A way around what rests now was planned.
+    pub fn avoid(&mut self, now: Instant) {
+        for contact in &mut self.contacts {
+            contact.avoided = contact.is_out(now).then_some(contact.state.position);
+        }
+    }
+
+    /// What lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it is far
+    /// enough.
+    pub fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
+        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.is_out(now) && !avoided(c));
+        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+    }
+
+    /// Where all neighbours are while they stand, those out of the plan among them.
+    pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let placed = self.contacts.iter().filter(|c| c.position_at.is_some());
+        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+    }
+
+    /// Whether a neighbour of the roster was heard within `span`, and one told that it hears us.
+    pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
+        let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
+        let roster = &self.contacts[..self.roster];
+        roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
     /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
@@ -170,15 +305,21 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
-    /// Time since any neighbour of the roster was heard; zero when all of them have landed, or there are none. Where
-    /// none was ever heard, the time since `since`.
+    /// Whether every other vehicle of the roster told that it has landed or is out; true where there is none.
+    pub fn all_rest(&self) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT))
+    }
+
+    /// Time since any neighbour of the roster was heard, or since one told that it hears us, whichever is longer; zero when
+    /// all of them have landed or are out, or there are none. Where neither ever was, the time since `since`.
     pub fn silence(&self, now: Instant, since: Instant) -> Duration {
-        let others = || self.contacts.iter().filter(|c| c.rank != u16::MAX);
-        if others().all(|c| c.landed) {
+        if self.all_rest() {
             return Duration::default();
         }
-        let newest = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
-        now - newest.max(since)
+        let others = || self.contacts[..self.roster].iter();
+        let heard = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
+        let hears_us = others().filter_map(|c| c.hears_us_at).max().unwrap_or(since);
+        now - heard.min(hears_us).max(since)
     }
 }
 
@@ -208,7 +349,16 @@ mod tests {
 
     fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
         let points = Vec::new();
-        Intent { system_id: 9, flags, mission_crc, plan_crc, progress_m: 4.0, speed_mps: 1.0, points }
+        Intent {
+            system_id: 9,
+            flags,
+            mission_crc,
+            plan_crc,
+            progress_m: 4.0,
+            speed_mps: 1.0,
+            heard: 2,
+            points,
+        }
     }
 
     #[test]
@@ -257,7 +407,7 @@ mod tests {
             (ON_PLAN, 1, 7, Some(2), None),
             (ON_PLAN, 1, 2, None, None),
         ] {
-            table.handle_intent(Instant::ZERO, &intent(flags, mission, plan), 1, own_plan);
+            table.handle_intent(Instant::ZERO, 1, &intent(flags, mission, plan), 1, own_plan);
             assert_eq!(table.at(Instant::ZERO)[0].progress_m, progress);
         }
     }
@@ -278,11 +428,13 @@ mod tests {
         let at = Instant::from_millis;
         assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
         table.handle_position(at(5000), &ORIGIN, 9, &place(0, 0));
+        assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "it does not hear us");
+        table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
         assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(4000));
-        assert!(table.heard_within(at(5500), Duration::from_millis(1000)));
-        assert!(!table.heard_within(at(6500), Duration::from_millis(1000)));
-        table.handle_intent(at(5000), &intent(LANDED, 1, 2), 1, None);
-        table.handle_intent(at(5000), &Intent { system_id: 3, ..intent(LANDED, 1, 2) }, 1, None);
+        assert!(table.linked_within(at(5500), Duration::from_millis(1000)));
+        assert!(!table.linked_within(at(6500), Duration::from_millis(1000)));
+        table.handle_intent(at(5000), 1, &intent(LANDED, 1, 2), 1, None);
+        table.handle_intent(at(5000), 1, &Intent { system_id: 3, ..intent(LANDED, 1, 2) }, 1, None);
         assert_eq!(table.silence(at(9000), at(2000)), Duration::default(), "all have landed");
     }
 }

@@ -110,15 +110,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
         let t = &self.telemetry;
-        let place = frames::enu_to_geodetic(&self.config.origin, &t.position);
-        let cm = frames::swap_enu_ned(&t.velocity) * 100.0;
+        let told = self.told_place();
+        let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
+        let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
             // When the position was heard, so that a copy is known as one.
             time_boot_ms: t.position_at.unwrap_or_default().boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
-            relative_alt: libm::roundf(t.position.z * 1e3) as i32,
+            relative_alt: libm::roundf(told.position.z * 1e3) as i32,
             vx: cm.x as i16,
             vy: cm.y as i16,
             vz: cm.z as i16,
@@ -128,29 +129,49 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn intent(&self) -> Intent {
         use State::*;
-        let flags = match self.state {
-            Done => intent::GROUNDED | intent::LANDED,
-            Disarm => intent::GROUNDED,
-            _ if self.telemetry.armed && self.telemetry.on_ground != Some(true) => intent::FLYING,
-            _ => intent::GROUNDED,
+        let grounded = match self.state {
+            Done | Disarm => true,
+            _ => !self.telemetry.armed || self.telemetry.on_ground == Some(true),
         };
         let on_plan = !self.guidance.returning
             && matches!(
                 self.state,
-                Ready | Scheduled | Streaming | Engaging | Arming | TakeOff | Climb | Follow | Paused
+                Ready
+                    | Scheduled
+                    | PadReplanning
+                    | Streaming
+                    | Engaging
+                    | Arming
+                    | TakeOff
+                    | Climb
+                    | Follow
+                    | Blocked
+                    | Replanning
+                    | Paused
             )
             || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
+        let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
+        let out = self.is_out();
+        let flags =
+            if grounded && !(out && self.told_place().vague) { intent::GROUNDED } else { intent::FLYING }
+                | flag(intent::LANDED, self.state == Done)
+                | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
+                | flag(intent::OUT, out)
+                | flag(intent::WAITING, self.waits())
+                | flag(intent::BLOCKED, self.around.blocked)
+                | flag(intent::DETOURS, self.around.flying || self.around.left);
         let plan = self.plan.as_ref();
         let mut points = heapless::Vec::new();
-        let along_m = self.progress_m();
+        let along_m = self.guidance.progress_m(self.state, &self.scene());
         let ahead = plan.into_iter().flat_map(|plan| plan.path.waypoints()).filter(|w| w.along_m > along_m);
         points.extend(ahead.take(intent::POINTS).map(|w| w.position));
         Intent {
             system_id: self.config.system_id,
-            flags: flags | if on_plan && plan.is_some() { intent::ON_PLAN } else { 0 },
+            flags,
             mission_crc: self.config.mission_crc,
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
-            progress_m: along_m,
+            progress_m: if self.around.flying { self.around.left_at_m } else { along_m },
+            heard: self.neighbours.heard_bits(self.now),
             speed_mps: self.telemetry.velocity.norm(),
             points,
         }

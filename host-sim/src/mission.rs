@@ -4,12 +4,15 @@ use std::sync::OnceLock;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
+use companion::PlanFailure;
 use planner_core::Point;
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::prm::Config;
 use planner_core::roadmap::{RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
+use planner_core::search::SearchWorkspace;
 use planner_core::segment::segment_is_clear;
 
 use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
@@ -18,6 +21,7 @@ use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
 use crate::scenario::{self, Scenario};
+use crate::swarm::member::DeskCompanion;
 
 /// The plan of a swarm with the desk's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
@@ -168,6 +172,48 @@ impl Mission {
         let mut workspace = Default::default();
         let mut own = Box::new(OwnPlan::default());
         plan::vehicle_plan(plan, index, &self.schedule, &mut workspace, &mut own)?;
+        Ok(own)
+    }
+
+    /// Answers a companion that asks for a plan: its part of the swarm's, or a way around what is in its way.
+    pub fn answer(
+        &self,
+        plan: &SwarmPlan,
+        index: usize,
+        companion: &DeskCompanion,
+    ) -> Result<Box<OwnPlan>, PlanFailure> {
+        let mut obstacles = Vec::new();
+        match companion.detour(|obstacle| obstacles.push(obstacle)) {
+            Some(request) => self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
+            None => self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity),
+        }
+    }
+
+    /// A way around `obstacles`, each of which reaches no deeper than the ground below it.
+    fn detour(
+        &self,
+        request: &DetourRequest,
+        obstacles: &mut [KeepOff],
+    ) -> Result<Box<OwnPlan>, DetourError> {
+        for obstacle in obstacles.iter_mut().filter(|o| o.to.z < o.from.z) {
+            // What lies on the ground has its centre a radius above it; nothing falls through a floor.
+            obstacle.to.z =
+                obstacle.to.z.max(self.map.ground_below(&obstacle.from).unwrap_or(f32::NEG_INFINITY));
+        }
+        let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
+        let mut own = Box::new(OwnPlan {
+            goal: Some(request.goal),
+            descent_m: request.descent_m,
+            ..OwnPlan::default()
+        });
+        detour::plan(
+            &self.view(),
+            request,
+            obstacles,
+            &mut search,
+            &mut heapless::Vec::new(),
+            &mut own.path,
+        )?;
         Ok(own)
     }
 

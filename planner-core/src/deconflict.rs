@@ -2,7 +2,7 @@
 //!
 //! [`Method::Algorithm2`] is P3D §3.4 as printed, kept for comparison. [`Method::Priority`] keeps the order of the swarm's
 //! schedule: before each stretch that conflicts with one an earlier-labelled vehicle has yet to leave, it stops (the
-//! gates of [`crate::schedule`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
+//! gates of [`crate::schedule`]); a vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
 
 use libm::{fmaxf, fminf, sqrtf};
 
@@ -49,8 +49,12 @@ pub struct Neighbour {
     pub age_s: f32,
     /// Progress on the path of the plan we share, metres (negative while taking off); `None` if it flies another plan.
     pub progress_m: Option<f32>,
-    /// Whether it stands on the ground.
+    /// Whether it stands on the ground, or lies there for all one knows.
     pub grounded: bool,
+    /// Whether it has left the plan for good: it keeps nobody waiting, it is an obstacle.
+    pub out: bool,
+    /// Whether it flies around something on a path of its own.
+    pub detours: bool,
 }
 
 /// The vehicle that asks.
@@ -64,6 +68,8 @@ pub struct Own<'a, const W: usize> {
     pub along_m: f32,
     /// Its path.
     pub path: &'a Path<W>,
+    /// Whether that is one of its own, not the plan's.
+    pub detours: bool,
 }
 
 /// What the neighbours leave.
@@ -141,14 +147,14 @@ fn priority<const W: usize>(
         let passed = neighbours
             .iter()
             .find(|n| n.id == gate.id)
-            .and_then(|n| n.progress_m)
-            .is_some_and(|progress_m| progress_m >= gate.until_m);
+            .is_some_and(|n| n.out || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m));
         if !passed {
             stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
             break;
         }
     }
-    for n in neighbours.iter().filter(|n| n.progress_m.is_none() && !n.grounded) {
+    let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
+    for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
         if let Some(distance) = first_contact(cfg, own, n) {
             stop(distance, n.id);
         }
@@ -189,6 +195,8 @@ mod tests {
             age_s: 0.0,
             progress_m: None,
             grounded: false,
+            out: false,
+            detours: false,
         }
     }
 
@@ -200,7 +208,7 @@ mod tests {
     }
 
     fn own(path: &Path<4>) -> Own<'_, 4> {
-        Own { rank: 1, position: Point::zeros(), along_m: 0.0, path }
+        Own { rank: 1, position: Point::zeros(), along_m: 0.0, path, detours: false }
     }
 
     #[test]
@@ -234,6 +242,9 @@ mod tests {
         heard[0].progress_m = Some(9.0);
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates, &heard);
         assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
+        heard[0] = Neighbour { out: true, grounded: true, ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0)) };
+        let advice = advise(&cfg(Method::Priority), &own(&path), &gates[2..], &heard);
+        assert_eq!(advice, Advice::FREE, "who is out of the plan will never pass");
     }
 
     #[test]

@@ -7,6 +7,7 @@
 
 pub mod assignment;
 pub mod deconflict;
+pub mod detour;
 pub mod frames;
 pub mod path;
 pub mod plan;

@@ -188,8 +188,8 @@ fn parts(length_m: f32) -> u32 {
 }
 
 /// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
-fn segments_distance_sq(p: &Piece, q: &Piece) -> f32 {
-    let (d1, d2, r) = (p.to - p.from, q.to - q.from, p.from - q.from);
+pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
+    let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
     let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
     let share = |n: f32, d: f32| if d > 0.0 { (n / d).clamp(0.0, 1.0) } else { 0.0 };
     let (b, c) = (d1.dot(&d2), d1.dot(&r));
@@ -210,7 +210,8 @@ fn conflict(cfg: &ScheduleConfig, p: &Piece, q: &Piece) -> bool {
     let apart = if p.parked || q.parked { cfg.parked_separation_m } else { cfg.separation_m };
     let reach = apart + 0.5 * (p.to_m - p.from_m + q.to_m - q.from_m);
     let middles = (p.from + p.to - q.from - q.to) * 0.5;
-    middles.norm_squared() < reach * reach && segments_distance_sq(p, q) < apart * apart
+    middles.norm_squared() < reach * reach
+        && segments_distance_sq((&p.from, &p.to), (&q.from, &q.to)) < apart * apart
 }
 
 /// Intervals of time that do not overlap.

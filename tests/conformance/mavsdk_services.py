@@ -4,51 +4,17 @@
 Usage: mavsdk_services.py udpin://127.0.0.1:PORT FLOAT_PARAMETER INTEGER_PARAMETER
 
 Prints one `ok ...` line for each thing that held; the first that does not ends it with exit code 1. Ends itself after
-60 seconds.
+120 seconds.
 """
 
-import asyncio
-import os
-import signal
-import socket
-import sys
-
-from mavsdk import System
+from drone import check, first, run
 from mavsdk.mission_raw import MissionItem
 
-TIMEOUT_S = 60
+TIMEOUT_S = 120
 # Home, take-off, two waypoints, return: MAV_CMD, frame, latitude, longitude, height.
 PLAN = [(16, 0, 0.0, 0.0, 488.0), (22, 3, 0.0, 0.0, 5.0), (16, 3, 1e-4, 0.0, 5.0), (16, 3, 1e-4, 1e-4, 6.0),
         (20, 3, 0.0, 0.0, 0.0)]
 HOME = 47.397742, 8.545594
-
-
-class Failed(Exception):
-    """Something did not hold."""
-
-
-def check(what, holds, seen=""):
-    if not holds:
-        raise Failed(f"{what}: {seen}")
-    print(f"ok {what} {seen}".rstrip(), flush=True)
-
-
-async def first(stream, holds, seconds):
-    async def search():
-        async for value in stream:
-            if holds(value):
-                return value or True
-
-    try:
-        return await asyncio.wait_for(search(), seconds)
-    except asyncio.TimeoutError:
-        return None
-
-
-def free_port():
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 def plan(kind=0):
@@ -69,10 +35,10 @@ async def use(drone, url, real, whole):
     await telemetry.set_rate_landed_state(5.0)
     check("rates are set", True)
     check("position", await first(telemetry.position(), lambda p: abs(p.latitude_deg - HOME[0]) < 1e-4, 20))
-    battery = await first(telemetry.battery(), lambda b: b.remaining_percent > 90, 8)
+    battery = await first(telemetry.battery(), lambda b: b.remaining_percent > 90, 20)
     check("battery", battery, f"{battery.remaining_percent:.0f} %" if battery else "")
-    check("gps", await first(telemetry.gps_info(), lambda g: g.num_satellites >= 6, 8))
-    check("landed state", str(await first(telemetry.landed_state(), lambda _: True, 8)).endswith("ON_GROUND"))
+    check("gps", await first(telemetry.gps_info(), lambda g: g.num_satellites >= 6, 20))
+    check("landed state", str(await first(telemetry.landed_state(), lambda _: True, 20)).endswith("ON_GROUND"))
     version = await drone.info.get_version()
     check("version", version.flight_sw_major > 0, f"{version.flight_sw_major}.{version.flight_sw_minor}")
 
@@ -102,24 +68,5 @@ async def use(drone, url, real, whole):
     check("mission cleared", left == 0 or (left == 1 and version.flight_sw_major == 4), left)
 
 
-async def main():
-    drone = System(port=free_port())
-    try:
-        await asyncio.wait_for(use(drone, *sys.argv[1:]), TIMEOUT_S)
-        code = 0
-    except Failed as failure:
-        print(f"FAILED {failure}", flush=True)
-        code = 1
-    except asyncio.TimeoutError:
-        print(f"FAILED not done within {TIMEOUT_S} s", flush=True)
-        code = 1
-    finally:
-        drone._stop_mavsdk_server()
-    # Streams that are still open would keep the interpreter from ending.
-    sys.stdout.flush()
-    os._exit(code)
-
-
 if __name__ == "__main__":
-    signal.alarm(TIMEOUT_S + 10)
-    asyncio.run(main())
+    run(use, TIMEOUT_S)

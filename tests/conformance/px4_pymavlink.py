@@ -4,7 +4,7 @@
 Usage: px4_pymavlink.py udpout:127.0.0.1:PORT        (any pymavlink connection string)
 
 Prints one `ok ...` line for each thing that held; the first that does not ends it with exit code 1, and so does a
-frame that does not parse. Ends itself after 110 seconds.
+frame that does not parse. Ends itself after 150 seconds.
 """
 
 import signal
@@ -18,7 +18,7 @@ MASK_POSITION, MASK_VELOCITY = 0xDF8, 0xDC7
 
 
 def main():
-    signal.alarm(110)
+    signal.alarm(150)
     pilot = Pilot(sys.argv[1])
     check("heartbeat", pilot.spin(10, lambda: "HEARTBEAT" in pilot.last))
     beat = pilot.last["HEARTBEAT"]

@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, python, workspace};
 
-const TIME_LIMIT: Duration = Duration::from_secs(120);
+const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
 const ARDUPILOT: &[&str] = &["--personality", "ardupilot", "--ready-after", "5"];
 

@@ -6,7 +6,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::frame::MAX_SENT;
-use companion::{Event, Instant, Link, PlanFailure, State};
+use companion::{Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
 use super::load;
@@ -49,13 +49,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut mission = Mission::prepare(load(&args.scenario, None)?, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
-    let own = mission.own_plan(&plan, index).map(|mut own| {
-        if args.swarm.is_none() {
-            own.gates.clear();
-            own.depart_s = 0.0;
-        }
-        own
-    });
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
         say!("no --swarm link: vehicle {} flies as the only one", args.id);
@@ -84,10 +77,16 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             companion.handle_timeout(now());
         }
         while let Some(event) = companion.poll_event() {
-            match (event, &own) {
-                (Event::PlanRequested, Ok(own)) => companion.handle_plan(now(), Ok(own)),
-                (Event::PlanRequested, Err(_)) => companion.handle_plan(now(), Err(PlanFailure::Capacity)),
-                (Event::StateChanged { from, to, text, .. }, _) => {
+            match event {
+                Event::PlanRequested => {
+                    let mut own = mission.answer(&plan, index, &companion);
+                    if let (Ok(own), None) = (&mut own, &args.swarm) {
+                        own.gates.clear();
+                        own.depart_s = 0.0;
+                    }
+                    companion.handle_plan(now(), own.as_deref().map_err(|failure| *failure));
+                }
+                Event::StateChanged { from, to, text, .. } => {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
                         let mut frame = [0; MAX_SENT];

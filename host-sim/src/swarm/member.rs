@@ -318,6 +318,17 @@ pub fn is_finished(state: State) -> bool {
 }
 
 fn on_path(state: State) -> bool {
-    use State::{Alone, AutopilotSilent, Follow, Paused, PilotControl, PositionLost};
-    matches!(state, Follow | Paused | Alone | AutopilotSilent | PositionLost | PilotControl)
+    use State::*;
+    matches!(
+        state,
+        Follow
+            | Paused
+            | Alone
+            | Blocked
+            | Replanning
+            | Stopping
+            | AutopilotSilent
+            | PositionLost
+            | PilotControl
+    )
 }

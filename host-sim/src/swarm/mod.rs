@@ -131,7 +131,7 @@ fn simulate(
             if member.wants_plan && member.planner != Planner::Late {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
-                    _ => mission.own_plan(plan, i).map_err(|_| PlanFailure::Capacity),
+                    _ => mission.answer(plan, i, &member.companion),
                 };
                 member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }

@@ -1,0 +1,220 @@
+//! Living with vehicles that left the plan: who counts as out, what is in the way, and flying around it.
+//!
+//! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it counts as dead) opens every
+//! gate that waits for it, and is an obstacle where it rests. A vehicle whose path that blocks, or which was out itself and
+//! may fly again, stops and waits until all others are out or stand and wait themselves. Then the one with the lowest
+//! system id asks its shell for a way around everybody and flies it to its goal. All the while it tells the progress at which it
+//! left the plan: whoever waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
+//!
+//! ENU metres. Cost: every half second, each leg ahead against each vehicle that is out.
+
+use planner_core::Point;
+use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::schedule::VehiclePlan;
+
+use crate::config::PlanFailure;
+use crate::events::Event;
+use crate::machine::{Companion, STANDING_MPS};
+use crate::mission::State;
+use crate::time::{Duration, Instant};
+
+/// Time between two looks along the path.
+const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
+const QUIET_S: u64 = 3;
+/// Each blocked vehicle with a lower id is given this time to begin.
+const TURN_S: u64 = 2;
+/// After a way around was not found the next is sought so much later.
+const RETRY_S: u64 = 10;
+/// A way around on which there is no progress for this long is blocked too.
+const STUCK: Duration = Duration::from_secs(20);
+/// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
+const KEPT: Duration = Duration::from_secs(20);
+/// An abort whose end the autopilot does not tell is over by then.
+const SETTLED: Duration = Duration::from_secs(5);
+/// A position older than this is vague.
+const FRESH: Duration = Duration::from_secs(2);
+/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
+const MARGIN_M: f32 = 0.25;
+
+/// What is known of the way ahead.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Around {
+    /// The path is blocked, or the plan was left.
+    pub(crate) blocked: bool,
+    /// It was out once: the others do not count on it any more.
+    pub(crate) left: bool,
+    /// The path is one around.
+    pub(crate) flying: bool,
+    /// Progress on the plan when it was left for a way around, metres.
+    pub(crate) left_at_m: f32,
+    /// The way around asked for has come.
+    pub(crate) ready: bool,
+    /// Ways around not found in a row.
+    pub(crate) failed: u8,
+    /// Where it was before its position became doubtful.
+    pub(crate) lost_at: Option<Point>,
+    pub(crate) quiet_since: Option<Instant>,
+    pub(crate) looked_at: Instant,
+}
+
+/// What the others are told of where it is.
+pub(crate) struct Told {
+    pub(crate) position: Point,
+    pub(crate) velocity: Point,
+    /// It may be metres away, or lower.
+    pub(crate) vague: bool,
+}
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Whether it has left the plan for good, and rests or is a pilot's.
+    pub(crate) fn is_out(&self) -> bool {
+        let lasted = self.now - self.entered_at;
+        match self.state {
+            State::Done => !self.guidance.at_goal(&self.scene()) || self.around.left,
+            State::Aborted => self.telemetry.on_ground == Some(true) || lasted >= SETTLED,
+            State::PilotControl => lasted >= KEPT,
+            _ => false,
+        }
+    }
+
+    /// Whether it stands until somebody else moves.
+    pub(crate) fn waits(&self) -> bool {
+        let held = self.guidance.advice.waiting_for != 0;
+        let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
+        match self.state {
+            State::Scheduled => self.around.blocked || (held && self.guidance.advice.stop_within_m <= 0.05),
+            State::Follow => held && stands,
+            State::Blocked => stands,
+            _ => false,
+        }
+    }
+
+    pub(crate) fn told_place(&self) -> Told {
+        let t = &self.telemetry;
+        let vague = self.around.lost_at.is_some() || t.position_age(self.now) > FRESH;
+        let position = self.around.lost_at.unwrap_or(t.position);
+        Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, vague }
+    }
+
+    /// Remembers where the position became doubtful, on entering a state.
+    pub(crate) fn mark_place(&mut self, to: State) {
+        match to {
+            State::PositionLost if self.around.lost_at.is_none() => {
+                let path = self.plan.as_ref().map(|plan| &plan.path);
+                let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
+                self.around.lost_at = Some(on_path.unwrap_or(self.telemetry.position));
+            }
+            State::Follow | State::WaitPosition => self.around.lost_at = None,
+            _ => {}
+        }
+    }
+
+    /// Looks for what is in the way, and whether the others stand.
+    pub(crate) fn look_around(&mut self) {
+        let now = self.now;
+        if now - self.around.looked_at < LOOK_EVERY {
+            return;
+        }
+        self.around.looked_at = now;
+        self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.plan.is_some();
+        let on_ground = matches!(self.state, State::Scheduled | State::PadReplanning);
+        let stopped = matches!(self.state, State::Blocked | State::Replanning);
+        if !on_ground && !stopped && self.state != State::Follow {
+            self.around.blocked = false;
+            self.around.quiet_since = None;
+            return;
+        }
+        let stuck =
+            self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
+        let astray = self.around.left && !self.around.flying;
+        self.around.blocked = !self.guidance.returning && (stuck || astray || self.is_in_the_way(on_ground));
+        if !self.neighbours.all_stand(now) {
+            self.around.quiet_since = None;
+        } else if self.around.quiet_since.is_none() {
+            self.around.quiet_since = Some(now);
+        }
+    }
+
+    fn is_in_the_way(&self, on_ground: bool) -> bool {
+        let Some(plan) = &self.plan else { return false };
+        let here = if on_ground { self.pad() } else { self.telemetry.position };
+        let along_m = self.guidance.along_m();
+        let mut blocked = false;
+        self.neighbours.obstacles(self.now, self.config.safety_distance_m, |obstacle| {
+            blocked |=
+                detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, &obstacle);
+        });
+        blocked
+    }
+
+    fn pad(&self) -> Point {
+        self.start - Point::new(0.0, 0.0, self.plan.as_ref().map_or(0.0, |plan| plan.climb_m))
+    }
+
+    /// Whether it may fly around now.
+    pub(crate) fn is_our_turn(&self) -> bool {
+        let wait_s = QUIET_S
+            + TURN_S * self.neighbours.blocked_before(self.config.system_id)
+            + RETRY_S * u64::from(self.around.failed);
+        self.around.blocked
+            && self.around.quiet_since.is_some_and(|at| self.now - at >= Duration::from_secs(wait_s))
+    }
+
+    pub(crate) fn request_detour(&mut self) {
+        self.plan_failure = None;
+        self.around.ready = false;
+        // Full only if the shell does not drain; then the way around is late.
+        let _ = self.events.push_back(Event::PlanRequested);
+    }
+
+    /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
+    /// `tell` is given all that is to be kept off.
+    pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
+        if !matches!(self.state, State::Replanning | State::PadReplanning) {
+            return None;
+        }
+        let plan = self.plan.as_ref()?;
+        let points = plan.path.waypoints();
+        let along_m = self.guidance.along_m();
+        let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
+        let ahead = points.get(next)?;
+        let behind = points.get(next.saturating_sub(1))?;
+        self.neighbours.places(self.now, self.config.safety_distance_m + MARGIN_M, tell);
+        Some(DetourRequest {
+            here: plan.path.point_at(along_m)?,
+            leg: [ahead.position, behind.position],
+            leg_clearance_m: ahead.clearance_m,
+            goal: plan.goal?,
+            descent_m: plan.descent_m,
+            required_clearance_m: self.config.required_clearance_m,
+        })
+    }
+
+    /// Takes the way around.
+    pub(crate) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
+        let along_m = self.guidance.along_m();
+        let here = self.plan.as_ref().and_then(|plan| plan.path.point_at(along_m));
+        if !here.is_some_and(|here| self.begins_at(detour, &here)) {
+            self.miss_detour(PlanFailure::Invalid);
+            return;
+        }
+        if !self.around.flying {
+            self.around.left_at_m = self.guidance.progress_m(self.state, &self.scene());
+        }
+        if let Some(plan) = &mut self.plan {
+            plan.path = detour.path.clone();
+            plan.gates.clear();
+            plan.depart_s = 0.0;
+        }
+        self.around =
+            Around { left: true, flying: true, left_at_m: self.around.left_at_m, ..Around::default() };
+        self.around.ready = true;
+        self.neighbours.avoid(self.now);
+    }
+
+    pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {
+        self.plan_failure = Some(failure);
+        self.around.failed = self.around.failed.saturating_add(1);
+    }
+}

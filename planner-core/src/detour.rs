@@ -1,0 +1,155 @@
+//! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it.
+//!
+//! It is flown alone, while all others stand (`companion/src/detour.rs` waits for that), so there is no time in it: the
+//! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOff`]. It begins with
+//! the rest of the leg at hand, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
+//! something already than it should be, it only comes no nearer.
+//!
+//! ENU metres. Cost: two A*, each edge looked at against every [`KeepOff`].
+
+use heapless::Vec;
+use libm::{fmaxf, fminf, sqrtf};
+
+use crate::Point;
+use crate::path::{Path, PathError};
+use crate::roadmap::{HalfEdge, RoadmapView};
+use crate::schedule::segments_distance_sq;
+use crate::search::{self, SearchError, SearchWorkspace};
+
+/// Coming nearer by less than this is none: a hovering vehicle sways, metres.
+const SWAY_M: f32 = 0.05;
+
+/// A stretch to stay away from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KeepOff {
+    /// One end.
+    pub from: Point,
+    /// The other end.
+    pub to: Point,
+    /// Distance to keep, metres.
+    pub radius_m: f32,
+}
+
+impl KeepOff {
+    /// The same, with no more distance than `here` has: who is too near already may fly off.
+    fn seen_from(&self, here: &Point) -> Self {
+        let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
+        Self { radius_m: fminf(self.radius_m, fmaxf(now_m - SWAY_M, 0.0)), ..*self }
+    }
+
+    fn touches(&self, a: &Point, b: &Point) -> bool {
+        segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
+    }
+}
+
+/// Whether the rest of a path from arc length `along_m`, from the climb to the descent, comes too near. Nearer than
+/// `here`, where the vehicle is, has to be: what it leaves is not in its way.
+pub fn is_blocked<const W: usize>(
+    path: &Path<W>,
+    along_m: f32,
+    climb_m: f32,
+    descent_m: f32,
+    here: &Point,
+    obstacle: &KeepOff,
+) -> bool {
+    let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
+    let obstacle = obstacle.seen_from(here);
+    let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
+    let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
+    let ground = last.position - up(descent_m);
+    climbs
+        || obstacle.touches(&last.position, &ground)
+        || path.waypoints().windows(2).filter(|leg| leg[1].along_m > along_m).any(|leg| {
+            let from = path.point_at(fmaxf(along_m, leg[0].along_m)).unwrap_or(leg[0].position);
+            obstacle.touches(&from, &leg[1].position)
+        })
+}
+
+/// What to plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DetourRequest {
+    /// Where the vehicle hovers, on a leg whose ends follow.
+    pub here: Point,
+    /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour began.
+    pub leg: [Point; 2],
+    /// Its clearance, metres.
+    pub leg_clearance_m: f32,
+    /// Index of the goal.
+    pub goal: u16,
+    /// Height of the goal over its ground, metres.
+    pub descent_m: f32,
+    /// Radius + safety margin, metres.
+    pub required_clearance_m: f32,
+}
+
+/// Why there is no way around.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DetourError {
+    /// The search found none.
+    Search(SearchError),
+    /// The path was refused.
+    Path(PathError),
+    /// The goal, or the column below it, is too near something.
+    GoalBlocked,
+}
+
+/// The shortest path to the goal that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer already
+/// the distance is shortened; `nodes` is scratch.
+pub fn plan<const N: usize, const W: usize>(
+    view: &RoadmapView<'_>,
+    request: &DetourRequest,
+    obstacles: &mut [KeepOff],
+    ws: &mut SearchWorkspace<N>,
+    nodes: &mut Vec<u16, W>,
+    out: &mut Path<W>,
+) -> Result<(), DetourError> {
+    let here = request.here;
+    obstacles.iter_mut().for_each(|obstacle| *obstacle = obstacle.seen_from(&here));
+    let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.touches(a, b));
+    let goal = view.header().starts + request.goal;
+    if usize::from(goal) >= view.node_count() {
+        return Err(DetourError::Search(SearchError::BadNode(goal)));
+    }
+    let above = view.node(goal);
+    if !clear(&above, &(above - Point::new(0.0, 0.0, request.descent_m))) {
+        return Err(DetourError::GoalBlocked);
+    }
+    let passable = |from: u16, edge: &HalfEdge| {
+        view.clears(edge, request.required_clearance_m) && clear(&view.node(from), &view.node(edge.target))
+    };
+    let mut best = f32::INFINITY;
+    let mut failed = Err(DetourError::Search(SearchError::NoPath));
+    for end in request.leg.iter().filter(|end| clear(&here, end)) {
+        let Some(entry) = (0..view.node_count() as u16).find(|&node| view.node(node) == *end) else {
+            continue;
+        };
+        let length_m = match search::astar(view, entry, goal, passable, ws, nodes) {
+            Ok(length_m) => length_m + (end - here).norm(),
+            Err(SearchError::NoPath) => continue,
+            Err(error) => {
+                failed = Err(DetourError::Search(error));
+                continue;
+            }
+        };
+        if length_m < best {
+            best = length_m;
+            failed = write(view, request, nodes, out).map_err(DetourError::Path);
+        }
+    }
+    failed
+}
+
+fn write<const W: usize>(
+    view: &RoadmapView<'_>,
+    request: &DetourRequest,
+    nodes: &[u16],
+    out: &mut Path<W>,
+) -> Result<(), PathError> {
+    *out = Path::new();
+    out.push(request.here, request.leg_clearance_m)?;
+    for (i, &node) in nodes.iter().enumerate() {
+        let edge = i.checked_sub(1).and_then(|before| view.edge_between(nodes[before], node));
+        out.push(view.node(node), edge.map_or(request.leg_clearance_m, |e| e.clearance_m))?;
+    }
+    Ok(())
+}
