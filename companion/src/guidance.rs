@@ -2,13 +2,14 @@
 
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Neighbour, Own};
 use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
 use crate::config::Config;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
+use crate::retreat;
 use crate::telemetry::Telemetry;
 use crate::time::Instant;
 
@@ -18,6 +19,8 @@ const ARRIVED_M: f32 = 0.35;
 const STANDING_MPS: f32 = 0.5;
 /// A reference slower than this stands, m/s.
 const STANDING_REFERENCE_MPS: f32 = 0.05;
+/// A stop further ahead is no place to wait at yet, metres.
+const WAITS_WITHIN_M: f32 = 8.0;
 /// This near its top the climb is done, metres.
 const CLIMBED_M: f32 = 0.12;
 /// The climb ends no slower than this, m/s.
@@ -74,6 +77,8 @@ pub struct Guidance {
     progress_at: Instant,
     /// Whether it flies back the way it came.
     pub returning: bool,
+    /// Whether it keeps out from under a vehicle that comes down.
+    pub retreating: bool,
 }
 
 /// What guidance reads beside its own state.
@@ -114,6 +119,7 @@ impl Guidance {
             progress_m: 0.0,
             progress_at: Instant::ZERO,
             returning: false,
+            retreating: false,
         }
     }
 
@@ -257,18 +263,54 @@ impl Guidance {
             self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
         }
         if self.on_path && setpoints_flow(state) && state != State::PilotControl {
-            let advice = if state == State::Follow {
+            let mut advice = if state == State::Follow {
                 self.advice
             } else {
                 Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
             };
             self.reference =
-                path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s);
+                self.retreat(state, &plan.path, &mut advice, neighbours.at(now), dt_s).or_else(|| {
+                    path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s)
+                });
             if self.tracker.along_m > self.progress_m + PROGRESS_M {
                 self.progress_m = self.tracker.along_m;
                 self.progress_at = now;
             }
         }
+    }
+
+    /// A step back from below a vehicle that comes down, where it stands or would wait.
+    fn retreat<const W: usize>(
+        &mut self,
+        state: State,
+        path: &Path<W>,
+        advice: &mut Advice,
+        neighbours: &[Neighbour],
+        dt_s: f32,
+    ) -> Option<Reference> {
+        let safety_m = self.deconflict.safety_distance_m;
+        let along_m = self.tracker.along_m;
+        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning);
+        let wait_m = along_m + advice.stop_within_m.max(0.0);
+        let to_m = if waits && advice.stop_within_m < WAITS_WITHIN_M {
+            retreat::elsewhere(path, wait_m, neighbours, safety_m)
+        } else {
+            None
+        };
+        self.retreating = to_m.is_some();
+        if let Some(to_m) = to_m {
+            // A place ahead needs no step back: it flies on as far as that.
+            advice.stop_within_m = (to_m - along_m).max(0.0);
+        }
+        let back = to_m.filter(|to_m| *to_m < along_m);
+        let step =
+            back.and_then(|to_m| retreat::step(path, &mut self.tracker, to_m, neighbours, safety_m, dt_s));
+        if step.is_some() {
+            self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
+        } else {
+            self.tracker.speed_mps = self.tracker.speed_mps.max(0.0);
+        }
+        step
     }
 
     /// Time since the reference last moved on.
@@ -309,6 +351,13 @@ impl Guidance {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);
+        if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
+            // Over its pad, on the way up.
+            let away = position - first.position;
+            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+                return true;
+            }
+        }
         if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
             return false;
         }
