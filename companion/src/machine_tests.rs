@@ -191,6 +191,29 @@ fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
 }
 
 #[test]
+fn the_heartbeat_is_believed_and_no_ack() {
+    use mavlink::dialects::ardupilotmega::{COMMAND_ACK_DATA, MavResult};
+    let mut bench = Bench::new(config());
+    bench.until(State::Ready, 6.0);
+    bench.refused.push(176);
+    bench.start();
+    bench.until(State::Engaging, 6.0);
+    // PX4's first ack of DO_SET_MODE says accepted, whatever comes of it.
+    let accepted = COMMAND_ACK_DATA {
+        command: MavCmd::MAV_CMD_DO_SET_MODE,
+        result: MavResult::MAV_RESULT_ACCEPTED,
+        ..Default::default()
+    };
+    bench.tell(&accepted);
+    bench.run(2.0);
+    assert_eq!(bench.state(), State::Engaging);
+    assert!(bench.commands.iter().filter(|c| c.0 == 176).count() >= 2, "asked again");
+    bench.refused.clear();
+    bench.tell(&COMMAND_ACK_DATA { result: MavResult::MAV_RESULT_TEMPORARILY_REJECTED, ..accepted });
+    bench.until(State::Follow, 20.0);
+}
+
+#[test]
 fn an_unsound_plan_is_refused() {
     let mut elsewhere = plan();
     elsewhere.path = planner_core::path::Path::new();

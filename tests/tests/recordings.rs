@@ -5,11 +5,13 @@
 
 use std::path::Path;
 
-use companion::Instant;
-use companion::frame::{Frame, Framer};
+use companion::frame::{self, Frame, Framer, Header};
+use companion::{Companion, Config as CompanionConfig, Instant, Link};
 use flockmate_tests::{logs, shared_data};
 use host_sim::autopilot::{Autopilot, Config, Personality};
-use planner_core::frames::Geodetic;
+use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA};
+use planner_core::Point;
+use planner_core::frames::{Geodetic, geodetic_to_enu};
 
 const COMMAND_ACK: u32 = 77;
 const HEARTBEAT: u32 = 0;
@@ -144,4 +146,92 @@ fn the_simulated_px4_answers_as_the_recorded_one_did() {
         (real.landed.first(), real.landed.last()),
         (simulated.landed.first(), simulated.landed.last())
     );
+}
+
+/// A flight as a companion saw it.
+#[derive(Debug, Default, PartialEq)]
+struct Seen {
+    modes: Vec<u32>,
+    grounded: Vec<bool>,
+    frames: u32,
+}
+
+/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global position was told, the
+/// companion's own, from local metres by that autopilot's projection, must be the same place.
+fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<GPS_GLOBAL_ORIGIN_DATA>) -> (Seen, Seen) {
+    let mut companion: Companion<2, 4, 2> =
+        Companion::new(CompanionConfig::new(1, Point::zeros(), origin)).unwrap();
+    let (mut told, mut seen, mut compared, mut buffer) = (Story::default(), Seen::default(), 0, [0; 512]);
+    let (mut grounded, mut sent) = (Vec::new(), 0);
+    let from_autopilot =
+        |entry: &&Recorded| entry.frame.as_ref().is_none_or(|f| (f.system, f.component) == (1, 1));
+    for (number, entry) in recorded.iter().filter(from_autopilot).enumerate() {
+        let now = Instant::from_micros((entry.t_s * 1e6) as u64);
+        companion.handle_bytes(Link::Autopilot, now, &entry.bytes);
+        sent += u32::from(entry.frame.is_some());
+        if let (20, Some(announced)) = (number, &announced) {
+            let sequence = entry.frame.as_ref().map_or(0, |f| f.sequence.wrapping_add(1));
+            let length = frame::encode(Header { system: 1, component: 1, sequence }, announced, &mut buffer);
+            companion.handle_bytes(Link::Autopilot, now, &buffer[..length]);
+            sent += 1;
+        }
+        if companion.poll_timeout().is_some_and(|due| due <= now) {
+            companion.handle_timeout(now);
+        }
+        for link in [Link::Autopilot, Link::Swarm] {
+            while companion.poll_transmit(link, &mut buffer) > 0 {}
+        }
+        while companion.poll_event().is_some() {}
+        let telemetry = companion.telemetry();
+        if telemetry.heartbeat_at.is_some() && seen.modes.last() != Some(&telemetry.custom_mode) {
+            seen.modes.push(telemetry.custom_mode);
+        }
+        if let Some(on_ground) = telemetry.on_ground.filter(|on| seen.grounded.last() != Some(on)) {
+            seen.grounded.push(on_ground);
+        }
+        let Some(heard) = &entry.frame else { continue };
+        told.hear(entry.t_s, heard);
+        if heard.message_id == EXTENDED_SYS_STATE {
+            let on_ground = heard.padded()[1] == 1;
+            if grounded.last() != Some(&on_ground) {
+                grounded.push(on_ground);
+            }
+        }
+        let Some(global) = heard.decode::<GLOBAL_POSITION_INT_DATA>() else { continue };
+        if let Some(at) = telemetry.position_at {
+            let place = Geodetic {
+                lat_deg: f64::from(global.lat) * 1e-7,
+                lon_deg: f64::from(global.lon) * 1e-7,
+                alt_m: f64::from(global.alt) * 1e-3,
+            };
+            let age_s = (now - at).secs_f32();
+            let apart = telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
+            // The two are told up to a stream's period apart.
+            assert!(age_s > 0.2 || apart.xy().norm() < 0.1, "{apart} at {} s, {age_s} s old", entry.t_s);
+            compared += 1;
+        }
+    }
+    println!("{compared} places compared");
+    assert!(compared > 300, "{compared} places compared");
+    seen.frames = companion.counters(Link::Autopilot).frames;
+    (Seen { modes: told.modes, grounded, frames: sent }, seen)
+}
+
+#[test]
+fn the_companion_sees_px4s_recorded_flight_as_it_was() {
+    let Some(path) = shared_data("mavlink/px4-1.17-offboard.tlog") else { return };
+    // The recording holds no GPS_GLOBAL_ORIGIN; it follows from its HOME_POSITION (planner-core's tests of frames).
+    let announced =
+        GPS_GLOBAL_ORIGIN_DATA { latitude: 473_977_415, longitude: 85_455_963, altitude: 489_824 };
+    let origin = Geodetic { lat_deg: 47.405, lon_deg: 8.55, alt_m: 480.0 };
+    let (told, seen) = play(&recording(&path), origin, Some(announced));
+    assert_eq!(told, seen);
+}
+
+#[test]
+fn the_companion_sees_arducopters_recorded_flight_as_it_was() {
+    let Some(path) = shared_data("mavlink/arducopter-4.6-guided.tlog") else { return };
+    let origin = Geodetic { lat_deg: -35.357, lon_deg: 149.17, alt_m: 580.0 };
+    let (told, seen) = play(&recording(&path), origin, None);
+    assert_eq!(told, seen);
 }

@@ -22,6 +22,22 @@ const ARDUPILOT_SENSORS: [u32; 3] = [1_399_979_055, 1_382_128_687, 1_467_063_343
 const PREARM: u32 = 0x1000_0000;
 const POSITION_SENSORS: u32 = 0x4000;
 
+/// Messages newer than many dialects: id, CRC seed and payload as PX4 1.17 was recorded to send them. What they say does not
+/// change; that they come, and that not everybody knows them, is what counts.
+const RECORDED: [(u32, u8, &[u8]); 4] = [
+    (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),
+    (380, 232, &[0, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255]),
+    (411, 106, &[13]),
+    (441, 169, &[0, 0, 0, 0, 255, 255, 255, 255, 4, 0, 0, 0, 0, 255, 255, 255, 255]),
+];
+
+/// Sends one of [`RECORDED`].
+pub(super) fn send_recorded(id: u32, port: &mut Port) {
+    if let Some(&(_, seed, payload)) = RECORDED.iter().find(|message| message.0 == id) {
+        port.send_seeded(id, seed, payload);
+    }
+}
+
 impl Snapshot {
     pub(super) fn throttle(&self) -> f32 {
         if self.armed { (0.5 * self.specific_force.norm() / GRAVITY).clamp(0.0, 1.0) } else { 0.0 }

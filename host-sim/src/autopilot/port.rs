@@ -147,7 +147,13 @@ impl Port {
 
     /// Queues a message whose payload the caller laid out, for what the crate's types cannot hold.
     pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
-        let Some(extra) = frame::extra_crc(id) else { return };
+        if let Some(extra) = frame::extra_crc(id) {
+            self.send_seeded(id, extra, payload);
+        }
+    }
+
+    /// The same for a message the crate does not know, with its CRC seed.
+    pub fn send_seeded(&mut self, id: u32, extra: u8, payload: &[u8]) {
         if let Some(start) = self.reserve() {
             let header = self.header();
             let len = frame::encode_raw(header, id, extra, payload, &mut self.queue[start..]);

@@ -12,15 +12,16 @@ use planner_core::frames::Geodetic;
 use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
 use super::config::Personality;
 use super::firmware::Status;
-use super::messages::scaled;
+use super::messages::{self, scaled};
 use super::port::Port;
 
 /// Message id and interval in microseconds of each stream; 0 is off until asked for.
-pub const STREAMS: [(u32, u32); 27] = [
+pub const STREAMS: [(u32, u32); 31] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 200_000),     // SYS_STATUS
     (2, 1_000_000),   // SYSTEM_TIME
     (4, 1_000_000),   // PING
+    (8, 1_000_000),   // LINK_NODE_STATUS
     (24, 125_000),    // GPS_RAW_INT
     (29, 1_000_000),  // SCALED_PRESSURE
     (30, 10_000),     // ATTITUDE
@@ -42,7 +43,10 @@ pub const STREAMS: [(u32, u32); 27] = [
     (242, 2_000_000), // HOME_POSITION
     (245, 200_000),   // EXTENDED_SYS_STATE
     (331, 33_333),    // ODOMETRY
+    (380, 2_000_000), // TIME_ESTIMATE_TO_TARGET
+    (411, 3_000_000), // CURRENT_EVENT_SEQUENCE
     (436, 2_000_000), // CURRENT_MODE
+    (441, 1_000_000), // GNSS_INTEGRITY
     (49, 0),          // GPS_GLOBAL_ORIGIN: when it changes
 ];
 
@@ -152,6 +156,7 @@ impl Snapshot {
                 let seq = port.pings;
                 port.send_raw(4, &ping(self.time_us, seq, 0, 0));
             }
+            8 | 380 | 411 | 441 => messages::send_recorded(id, port),
             24 => self.send_gps(port),
             29 => port.send(&dialect::SCALED_PRESSURE_DATA {
                 time_boot_ms: self.boot_ms(),

@@ -16,6 +16,7 @@ mod flight;
 pub mod params;
 pub mod reference;
 pub mod setpoint;
+mod unasked;
 
 pub(super) use self::commands::handle_stream_request;
 
@@ -160,6 +161,7 @@ pub struct Copter {
     pub tuning: Tuning,
     ready_us: u64,
     told: [bool; 2],
+    runtime_us: u64,
     armed: bool,
     landed: bool,
     mode: Mode,
@@ -187,6 +189,7 @@ impl Copter {
             params,
             ready_us: micros(ready_s),
             told: [false; 2],
+            runtime_us: 0,
             armed: false,
             landed: true,
             mode: Mode::Stabilize,
@@ -204,12 +207,6 @@ impl Copter {
             speed: None,
             leg: ReturnLeg::Land,
         }
-    }
-
-    /// The little it says unasked.
-    pub fn boot(&mut self, body: &mut Body) {
-        body.say(6, "ArduPilot Ready");
-        body.announce(1);
     }
 
     /// Motors on.
@@ -416,19 +413,6 @@ impl Copter {
     }
 
     /// Origin and position, each once.
-    fn tell_progress(&mut self, body: &mut Body, now_us: u64) {
-        if !self.told[0] && self.origin_known(now_us) {
-            self.told[0] = true;
-            body.announce_origin();
-            body.announce(242);
-            body.say(6, "EKF3 IMU0 origin set");
-        }
-        if !self.told[1] && self.position_known(now_us) {
-            self.told[1] = true;
-            body.say(6, "EKF3 IMU0 is using GPS");
-        }
-    }
-
     fn update_failsafe(&mut self, body: &mut Body, sense: &Sense) {
         let now_us = sense.now_us;
         let since = |start: u64| now_us.saturating_sub(start);

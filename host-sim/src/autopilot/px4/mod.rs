@@ -16,18 +16,14 @@ pub mod params;
 pub mod setpoint;
 
 mod commands;
+mod firmware;
 
 use planner_core::Point;
 
+pub use self::firmware::Px4;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
-use super::body::{Body, Order, Sense};
-use super::config::Personality;
-use super::firmware::Status;
-use super::inbox::Sender;
-use super::params::Params;
-use super::vehicle::VehicleLimits;
-use super::wire::Fields;
+use super::body::{Order, Sense};
 
 /// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
 const LOSS_REACTION_S: f32 = 0.15;
@@ -107,72 +103,6 @@ impl Mode {
 impl From<Mode> for u32 {
     fn from(mode: Mode) -> Self {
         mode.custom_mode()
-    }
-}
-
-/// The firmware: state machine and parameters.
-#[derive(Clone, Debug)]
-pub struct Px4 {
-    /// Arming, modes, failsafe.
-    pub commander: Commander,
-    /// The parameter table.
-    pub params: Params,
-    /// Those of them that act.
-    pub tuning: Tuning,
-    /// DO_SET_MODE understood and not yet decided: who asked, for which mode if it is one.
-    asked: Option<(Sender, Option<Mode>)>,
-}
-
-impl Px4 {
-    /// As PX4 boots, with the airframe's limits in its parameters.
-    pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let params = params::params(system_id, limits);
-        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
-    }
-
-    /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
-    pub(super) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
-        if let Some((from, mode)) = self.asked.take() {
-            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
-            body.acknowledge(from, commands::DO_SET_MODE, commands::accept(changed));
-        }
-        self.commander.update(sense, &self.tuning)
-    }
-
-    /// What telemetry tells.
-    pub fn status(&self, body: &Body, sense: &Sense) -> Status {
-        let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
-        Status {
-            personality: Personality::Px4,
-            custom_mode: self.commander.mode().custom_mode(),
-            intended_mode: self.commander.intention().custom_mode(),
-            flags,
-            system_status,
-            armable: self.commander.armable(sense, &self.tuning),
-            landed_state: self.commander.landed_state(),
-            guided: true,
-            ekf_flags: 0,
-            origin_known: true,
-            // LOCAL_POSITION_NED comes only while the estimate is valid.
-            position_known: body.gps_ok,
-        }
-    }
-
-    /// Takes a setpoint, if it counts.
-    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
-        let context = setpoint::Context {
-            frame: &body.frame,
-            heading: body.vehicle.state().heading_rad,
-            home_alt_m: body.home.alt_m,
-        };
-        let setpoint = if id == 84 {
-            setpoint::local_ned(fields, &context)
-        } else {
-            setpoint::global_int(fields, &context)
-        };
-        if let Some(setpoint) = setpoint {
-            self.commander.handle_setpoint(setpoint, body.time_us);
-        }
     }
 }
 

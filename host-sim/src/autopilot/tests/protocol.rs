@@ -17,7 +17,9 @@ fn it_floods_at_once_at_px4s_rates() {
         assert!((seen - rate).abs() <= 0.05 * rate + 0.1, "message {id}: {seen} Hz, not {rate}");
     }
     let counters = bench.framer.counters();
-    assert_eq!((counters.bad_crc, counters.unknown, counters.noise_bytes), (0, 0, 0));
+    assert_eq!((counters.bad_crc, counters.noise_bytes), (0, 0));
+    assert!(counters.unknown >= 9, "GNSS_INTEGRITY is in no dialect here: {counters:?}");
+    assert!([8, 380, 411, 436].iter().all(|&id| bench.of(id).count() >= 3), "newer than many dialects");
     assert!(bench.of(253).next().is_none(), "no STATUSTEXT on this link");
 }
 
@@ -25,9 +27,10 @@ fn it_floods_at_once_at_px4s_rates() {
 fn sequence_numbers_have_no_gap() {
     let mut bench = Bench::new();
     bench.run(5.0);
-    for pair in bench.received.windows(2) {
-        assert_eq!(pair[1].1.sequence, pair[0].1.sequence.wrapping_add(1));
-    }
+    // Those of unknown id are skipped.
+    let gap = |pair: &[(f64, Frame)]| u32::from(pair[1].1.sequence.wrapping_sub(pair[0].1.sequence)) - 1;
+    let gaps: u32 = bench.received.windows(2).map(gap).sum();
+    assert!(gaps <= bench.framer.counters().unknown, "{gaps} numbers are missing");
 }
 
 #[test]
