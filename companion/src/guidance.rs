@@ -297,7 +297,7 @@ impl Guidance {
         }
     }
 
-    /// A step back from below a vehicle that comes down, where it stands or would wait.
+    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to.
     fn retreat<const W: usize>(
         &mut self,
         state: State,
@@ -319,7 +319,6 @@ impl Guidance {
         };
         self.retreating = to_m.is_some();
         if let Some(to_m) = to_m {
-            // A place ahead needs no step back: it flies on as far as that.
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
         let back = to_m.filter(|to_m| *to_m < along_m);
