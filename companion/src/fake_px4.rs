@@ -383,7 +383,7 @@ impl Bench {
     fn tell_neighbour(&mut self) {
         let Some((place, flags, progress_m, plan_crc)) = self.neighbour else { return };
         self.told = self.told.wrapping_add(1);
-        if self.told % 4 != 0 {
+        if !self.told.is_multiple_of(4) {
             return;
         }
         let intent = Intent {

@@ -131,7 +131,7 @@ impl Case {
         gates.sort_by(|a, b| a.at_m.total_cmp(&b.at_m));
         let unplanned = if hard { 1.0 } else { uniform(rng, 0.0, 1.0) };
         // Half of the hard cases pass all gates, the other half have nobody's progress.
-        let passed = hard && rng.next_u32() % 2 == 0;
+        let passed = hard && rng.next_u32().is_multiple_of(2);
         let neighbours = (0..neighbours)
             .map(|k| Neighbour {
                 id: 2 + k as u8,
@@ -143,7 +143,7 @@ impl Case {
                     true => Some(100.0),
                     false => (uniform(rng, 0.0, 1.0) > unplanned).then(|| uniform(rng, 0.0, 60.0)),
                 },
-                grounded: !hard && rng.next_u32() % 8 == 0,
+                grounded: !hard && rng.next_u32().is_multiple_of(8),
                 ..Neighbour::default()
             })
             .collect();
