@@ -29,6 +29,8 @@ pub const LAND: u16 = 21;
 pub const PAUSE_CONTINUE: u16 = 193;
 /// MISSION_START.
 pub const START: u16 = 300;
+/// NAV_FENCE_CIRCLE_EXCLUSION, as COMMAND_INT: a sphere to keep out of, of radius `param1` metres.
+pub const EXCLUDE: u16 = 5004;
 /// REQUEST_MESSAGE.
 pub const REQUEST: u16 = 512;
 
@@ -42,6 +44,8 @@ pub struct Command {
     pub command: u16,
     /// First parameter.
     pub param1: f32,
+    /// COMMAND_INT: latitude and longitude, 1e-7 degrees, and altitude, metres.
+    pub place: Option<(i32, i32, f32)>,
     /// Sender: system and component.
     pub from: (u8, u8),
     /// Whether our system was named, so that an answer is due.
@@ -64,9 +68,12 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
     if !for_system || !for_component || own_echo {
         return None;
     }
+    let word = |at: usize| [p[at], p[at + 1], p[at + 2], p[at + 3]];
+    let (whole, float) = (|at| i32::from_le_bytes(word(at)), |at| f32::from_le_bytes(word(at)));
     Some(Command {
         command: u16::from_le_bytes([p[28], p[29]]),
-        param1: f32::from_le_bytes([p[0], p[1], p[2], p[3]]),
+        param1: float(0),
+        place: (frame.message_id == COMMAND_INT).then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_us: target_system == system,
         to_component: target_component == crate::COMPONENT,

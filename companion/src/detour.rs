@@ -8,10 +8,13 @@
 //!
 //! ENU metres. Cost: every half second, each leg ahead against each vehicle that is out.
 
+use heapless::Vec;
 use planner_core::Point;
 use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::frames::{self, Geodetic};
 use planner_core::schedule::VehiclePlan;
 
+use crate::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 use crate::config::PlanFailure;
 use crate::events::Event;
 use crate::machine::{Companion, STANDING_MPS};
@@ -37,6 +40,20 @@ const FRESH: Duration = Duration::from_secs(2);
 /// Beyond the safety distance, so that what strays a little does not block the way again, metres.
 const MARGIN_M: f32 = 0.25;
 
+/// Obstacles that were not on the map.
+const OBSTACLES: usize = 16;
+/// The largest of them, metres.
+const OBSTACLE_MAX_M: f32 = 1000.0;
+/// Two nearer than this are one that was told twice, metres.
+const SAME_M: f32 = 0.1;
+
+/// Obstacles that were not on the map, and for how many of them a way around was planned.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Obstacles {
+    known: Vec<KeepOff, OBSTACLES>,
+    pub(crate) avoided: usize,
+}
+
 /// What is known of the way ahead.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Around {
@@ -52,7 +69,7 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found in a row.
     pub(crate) failed: u8,
-    /// Where it was before its position became doubtful.
+    /// Where it was before its position jumped.
     pub(crate) lost_at: Option<Point>,
     pub(crate) quiet_since: Option<Instant>,
     pub(crate) looked_at: Instant,
@@ -97,10 +114,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, vague }
     }
 
-    /// Remembers where the position became doubtful, on entering a state.
+    /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.
     pub(crate) fn mark_place(&mut self, to: State) {
         match to {
-            State::PositionLost if self.around.lost_at.is_none() => {
+            State::PositionLost if self.around.lost_at.is_none() && self.telemetry.is_settling(self.now) => {
                 let path = self.plan.as_ref().map(|plan| &plan.path);
                 let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
                 self.around.lost_at = Some(on_path.unwrap_or(self.telemetry.position));
@@ -130,7 +147,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let astray = self.around.left && !self.around.flying;
         self.around.blocked = !self.guidance.returning && (stuck || astray || self.is_in_the_way(on_ground));
         if !self.neighbours.all_stand(now) {
-            self.around.quiet_since = None;
+            // Somebody moved: what stood in the way may have gone.
+            (self.around.quiet_since, self.around.failed) = (None, 0);
         } else if self.around.quiet_since.is_none() {
             self.around.quiet_since = Some(now);
         }
@@ -140,12 +158,34 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(plan) = &self.plan else { return false };
         let here = if on_ground { self.pad() } else { self.telemetry.position };
         let along_m = self.guidance.along_m();
-        let mut blocked = false;
+        let ahead = |obstacle: &KeepOff| {
+            detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, obstacle)
+        };
+        let mut blocked = self.obstacles.known[self.obstacles.avoided..].iter().any(ahead);
         self.neighbours.obstacles(self.now, self.config.safety_distance_m, |obstacle| {
-            blocked |=
-                detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, &obstacle);
+            blocked |= ahead(&obstacle);
         });
         blocked
+    }
+
+    /// Takes an obstacle that is not on the map: its centre, and its radius.
+    pub(crate) fn exclude(&mut self, command: &Command) -> u8 {
+        let Some((lat, lon, alt_m)) = command.place else { return DENIED };
+        let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
+        let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
+        if !(place.is_valid() && (0.0..=OBSTACLE_MAX_M).contains(&command.param1)) {
+            return DENIED;
+        }
+        let centre = frames::geodetic_to_enu(&self.config.origin, &place);
+        let radius_m = command.param1 + self.config.required_clearance_m;
+        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_M && o.radius_m >= radius_m;
+        if self.obstacles.known.iter().any(told) {
+            return ACCEPTED;
+        }
+        match self.obstacles.known.push(KeepOff { from: centre, to: centre, radius_m }) {
+            Ok(()) => ACCEPTED,
+            Err(_) => TEMPORARILY_REJECTED,
+        }
     }
 
     fn pad(&self) -> Point {
@@ -170,7 +210,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
     /// `tell` is given all that is to be kept off.
-    pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
+    pub fn detour(&self, mut tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
         if !matches!(self.state, State::Replanning | State::PadReplanning) {
             return None;
         }
@@ -180,6 +220,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
+        self.obstacles.known.iter().for_each(|obstacle| tell(*obstacle));
         self.neighbours.places(self.now, self.config.safety_distance_m + MARGIN_M, tell);
         Some(DetourRequest {
             here: plan.path.point_at(along_m)?,
@@ -211,6 +252,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Around { left: true, flying: true, left_at_m: self.around.left_at_m, ..Around::default() };
         self.around.ready = true;
         self.neighbours.avoid(self.now);
+        self.obstacles.avoided = self.obstacles.known.len();
     }
 
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {

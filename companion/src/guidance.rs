@@ -2,13 +2,14 @@
 
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Neighbour, Own};
 use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
 use crate::config::Config;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
+use crate::retreat;
 use crate::telemetry::Telemetry;
 use crate::time::Instant;
 
@@ -18,8 +19,12 @@ const ARRIVED_M: f32 = 0.35;
 const STANDING_MPS: f32 = 0.5;
 /// A reference slower than this stands, m/s.
 const STANDING_REFERENCE_MPS: f32 = 0.05;
+/// A stop further ahead is no place to wait at yet, metres.
+const WAITS_WITHIN_M: f32 = 8.0;
 /// This near its top the climb is done, metres.
 const CLIMBED_M: f32 = 0.12;
+/// This near the lower end of the guided descent it is done, metres.
+const DESCENDED_M: f32 = 0.2;
 /// The climb ends no slower than this, m/s.
 const CREEP_MPS: f32 = 0.05;
 /// The climb's reference is at most this far above the vehicle, metres.
@@ -74,6 +79,12 @@ pub struct Guidance {
     progress_at: Instant,
     /// Whether it flies back the way it came.
     pub returning: bool,
+    /// Whether it keeps out from under a vehicle that comes down.
+    pub retreating: bool,
+    /// How far the reference has gone down below the end of the path, metres; none before the descent.
+    descended_m: Option<f32>,
+    /// Height over the ground at which the autopilot lands by itself, metres.
+    low_m: f32,
 }
 
 /// What guidance reads beside its own state.
@@ -114,6 +125,9 @@ impl Guidance {
             progress_m: 0.0,
             progress_at: Instant::ZERO,
             returning: false,
+            retreating: false,
+            descended_m: None,
+            low_m: config.required_clearance_m - config.radius_m,
         }
     }
 
@@ -123,6 +137,7 @@ impl Guidance {
         self.reference = None;
         self.on_path = false;
         self.returning = false;
+        self.descended_m = None;
         self.advice = NOT_ASKED;
     }
 
@@ -148,14 +163,15 @@ impl Guidance {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
 
-    /// Whether the reference stands.
+    /// Whether the reference stands, and is not on its way down.
     pub fn stands(&self) -> bool {
-        self.tracker.speed_mps < STANDING_REFERENCE_MPS
+        self.tracker.speed_mps < STANDING_REFERENCE_MPS && self.descended_m.is_none()
     }
 
     /// Begins another path.
     pub fn begin_path(&mut self, now: Instant) {
         self.tracker = Tracker::default();
+        self.descended_m = None;
         self.run(now);
     }
 
@@ -174,6 +190,7 @@ impl Guidance {
         let along_m =
             path.project(position, self.tracker.along_m, REJOIN_WINDOW_M).clamp(0.0, path.length_m());
         self.tracker = Tracker { along_m, speed_mps: 0.0 };
+        self.descended_m = None;
         self.run(now);
     }
 
@@ -206,7 +223,11 @@ impl Guidance {
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
         match state {
             State::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
-            State::Land if self.reached_end(path) => length_m + (end_z - z).clamp(0.0, plan.descent_m),
+            State::Follow | State::Land
+                if self.reached_end(path) && (state == State::Land || self.descended_m.is_some()) =>
+            {
+                length_m + (end_z - z).clamp(0.0, plan.descent_m)
+            }
             // A metre beyond the ground, so that every gate on this flight opens.
             State::Disarm | State::Done if self.reached_end(path) => length_m + plan.descent_m + 1.0,
             _ if self.on_path => {
@@ -257,13 +278,18 @@ impl Guidance {
             self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
         }
         if self.on_path && setpoints_flow(state) && state != State::PilotControl {
-            let advice = if state == State::Follow {
+            let mut advice = if state == State::Follow {
                 self.advice
             } else {
                 Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
             };
             self.reference =
-                path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s);
+                self.retreat(state, &plan.path, &mut advice, neighbours.at(now), dt_s).or_else(|| {
+                    path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s)
+                });
+            if state == State::Follow {
+                self.descend(scene, plan.descent_m, now, dt_s);
+            }
             if self.tracker.along_m > self.progress_m + PROGRESS_M {
                 self.progress_m = self.tracker.along_m;
                 self.progress_at = now;
@@ -271,14 +297,81 @@ impl Guidance {
         }
     }
 
+    /// A step back from below a vehicle that comes down, where it stands or would wait.
+    fn retreat<const W: usize>(
+        &mut self,
+        state: State,
+        path: &Path<W>,
+        advice: &mut Advice,
+        neighbours: &[Neighbour],
+        dt_s: f32,
+    ) -> Option<Reference> {
+        let safety_m = self.deconflict.safety_distance_m;
+        let along_m = self.tracker.along_m;
+        // On its way down it goes on.
+        let waits =
+            matches!(state, State::Follow | State::Blocked | State::Replanning) && self.descended_m.is_none();
+        let wait_m = along_m + advice.stop_within_m.max(0.0);
+        let to_m = if waits && advice.stop_within_m < WAITS_WITHIN_M {
+            retreat::elsewhere(path, wait_m, neighbours, safety_m)
+        } else {
+            None
+        };
+        self.retreating = to_m.is_some();
+        if let Some(to_m) = to_m {
+            // A place ahead needs no step back: it flies on as far as that.
+            advice.stop_within_m = (to_m - along_m).max(0.0);
+        }
+        let back = to_m.filter(|to_m| *to_m < along_m);
+        let step =
+            back.and_then(|to_m| retreat::step(path, &mut self.tracker, to_m, neighbours, safety_m, dt_s));
+        if step.is_some() {
+            self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
+        } else {
+            self.tracker.speed_mps = self.tracker.speed_mps.max(0.0);
+        }
+        step
+    }
+
     /// Time since the reference last moved on.
     pub fn progress_at(&self) -> Instant {
         self.progress_at
     }
 
-    /// Speed of the climb's reference: it brakes at half the acceleration, so that a low ceiling is not overshot into.
+    /// At the end of the path and free to land the reference goes straight down, not lower than the margin kept to
+    /// obstacles: only from there the autopilot lands by itself, which the wind may carry off.
+    fn descend<const W: usize, const G: usize>(
+        &mut self,
+        scene: &Scene<'_, W, G>,
+        descent_m: f32,
+        now: Instant,
+        dt_s: f32,
+    ) {
+        let descended_m = match self.descended_m {
+            Some(descended_m) => descended_m,
+            None if self.stands_at_end(scene) => 0.0,
+            None => return,
+        };
+        let rate = self.vertical_rate(self.guided_m(descent_m) - descended_m);
+        self.descended_m = Some(descended_m + rate * dt_s);
+        if rate > 0.0 {
+            self.progress_at = now;
+        }
+    }
+
+    /// How far down the reference leads, metres.
+    fn guided_m(&self, descent_m: f32) -> f32 {
+        libm::fmaxf(descent_m - self.low_m, 0.0)
+    }
+
+    /// Speed of the climb's reference.
     fn climb_rate(&self, top: f32) -> f32 {
-        let left = top - self.climb_z;
+        self.vertical_rate(top - self.climb_z)
+    }
+
+    /// Speed of a vertical reference with this way left: it brakes at half the acceleration, so that a low ceiling is not
+    /// overshot into.
+    fn vertical_rate(&self, left: f32) -> f32 {
         if left <= 0.0 {
             return 0.0;
         }
@@ -294,7 +387,19 @@ impl Guidance {
         })
     }
 
+    /// Whether the path and the guided descent are flown.
     pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let (Some(plan), Some(reference), Some(descended_m)) = (scene.plan, self.reference, self.descended_m)
+        else {
+            return false;
+        };
+        let guided_m = self.guided_m(plan.descent_m);
+        let low_z = reference.position.z - guided_m;
+        descended_m >= guided_m && (scene.telemetry.position.z - low_z < DESCENDED_M || guided_m == 0.0)
+    }
+
+    /// Whether it stands at the end of the path and nobody keeps it from landing.
+    fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
         let (Some(plan), Some(reference)) = (scene.plan, self.reference) else { return false };
         self.on_path
             && reference.finished
@@ -309,6 +414,13 @@ impl Guidance {
         let Some(plan) = scene.plan else { return false };
         let position = &scene.telemetry.position;
         let along_m = plan.path.project(position, self.tracker.along_m, window_m);
+        if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
+            // Over its pad, on the way up.
+            let away = position - first.position;
+            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+                return true;
+            }
+        }
         if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
             return false;
         }
@@ -339,7 +451,17 @@ impl Guidance {
                 Setpoint::Move(place, Point::new(0.0, 0.0, rate), still)
             }
             _ => match self.reference {
-                Some(r) if self.on_path => Setpoint::Move(r.position, r.velocity, r.acceleration),
+                Some(r) if self.on_path => {
+                    let down_m = self.descended_m.unwrap_or(0.0);
+                    let rate = match scene.plan {
+                        Some(plan) if state == State::Follow && self.descended_m.is_some() => {
+                            self.vertical_rate(self.guided_m(plan.descent_m) - down_m)
+                        }
+                        _ => 0.0,
+                    };
+                    let down = |length: f32| Point::new(0.0, 0.0, length);
+                    Setpoint::Move(r.position - down(down_m), r.velocity - down(rate), r.acceleration)
+                }
                 _ => Setpoint::Move(self.hold, still, still),
             },
         }

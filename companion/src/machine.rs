@@ -12,12 +12,12 @@ use planner_core::schedule::VehiclePlan;
 use crate::autopilot::Kind;
 use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
-use crate::detour::Around;
+use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
-use crate::guidance::{Guidance, LOST_WINDOW_M, REJOIN_WINDOW_M, Scene, setpoints_flow};
+use crate::guidance::{Guidance, Scene, setpoints_flow};
 use crate::intent::Intent;
-use crate::mission::{self, Action, Inputs, Row, State};
+use crate::mission::{self, Action, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
 use crate::telemetry::{Change, Telemetry};
@@ -29,11 +29,9 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// A hovering vehicle sways more slowly, m/s.
 pub(crate) const STANDING_MPS: f32 = 0.3;
-const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
+pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 const SWARM_EVERY: Duration = Duration::from_millis(200);
 pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
-/// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
-const LANDING_DRIFT_M: f32 = 1.0;
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
 const EVENTS: usize = 16;
@@ -51,12 +49,13 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) plan: Option<VehiclePlan<W, G>>,
     pub(crate) plan_failure: Option<PlanFailure>,
     pub(crate) around: Around,
+    pub(crate) obstacles: Obstacles,
     pub(crate) state: State,
     pub(crate) entered_at: Instant,
-    wishes: Wishes,
+    pub(crate) wishes: Wishes,
     repeats: Repeats,
     pub(crate) guidance: Guidance,
-    mode_before: u32,
+    pub(crate) mode_before: u32,
     pub(crate) now: Instant,
     stepped_at: Instant,
     next_step: Instant,
@@ -91,6 +90,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: None,
             plan_failure: None,
             around: Around::default(),
+            obstacles: Obstacles::default(),
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             wishes: Wishes::default(),
@@ -224,7 +224,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
-    fn departure_due(&self) -> bool {
+    pub(crate) fn departure_due(&self) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
         (self.now - self.entered_at).secs_f32() >= depart_s
     }
@@ -304,6 +304,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let result = match commands::apply(&mut self.wishes, self.state, command) {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, command.param1),
+            None if command.command == commands::EXCLUDE => self.exclude(command),
             // To all components: another one's.
             None if !command.to_component => return,
             None => UNSUPPORTED,
@@ -358,72 +359,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn inputs(&self) -> Inputs {
-        let (t, now, scene) = (&self.telemetry, self.now, self.scene());
-        let kind = self.kind();
-        let offboard = t.custom_mode == kind.setpoint_mode();
-        let mode_foreign = match self.state {
-            State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
-            // Disarming after a landing the autopilot chooses a mode of its own.
-            State::Land | State::Disarm => !offboard && t.custom_mode != kind.land_mode() && t.armed,
-            _ => !offboard,
-        };
-        let away = t.position - self.start;
-        let follow = self.state == State::Follow;
-        let fence = self.config.geofence;
-        let charge_below = |percent| (0..percent).contains(&t.battery_percent);
-        let inside =
-            |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
-        Inputs {
-            in_state: now - self.entered_at,
-            heartbeat_age: t.heartbeat_age(now),
-            position_age: t.position_age(now),
-            jumped: t.is_settling(now),
-            stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
-            neighbour_age: self.neighbours.silence(now, self.entered_at),
-            neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
-            plan_ready: self.plan.is_some(),
-            plan_failed: self.plan_failure.is_some(),
-            roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
-            has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
-            at_start: away.xy().norm() <= self.config.start_tolerance_m,
-            start: self.wishes.start,
-            pause: self.wishes.pause,
-            resume: self.wishes.resume,
-            land: self.wishes.land,
-            turn_back: self.wishes.turn_back && !self.guidance.returning,
-            armed: t.armed,
-            offboard,
-            mode_foreign,
-            critical: t.is_critical(),
-            on_ground: t.on_ground == Some(true),
-            airborne: t.armed && t.on_ground == Some(false),
-            lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
-            gates_open: self.guidance.advice.stop_within_m > 0.05
-                && self.departure_due()
-                && !self.around.blocked
-                && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
-            climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
-            path_done: follow && self.guidance.path_done(&scene),
-            near_path: match self.state {
-                State::PilotControl => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
-                State::PositionLost => self.guidance.near_path(&scene, LOST_WINDOW_M),
-                _ => false,
-            },
-            battery_low: charge_below(self.config.battery_low_percent),
-            battery_critical: charge_below(self.config.battery_low_percent / 2),
-            room_below: !self
-                .neighbours
-                .any_below(&t.position, self.config.safety_distance_m + LANDING_DRIFT_M),
-            outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
-            blocked: self.around.blocked,
-            our_turn: self.is_our_turn(),
-            detour_ready: self.around.ready,
-            detours_failed: self.around.failed,
-            standing: self.guidance.stands() && t.velocity.norm() < STANDING_MPS,
-        }
-    }
-
     fn take(&mut self, row: &'static Row) {
         let (from, now) = (self.state, self.now);
         self.state = row.to;
@@ -458,6 +393,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.plan = None;
                 self.plan_failure = None;
                 self.around = Around { left: self.around.left, ..Around::default() };
+                self.obstacles.avoided = 0;
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }

@@ -4,6 +4,7 @@
 //! held for the row's limit. Order is rank: the pilot and the failsafe come first. `README.md` prints the same table, and
 //! a test compares the two.
 
+use crate::table::TABLE;
 use crate::time::Duration;
 
 /// Where the mission is.
@@ -151,7 +152,7 @@ pub enum Guard {
     DetourReady,
     /// There is no way around.
     DetourFailed,
-    /// There was none several times.
+    /// There was none several times, and no neighbour is below.
     NoWayAround,
     /// Standing still.
     Standing,
@@ -299,7 +300,7 @@ pub struct Inputs {
 /// So many ways around that are not found are enough.
 const DETOURS_TRIED: u8 = 4;
 
-const NOW: Duration = Duration::from_millis(0);
+pub(crate) const NOW: Duration = Duration::from_millis(0);
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
 const HEARD: Duration = Duration::from_millis(1500);
 const FRESH: Duration = Duration::from_millis(500);
@@ -351,7 +352,7 @@ impl Guard {
             Self::OurTurn => i.our_turn,
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
-            Self::NoWayAround => i.detours_failed >= DETOURS_TRIED,
+            Self::NoWayAround => i.detours_failed >= DETOURS_TRIED && i.room_below,
             Self::Standing => i.standing,
         }
     }
@@ -366,148 +367,6 @@ pub fn awaits(state: State, guard: Guard) -> bool {
 pub fn update(state: State, inputs: &Inputs) -> Option<&'static Row> {
     TABLE.iter().find(|row| row.from.contains(&state) && row.guard.holds(inputs, row.limit))
 }
-
-const fn s(secs: u64) -> Duration {
-    Duration::from_secs(secs)
-}
-
-const fn info(
-    from: &'static [State],
-    guard: Guard,
-    limit: Duration,
-    to: State,
-    action: Action,
-    text: &'static str,
-) -> Row {
-    Row { from, guard, limit, to, action, text, warning: false }
-}
-
-const fn warn(
-    from: &'static [State],
-    guard: Guard,
-    limit: Duration,
-    to: State,
-    action: Action,
-    text: &'static str,
-) -> Row {
-    Row { from, guard, limit, to, action, text, warning: true }
-}
-
-use Action as A;
-use Guard as G;
-use State::*;
-
-/// On the ground before arming.
-const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
-/// In the air, or about to be, under our setpoints.
-const FLYING: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, AutopilotSilent, PositionLost];
-/// In the air, with links and position as they should be.
-const SOUND: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping];
-/// The same, on its path under way or stopped: it can stop along it.
-const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning];
-
-/// In the air, and the autopilot was heard.
-const LINKED: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, PositionLost];
-
-/// The mission.
-#[rustfmt::skip]
-pub static TABLE: &[Row] = &[
-    // The autopilot itself, the pilot and the failsafe: before everything else.
-    warn(FLYING,              G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Disarmed in flight: mission over"),
-    warn(FLYING,              G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe: setpoints stopped"),
-    warn(FLYING,              G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: mission stopped"),
-    warn(&[Land, Disarm],     G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe while landing"),
-    warn(&[Land, Disarm],     G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
-    warn(&[Streaming, Engaging, Arming], G::FailsafeActs, NOW, Aborted,     A::ForgetStart, "Failsafe before take-off: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::ModeTaken, NOW, Aborted,        A::ForgetStart, "Mode changed by pilot: start cancelled"),
-    // Started anew in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
-    warn(WAITING,             G::FoundFlying,      NOW,    Failsafe,        A::ForgetStart, "Found in flight: no mission"),
-    // Links and position.
-    warn(WAITING,             G::NoHeartbeat,      s(3),   WaitAutopilot,   A::ForgetStart, "Autopilot silent: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::NoHeartbeat, s(3), Aborted,     A::ForgetStart, "Autopilot silent: start cancelled"),
-    warn(LINKED,              G::NoHeartbeat,      s(3),   AutopilotSilent, A::BrakeOnPath, "Autopilot silent: stopping"),
-    warn(&[Land, Disarm, PilotControl, Failsafe], G::NoHeartbeat, s(60), Aborted, A::ForgetStart, "Autopilot lost"),
-    warn(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, s(2), WaitPosition,  A::ForgetStart, "Position lost: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::NoPosition, s(1), Aborted,      A::ForgetStart, "Position lost: start cancelled"),
-    warn(SOUND,               G::PositionJumped,   NOW,    PositionLost,    A::BrakeOnPath, "Position jumped: stopping"),
-    warn(SOUND,               G::NoPosition,       s(1),   PositionLost,    A::BrakeOnPath, "Position lost: stopping"),
-    // Orders and limits in flight.
-    info(ON_PATH,             G::LandCommanded,    NOW,    Stopping,        A::BrakeOnPath, "Landing as commanded"),
-    info(&[TakeOff, Climb, PositionLost, AutopilotSilent], G::LandCommanded, NOW, Land, A::AskLand, "Landing as commanded"),
-    warn(ON_PATH,             G::BatteryCritical,  NOW,    Stopping,        A::BrakeOnPath, "Battery critical: landing"),
-    warn(ON_PATH,             G::BatteryLow,       NOW,    Stopping,        A::BrakeOnPath, "Battery low: landing"),
-    warn(&[TakeOff, Climb],   G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
-    warn(&[TakeOff, Climb],   G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
-    warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
-    info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
-    info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
-    info(ON_PATH,             G::ReturnCommanded,  NOW,    Follow,          A::TurnBack,    "Flying back to the start"),
-    info(&[TakeOff, Climb],   G::ReturnCommanded,  NOW,    Land,            A::AskLand,     "Landing on the pad"),
-    // The mission in order.
-    info(&[WaitAutopilot],    G::AutopilotHeard,   NOW,    WaitPosition,    A::Connect,     "Autopilot found"),
-    info(&[WaitPosition],     G::PositionKnown,    NOW,    Planning,        A::RequestPlan, "Position known: planning"),
-    warn(&[Planning],         G::RoadmapBad,       NOW,    Aborted,         A::ForgetStart, "Roadmap missing or wrong: mission aborted"),
-    warn(&[Planning],         G::PlanFailed,       NOW,    Aborted,         A::ForgetStart, "No plan: mission aborted"),
-    info(&[Planning],         G::PlanReady,        NOW,    Ready,           A::None,        "Ready"),
-    warn(&[Planning],         G::Elapsed,          s(30),  Planning,        A::RequestPlan, "Plan is late: asked again"),
-    info(&[Ready],            G::StartWithoutGoal, NOW,    Done,            A::ForgetStart, "No goal for this vehicle: staying"),
-    warn(&[Ready],            G::StartElsewhere,   NOW,    Aborted,         A::ForgetStart, "Not at its start: start refused"),
-    warn(&[Ready],            G::StartArmed,       NOW,    Aborted,         A::ForgetStart, "Armed by someone else: start refused"),
-    info(&[Ready],            G::StartCommanded,   NOW,    Scheduled,       A::None,        "Started"),
-    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::LandCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
-    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::ReturnCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
-    info(&[Scheduled],        G::OurTurn,          NOW,    PadReplanning,   A::RequestDetour, "All others stand: planning around"),
-    info(&[PadReplanning],    G::DetourReady,      NOW,    Scheduled,       A::None,        "A way around is found"),
-    warn(&[PadReplanning],    G::DetourFailed,     NOW,    Scheduled,       A::None,        "No way around yet"),
-    warn(&[PadReplanning],    G::Elapsed,          s(5),   Scheduled,       A::MissDetour,  "The way around is late"),
-    info(&[Scheduled],        G::GatesOpen,        NOW,    Streaming,       A::HoldHere,    ""),
-    info(&[Streaming],        G::Elapsed,          s(1),   Engaging,        A::AskOffboard, ""),
-    info(&[Engaging],         G::Offboard,         NOW,    Arming,          A::AskArm,      "Setpoints followed: arming"),
-    warn(&[Engaging],         G::Elapsed,          s(5),   Aborted,         A::ForgetStart, "Setpoint mode refused: mission aborted"),
-    info(&[Arming],           G::Armed,            NOW,    TakeOff,         A::AskTakeOff,  "Taking off"),
-    warn(&[Arming],           G::Elapsed,          s(8),   Aborted,         A::AskDisarm,   "Arming refused: mission aborted"),
-    info(&[TakeOff],          G::LiftedOff,        NOW,    Climb,           A::BeginClimb,  ""),
-    warn(&[TakeOff],          G::Elapsed,          s(12),  Land,            A::AskLand,     "Take-off takes too long: landing"),
-    info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
-    warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
-    info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
-    info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
-    warn(&[Follow, Blocked],  G::NeighboursSilent, s(2),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
-    warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
-    warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
-    info(&[Blocked],          G::PathClear,        NOW,    Follow,          A::RunPath,     "Path clear again"),
-    warn(&[Blocked],          G::NoWayAround,      NOW,    Land,            A::AskLand,     "No way around: landing"),
-    warn(&[Blocked],          G::Elapsed,          s(600), Land,            A::AskLand,     "Path blocked for 10 min: landing"),
-    info(&[Blocked],          G::OurTurn,          NOW,    Replanning,      A::RequestDetour, "All others stand: planning around"),
-    info(&[Replanning],       G::DetourReady,      NOW,    Follow,          A::FlyDetour,   "Flying around"),
-    warn(&[Replanning],       G::DetourFailed,     NOW,    Blocked,         A::None,        "No way around yet"),
-    warn(&[Replanning],       G::Elapsed,          s(5),   Blocked,         A::MissDetour,  "The way around is late"),
-    info(&[Paused],           G::ResumeCommanded,  NOW,    Follow,          A::RunPath,     "Resumed"),
-    warn(&[Paused],           G::Elapsed,          s(600), Land,            A::AskLand,     "Paused for 10 min: landing"),
-    info(&[Alone],            G::NeighbourHeard,   NOW,    Follow,          A::RunPath,     "Neighbours heard again"),
-    warn(&[Alone],            G::Elapsed,          s(20),  Land,            A::AskLand,     "Neighbours still silent: landing"),
-    info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    PositionLost,    A::BrakeOnPath, "Autopilot heard again"),
-    warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Aborted,         A::ForgetStart, "Autopilot lost"),
-    info(&[PositionLost],     G::BackOnPath,       NOW,    Follow,          A::Rejoin,      "Position known again"),
-    warn(&[PositionLost],     G::BackOffPath,      NOW,    Land,            A::AskLand,     "Position is elsewhere: landing"),
-    warn(&[PositionLost],     G::Elapsed,          s(3),   Land,            A::AskLand,     "Position still lost: landing"),
-    info(&[Land],             G::Disarmed,         NOW,    Done,            A::ForgetStart, "Landed"),
-    info(&[Land],             G::OnGround,         NOW,    Disarm,          A::AskDisarm,   ""),
-    warn(&[Land],             G::Elapsed,          s(120), Land,            A::AskLand,     "Landing takes long"),
-    info(&[Disarm],           G::Disarmed,         NOW,    Done,            A::ForgetStart, "Landed"),
-    warn(&[Disarm],           G::Elapsed,          s(30),  Aborted,         A::ForgetStart, "On the ground, still armed"),
-    // After the pilot or a failsafe.
-    warn(&[PilotControl],     G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Pilot landed: mission over"),
-    warn(&[PilotControl],     G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe: setpoints stopped"),
-    info(&[PilotControl],     G::ResumedOnPath,    NOW,    Follow,          A::Rejoin,      "Resumed after the pilot"),
-    warn(&[PilotControl],     G::ResumedOffPath,   NOW,    Land,            A::AskLand,     "Too far from the path: landing"),
-    warn(&[PilotControl],     G::Elapsed,          s(900), PilotControl,    A::None,        "Pilot still has control"),
-    warn(&[Failsafe],         G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed after failsafe: mission over"),
-    warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
-    info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start anew when ready"),
-];
 
 #[cfg(test)]
 #[path = "mission_tests.rs"]

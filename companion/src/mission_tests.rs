@@ -6,6 +6,10 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::*;
+use crate::table::*;
+use Action as A;
+use Guard as G;
+use State::*;
 
 const ALL: &[State] = &[
     WaitAutopilot,
@@ -130,7 +134,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::OurTurn => i.our_turn = true,
         G::DetourReady => i.detour_ready = true,
         G::DetourFailed => i.plan_failed = true,
-        G::NoWayAround => i.detours_failed = 9,
+        G::NoWayAround => (i.detours_failed, i.room_below) = (9, true),
         G::Standing => i.standing = true,
     }
     i

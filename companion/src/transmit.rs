@@ -159,7 +159,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 | flag(intent::OUT, out)
                 | flag(intent::WAITING, self.waits())
                 | flag(intent::BLOCKED, self.around.blocked)
-                | flag(intent::DETOURS, self.around.flying || self.around.left);
+                | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
         let plan = self.plan.as_ref();
         let mut points = heapless::Vec::new();
         let along_m = self.guidance.progress_m(self.state, &self.scene());

@@ -39,6 +39,9 @@ const STRAY_M: f32 = 0.5;
 const SLOT_GRID_M: f32 = 0.25;
 /// What one vehicle may stray beside another that stands on the ground, metres.
 const STRAY_BESIDE_PARKED_M: f32 = 0.25;
+/// How much further gusts carry one vehicle, for each m/s of their peak, seconds. Two are not carried towards each other
+/// at once, so this is for one beside another that stands.
+const STRAY_PER_GUST_S: f32 = 0.05;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
@@ -83,7 +86,9 @@ impl Mission {
         let safety_m = scenario.deconfliction.safety_distance_m;
         let schedule = ScheduleConfig {
             separation_m: safety_m + STRAY_M,
-            parked_separation_m: safety_m + STRAY_BESIDE_PARKED_M,
+            parked_separation_m: safety_m
+                + STRAY_BESIDE_PARKED_M
+                + STRAY_PER_GUST_S * scenario.simulation.gust_mps,
             cruise_mps: scenario.mission.cruise_mps,
             vertical_mps: VERTICAL_MPS,
         };

@@ -15,6 +15,7 @@
 //!
 //! Cost: pieces of one path × pieces of all others, each a distance between two segments behind a cheap bound.
 
+mod near;
 pub mod sipp;
 
 use heapless::Vec;

@@ -64,7 +64,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let faults = match &faults_value {
         Some(value) => {
             let items = value.items()?;
-            items.iter().map(|v| fault(&v.table()?, &ids, &mut unsupported)).collect::<Result<Vec<_>>>()?
+            items.iter().map(|v| fault(&v.table()?, &ids)).collect::<Result<Vec<_>>>()?
         }
         None => Vec::new(),
     };
@@ -386,7 +386,7 @@ fn simulation(table: &Table<'_>) -> Result<Simulation> {
     Ok(simulation)
 }
 
-fn fault(table: &Table<'_>, ids: &[u8], unsupported: &mut Vec<ScenarioError>) -> Result<Fault> {
+fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
     let kind = table.need("kind", "what happens, for example \"kill\"")?.word(&words)?;
@@ -414,9 +414,6 @@ fn fault(table: &Table<'_>, ids: &[u8], unsupported: &mut Vec<ScenarioError>) ->
         return Err(table
             .text
             .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));
-    }
-    if fault.kind == FAULT_OBSTACLE {
-        unsupported.push(not_yet(table.text, &table.span, "faults of kind \"obstacle\""));
     }
     Ok(fault)
 }

@@ -210,11 +210,6 @@ fn what_is_missing_altogether_is_said() {
 #[test]
 fn what_is_not_built_yet_is_refused_by_name() {
     let cases = [
-        (
-            "[mission]",
-            "[[faults]]\nat_s = 1\nkind = \"obstacle\"\nposition = [1, 1, 1]\nradius_m = 1\n[mission]",
-            "not available yet: faults of kind \"obstacle\"",
-        ),
         ("[mission]", "[area]\nheight_m = 20\n[mission]", "not available yet: [area]"),
         ("[mission]", "[formation]\npure = true\n[mission]", "not available yet: [formation]"),
         ("[mission]", "[mission]\nmode = \"coverage\"", "not available yet: this mission.mode"),

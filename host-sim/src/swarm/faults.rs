@@ -17,15 +17,18 @@
 //! | `late-plan` | who asks for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
 //!
-//! A fault without a vehicle strikes all.
+//! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and tells all companions | gone; the companions keep off on |
+//!
+//! A fault without a vehicle strikes all; an obstacle strikes nobody.
 
 use planner_core::Point;
+use planner_core::frames::enu_to_geodetic;
 
 use super::ground_station::GroundStation;
 use super::member::{Member, Planner};
 use super::radio::{Cut, Radio};
 use crate::report::{Event, Level};
-use crate::scenario::{Fault, Scenario};
+use crate::scenario::{FAULT_OBSTACLE, Fault, Scenario};
 
 /// Share of bytes changed by `serial-corrupt`: half of all frames of a setpoint's length are lost.
 const CORRUPTION: f64 = 0.01;
@@ -46,6 +49,8 @@ pub struct World<'a> {
     pub radio: &'a mut Radio,
     /// Who tells them to go on.
     pub ground_station: &'a mut GroundStation,
+    /// Spheres that are on no map: centre and radius, metres.
+    pub obstacles: &'a mut Vec<(Point, f32)>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -95,6 +100,22 @@ impl<'a> Script<'a> {
                 _ => continue,
             };
             *stage = next;
+            if let (FAULT_OBSTACLE, Some(place), Some(radius_m)) =
+                (fault.kind, fault.position, fault.radius_m)
+            {
+                let done = if next == Stage::Acting {
+                    world.obstacles.push((place, radius_m));
+                    let centre = enu_to_geodetic(&self.scenario.map.origin, &place);
+                    world.ground_station.exclude(centre, radius_m);
+                    "begins"
+                } else {
+                    world.obstacles.retain(|obstacle| *obstacle != (place, radius_m));
+                    "ends"
+                };
+                let text = format!("fault {done}: {}", fault.kind);
+                log.push(Event { t_s, vehicle: None, level: Level::Warning, text });
+                continue;
+            }
             for (i, vehicle) in self.scenario.vehicles.iter().enumerate() {
                 if fault.vehicle.is_some_and(|id| id != vehicle.id) {
                     continue;

@@ -1,10 +1,11 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! tells a vehicle to go on that its pilot gave back. Who cannot fly is not waited for, and who is late not for ever.
+//! tells a vehicle to go on that its pilot gave back, and all of an obstacle it sees. Who cannot fly is not waited for, and who is late not for ever.
 
 use companion::State;
 use companion::frame::{self, Header};
-use mavlink::dialects::ardupilotmega::{COMMAND_LONG_DATA, MavCmd};
+use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use planner_core::Point;
+use planner_core::frames::Geodetic;
 
 use super::member::{Member, is_finished};
 use super::radio::Radio;
@@ -29,6 +30,8 @@ pub struct GroundStation {
     last_us: u64,
     /// Vehicles to tell that they go on, and until when.
     resumes: Vec<(usize, u64)>,
+    /// Centres and radii of obstacles to tell, metres.
+    obstacles: Vec<(Geodetic, f32)>,
 }
 
 impl GroundStation {
@@ -50,6 +53,11 @@ impl GroundStation {
     /// Tells a vehicle to go on once its companion leaves it to the pilot.
     pub fn resume(&mut self, now_us: u64, vehicle: usize) {
         self.resumes.push((vehicle, now_us + RESUME_US));
+    }
+
+    /// Tells all vehicles of an obstacle, from now on.
+    pub fn exclude(&mut self, centre: Geodetic, radius_m: f32) {
+        self.obstacles.push((centre, radius_m));
     }
 
     /// Commands the start once all are ready, and again to each that has not heard it.
@@ -74,6 +82,23 @@ impl GroundStation {
         }
         self.last_us = now_us;
         self.resumes.retain(|&(_, until_us)| now_us < until_us);
+        for (centre, radius_m) in self.obstacles.clone() {
+            let command = COMMAND_INT_DATA {
+                command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+                target_system: EVERYBODY,
+                frame: MavFrame::MAV_FRAME_GLOBAL,
+                param1: radius_m,
+                x: (centre.lat_deg * 1e7).round() as i32,
+                y: (centre.lon_deg * 1e7).round() as i32,
+                z: centre.alt_m as f32,
+                ..COMMAND_INT_DATA::DEFAULT
+            };
+            let mut buffer = [0; frame::MAX_SENT];
+            let header = Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence: self.sequence };
+            let length = frame::encode(header, &command, &mut buffer);
+            self.sequence = self.sequence.wrapping_add(1);
+            radio.broadcast(now_us, None, places, &buffer[..length]);
+        }
         for (i, member) in members.iter().enumerate() {
             let id = member.system_id();
             if state(member) == State::Ready {

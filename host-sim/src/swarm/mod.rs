@@ -109,6 +109,7 @@ fn simulate(
     let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
     let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
+    monitor.waits_end = !scenario.faults.is_empty();
     let mut ground_station = GroundStation::new();
     let mut script = Script::new(scenario);
     let mut log = Vec::new();
@@ -123,8 +124,12 @@ fn simulate(
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
         t_s = now_us as f64 * 1e-6;
-        let mut world =
-            World { members: &mut members, radio: &mut radio, ground_station: &mut ground_station };
+        let mut world = World {
+            members: &mut members,
+            radio: &mut radio,
+            ground_station: &mut ground_station,
+            obstacles: &mut monitor.obstacles,
+        };
         script.step(now_us, &mut world, &mut log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission.map, &mut radio, &places, &mut log);

@@ -82,6 +82,11 @@ pub struct Monitor<'a> {
     too_near: Vec<bool>,
     recorded_s: f64,
     window: Sample,
+    /// Whether a standstill that ends was none: where faults strike, vehicles wait until it is known what became of the one
+    /// struck, and for their turn to fly around it.
+    pub waits_end: bool,
+    /// Spheres that are on no map: centre and radius, metres.
+    pub obstacles: Vec<(Point, f32)>,
     /// Bodies that reached into an obstacle.
     pub wall_contacts: u32,
     /// Pairs that came nearer than the safety distance.
@@ -125,6 +130,8 @@ impl<'a> Monitor<'a> {
             too_near: vec![false; radii_m.len() * radii_m.len()],
             recorded_s: f64::NEG_INFINITY,
             window: NOTHING,
+            waits_end: false,
+            obstacles: Vec::new(),
             wall_contacts: 0,
             violations: 0,
             deadlocks: 0,
@@ -197,6 +204,9 @@ impl<'a> Monitor<'a> {
         } else {
             false
         };
+        let inside =
+            |&(centre, extent_m): &(Point, f32)| (now.position - centre).norm() < radius_m + extent_m;
+        let touches = touches || self.obstacles.iter().any(inside);
         let was_touching = std::mem::replace(&mut self.vehicles[i].in_contact, touches);
         if touches && !was_touching {
             self.wall_contacts += 1;
@@ -278,7 +288,9 @@ impl<'a> Monitor<'a> {
         if now.phase != Phase::Flying || now.ordered || moved {
             vehicle.best_progress_m = vehicle.best_progress_m.max(now.progress_m);
             vehicle.progressed_s = t_s;
-            vehicle.stuck = false;
+            if std::mem::take(&mut vehicle.stuck) && moved && self.waits_end {
+                self.deadlocks -= 1;
+            }
         } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
             vehicle.stuck = true;
             self.deadlocks += 1;
@@ -378,6 +390,20 @@ mod tests {
                 monitor.observe(f64::from(step) * 0.1, &seen);
             }
             assert_eq!(monitor.deadlocks, 1);
+        });
+    }
+
+    #[test]
+    fn where_faults_strike_a_standstill_that_ends_is_a_wait() {
+        with_monitor(|mut monitor| {
+            monitor.waits_end = true;
+            let on_path = |x| [at(x, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
+            for step in 0..300 {
+                monitor.observe(f64::from(step) * 0.1, &on_path(2.0));
+            }
+            assert_eq!(monitor.deadlocks, 1);
+            monitor.observe(30.0, &on_path(2.5));
+            assert_eq!(monitor.deadlocks, 0);
         });
     }
 }

@@ -62,8 +62,9 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     failed
 }
 
-/// Rounds in which who cannot be fitted in goes first, before others are held back for it instead.
-const REORDERINGS: usize = 16;
+/// Rounds in which who cannot be fitted in goes first, before others are held back for it instead. No more than vehicles:
+/// in a crowd, where many swap places, nearly everybody has to leave its place before somebody else comes.
+const REORDERINGS: usize = 64;
 /// Rounds in which others are held back, each by [`HEAD_START_S`] more.
 const HEAD_STARTS: usize = 8;
 /// What two vehicles head-on need to clear a side room, seconds.

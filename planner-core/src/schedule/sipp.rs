@@ -11,6 +11,7 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+use super::near::Cells;
 use super::{
     Flight, Forbidden, Piece, ScheduleConfig, ScheduleError, conflict, cut, first_allowed, forbid, parts,
 };
@@ -42,8 +43,9 @@ const NO_STATE: State =
 
 /// Scratch for roadmaps of up to `N` nodes, as many states, and `P` scheduled pieces. All zero when new.
 pub struct SippWorkspace<const N: usize, const P: usize> {
-    /// Times are absolute here.
+    /// Times are absolute here; sorted into `cells`.
     pieces: Vec<Piece, P>,
+    cells: Cells,
     states: [State; N],
     len: usize,
     /// First state of each node, plus one.
@@ -58,6 +60,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     pub const fn new() -> Self {
         Self {
             pieces: Vec::new(),
+            cells: Cells::new(),
             states: [NO_STATE; N],
             len: 0,
             first: [0; N],
@@ -121,12 +124,12 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     }
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &pad, &start, climb_s);
+    ws.forbid_departures(cfg, &pad, &start, climb_s, (route.not_before_s, leave_pad_by_s));
     ws.relax(route.from, None, route.not_before_s, leave_pad_by_s, climb_s, &goal, &start, cfg);
     while let Some(state) = ws.heap.pop() {
         let reached = ws.states[usize::from(state)];
         if reached.node == route.to {
-            ws.forbid_departures(cfg, &goal, &ground, descent_s);
+            ws.forbid_departures(cfg, &goal, &ground, descent_s, (reached.arrive_s, reached.until_s));
             let from_s = fmaxf(reached.arrive_s, land_after_s - descent_s);
             let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
             if let Some(land_s) = land_s {
@@ -141,8 +144,11 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
             let there = view.node(edge.target);
             let duration_s = (there - here).norm() / cfg.cruise_mps;
             ws.add_states(cfg, view, edge.target);
-            ws.forbid_departures(cfg, &here, &there, duration_s);
             let (from_s, until_s) = (reached.arrive_s, reached.until_s);
+            if !ws.may_improve(edge.target, from_s, until_s, duration_s) {
+                continue;
+            }
+            ws.forbid_departures(cfg, &here, &there, duration_s, (from_s, until_s));
             ws.relax(edge.target, Some(state), from_s, until_s, duration_s, &goal, &there, cfg);
         }
     }
@@ -156,6 +162,7 @@ fn load<'a, const N: usize, const P: usize, const W: usize>(
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut SippWorkspace<N, P>,
 ) -> Result<(), ScheduleError> {
+    const { assert!(P <= u16::MAX as usize, "cells count pieces in 16 bits") };
     ws.pieces.clear();
     for other in scheduled {
         cut(cfg, other, &mut ws.cut)?;
@@ -168,7 +175,19 @@ fn load<'a, const N: usize, const P: usize, const W: usize>(
         let for_ever = Piece { from_s: f32::NEG_INFINITY, to_s: f32::INFINITY, ..standing(place, true) };
         ws.pieces.push(for_ever).map_err(|_| ScheduleError::PiecesFull)?;
     }
+    ws.cells.sort(&mut ws.pieces);
     Ok(())
+}
+
+/// The pieces in conflict with `own`.
+fn near<'s>(
+    cells: &'s Cells,
+    pieces: &'s [Piece],
+    cfg: &'s ScheduleConfig,
+    own: &'s Piece,
+) -> impl Iterator<Item = &'s Piece> {
+    let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
+    cells.around(pieces, own, apart_m).filter(|q| conflict(cfg, own, q))
 }
 
 /// A vehicle at one place; the times are for the caller.
@@ -178,7 +197,7 @@ fn standing(at: Point, parked: bool) -> Piece {
 
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     fn near<'s>(&'s self, cfg: &'s ScheduleConfig, own: &'s Piece) -> impl Iterator<Item = &'s Piece> {
-        self.pieces.iter().filter(|q| conflict(cfg, own, q))
+        near(&self.cells, &self.pieces, cfg, own)
     }
 
     /// Makes the states of a node, one for each safe interval, unless they are there.
@@ -188,7 +207,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
         let hover = standing(view.node(node), false);
         self.forbidden.clear();
-        for q in self.pieces.iter().filter(|q| conflict(cfg, &hover, q)) {
+        for q in near(&self.cells, &self.pieces, cfg, &hover) {
             forbid(&mut self.forbidden, q.from_s, q.to_s);
         }
         self.forbidden.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
@@ -207,8 +226,32 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Collects the departures from `a` that would meet somebody on the way to `b`.
-    fn forbid_departures(&mut self, cfg: &ScheduleConfig, a: &Point, b: &Point, duration_s: f32) {
+    /// Whether some interval of `node` would be reached earlier if nobody were in the way.
+    fn may_improve(&self, node: u16, from_s: f32, until_s: f32, duration_s: f32) -> bool {
+        let mut at = self.first[usize::from(node)];
+        while at != 0 {
+            let index = at - 1;
+            let state = &self.states[usize::from(index)];
+            at = state.next;
+            let leave_s = fmaxf(from_s, state.from_s - duration_s);
+            let fits = leave_s <= until_s && leave_s + duration_s <= state.until_s;
+            if fits && leave_s + duration_s < state.arrive_s && self.heap.place(index) != SETTLED {
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Collects the departures from `a` that would meet somebody on the way to `b`, as far as they matter for leaving
+    /// between the two times of `leave_s`.
+    fn forbid_departures(
+        &mut self,
+        cfg: &ScheduleConfig,
+        a: &Point,
+        b: &Point,
+        duration_s: f32,
+        leave_s: (f32, f32),
+    ) {
         self.forbidden.clear();
         let length_m = (b - a).norm();
         let stretch = |from: f32, to: f32| Piece {
@@ -221,7 +264,12 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             parked: false,
         };
         let (whole, parts) = (stretch(0.0, 1.0), parts(length_m));
-        for q in self.pieces.iter().filter(|q| conflict(cfg, &whole, q)) {
+        let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
+        for q in self.cells.around(&self.pieces, &whole, apart_m) {
+            // What ends before or begins after cannot even touch the times asked for.
+            if q.to_s < leave_s.0 || q.from_s - duration_s > leave_s.1 || !conflict(cfg, &whole, q) {
+                continue;
+            }
             for part in 0..parts {
                 let p = stretch(part as f32 / parts as f32, (part + 1) as f32 / parts as f32);
                 if conflict(cfg, &p, q) {

@@ -1,0 +1,81 @@
+//! What the guards of the mission table look at, from the state of the companion.
+
+use planner_core::Point;
+
+use crate::config::PlanFailure;
+use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
+use crate::machine::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
+use crate::mission::{Inputs, State};
+use crate::time::Duration;
+
+/// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
+const LANDING_DRIFT_M: f32 = 1.0;
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// A snapshot.
+    pub(crate) fn inputs(&self) -> Inputs {
+        let (t, now, scene) = (&self.telemetry, self.now, self.scene());
+        let kind = self.kind();
+        let offboard = t.custom_mode == kind.setpoint_mode();
+        let mode_foreign = match self.state {
+            State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
+            // Disarming after a landing the autopilot chooses a mode of its own.
+            State::Land | State::Disarm => !offboard && t.custom_mode != kind.land_mode() && t.armed,
+            _ => !offboard,
+        };
+        let away = t.position - self.start;
+        let follow = self.state == State::Follow;
+        let fence = self.config.geofence;
+        let charge_below = |percent| (0..percent).contains(&t.battery_percent);
+        let inside =
+            |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
+        Inputs {
+            in_state: now - self.entered_at,
+            heartbeat_age: t.heartbeat_age(now),
+            position_age: t.position_age(now),
+            jumped: t.is_settling(now),
+            stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
+            neighbour_age: self.neighbours.silence(now, self.entered_at),
+            neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
+            plan_ready: self.plan.is_some(),
+            plan_failed: self.plan_failure.is_some(),
+            roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
+            has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
+            at_start: away.xy().norm() <= self.config.start_tolerance_m,
+            start: self.wishes.start,
+            pause: self.wishes.pause,
+            resume: self.wishes.resume,
+            land: self.wishes.land,
+            turn_back: self.wishes.turn_back && !self.guidance.returning,
+            armed: t.armed,
+            offboard,
+            mode_foreign,
+            critical: t.is_critical(),
+            on_ground: t.on_ground == Some(true),
+            airborne: t.armed && t.on_ground == Some(false),
+            lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
+            gates_open: self.guidance.advice.stop_within_m > 0.05
+                && self.departure_due()
+                && !self.around.blocked
+                && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
+            climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
+            path_done: follow && self.guidance.path_done(&scene),
+            near_path: match self.state {
+                State::PilotControl => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
+                State::PositionLost => self.guidance.near_path(&scene, LOST_WINDOW_M),
+                _ => false,
+            },
+            battery_low: charge_below(self.config.battery_low_percent),
+            battery_critical: charge_below(self.config.battery_low_percent / 2),
+            room_below: !self
+                .neighbours
+                .any_below(&t.position, self.config.safety_distance_m + LANDING_DRIFT_M),
+            outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
+            blocked: self.around.blocked,
+            our_turn: self.is_our_turn(),
+            detour_ready: self.around.ready,
+            detours_failed: self.around.failed,
+            standing: self.guidance.stands() && t.velocity.norm() < STANDING_MPS,
+        }
+    }
+}

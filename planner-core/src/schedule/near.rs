@@ -1,0 +1,125 @@
+//! Which scheduled pieces come near a place: they are sorted into the cells of a square grid, so that a look around asks only
+//! the cells about it.
+//!
+//! Cost: one sort to build; a look takes the pieces in the cells within reach.
+
+use libm::{fmaxf, fminf};
+
+use super::Piece;
+
+/// Cells along one side.
+const SIDE: usize = 32;
+/// A cell is no smaller, metres: far below any separation finer cells find nothing less.
+const CELL_LEAST_M: f32 = 0.5;
+
+/// Pieces by the cell of their middle, seen from above.
+#[derive(Clone, Debug)]
+pub(super) struct Cells {
+    min: [f32; 2],
+    cell_m: f32,
+    /// Half of the longest piece, metres.
+    half_m: f32,
+    /// Where the pieces of each cell begin, row by row.
+    starts: [u16; SIDE * SIDE + 1],
+}
+
+impl Cells {
+    pub(super) const fn new() -> Self {
+        Self { min: [0.0; 2], cell_m: 1.0, half_m: 0.0, starts: [0; SIDE * SIDE + 1] }
+    }
+
+    /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
+    pub(super) fn sort(&mut self, pieces: &mut [Piece]) {
+        let (mut min, mut max) = ([f32::INFINITY; 2], [f32::NEG_INFINITY; 2]);
+        self.half_m = 0.0;
+        for piece in &*pieces {
+            let middle = middle(piece);
+            for a in 0..2 {
+                (min[a], max[a]) = (fminf(min[a], middle[a]), fmaxf(max[a], middle[a]));
+            }
+            self.half_m = fmaxf(self.half_m, half_length(piece));
+        }
+        let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
+        (self.min, self.cell_m) = (min, fmaxf(extent_m / SIDE as f32, CELL_LEAST_M));
+        pieces.sort_unstable_by_key(|piece| {
+            let [x, y] = middle(piece);
+            self.at(1, y) * SIDE + self.at(0, x)
+        });
+        self.starts.fill(0);
+        for piece in &*pieces {
+            let [x, y] = middle(piece);
+            self.starts[self.at(1, y) * SIDE + self.at(0, x) + 1] += 1;
+        }
+        for cell in 0..SIDE * SIDE {
+            self.starts[cell + 1] += self.starts[cell];
+        }
+    }
+
+    /// The cell of a coordinate, the nearest if it lies outside.
+    fn at(&self, axis: usize, value: f32) -> usize {
+        (((value - self.min[axis]) / self.cell_m) as usize).min(SIDE - 1)
+    }
+
+    /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some more.
+    pub(super) fn around<'a>(
+        &'a self,
+        pieces: &'a [Piece],
+        own: &Piece,
+        apart_m: f32,
+    ) -> impl Iterator<Item = &'a Piece> {
+        let reach_m = apart_m + half_length(own) + self.half_m;
+        let middle = middle(own);
+        let [columns, rows] =
+            [0, 1].map(|axis| (self.at(axis, middle[axis] - reach_m), self.at(axis, middle[axis] + reach_m)));
+        (rows.0..=rows.1).flat_map(move |row| {
+            let from = self.starts[row * SIDE + columns.0];
+            let to = self.starts[row * SIDE + columns.1 + 1];
+            &pieces[usize::from(from)..usize::from(to)]
+        })
+    }
+}
+
+fn middle(piece: &Piece) -> [f32; 2] {
+    [(piece.from.x + piece.to.x) * 0.5, (piece.from.y + piece.to.y) * 0.5]
+}
+
+fn half_length(piece: &Piece) -> f32 {
+    (piece.to - piece.from).norm() * 0.5
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Point;
+    use crate::schedule::{ScheduleConfig, conflict};
+    use heapless::Vec;
+    use proptest::prelude::*;
+
+    fn piece((x, y, dx, dy): (f32, f32, f32, f32)) -> Piece {
+        let (from, to) = (Point::new(x, y, 1.0), Point::new(x + dx, y + dy, 1.0));
+        let to_m = (to - from).norm();
+        Piece { from, to, from_m: 0.0, to_m, from_s: 0.0, to_s: 1.0, parked: false }
+    }
+
+    fn place() -> impl Strategy<Value = (f32, f32, f32, f32)> {
+        (-40.0f32..40.0, -9.0f32..9.0, -1.5f32..1.5, -1.5f32..1.5)
+    }
+
+    proptest! {
+        /// The cells about a piece hold every piece in conflict with it.
+        #[test]
+        fn none_in_conflict_is_missed(
+            others in proptest::collection::vec(place(), 0..200),
+            own in (-60.0f32..60.0, -20.0f32..20.0, -8.0f32..8.0, -8.0f32..8.0),
+        ) {
+            let cfg = ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+            let mut pieces: Vec<Piece, 200> = others.into_iter().map(piece).collect();
+            let mut cells = Cells::new();
+            cells.sort(&mut pieces);
+            let own = piece(own);
+            let all = pieces.iter().filter(|q| conflict(&cfg, &own, q)).count();
+            let found = cells.around(&pieces, &own, 2.0).filter(|q| conflict(&cfg, &own, q)).count();
+            prop_assert_eq!(found, all);
+        }
+    }
+}
