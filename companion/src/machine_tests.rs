@@ -199,17 +199,13 @@ fn the_heartbeat_is_believed_and_no_ack() {
     bench.start();
     bench.until(State::Engaging, 6.0);
     // PX4's first ack of DO_SET_MODE says accepted, whatever comes of it.
-    let accepted = COMMAND_ACK_DATA {
-        command: MavCmd::MAV_CMD_DO_SET_MODE,
-        result: MavResult::MAV_RESULT_ACCEPTED,
-        ..Default::default()
-    };
-    bench.tell(&accepted);
+    let ack = |result| COMMAND_ACK_DATA { command: MavCmd::MAV_CMD_DO_SET_MODE, result };
+    bench.tell(&ack(MavResult::MAV_RESULT_ACCEPTED));
     bench.run(2.0);
     assert_eq!(bench.state(), State::Engaging);
     assert!(bench.commands.iter().filter(|c| c.0 == 176).count() >= 2, "asked again");
     bench.refused.clear();
-    bench.tell(&COMMAND_ACK_DATA { result: MavResult::MAV_RESULT_TEMPORARILY_REJECTED, ..accepted });
+    bench.tell(&ack(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
     bench.until(State::Follow, 20.0);
 }
 

@@ -158,7 +158,7 @@ struct Seen {
 
 /// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global position was told, the
 /// companion's own, from local metres by that autopilot's projection, must be the same place.
-fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<GPS_GLOBAL_ORIGIN_DATA>) -> (Seen, Seen) {
+fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_ORIGIN_DATA>) -> (Seen, Seen) {
     let mut companion: Companion<2, 4, 2> =
         Companion::new(CompanionConfig::new(1, Point::zeros(), origin)).unwrap();
     let (mut told, mut seen, mut compared, mut buffer) = (Story::default(), Seen::default(), 0, [0; 512]);
@@ -169,7 +169,7 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<GPS_GLOBAL_OR
         let now = Instant::from_micros((entry.t_s * 1e6) as u64);
         companion.handle_bytes(Link::Autopilot, now, &entry.bytes);
         sent += u32::from(entry.frame.is_some());
-        if let (20, Some(announced)) = (number, &announced) {
+        if let (20, Some(announced)) = (number, announced) {
             let sequence = entry.frame.as_ref().map_or(0, |f| f.sequence.wrapping_add(1));
             let length = frame::encode(Header { system: 1, component: 1, sequence }, announced, &mut buffer);
             companion.handle_bytes(Link::Autopilot, now, &buffer[..length]);
@@ -224,7 +224,7 @@ fn the_companion_sees_px4s_recorded_flight_as_it_was() {
     let announced =
         GPS_GLOBAL_ORIGIN_DATA { latitude: 473_977_415, longitude: 85_455_963, altitude: 489_824 };
     let origin = Geodetic { lat_deg: 47.405, lon_deg: 8.55, alt_m: 480.0 };
-    let (told, seen) = play(&recording(&path), origin, Some(announced));
+    let (told, seen) = play(&recording(&path), origin, Some(&announced));
     assert_eq!(told, seen);
 }
 
