@@ -90,7 +90,8 @@ pub fn run(neighbours: usize) {
     let mut rng = Pcg32::seed_from_u64(SEED);
     for number in 0..CASES {
         let case = Case::new(&mut rng, neighbours, number % 2 == 0);
-        let own = Own { rank: 0, position: case.position, along_m: case.along_m, path: &case.path, detours: false };
+        let own =
+            Own { rank: 0, position: case.position, along_m: case.along_m, path: &case.path, detours: false };
         black_box(priority_step(&case.cfg, &own, &case.gates, black_box(&case.neighbours)));
     }
 }
