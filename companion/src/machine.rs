@@ -193,7 +193,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.now = now;
         match (self.state, outcome) {
             (State::Planning, Ok(plan)) if self.begins_at(plan, &self.start) => {
-                self.plan = Some(plan.clone())
+                self.plan = Some(plan.clone());
             }
             (State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
             (State::Planning, Ok(_)) => self.plan_failure = Some(PlanFailure::Invalid),
