@@ -10,7 +10,10 @@ use planner_core::Point;
 use planner_core::voxel::GridShape;
 
 const CRUISE_MPS: f32 = 2.0;
+/// Edge of a map cell, metres.
 const RESOLUTION_M: f32 = 0.25;
+/// The same where a doorway of 1.6 m is to be cut, metres.
+const DOORWAY_RESOLUTION_M: f32 = 0.2;
 /// Height of starts and goals over the floor's top, metres.
 const HEIGHT_M: f32 = 1.5;
 /// The gusts of every case.
@@ -22,44 +25,50 @@ pub struct Meeting {
     pub cases: Vec<(&'static str, &'static str)>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
-    /// Stand on their pads all the time.
-    parked: Vec<Point>,
+    resolution_m: f32,
     nodes: usize,
     edge_max_m: f32,
+    safety_margin_m: f32,
+    sampling: &'static str,
     safety_distance_m: f32,
     time_limit_s: f32,
+    /// Seeds flown at most.
+    pub seeds_most: u64,
 }
 
 impl Meeting {
+    /// Whether more than twenty meet.
+    pub fn is_large(&self) -> bool {
+        self.vehicles.len() > 20
+    }
+
     /// The scenario's text, flown with `method` under the disturbances of one case.
     pub fn scenario(&self, method: &str, simulation: &str, seed: u64) -> String {
         let mut text =
-            format!("seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {RESOLUTION_M}\n", self.map);
+            format!("seed = {seed}\n[map]\nfile = {:?}\nresolution_m = {}\n", self.map, self.resolution_m);
         let goals: Vec<String> =
             self.vehicles.iter().map(|(_, g)| format!("[{:.3}, {:.3}, {:.3}]", g.x, g.y, g.z)).collect();
         let _ = write!(
             text,
-            "[roadmap]\nnodes = {}\nedge_min_m = 0.3\nedge_max_m = {}\nsafety_margin_m = 0.5\n\
+            "[roadmap]\nnodes = {}\nedge_min_m = 0.3\nedge_max_m = {}\nsafety_margin_m = {}\nsampling = {:?}\n\
              [mission]\nmode = \"labelled\"\ncruise_mps = {CRUISE_MPS}\ngoals = [{}]\n\
              [deconfliction]\nmethod = {method:?}\nsafety_distance_m = {}\n\
              [simulation]\ntime_limit_s = {}\n{simulation}\n",
             self.nodes,
             self.edge_max_m,
+            self.safety_margin_m,
+            self.sampling,
             goals.join(", "),
             self.safety_distance_m,
             self.time_limit_s,
         );
-        let starts = self.vehicles.iter().map(|(start, _)| start).chain(&self.parked);
-        for (i, start) in starts.enumerate() {
+        for (i, (start, _)) in self.vehicles.iter().enumerate() {
             let [x, y, z] = (*start).into();
             let _ = write!(
                 text,
-                "[[vehicles]]\nid = {}\nstart = [{x:.3}, {y:.3}, {z:.3}]\nradius_m = 0.3\n",
+                "[[vehicles]]\nid = {}\nstart = [{x:.3}, {y:.3}, {z:.3}]\nradius_m = 0.3\ngoal = {i}\n",
                 i + 1
             );
-            if i < self.vehicles.len() {
-                let _ = writeln!(text, "goal = {i}");
-            }
         }
         text
     }
@@ -79,11 +88,14 @@ fn indoors() -> Meeting {
         cases: Vec::new(),
         map: PathBuf::new(),
         vehicles: Vec::new(),
-        parked: Vec::new(),
+        resolution_m: RESOLUTION_M,
         nodes: 250,
         edge_max_m: 5.0,
+        safety_margin_m: 0.5,
+        sampling: "uniform",
         safety_distance_m: 1.5,
         time_limit_s: 400.0,
+        seeds_most: u64::MAX,
     }
 }
 
@@ -122,13 +134,34 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         cases: vec![("circle, 100, 3 m apart", GUSTS)],
         map: hall(dir, 66.0, "field.bt")?,
         vehicles: circle(100, 60.0, 66.0),
-        nodes: 2000,
-        edge_max_m: 8.0,
+        nodes: 1500,
+        edge_max_m: 9.0,
+        // Evenly spread: between pads 3.8 m apart a way in and out leads only straight ahead.
+        sampling: "halton",
         safety_distance_m: 3.0,
         time_limit_s: 900.0,
+        seeds_most: 3,
         ..indoors()
     };
-    Ok(vec![corridor, crossing, twenty, hundred])
+    let doorway = Meeting {
+        cases: three([
+            "doorway, one stands in it",
+            "doorway, 30 % radio loss",
+            "doorway, 300 ms radio delay",
+        ]),
+        map: doorway(dir)?,
+        vehicles: vec![
+            (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
+            (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
+            // Takes off and lands in the doorway.
+            (Point::new(8.2, 4.4, z), Point::new(8.6, 4.4, z)),
+        ],
+        resolution_m: DOORWAY_RESOLUTION_M,
+        nodes: 600,
+        safety_margin_m: 0.3,
+        ..indoors()
+    };
+    Ok(vec![corridor, crossing, doorway, twenty, hundred])
 }
 
 /// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
@@ -146,9 +179,15 @@ fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
 }
 
 /// A map of `size`, solid but for what `free` says of cell centres; its floor is one cell thick.
-fn carve(dir: &Path, name: &str, size: Point, free: impl Fn(Point) -> bool) -> Result<PathBuf> {
-    let dims = [0, 1, 2].map(|a| (size[a] / RESOLUTION_M).round() as u32);
-    let shape = GridShape { dims, min: Point::zeros(), resolution_m: RESOLUTION_M };
+fn carve(
+    dir: &Path,
+    name: &str,
+    resolution_m: f32,
+    size: Point,
+    free: impl Fn(Point) -> bool,
+) -> Result<PathBuf> {
+    let dims = [0, 1, 2].map(|a| (size[a] / resolution_m).round() as u32);
+    let shape = GridShape { dims, min: Point::zeros(), resolution_m };
     let mut map = OccupancyMap::unknown(shape, name)?;
     for (i, j, k) in
         (0..dims[0]).flat_map(|i| (0..dims[1]).flat_map(move |j| (0..dims[2]).map(move |k| (i, j, k))))
@@ -163,16 +202,29 @@ fn carve(dir: &Path, name: &str, size: Point, free: impl Fn(Point) -> bool) -> R
 
 /// 30 m × 3 m, with one side room off its middle.
 fn corridor(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "corridor.bt", Point::new(30.5, 8.5, 3.5), |p| {
+    carve(dir, "corridor.bt", RESOLUTION_M, Point::new(30.5, 8.5, 3.5), |p| {
         let corridor = (0.25..30.25).contains(&p.x) && (0.5..3.5).contains(&p.y);
         let room = (13.0..17.0).contains(&p.x) && (3.5..8.0).contains(&p.y);
         corridor || room
     })
 }
 
+/// Two rooms of 8 m × 9 m with a doorway 1.6 m wide and 2.2 m high between them, and the long way round through a passage 3 m wide.
+fn doorway(dir: &Path) -> Result<PathBuf> {
+    carve(dir, "doorway.bt", DOORWAY_RESOLUTION_M, Point::new(17.0, 13.6, 3.6), |p| {
+        let rooms = (0.2..16.8).contains(&p.x) && (0.2..9.2).contains(&p.y);
+        let wall = (8.2..8.6).contains(&p.x) && !(3.6..5.2).contains(&p.y);
+        let ends = (0.2..3.2).contains(&p.x) || (13.8..16.8).contains(&p.x);
+        let passage = (10.0..13.0).contains(&p.y) && (0.2..16.8).contains(&p.x);
+        // Low: nobody flies over who stands in it.
+        let lintel = (8.2..8.6).contains(&p.x) && p.z > 2.4;
+        (rooms && !wall && !lintel) || passage || (ends && (9.0..10.2).contains(&p.y))
+    })
+}
+
 /// Two corridors 4 m wide that cross at (15, 15).
 fn crossing(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "crossing.bt", Point::new(30.0, 30.0, 3.5), |p| {
+    carve(dir, "crossing.bt", RESOLUTION_M, Point::new(30.0, 30.0, 3.5), |p| {
         let across = |v: f32| (13.0..17.0).contains(&v);
         let along = |v: f32| (0.25..29.75).contains(&v);
         (across(p.x) && along(p.y)) || (across(p.y) && along(p.x))
@@ -181,5 +233,5 @@ fn crossing(dir: &Path) -> Result<PathBuf> {
 
 /// An open hall of twice `half_m` a side; low, so that everybody meets at one height.
 fn hall(dir: &Path, half_m: f32, name: &str) -> Result<PathBuf> {
-    carve(dir, name, Point::new(2.0 * half_m, 2.0 * half_m, 3.5), |_| true)
+    carve(dir, name, RESOLUTION_M, Point::new(2.0 * half_m, 2.0 * half_m, 3.5), |_| true)
 }

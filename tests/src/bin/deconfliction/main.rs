@@ -37,6 +37,9 @@ struct Args {
     /// Only the cases whose name contains this.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
+    /// Leave out meetings of more than twenty.
+    #[arg(long)]
+    small: bool,
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<std::path::PathBuf>,
@@ -92,7 +95,7 @@ fn main() -> Result<()> {
     let mut rows = Vec::new();
     for mut meeting in cases::all(dir)? {
         meeting.cases.retain(|(name, _)| name.contains(&args.only));
-        if meeting.cases.is_empty() {
+        if meeting.cases.is_empty() || (args.small && meeting.is_large()) {
             continue;
         }
         let began = Instant::now();
@@ -127,7 +130,7 @@ fn main() -> Result<()> {
 
 /// The rows of a meeting: its cases, each with both methods.
 fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
-    let seeds: Vec<u64> = (args.first..args.first + args.seeds).collect();
+    let seeds: Vec<u64> = (args.first..args.first + args.seeds.min(meeting.seeds_most)).collect();
     let flown: Vec<Vec<Row>> =
         seeds.into_par_iter().map(|seed| fly_seed(meeting, seed, dir)).collect::<Result<_>>()?;
     let mut sums = rows(meeting);

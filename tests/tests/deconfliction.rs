@@ -1,0 +1,28 @@
+//! The deconfliction suite over a few seeds; `cargo xtask bench --only deconfliction` flies a hundred of each case.
+
+use std::process::Command;
+
+use serde_json::Value;
+
+/// Seeds of each case: the whole suite takes minutes.
+const SEEDS: u64 = 2;
+
+#[test]
+fn hard_meetings_end_without_a_touch_or_a_standstill() {
+    let dir = tempfile::tempdir().unwrap();
+    let rows = dir.path().join("rows.json");
+    let suite = Command::new(env!("CARGO_BIN_EXE_deconfliction"))
+        .args(["--small", "--seeds", &SEEDS.to_string(), "--out"])
+        .arg(&rows)
+        .status();
+    assert!(suite.unwrap().success());
+    let rows: Vec<Value> = serde_json::from_str(&std::fs::read_to_string(rows).unwrap()).unwrap();
+    let ours: Vec<&Value> = rows.iter().filter(|row| row["method"] == "priority").collect();
+    assert!(ours.len() >= 12, "{} cases", ours.len());
+    for row in ours {
+        assert_eq!(row["complete"], SEEDS, "{row}");
+        for count in ["violations", "wall_contacts", "deadlocks"] {
+            assert_eq!(row[count], 0, "{row}");
+        }
+    }
+}
