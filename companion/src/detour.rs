@@ -29,6 +29,8 @@ const QUIET_S: u64 = 3;
 const TURN_S: u64 = 2;
 /// After a way around was not found the next is sought so much later.
 const RETRY_S: u64 = 10;
+/// Standing and waiting while all others stand for this long is a dead end: whoever is waited for has found no way around.
+const DEAD_END: Duration = Duration::from_secs(30);
 /// A way around on which there is no progress for this long is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
 /// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
@@ -145,7 +147,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
         let astray = self.around.left && !self.around.flying;
-        self.around.blocked = !self.guidance.returning && (stuck || astray || self.is_in_the_way(on_ground));
+        let dead_end = self.waits() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
+        self.around.blocked =
+            !self.guidance.returning && (stuck || astray || dead_end || self.is_in_the_way(on_ground));
         if !self.neighbours.all_stand(now) {
             // Somebody moved: what stood in the way may have gone.
             (self.around.quiet_since, self.around.failed) = (None, 0);
