@@ -3,7 +3,7 @@
 //! Little-endian, versioned, closed by a CRC-32; byte by byte in `planner-core/README.md`. Nodes are mission-frame
 //! points, edges are stored from both ends (half-edges) in compressed sparse rows, neighbours in ascending order. A
 //! half-edge takes four bytes: its length follows from the nodes, its clearance is kept in whole millimetres rounded
-//! down, so that 4096 nodes and 65536 half-edges take 320 kB. One roadmap built at a small margin serves vehicles of any
+//! down, so that 4096 nodes and 65536 half-edges take 320 kB, 32 kB more with landmarks. One roadmap built at a small margin serves vehicles of any
 //! size, because each edge carries the clearance it really has (P3D Table 1 from a single build).
 //!
 //! A roadmap may carry the lengths of the ways from each node to two landmarks, eight bytes a node. By the triangle
@@ -31,6 +31,8 @@ pub const HEADER_LEN: usize = 72;
 pub const MAX_NODES: usize = u16::MAX as usize;
 /// Largest coordinate magnitude, metres: squared lengths stay far inside f32.
 pub const MAX_COORDINATE_M: f32 = 1.0e6;
+/// Longest way to a landmark, metres.
+pub const MAX_WAY_M: f32 = 4.0 * MAX_COORDINATE_M;
 /// Largest clearance a half-edge can carry, metres.
 pub const MAX_CLEARANCE_M: f32 = 65.535;
 
@@ -68,7 +70,7 @@ pub enum RoadmapError {
     OneWay(u16),
     /// An edge of this node has no length: its two nodes coincide.
     ZeroLength(u16),
-    /// A way from this node to a landmark is no length, or is longer by more than an edge than from the edge's other end.
+    /// A way from this node to a landmark is no length or beyond [`MAX_WAY_M`], or is longer by more than an edge than from the edge's other end.
     Landmark(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
@@ -253,21 +255,23 @@ impl<'a> RoadmapView<'a> {
     }
 
     /// The bound that the landmarks give must not jump by more than an edge is long, but for the rounding of the sums:
-    /// then A* finds shortest ways with it, whatever the bytes were.
+    /// then A* finds shortest ways with it, to the same rounding, whatever the bytes were.
     fn check_landmarks(&self) -> Result<(), RoadmapError> {
-        const ROUNDING: f32 = 1e-6;
+        // Each way is the rounded sum of the one before it and an edge: half a unit in the last place, twice for safety.
+        const ROUNDING: f32 = 1.2e-7;
         if self.landmarks.is_empty() {
             return Ok(());
         }
         for node in 0..self.nodes.len() as u16 {
             let here = self.ways_to_landmarks_m(node);
-            if !here.iter().all(|way| way.is_finite() && *way >= 0.0) {
+            if !here.iter().all(|way| (0.0..=MAX_WAY_M).contains(way)) {
                 return Err(RoadmapError::Landmark(node));
             }
             for edge in self.half_edges(node) {
                 let length = self.distance_m(node, edge.target);
                 let steps = here.iter().zip(self.ways_to_landmarks_m(edge.target));
-                if !steps.into_iter().all(|(a, b)| libm::fabsf(a - b) <= length + ROUNDING * (a + b)) {
+                if !steps.into_iter().all(|(a, b)| libm::fabsf(a - b) <= length + ROUNDING * (a + b + length))
+                {
                     return Err(RoadmapError::Landmark(node));
                 }
             }

@@ -1,7 +1,8 @@
 //! Shortest paths on a roadmap: A* for one pair, one Dijkstra row for a vehicle's costs to many goals.
 //!
-//! Source: P3D §3.3 (A* per pair, cost matrix for the allocation); the heuristic is the straight distance, admissible and
-//! consistent because an edge is as long as the straight line between its nodes. Metres, f32. Cost O(half-edges +
+//! Source: P3D §3.3 (A* per pair, cost matrix for the allocation); the heuristic is the greater of the straight distance and
+//! what the roadmap's landmarks tell, both admissible and consistent: an edge is as long as the straight line between its
+//! nodes, and no way to a landmark differs between its ends by more. Blocked edges only lengthen ways. Metres, f32. Cost O(half-edges +
 //! nodes · log nodes), each node settled once; memory is the caller's [`SearchWorkspace`].
 //!
 //! Edge lengths are not stored but follow from the nodes. Most half-edges never need theirs: the target is settled or

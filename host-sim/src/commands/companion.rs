@@ -40,6 +40,8 @@ pub struct Args {
 
 /// Sleep between two looks at the links.
 const NAP: Duration = Duration::from_millis(1);
+/// After its end it goes on telling the others so, as a board does for good.
+const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Runs until the mission ends. Exit code 0 if it was flown to its end.
 ///
@@ -63,6 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Clock::now();
     let now = || Instant::from_micros(began.elapsed().as_micros() as u64);
     let mut buffer = [0; 2048];
+    let mut finished_at = None;
     loop {
         for (link, io) in &mut links {
             loop {
@@ -106,7 +109,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             }
         }
         let state = companion.state();
-        if is_finished(state) {
+        if !is_finished(state) {
+            finished_at = None;
+        } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL || args.swarm.is_none() {
             return Ok(if state == State::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE });
         }
         sleep(NAP);

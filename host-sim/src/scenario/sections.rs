@@ -16,7 +16,7 @@ use crate::map::{Source, Unknown};
 
 /// Most vehicles of a swarm: the system ids there are.
 const MAX_ID: u64 = 250;
-/// Mission origin where none is given: the test field of the SPEC's example.
+/// Mission origin where none is given: a test field.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
 pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {

@@ -16,7 +16,6 @@
 //! | `companion-reset` | a new companion with a new clock | |
 //! | `late-plan` | who asks for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
-//!
 //! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and tells all companions | gone; the companions keep off on |
 //!
 //! A fault without a vehicle strikes all; an obstacle strikes nobody.

@@ -12,7 +12,7 @@ use crate::map::edt::ClearanceField;
 
 /// Rounding of positions that is no contact, metres.
 const TOUCH_M: f32 = 1e-3;
-/// No progress for this long while a way is left is a deadlock (SPEC §4), seconds.
+/// No progress for this long while a way is left is a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
 /// Progress that counts, metres.
 const PROGRESS_M: f32 = 0.1;

@@ -216,8 +216,12 @@ fn ways_to_landmarks_are_written_and_checked() {
     for (node, ways) in [(0, [0.0, 5.0]), (1, [5.0, 0.0]), (2, [aside, 5.0 + aside])] {
         assert_eq!(view.ways_to_landmarks_m(node), ways, "node {node}");
     }
+    for few in 0..2 {
+        let bytes = encode_with_landmarks(&header(0, 0), &nodes[..few], &[]);
+        assert!(RoadmapView::parse(&bytes).is_ok_and(|view| view.node_count() == few));
+    }
     let first = out.len() - 4 - 3 * LANDMARKS_LEN;
-    for wrong in [f32::NAN, f32::INFINITY, -1.0, 5.01] {
+    for wrong in [f32::NAN, f32::INFINITY, -1.0, 5.01, 1e30] {
         let mut changed = out.clone();
         changed[first..first + 4].copy_from_slice(&wrong.to_le_bytes());
         let refused = RoadmapView::parse(&sealed(changed)).map(|_| ());

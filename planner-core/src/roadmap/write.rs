@@ -1,8 +1,8 @@
 //! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
 
 use super::{
-    CRC, HEADER_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, NODE_LEN, RoadmapError, RoadmapHeader,
-    RoadmapView, VERSION, WORD_LEN, in_range, target_of,
+    CRC, HEADER_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN, RoadmapError,
+    RoadmapHeader, RoadmapView, VERSION, WORD_LEN, in_range, target_of,
 };
 use crate::Point;
 use crate::search::{SearchWorkspace, ways_from};
@@ -57,12 +57,15 @@ pub fn write_with_landmarks<const N: usize>(
     let view = RoadmapView::over(*header, 0, graph, nodes.len(), 2 * edges.len());
     let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
     let mut landmark = 0;
-    for column in 0..LANDMARKS.min(nodes.len()) {
+    for column in 0..if nodes.is_empty() { 0 } else { LANDMARKS } {
         ways_from(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
         let mut farthest_m = 0.0;
-        for (node, ways) in (0..).zip(ways.chunks_exact_mut(LANDMARKS)) {
+        for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARKS)) {
             let reached = Some(ws.distance_m(node)).filter(|way| way.is_finite());
             let way_m = reached.unwrap_or(0.0);
+            if way_m > MAX_WAY_M {
+                return Err(RoadmapError::Landmark(node));
+            }
             ways[column] = way_m.to_le_bytes();
             if way_m > farthest_m {
                 (landmark, farthest_m) = (node, way_m);
