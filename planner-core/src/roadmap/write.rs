@@ -52,12 +52,15 @@ pub fn write_with_landmarks<const N: usize>(
     out: &mut [u8],
 ) -> Result<usize, RoadmapError> {
     let out = write_graph(header, nodes, edges, LANDMARKS, out)?;
+    if nodes.is_empty() {
+        return Ok(seal(out));
+    }
     let body = &mut out[HEADER_LEN..];
     let (graph, rest) = body.split_at_mut(body.len() - WORD_LEN - nodes.len() * LANDMARKS_LEN);
     let view = RoadmapView::over(*header, 0, graph, nodes.len(), 2 * edges.len());
     let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
     let mut landmark = 0;
-    for column in 0..if nodes.is_empty() { 0 } else { LANDMARKS } {
+    for column in 0..LANDMARKS {
         ways_from(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
         let mut farthest_m = 0.0;
         for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARKS)) {
