@@ -28,6 +28,7 @@ mod inputs;
 pub mod intent;
 mod machine;
 pub mod mission;
+pub mod mission_file;
 pub mod neighbours;
 pub mod outbox;
 pub mod px4;
