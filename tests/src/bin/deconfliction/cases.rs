@@ -16,8 +16,8 @@ const RESOLUTION_M: f32 = 0.25;
 const DOORWAY_RESOLUTION_M: f32 = 0.2;
 /// Height of starts and goals over the floor's top, metres.
 const HEIGHT_M: f32 = 1.5;
-/// The gusts of every case.
-const GUSTS: &str = "gust_mps = 3.0\n";
+/// The gusts of every case: what a mission is planned for.
+pub const GUSTS: &str = "gust_mps = 3.0\n";
 
 /// A map and who flies on it: planned once a seed, flown once for each disturbance and method.
 pub struct Meeting {

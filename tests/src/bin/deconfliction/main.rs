@@ -179,7 +179,8 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
 fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     let mut rows = rows(meeting);
     rows.iter_mut().for_each(|row| row.seeds = 1);
-    let mut mission = Mission::prepare(parsed(meeting, "off", "", seed, dir)?, &Progress::hidden())?;
+    let mut mission =
+        Mission::prepare(parsed(meeting, "off", cases::GUSTS, seed, dir)?, &Progress::hidden())?;
     let plan = match mission.plan() {
         Ok(plan) => plan,
         Err(error) => {
