@@ -200,11 +200,16 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     mission.schedule = apart;
     let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
-    for (row, (&(_, simulation), method)) in rows.iter_mut().zip(cases) {
+    for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases) {
         let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck);
         mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
         count(row, &flight.result, &alone);
+        if !flight.result.complete {
+            let file = dir.join(format!("{name}, {method}, seed {seed}.toml"));
+            std::fs::write(&file, meeting.scenario(method, &simulation, seed))
+                .with_context(|| format!("cannot write {}", file.display()))?;
+        }
         let errors = flight.log.iter().filter(|event| event.level == Level::Error);
         row.incidents
             .extend(errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)));
