@@ -140,6 +140,17 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         nodes: 400,
         ..indoors()
     };
+    // High enough to fly over a vehicle that lies somewhere on the floor.
+    let radios = Meeting {
+        cases: ["radio only hears, crossing", "radio only sends, crossing", "radio is dead, crossing"]
+            .into_iter()
+            .zip(FAILED)
+            .collect(),
+        map: crossing_map(dir, "high.bt", 4.5)?,
+        vehicles: crossing_vehicles(z),
+        nodes: 400,
+        ..indoors()
+    };
     let circle = |count: usize, radius_m: f32, middle_m: f32| {
         let place = move |i: usize| {
             let angle = i as f32 * TAU / count as f32;
@@ -200,7 +211,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         safety_margin_m: 0.3,
         ..indoors()
     };
-    Ok(vec![corridor, crossing, doorway, stopped, twenty, hundred])
+    Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, hundred])
 }
 
 /// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
@@ -262,8 +273,8 @@ fn doorway(dir: &Path) -> Result<PathBuf> {
 }
 
 /// Two corridors 4 m wide that cross at (15, 15).
-fn crossing(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "crossing.bt", RESOLUTION_M, Point::new(30.0, 30.0, 3.5), |p| {
+fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
+    carve(dir, name, RESOLUTION_M, Point::new(30.0, 30.0, height_m), |p| {
         let across = |v: f32| (13.0..17.0).contains(&v);
         let along = |v: f32| (0.25..29.75).contains(&v);
         (across(p.x) && along(p.y)) || (across(p.y) && along(p.x))
