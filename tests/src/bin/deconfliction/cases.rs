@@ -130,12 +130,9 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         vehicles: vec![(ends[0], ends[1]), (ends[1], ends[0])],
         ..indoors()
     };
-    let radios =
-        ["crossing, a radio only hears", "crossing, a radio only sends", "crossing, a radio is dead"];
-    let calm = three(["crossing, 8", "crossing, 30 % radio loss", "crossing, 300 ms radio delay"]);
     let crossing = Meeting {
-        cases: calm.into_iter().chain(radios.into_iter().zip(FAILED)).collect(),
-        map: crossing(dir)?,
+        cases: three(["crossing, 8", "crossing, 30 % radio loss", "crossing, 300 ms radio delay"]),
+        map: crossing_map(dir, "crossing.bt", 3.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
         ..indoors()
