@@ -271,6 +271,7 @@ impl Mission {
             mode: planner_mode(&scenario.mission),
             method: scenario.deconfliction.method,
             origin: scenario.map.origin,
+            cruise_mps: scenario.mission.cruise_mps,
             schedule: self.schedule,
             safety_distance_m: scenario.deconfliction.safety_distance_m,
             geofence: scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max)),
