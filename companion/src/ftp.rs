@@ -14,7 +14,11 @@ mod packet;
 
 use heapless::Deque;
 
-use self::packet::{ACK, EFBIG, EIO, HEAD, NAK, No, Request, Text, chunk, decimal, is_open, op, print, told};
+#[cfg(test)]
+pub(crate) use self::packet::TEXTS;
+use self::packet::{
+    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, print, told,
+};
 use crate::frame::Frame;
 use crate::store::window::Taken;
 use crate::store::{Answer, File, Store, UploadError, UploadState};
@@ -290,7 +294,7 @@ impl Ftp {
             op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
                 Some(file) => {
                     store.remove(file);
-                    self.text = Some((false, "File removed from the next start on"));
+                    self.text = Some(REMOVED);
                     self.finish(request, Ok(()));
                 }
                 None => self.nak(request, No::NotFound),
