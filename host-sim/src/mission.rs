@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use companion::PlanFailure;
+use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
@@ -57,8 +58,8 @@ pub struct Mission {
     pub roadmap: Roadmap,
     /// The roadmap as the file on the board.
     pub roadmap_file: Vec<u8>,
-    /// The CRC-32 at its end.
-    pub roadmap_crc: u32,
+    /// The mission as the file on the board.
+    pub mission_file: Vec<u8>,
     /// The vehicles' tasks, in the order of the scenario.
     pub tasks: Vec<VehicleTask>,
     /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
@@ -104,22 +105,23 @@ impl Mission {
             .collect::<anyhow::Result<_>>()?;
         let (roadmap, header) = build(&scenario, &map, &goals)?;
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
-        let roadmap_crc = parsed(&roadmap_file).crc();
-        timing.roadmap_s = begun.elapsed().as_secs_f64();
-        drop(stage);
-        Ok(Self {
+        let mut mission = Self {
             scenario,
             map,
             goals,
             roadmap,
             roadmap_file,
-            roadmap_crc,
+            mission_file: Vec::new(),
             tasks,
             descents_m,
             schedule,
             timing,
             clearance_field: OnceLock::new(),
-        })
+        };
+        mission.mission_file = mission.encode()?;
+        mission.timing.roadmap_s = begun.elapsed().as_secs_f64();
+        drop(stage);
+        Ok(mission)
     }
 
     /// The map's distance field, made when first asked for: only a flight needs it.
@@ -260,20 +262,44 @@ impl Mission {
         enu_to_geodetic(&self.scenario.map.origin, &pad)
     }
 
-    /// CRC-32 of what all companions must agree on: roadmap, tasks, goals and separation.
-    pub fn crc(&self) -> u32 {
-        const CRC32: crc::Crc<u32> = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC);
-        let mut digest = CRC32.digest();
-        digest.update(&self.roadmap_crc.to_le_bytes());
-        for task in &self.tasks {
-            digest.update(&[task.id]);
-            digest.update(&task.goal.unwrap_or(u16::MAX).to_le_bytes());
-            digest.update(&task.required_clearance_m.to_le_bytes());
-        }
-        for number in [self.schedule.separation_m, self.schedule.cruise_mps].iter().chain(&self.descents_m) {
-            digest.update(&number.to_le_bytes());
-        }
-        digest.finalize()
+    /// The mission as a companion reads it; its CRC covers all that companions must agree on.
+    pub fn mission_view(&self) -> MissionView<'_> {
+        MissionView::parse(&self.mission_file).expect("we wrote it ourselves")
+    }
+
+    fn encode(&self) -> anyhow::Result<Vec<u8>> {
+        let scenario = &self.scenario;
+        let header = MissionHeader {
+            roadmap_crc: self.view().crc(),
+            mode: planner_mode(&scenario.mission),
+            method: scenario.deconfliction.method,
+            origin: scenario.map.origin,
+            cruise_mps: scenario.mission.cruise_mps,
+            schedule: self.schedule,
+            safety_distance_m: scenario.deconfliction.safety_distance_m,
+            geofence: scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max)),
+        };
+        let vehicles: Vec<_> = scenario
+            .vehicles
+            .iter()
+            .zip(&self.tasks)
+            .map(|(vehicle, &task)| MissionVehicle {
+                task,
+                start: vehicle.start,
+                radius_m: vehicle.radius_m,
+                speed_max_mps: vehicle.speed_max_mps,
+            })
+            .collect();
+        let goals: Vec<_> = self
+            .goals
+            .iter()
+            .zip(&self.descents_m)
+            .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
+            .collect();
+        let mut bytes = vec![0; mission_file::encoded_len(vehicles.len(), goals.len())];
+        mission_file::write(&header, &vehicles, &goals, &mut bytes)
+            .map_err(|e| anyhow!("no mission file: {}: {e:?}", scenario.path))?;
+        Ok(bytes)
     }
 }
 

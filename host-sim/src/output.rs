@@ -101,7 +101,12 @@ pub fn write(
 /// Writes one `x y z` a line, metres, for other programs to be given the same work.
 pub fn write_points(path: &Path, points: impl Iterator<Item = Point>) -> anyhow::Result<()> {
     let text: String = points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    write_file(path, text.as_bytes())
+}
+
+/// Writes a file whole.
+pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Prints what `result.json` holds, for a person.

@@ -17,7 +17,8 @@ use crate::say;
 pub struct Args {
     /// The scenario
     scenario: PathBuf,
-    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`
+    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and for `roadmap.bin` and
+    /// `mission.bin`, the two files that a board is given
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 }
@@ -36,6 +37,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     output::write(&args.out, &result, &mission.timing, page)?;
     output::write_points(&args.out.join("starts.txt"), mission.scenario.vehicles.iter().map(|v| v.start))?;
     output::write_points(&args.out.join("goals.txt"), mission.goals.iter().copied())?;
+    output::write_file(&args.out.join("roadmap.bin"), &mission.roadmap_file)?;
+    output::write_file(&args.out.join("mission.bin"), &mission.mission_file)?;
     output::print_summary(&result, &args.out);
     say!("pads       where each stands, as `--home` of `host-sim autopilot`");
     for (i, task) in mission.tasks.iter().enumerate() {

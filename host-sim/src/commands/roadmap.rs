@@ -9,6 +9,7 @@ use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
 use super::load;
 use crate::mission::Mission;
+use crate::output;
 use crate::progress::Progress;
 use crate::say;
 
@@ -44,8 +45,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out } => {
             let mission = Mission::prepare(load(scenario, None)?, &Progress::on_terminal())?;
-            std::fs::write(out, &mission.roadmap_file)
-                .with_context(|| format!("cannot write {}", out.display()))?;
+            output::write_file(out, &mission.roadmap_file)?;
             print(&mission.view());
         }
         Action::Info { file } => {

@@ -194,9 +194,11 @@ impl Member {
         if self.companion.poll_timeout().is_some_and(|due| due <= now) {
             self.companion.handle_timeout(now);
         }
+        let mut restarts = false;
         while let Some(happened) = self.companion.poll_event() {
             match happened {
                 Event::PlanRequested => self.wants_plan = true,
+                Event::RestartRequested => restarts = true,
                 Event::StateChanged { from, to, text, warning } => {
                     self.note(from, to, text, warning);
                     log.push(self.entry(now_us, from, to, text));
@@ -204,6 +206,10 @@ impl Member {
             }
         }
         self.drain(now_us, station, radio, places);
+        if restarts {
+            // It could be made once, so it can again.
+            let _ = self.reset_companion(now_us);
+        }
         self.down.read(now_us, &mut self.bytes);
         if !self.bytes.is_empty() && !booting {
             self.autopilot.handle_bytes(&self.bytes);

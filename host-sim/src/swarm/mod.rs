@@ -15,7 +15,7 @@ pub mod serial;
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
-use companion::{Config, PlanFailure, RosterEntry, State};
+use companion::{Config, PlanFailure, State};
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
@@ -29,7 +29,7 @@ use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
-use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
+use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
@@ -314,25 +314,10 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
 
 /// What the companion of one vehicle is told; the same whether it runs in a swarm simulation or alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
-    let scenario = &mission.scenario;
-    let index = mission.index_of(id)?;
-    let vehicle = &scenario.vehicles[index];
-    let mut roster: Vec<RosterEntry> =
-        scenario.vehicles.iter().map(|v| RosterEntry { system_id: v.id, start: v.start }).collect();
-    roster.sort_unstable_by_key(|entry| entry.system_id);
-    let mut config = Config::new(id, vehicle.start, scenario.map.origin);
-    config.roster =
-        heapless::Vec::from_slice(&roster).map_err(|_| anyhow::anyhow!("more than {VEHICLES} vehicles"))?;
-    config.mission_crc = mission.crc();
-    config.cruise_mps = scenario.mission.cruise_mps.min(vehicle.speed_max_mps);
-    config.climb_mps = VERTICAL_MPS;
-    config.accel_mps2 = ACCEL_MPS2;
-    config.radius_m = vehicle.radius_m;
-    config.required_clearance_m = mission.tasks[index].required_clearance_m;
-    config.safety_distance_m = scenario.deconfliction.safety_distance_m;
-    config.method = scenario.deconfliction.method;
-    config.geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
-    Ok(config)
+    mission.index_of(id)?;
+    let config = mission.mission_view().config(id);
+    let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e:?}", mission.scenario.path))?;
+    Ok(Config { accel_mps2: ACCEL_MPS2, ..config })
 }
 
 /// A companion on the heap: it is too large for a stack.

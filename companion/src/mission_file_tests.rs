@@ -1,0 +1,159 @@
+//! The mission file: what is written comes back, what is not sound is refused by name.
+
+extern crate std;
+use std::vec;
+use std::vec::Vec as List;
+
+use proptest::prelude::*;
+
+use super::*;
+
+fn header() -> MissionHeader {
+    MissionHeader {
+        roadmap_crc: 0x1234_5678,
+        mode: Mode::Unlabelled(Objective::Makespan),
+        method: Method::Priority,
+        origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
+        cruise_mps: 2.0,
+        schedule: ScheduleConfig {
+            separation_m: 2.0,
+            parked_separation_m: 1.75,
+            cruise_mps: 1.8,
+            vertical_mps: 1.0,
+        },
+        safety_distance_m: 1.5,
+        geofence: Some((Point::new(-5.0, -5.0, 0.0), Point::new(50.0, 30.0, 60.0))),
+    }
+}
+
+fn vehicle(id: u8, goal: Option<u16>) -> MissionVehicle {
+    MissionVehicle {
+        task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.2, goal },
+        start: Point::new(f32::from(id), 3.0, 1.5),
+        radius_m: 0.3,
+        speed_max_mps: 1.5,
+    }
+}
+
+fn goal(i: usize) -> MissionGoal {
+    MissionGoal { position: Point::new(28.0, i as f32, 1.8), descent_m: 1.5 }
+}
+
+fn file() -> List<u8> {
+    let vehicles = [vehicle(7, None), vehicle(2, Some(1)), vehicle(250, Some(0))];
+    let goals = [goal(0), goal(1)];
+    let mut out = vec![0xAA; encoded_len(3, 2)];
+    assert_eq!(write(&header(), &vehicles, &goals, &mut out), Ok(out.len()));
+    out
+}
+
+/// A file with bytes changed and the CRC made right again.
+fn forged(at: usize, bytes: &[u8]) -> List<u8> {
+    let mut file = file();
+    file[at..at + bytes.len()].copy_from_slice(bytes);
+    let end = file.len() - 4;
+    let crc = CRC.checksum(&file[..end]);
+    file[end..].copy_from_slice(&crc.to_le_bytes());
+    file
+}
+
+#[test]
+fn comes_back_as_written() {
+    let file = file();
+    assert_eq!(file.len(), 104 + 3 * 32 + 2 * 16 + 4);
+    let view = MissionView::parse(&file).unwrap();
+    assert_eq!(view.header(), &header());
+    assert_eq!(view.vehicles().nth(1), Some(vehicle(2, Some(1))));
+    assert_eq!(view.goals().nth(1), Some(goal(1)));
+    let (mut tasks, mut descents) = (Vec::<_, 3>::new(), Vec::new());
+    let request = view.request(&mut tasks, &mut descents).unwrap();
+    assert_eq!(
+        (request.vehicles.len(), request.descents_m, request.mode),
+        (3, &[1.5, 1.5][..], header().mode)
+    );
+    let whole = [file.as_slice(), &[0xFF; 40]].concat();
+    assert_eq!(MissionView::parse(&whole).unwrap().crc(), view.crc(), "as it lies in flash");
+}
+
+#[test]
+fn a_companion_is_configured_from_it() {
+    let file = file();
+    let view = MissionView::parse(&file).unwrap();
+    let config = view.config::<3>(2).unwrap();
+    assert_eq!(config.check(), Ok(()));
+    let ids: List<u8> = config.roster.iter().map(|e| e.system_id).collect();
+    assert_eq!((ids, config.mission_crc), (vec![2, 7, 250], view.crc()));
+    assert_eq!((config.cruise_mps, config.geofence), (1.5, header().geofence));
+    assert_eq!(view.config::<3>(9), Err(MissionError::NotInRoster(9)));
+    assert_eq!(view.config::<2>(2), Err(MissionError::RosterFull));
+    assert!(view.request(&mut Vec::<_, 2>::new(), &mut Vec::new()).is_err());
+}
+
+#[test]
+fn what_is_not_sound_is_refused_by_name() {
+    let nan = f32::NAN.to_le_bytes();
+    let vehicle_at = |i: usize, byte: usize| HEADER_LEN + i * VEHICLE_LEN + byte;
+    for (file, why) in [
+        (forged(0, b"X"), MissionError::Magic),
+        (forged(8, &[9]), MissionError::Version(9)),
+        (forged(10, &[103]), MissionError::Length),
+        (forged(24, &[4]), MissionError::Length),
+        (forged(24, &[0xFF; 4]), MissionError::Length),
+        (forged(20, &[3]), MissionError::Header("mode")),
+        (forged(21, &[3]), MissionError::Header("method")),
+        (forged(22, &[2]), MissionError::Header("flags")),
+        (forged(32, &f64::NAN.to_le_bytes()), MissionError::Header("origin")),
+        (forged(56, &nan), MissionError::Header("cruise_mps")),
+        (forged(60, &(-1.0f32).to_le_bytes()), MissionError::Header("vertical_mps")),
+        (forged(64, &0.0f32.to_le_bytes()), MissionError::Header("safety_distance_m")),
+        (forged(68, &f32::INFINITY.to_le_bytes()), MissionError::Header("separation_m")),
+        (forged(72, &nan), MissionError::Header("parked_separation_m")),
+        (forged(100, &nan), MissionError::Header("schedule_mps")),
+        (forged(76, &99.0f32.to_le_bytes()), MissionError::Header("geofence")),
+        (forged(vehicle_at(1, 0), &[7]), MissionError::Vehicle(1)),
+        (forged(vehicle_at(0, 0), &[0]), MissionError::Vehicle(0)),
+        (forged(vehicle_at(2, 2), &[2, 0]), MissionError::Vehicle(2)),
+        (forged(vehicle_at(2, 4), &nan), MissionError::Vehicle(2)),
+        (forged(vehicle_at(0, 24), &(-0.1f32).to_le_bytes()), MissionError::Vehicle(0)),
+        (forged(HEADER_LEN + 3 * VEHICLE_LEN + 12, &nan), MissionError::Goal(0)),
+    ] {
+        assert_eq!(MissionView::parse(&file).err(), Some(why));
+    }
+    let mut small = [0; 100];
+    let needed = encoded_len(1, 0);
+    let one = [vehicle(1, None)];
+    assert_eq!(write(&header(), &one, &[], &mut small), Err(MissionError::MissionFull { needed }));
+    assert_eq!(write(&header(), &[vehicle(1, Some(0))], &[], &mut [0; 200]), Err(MissionError::Vehicle(0)));
+}
+
+#[test]
+fn no_cut_and_no_changed_bit_passes() {
+    let file = file();
+    for length in 0..file.len() {
+        assert!(MissionView::parse(&file[..length]).is_err(), "cut at {length}");
+    }
+    for bit in 0..8 * file.len() {
+        let mut damaged = file.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        assert!(MissionView::parse(&damaged).is_err(), "bit {bit}");
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_bytes_are_survived(patches in proptest::collection::vec((8usize..232, any::<u8>()), 0..6)) {
+        let mut bytes = file();
+        for (at, byte) in patches {
+            bytes[at] = byte;
+        }
+        let end = bytes.len() - 4;
+        let crc = CRC.checksum(&bytes[..end]);
+        bytes[end..].copy_from_slice(&crc.to_le_bytes());
+        if let Ok(view) = MissionView::parse(&bytes) {
+            for vehicle in view.vehicles() {
+                let config = view.config::<8>(vehicle.task.id).unwrap();
+                prop_assert_eq!(config.check(), Ok(()));
+            }
+        }
+    }
+}

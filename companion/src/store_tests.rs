@@ -1,0 +1,262 @@
+//! The store over a simulated flash.
+
+extern crate std;
+use planner_core::roadmap::RoadmapView;
+use rand_core::Rng;
+
+use super::window::Taken;
+use super::*;
+use crate::fake_flash::*;
+
+/// Uploads a file in pieces of `piece` bytes.
+fn upload(
+    store: &mut Store,
+    flash: &mut Flash,
+    file: File,
+    bytes: &[u8],
+    piece: usize,
+) -> Result<Result<(), UploadError>, Cut> {
+    if let Err(why) = store.open(file, true) {
+        return Ok(Err(why));
+    }
+    run(store, flash, true)?;
+    for (i, part) in bytes.chunks(piece).enumerate() {
+        assert_eq!(store.take((i * piece) as u32, part), Taken::Yes);
+        run(store, flash, true)?;
+    }
+    store.close();
+    run(store, flash, true)?;
+    match store.upload() {
+        Some(UploadState::Ended(result)) => Ok(result),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn files_come_back_after_a_restart() {
+    let mut flash = Flash::new(1);
+    let mut store = started(&mut flash);
+    assert_eq!((store.roadmap(), store.mission(), store.size(File::Roadmap)), (None, None, None));
+    for (round, nodes) in [300, 10, 600].into_iter().enumerate() {
+        let (road, flown) = (roadmap(nodes), mission(nodes as u8 % 50 + 1));
+        for (file, bytes) in [(File::Roadmap, &road), (File::Mission, &flown)] {
+            assert_eq!(upload(&mut store, &mut flash, file, bytes, 239).unwrap(), Ok(()));
+            assert_eq!(store.size(file), Some(bytes.len() as u32));
+        }
+        assert_eq!(store.roadmap().is_some(), round > 0, "used from the next start on");
+        if round > 0 {
+            assert_eq!(store.open(File::Roadmap, true), Err(UploadError::Waiting), "one waits already");
+        }
+        store = started(&mut flash);
+        assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
+        assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+        assert!(RoadmapView::parse(held(&flash, store.roadmap()).unwrap()).is_ok());
+    }
+    store.remove(File::Roadmap);
+    store.remove(File::Mission);
+    run(&mut store, &mut flash, false).unwrap();
+    assert_eq!((store.size(File::Roadmap), store.size(File::Mission)), (None, None));
+    store = started(&mut flash);
+    assert_eq!((store.roadmap(), store.mission()), (None, None));
+    assert_eq!(upload(&mut store, &mut flash, File::Roadmap, &roadmap(20), 80).unwrap(), Ok(()));
+    store = started(&mut flash);
+    assert_eq!(held(&flash, store.roadmap()), Some(roadmap(20).as_slice()));
+}
+
+#[test]
+fn what_is_damaged_or_not_whole_leaves_the_old() {
+    let mut flash = Flash::new(2);
+    let mut store = started(&mut flash);
+    let (road, flown) = (roadmap(200), mission(3));
+    upload(&mut store, &mut flash, File::Roadmap, &road, 239).unwrap().unwrap();
+    upload(&mut store, &mut flash, File::Mission, &flown, 239).unwrap().unwrap();
+    for (file, whole) in [(File::Roadmap, roadmap(210)), (File::Mission, mission(4))] {
+        for (bytes, why) in [
+            (&whole[..whole.len() - 1], UploadError::Damaged),
+            (&whole[1..], UploadError::Damaged),
+            (&[][..], UploadError::Damaged),
+            (&[&whole[..], &[0xFF; 40]].concat(), UploadError::Damaged),
+            (&[&whole[..60], &[0x11], &whole[61..]].concat(), UploadError::Damaged),
+        ] {
+            store = started(&mut flash);
+            assert_eq!(upload(&mut store, &mut flash, file, bytes, 100).unwrap(), Err(why));
+        }
+        store = started(&mut flash);
+        store.open(file, true).unwrap();
+        run(&mut store, &mut flash, true).unwrap();
+        assert_eq!(store.take(0, &whole[..100]), Taken::Yes);
+        assert_eq!(store.take(101, &whole[101..150]), Taken::Yes);
+        store.close();
+        assert_eq!(store.upload(), Some(UploadState::Ended(Err(UploadError::Incomplete))));
+    }
+    store = started(&mut flash);
+    assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
+    assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+    assert_eq!(store.open(File::Mission, true), Ok(()));
+    assert_eq!(store.take(4000, &[0; 97]), Taken::TooLarge);
+    assert_eq!(store.open(File::Roadmap, true), Ok(()));
+    run(&mut store, &mut flash, true).unwrap();
+    assert_eq!(store.take(24 << 10, &[0; 1]), Taken::TooLarge);
+}
+
+#[test]
+fn nothing_is_erased_while_armed() {
+    let mut flash = Flash::new(3);
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    assert_eq!(store.open(File::Roadmap, false), Err(UploadError::Armed));
+    store.set_parameter(0, 2.5).unwrap();
+    run(&mut store, &mut flash, false).unwrap();
+    assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
+    run(&mut store, &mut flash, true).unwrap();
+    assert!(!store.is_unsaved());
+    // With areas erased ahead, parameters are kept and a roadmap is taken in while armed.
+    store.set_parameter(0, 3.5).unwrap();
+    run(&mut store, &mut flash, false).unwrap();
+    let road = roadmap(50);
+    store.open(File::Roadmap, false).unwrap();
+    run(&mut store, &mut flash, false).unwrap();
+    for (i, part) in road.chunks(200).enumerate() {
+        assert_eq!(store.take(200 * i as u32, part), Taken::Yes);
+        run(&mut store, &mut flash, false).unwrap();
+    }
+    store.close();
+    run(&mut store, &mut flash, false).unwrap();
+    assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    let store = Store::mount(LAYOUT, &mut flash);
+    assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", 3.5)));
+    assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
+}
+
+#[test]
+fn parameters_outlive_many_changes_and_the_mission_with_them() {
+    let mut flash = Flash::new(4);
+    let mut store = started(&mut flash);
+    let flown = mission(40);
+    upload(&mut store, &mut flash, File::Mission, &flown, 239).unwrap().unwrap();
+    for i in 0..300u32 {
+        let value = 0.5 + (i % 40) as f32 * 0.1;
+        store.set_parameter(0, value).unwrap();
+        run(&mut store, &mut flash, true).unwrap();
+        if i % 13 == 0 {
+            store = started(&mut flash);
+        }
+        assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", value)));
+        assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+    }
+}
+
+/// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or `after`, whole.
+fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(), Cut>, cuts: u32) {
+    let (old_road, old_mission) = (roadmap(200), mission(30));
+    let (new_road, new_mission) = (roadmap(500), mission(50));
+    let mut found = [0; 2];
+    for cut in 0..cuts {
+        let mut flash = Flash::new(seed + u64::from(cut));
+        let mut store = started(&mut flash);
+        upload(&mut store, &mut flash, File::Roadmap, &old_road, 239).unwrap().unwrap();
+        upload(&mut store, &mut flash, File::Mission, &old_mission, 239).unwrap().unwrap();
+        store.set_parameter(0, 1.0).unwrap();
+        store = started(&mut flash);
+        assert!(store.parameters().get(0).unwrap().1 == 1.5, "never asked to keep it");
+        store.set_parameter(0, 1.0).unwrap();
+        run(&mut store, &mut flash, true).unwrap();
+        // How many words the change takes, from a first go without a cut.
+        let (bytes, torn, rng) = (flash.bytes.clone(), flash.torn.clone(), flash.rng.clone());
+        let begun = flash.programmed;
+        change(&mut Store::mount(LAYOUT, &mut flash), &mut flash).expect("the power is on");
+        let words = flash.programmed - begun;
+        (flash.bytes, flash.torn, flash.rng) = (bytes, torn, rng);
+        flash.power = Some(flash.rng.next_u32() % words);
+        change(&mut Store::mount(LAYOUT, &mut flash), &mut flash).expect_err("the power goes");
+        flash.power = None;
+        // Some boards are cut again while they tidy up.
+        if cut % 3 == 0 {
+            flash.power = Some(flash.rng.next_u32() % 40);
+            let mut store = Store::mount(LAYOUT, &mut flash);
+            let _ = run(&mut store, &mut flash, true);
+            flash.power = None;
+        }
+        let mut store = started(&mut flash);
+        let (road, flown) = (held(&flash, store.roadmap()), held(&flash, store.mission()));
+        let is_new = road == Some(new_road.as_slice());
+        assert!(is_new || road == Some(old_road.as_slice()), "cut {cut}: neither roadmap is whole");
+        assert!(flown == Some(&new_mission) || flown == Some(&old_mission), "cut {cut}: neither mission");
+        let value = store.parameters().get(0).unwrap().1;
+        assert!(value == 1.0 || value == 2.0, "cut {cut}: {value}");
+        found[usize::from(is_new)] += 1;
+        // And everything still works.
+        assert_eq!(
+            upload(&mut store, &mut flash, File::Roadmap, &new_road, 239).unwrap(),
+            Ok(()),
+            "cut {cut}"
+        );
+        assert_eq!(
+            upload(&mut store, &mut flash, File::Mission, &new_mission, 80).unwrap(),
+            Ok(()),
+            "cut {cut}"
+        );
+        store = started(&mut flash);
+        assert_eq!(held(&flash, store.roadmap()), Some(new_road.as_slice()), "cut {cut}");
+        assert_eq!(held(&flash, store.mission()), Some(new_mission.as_slice()), "cut {cut}");
+    }
+    std::println!("{cuts} cuts: {} found the old roadmap, {} the new", found[0], found[1]);
+}
+
+#[test]
+fn a_cut_anywhere_leaves_the_old_roadmap_or_the_new_one_whole() {
+    let change = |store: &mut Store, flash: &mut Flash| {
+        let road = roadmap(500);
+        run(store, flash, true)?;
+        upload(store, flash, File::Roadmap, &road, 239)?.expect("it is sound");
+        *store = Store::mount(LAYOUT, flash);
+        run(store, flash, true)
+    };
+    cut_anywhere(1000, change, 300);
+}
+
+#[test]
+fn a_cut_anywhere_leaves_the_old_mission_or_the_new_one_whole() {
+    let change = |store: &mut Store, flash: &mut Flash| {
+        let flown = mission(50);
+        run(store, flash, true)?;
+        for _ in 0..5 {
+            upload(store, flash, File::Mission, &flown, 239)?.expect("it is sound");
+            store.set_parameter(0, 2.0).unwrap();
+            run(store, flash, true)?;
+        }
+        Ok(())
+    };
+    cut_anywhere(5000, change, 300);
+}
+
+#[test]
+fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
+    for failing in 0..3 {
+        let mut flash = Flash::new(6);
+        let mut store = started(&mut flash);
+        store.set_parameter(0, 2.0).unwrap();
+        let opened = store.open(File::Roadmap, true);
+        assert_eq!(opened, Ok(()));
+        let mut asked = 0;
+        let road = roadmap(50);
+        loop {
+            while let Some(request) = store.poll(true) {
+                asked += 1;
+                assert!(asked < 10_000, "it asks for ever");
+                let bad = match request {
+                    FlashRequest::Erase { .. } => failing == 0,
+                    FlashRequest::Program { .. } => failing == 1,
+                    FlashRequest::Read { .. } => failing == 2,
+                };
+                let nothing = [0; READ];
+                let len = if let FlashRequest::Read { len, .. } = request { len } else { 0 };
+                store.handle(if bad { Err(Fault) } else { Ok(&nothing[..len]) });
+            }
+            match store.upload() {
+                Some(UploadState::Taking) if store.take(0, &road[..200]) == Taken::Yes => store.close(),
+                Some(UploadState::Ended(result)) => break assert!(result.is_err()),
+                _ => break,
+            }
+        }
+    }
+}
