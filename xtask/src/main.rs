@@ -1,8 +1,9 @@
-//! The developer's one entry: `cargo xtask test`, `cargo xtask bench`.
+//! The developer's one entry: `cargo xtask test`, `bench`, and the firmware's `build`.
 #![forbid(unsafe_code)]
 
 mod bare_metal;
 mod bench;
+mod build;
 mod install;
 mod shell;
 mod test;
@@ -18,12 +19,15 @@ enum Command {
     Test(test::Args),
     /// Our times beside those of other programs.
     Bench(bench::Args),
+    /// The firmware for a board.
+    Build(build::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Test(args) => test::run(&args),
         Command::Bench(args) => bench::run_bench(&args),
+        Command::Build(args) => build::run(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
