@@ -44,6 +44,8 @@ pub struct Config<const V: usize> {
     /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
     /// percent; 0 never.
     pub battery_low_percent: i8,
+    /// How often position and intent go to the swarm, each second.
+    pub swarm_hz: u8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
 }
@@ -81,6 +83,7 @@ impl<const V: usize> Config<V> {
             method: Method::Priority,
             start_tolerance_m: 2.0,
             battery_low_percent: 15,
+            swarm_hz: 5,
             geofence: None,
         }
     }
@@ -109,8 +112,8 @@ impl<const V: usize> Config<V> {
             self.start_tolerance_m,
         ];
         let starts = self.roster.iter().flat_map(|e| e.start.iter());
-        if positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || starts.into_iter().any(|c| !c.is_finite())
-        {
+        let bad = positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || self.swarm_hz == 0;
+        if bad || starts.into_iter().any(|c| !c.is_finite()) {
             return Err(ConfigError::NotPositive);
         }
         if self.origin.is_valid() { Ok(()) } else { Err(ConfigError::Origin) }

@@ -30,7 +30,6 @@ const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// A hovering vehicle sways more slowly, m/s.
 pub(crate) const STANDING_MPS: f32 = 0.3;
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
-const SWARM_EVERY: Duration = Duration::from_millis(200);
 pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
@@ -181,7 +180,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.heartbeat_due = [true; 2];
         }
         if now >= self.next_swarm {
-            self.next_swarm = now + SWARM_EVERY;
+            self.next_swarm = now + Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
             self.position_due = self.telemetry.position_at.is_some();
             self.intent_due = true;
         }

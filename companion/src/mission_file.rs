@@ -31,7 +31,7 @@ pub const GOAL_LEN: usize = 16;
 /// The vehicle's goal that means: none of its own.
 pub const NO_GOAL: u16 = u16::MAX;
 
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 const CRC_LEN: usize = 4;
 /// Flag: the six numbers of the geofence count.
 const FENCED: u16 = 1;
@@ -372,6 +372,11 @@ impl<'a> MissionView<'a> {
     /// The CRC-32 at the end of the file: the mission's identity on the radio.
     pub fn crc(&self) -> u32 {
         self.crc
+    }
+
+    /// Bytes the file takes.
+    pub fn byte_len(&self) -> usize {
+        encoded_len(self.vehicles.len(), self.goals.len())
     }
 
     /// The vehicles, in the order of the roadmap's starts.

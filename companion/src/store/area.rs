@@ -1,0 +1,181 @@
+//! Areas of flash, each written once between two erasures: two slots for roadmaps, two halves of the journal.
+//!
+//! | offset | word of 32 bytes | programmed |
+//! |---|---|---|
+//! | 0 | "clean" | after all sectors of the area were erased: an erasure that was cut has none |
+//! | 32 | "used" | before anything else is written |
+//! | 64 | seal: what the area holds | last of all, when everything was read back |
+//! | 256 | data | between the two |
+//!
+//! A word that was cut while it was programmed may read as anything, or not at all; no decision hangs on one such word being
+//! one or the other: a seal is believed only with its CRC, an area is written only if it is clean and unused.
+
+use super::{BLOCK, Fault, Layout, ReadFlash, WORD, crc32};
+
+/// Where an area's data begins, bytes.
+pub const DATA_AT: u32 = BLOCK as u32;
+const USED_AT: u32 = WORD as u32;
+const SEAL_AT: u32 = 2 * WORD as u32;
+
+const CLEAN: [u8; WORD] = *b"FLKCLEAN: erased, may be written";
+const USED: [u8; WORD] = *b"FLKUSED:  written to, seal ahead";
+const SEAL_MAGIC: [u8; 4] = *b"FLKS";
+
+/// One of the four areas.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Area {
+    /// Roadmap slot 0 or 1.
+    Slot(usize),
+    /// Half 0 or 1 of the journal.
+    Half(usize),
+}
+
+impl Area {
+    /// Its first byte in the storage bank.
+    pub fn at(self, layout: &Layout) -> u32 {
+        match self {
+            Self::Slot(i) => i as u32 * layout.slot_len,
+            Self::Half(i) => 2 * layout.slot_len + i as u32 * layout.half_len,
+        }
+    }
+
+    /// Its length.
+    pub fn len(self, layout: &Layout) -> u32 {
+        match self {
+            Self::Slot(_) => layout.slot_len,
+            Self::Half(_) => layout.half_len,
+        }
+    }
+
+    /// Where its data begins in the storage bank.
+    pub fn data_at(self, layout: &Layout) -> u32 {
+        self.at(layout) + DATA_AT
+    }
+
+    /// Where it ends in the storage bank.
+    pub fn end(self, layout: &Layout) -> u32 {
+        self.at(layout) + self.len(layout)
+    }
+}
+
+/// A word to program, and where.
+pub type WordAt = (u32, [u8; WORD]);
+
+/// The word that says an area is clean.
+pub fn clean(layout: &Layout, area: Area) -> WordAt {
+    (area.at(layout), CLEAN)
+}
+
+/// The word that says an area is written to.
+pub fn used(layout: &Layout, area: Area) -> WordAt {
+    (area.at(layout) + USED_AT, USED)
+}
+
+/// The word that seals an area.
+pub fn seal(layout: &Layout, area: Area, seal: &Seal) -> WordAt {
+    (area.at(layout) + SEAL_AT, seal.to_bytes())
+}
+
+/// What a sealed area holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Seal {
+    /// The larger, the newer.
+    pub sequence: u32,
+    /// Bytes of the roadmap file; 0 in the journal.
+    pub len: u32,
+    /// CRC-32 at the end of the roadmap file; 0 in the journal.
+    pub crc: u32,
+}
+
+impl Seal {
+    fn to_bytes(self) -> [u8; WORD] {
+        let mut word = [0; WORD];
+        word[..4].copy_from_slice(&SEAL_MAGIC);
+        word[4..8].copy_from_slice(&self.sequence.to_le_bytes());
+        word[8..12].copy_from_slice(&self.len.to_le_bytes());
+        word[12..16].copy_from_slice(&self.crc.to_le_bytes());
+        close(&mut word);
+        word
+    }
+
+    fn from_bytes(word: &[u8; WORD]) -> Option<Self> {
+        (word[..4] == SEAL_MAGIC && is_closed(word)).then(|| Self {
+            sequence: u32_at(word, 4),
+            len: u32_at(word, 8),
+            crc: u32_at(word, 12),
+        })
+    }
+}
+
+/// Puts the CRC-32 of a word's first 28 bytes into its last 4.
+pub fn close(word: &mut [u8; WORD]) {
+    let crc = crc32(&word[..WORD - 4]);
+    word[WORD - 4..].copy_from_slice(&crc.to_le_bytes());
+}
+
+/// Whether a word ends with the CRC-32 of the rest.
+pub fn is_closed(word: &[u8; WORD]) -> bool {
+    crc32(&word[..WORD - 4]) == u32_at(word, WORD - 4)
+}
+
+/// The little-endian number at an offset.
+pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+}
+
+/// What an area is good for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Condition {
+    /// To be erased before it is written.
+    Dirty,
+    /// May be written.
+    Clean,
+    /// Being written.
+    Open,
+    /// Holds something whole.
+    Sealed(Seal),
+}
+
+impl Condition {
+    /// The seal of a sealed area.
+    pub fn seal(self) -> Option<Seal> {
+        match self {
+            Self::Sealed(seal) => Some(seal),
+            _ => None,
+        }
+    }
+}
+
+/// Reads the first words of an area; a slot's file is read whole and checked.
+pub fn look(layout: &Layout, area: Area, flash: &mut impl ReadFlash) -> Condition {
+    let at = area.at(layout);
+    let mut word = |offset| {
+        let mut word = [0; WORD];
+        flash.read(at + offset, &mut word).map(|()| word)
+    };
+    let (clean, used, sealed) = (word(0), word(USED_AT), word(SEAL_AT));
+    if clean == Ok(CLEAN) && used == Ok([0xFF; WORD]) && sealed == Ok([0xFF; WORD]) {
+        return Condition::Clean;
+    }
+    let Some(seal) = sealed.ok().and_then(|word| Seal::from_bytes(&word)) else { return Condition::Dirty };
+    match area {
+        Area::Slot(_) if seal.len > area.len(layout) - DATA_AT => Condition::Dirty,
+        Area::Slot(_) if file_crc(at + DATA_AT, seal.len, flash) != Ok(seal.crc) => Condition::Dirty,
+        _ => Condition::Sealed(seal),
+    }
+}
+
+/// CRC-32 over a file in flash without its last four bytes.
+fn file_crc(at: u32, len: u32, flash: &mut impl ReadFlash) -> Result<u32, Fault> {
+    let mut block = [0; BLOCK];
+    let (mut sum, mut done) = (super::CRC_START, 0);
+    let covered = len.saturating_sub(4);
+    while done < covered {
+        let count = (covered - done).min(BLOCK as u32);
+        let block = &mut block[..count as usize];
+        flash.read(at + done, block)?;
+        sum = super::crc_step(sum, block);
+        done += count;
+    }
+    Ok(!sum)
+}

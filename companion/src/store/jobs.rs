@@ -1,0 +1,506 @@
+//! What the store does with its flash, one request at a time: which job is next, what it asks for, what follows.
+
+use core::ops::Range;
+
+use super::area::{self, Area, Condition, Seal};
+use super::journal::{self, Kind, record_len};
+use super::upload::{UploadError, UploadState};
+use super::{Answer, BLOCK, CRC_START, Fault, File, FlashRequest, READ, Store, WORD, crc_step, crc32};
+
+/// Tries to write the journal before that is given up until the next start.
+const TRIES: u8 = 4;
+
+/// What the store is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Job {
+    /// Nothing.
+    None,
+    /// What is under way does not matter any more.
+    Ignored,
+    /// Reading for somebody.
+    Read { at: u32, len: usize },
+    /// Summing for somebody.
+    Sum { at: u32, end: u32, sum: u32 },
+    /// Erasing an area, sector by sector.
+    Erase { area: Area, at: u32 },
+    /// Saying that it is clean.
+    MarkClean(Area),
+    /// Saying that it is written to.
+    MarkUsed(Area),
+    /// The window's first block.
+    Flush(Area),
+    /// The window's last bytes, from there on.
+    FlushRest { slot: Area, done: u32 },
+    /// Reading the roadmap back.
+    Check { slot: Area, done: u32, sum: u32, tail: [u8; 4] },
+    /// Sealing an area.
+    Seal(Area, Seal),
+    /// Reading the seal back.
+    SealCheck(Area, Seal),
+    /// A record of the journal.
+    Record(Record),
+}
+
+/// A record being written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Record {
+    kind: Kind,
+    /// Where it begins.
+    at: u32,
+    len: u32,
+    crc: u32,
+    source: Source,
+    step: Step,
+    done: u32,
+    sum: u32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Source {
+    /// In the buffer, whole.
+    Buffer,
+    Window,
+    Flash(u32),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Step {
+    Head,
+    Load,
+    Data,
+    Verify,
+}
+
+/// The journal's other half being filled.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Compaction {
+    half: usize,
+    at: u32,
+    /// Next: 0 the parameters, 1 the mission, 2 the seal.
+    step: u8,
+    mission: Option<Range<u32>>,
+}
+
+impl Store {
+    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only if `may_erase`.
+    pub fn poll(&mut self, may_erase: bool) -> Option<FlashRequest<'_>> {
+        if self.asked {
+            return None;
+        }
+        if self.job == Job::None {
+            self.job = self.choose(may_erase)?;
+        }
+        // An erasure goes on only while it may.
+        if let (Job::Erase { .. }, false) = (self.job, may_erase) {
+            self.job = Job::None;
+            return None;
+        }
+        self.prepare();
+        self.asked = true;
+        let layout = &self.layout;
+        Some(match self.job {
+            Job::None | Job::Ignored => {
+                self.asked = false;
+                return None;
+            }
+            Job::Read { at, len } => FlashRequest::Read { at, len },
+            Job::Sum { at, end, .. } => FlashRequest::Read { at, len: READ.min((end - at) as usize) },
+            Job::Erase { at, .. } => FlashRequest::Erase { at },
+            Job::MarkClean(_) | Job::MarkUsed(_) | Job::Seal(..) => {
+                let (at, word) = match self.job {
+                    Job::MarkClean(area) => area::clean(layout, area),
+                    Job::Seal(area, seal) => area::seal(layout, area, &seal),
+                    Job::MarkUsed(area) => area::used(layout, area),
+                    _ => return None,
+                };
+                self.word = word;
+                FlashRequest::Program { at, bytes: &self.word }
+            }
+            Job::Flush(slot) => {
+                FlashRequest::Program { at: slot.data_at(layout) + self.window.front(), bytes: &self.buffer }
+            }
+            Job::FlushRest { slot, done } => {
+                let at = self.window.front() + done;
+                let left = self.window.file_len() - at;
+                let count = left.next_multiple_of(WORD as u32).min(BLOCK as u32) as usize;
+                FlashRequest::Program { at: slot.data_at(layout) + at, bytes: &self.buffer[..count] }
+            }
+            Job::Check { slot, done, .. } => {
+                let left = (self.window.file_len() - done) as usize;
+                FlashRequest::Read { at: slot.data_at(layout) + done, len: left.min(READ) }
+            }
+            Job::SealCheck(area, seal) => {
+                FlashRequest::Read { at: area::seal(layout, area, &seal).0, len: WORD }
+            }
+            Job::Record(record) => {
+                let data_at = record.at + WORD as u32 + record.done;
+                let left = (record.len - record.done) as usize;
+                match (record.step, record.source) {
+                    (Step::Head, _) => {
+                        self.word = journal::head(record.kind, record.len, record.crc);
+                        FlashRequest::Program { at: record.at, bytes: &self.word }
+                    }
+                    (Step::Load, Source::Flash(from)) => {
+                        FlashRequest::Read { at: from + record.done, len: left.min(BLOCK) }
+                    }
+                    (Step::Load | Step::Data, _) => {
+                        let count = left.next_multiple_of(WORD).min(BLOCK);
+                        FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
+                    }
+                    (Step::Verify, _) => FlashRequest::Read { at: data_at, len: left.min(READ) },
+                }
+            }
+        })
+    }
+
+    /// Fills the buffer for what is programmed next.
+    fn prepare(&mut self) {
+        let rest = match self.job {
+            Job::Flush(_) => self.window.block().map(|block| &block[..]),
+            Job::FlushRest { done, .. } => self.window.rest().and_then(|rest| rest.get(done as usize..)),
+            Job::Record(Record { step: Step::Load, source: Source::Window, done, .. }) => {
+                self.window.rest().and_then(|rest| rest.get(done as usize..))
+            }
+            _ => return,
+        };
+        let rest = rest.unwrap_or_default();
+        let count = rest.len().min(BLOCK);
+        self.buffer.fill(0xFF);
+        self.buffer[..count].copy_from_slice(&rest[..count]);
+    }
+
+    fn choose(&mut self, may_erase: bool) -> Option<Job> {
+        match self.upload {
+            Some((File::Roadmap, UploadState::Opening)) => {
+                let slot = self.target()?;
+                return match self.slots[slot] {
+                    Condition::Clean => Some(Job::MarkUsed(Area::Slot(slot))),
+                    _ if self.erasure_failed => {
+                        self.end(Err(UploadError::Flash));
+                        None
+                    }
+                    _ => may_erase.then(|| self.erase(Area::Slot(slot))),
+                };
+            }
+            Some((File::Roadmap, state)) => {
+                if let Some(slot) = self.open_slot() {
+                    if self.window.block().is_some() {
+                        return Some(Job::Flush(slot));
+                    }
+                    if state == UploadState::Closing {
+                        let all = self.window.front() >= self.window.file_len();
+                        return Some(if all {
+                            self.begin_check(slot)
+                        } else {
+                            Job::FlushRest { slot, done: 0 }
+                        });
+                    }
+                }
+            }
+            _ => {}
+        }
+        if let Some(job) = self.choose_record(may_erase) {
+            return Some(job);
+        }
+        let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
+        let area = self.stale().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
+        Some(self.erase(area))
+    }
+
+    fn begin_check(&self, slot: Area) -> Job {
+        Job::Check { slot, done: 0, sum: CRC_START, tail: [0; 4] }
+    }
+
+    fn erase(&mut self, area: Area) -> Job {
+        *self.condition(area) = Condition::Dirty;
+        Job::Erase { area, at: area.at(&self.layout) }
+    }
+
+    /// The journal's next step.
+    fn choose_record(&mut self, may_erase: bool) -> Option<Job> {
+        if let Some(compaction) = self.journal.compacting.clone() {
+            let Compaction { half, at, step, mission } = compaction;
+            return Some(match (step, self.journal.mission.clone()) {
+                (0, _) => Job::Record(self.parameters_record(at)),
+                (1, Some(kept)) => Job::Record(Record {
+                    kind: Kind::Mission,
+                    at,
+                    len: kept.end - kept.start,
+                    crc: self.journal.mission_crc,
+                    source: Source::Flash(kept.start),
+                    step: Step::Head,
+                    done: 0,
+                    sum: CRC_START,
+                }),
+                _ => {
+                    let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
+                    let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
+                    self.journal.compacting = Some(Compaction { half, at, step: 2, mission });
+                    Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0 })
+                }
+            });
+        }
+        let closing = self.upload == Some((File::Mission, UploadState::Closing));
+        if self.journal.failures >= TRIES {
+            if closing {
+                self.end(Err(UploadError::Flash));
+            }
+            return None;
+        }
+        let (kind, len) = if closing {
+            (Kind::Mission, self.window.file_len())
+        } else if self.journal.removed {
+            (Kind::Mission, 0)
+        } else if self.unsaved {
+            (Kind::Parameters, journal::PARAMETERS_LEN as u32)
+        } else {
+            return None;
+        };
+        let fits = |active: usize| self.journal.end + record_len(len) <= Area::Half(active).end(&self.layout);
+        if !self.journal.active.is_some_and(fits) {
+            return self.begin_compaction(may_erase, closing);
+        }
+        let at = self.journal.end;
+        Some(Job::Record(match kind {
+            Kind::Parameters => self.parameters_record(at),
+            Kind::Mission => {
+                let crc = if len == 0 { crc32(&[]) } else { crc32(self.window.rest().unwrap_or_default()) };
+                let (step, source) = (Step::Head, Source::Window);
+                Record { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
+            }
+        }))
+    }
+
+    fn begin_compaction(&mut self, may_erase: bool, closing: bool) -> Option<Job> {
+        let half = usize::from(self.journal.active == Some(0));
+        match self.journal.halves[half] {
+            Condition::Clean => Some(Job::MarkUsed(Area::Half(half))),
+            _ if may_erase && !self.erasure_failed => Some(self.erase(Area::Half(half))),
+            _ => {
+                if closing {
+                    self.end(Err(if may_erase { UploadError::Flash } else { UploadError::Armed }));
+                }
+                None
+            }
+        }
+    }
+
+    fn parameters_record(&mut self, at: u32) -> Record {
+        let len = journal::PARAMETERS_LEN;
+        self.buffer.fill(0xFF);
+        self.buffer[..4].copy_from_slice(&self.forgotten.to_le_bytes());
+        self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
+        self.unsaved = false;
+        Record {
+            kind: Kind::Parameters,
+            at,
+            len: len as u32,
+            crc: crc32(&self.buffer[..len]),
+            source: Source::Buffer,
+            step: Step::Head,
+            done: 0,
+            sum: CRC_START,
+        }
+    }
+
+    /// Takes in how the last request went; `Ok` of an erasure or a program holds no bytes.
+    pub fn handle<'a>(&mut self, outcome: Result<&'a [u8], Fault>) -> Option<Answer<'a>> {
+        if !core::mem::take(&mut self.asked) {
+            return None;
+        }
+        let job = core::mem::replace(&mut self.job, Job::None);
+        match (job, outcome) {
+            (Job::None | Job::Ignored, _) => {}
+            (Job::Read { .. }, Ok(bytes)) => return Some(Answer::Bytes(bytes)),
+            (Job::Read { .. } | Job::Sum { .. }, Err(Fault)) => return Some(Answer::Failed),
+            (Job::Sum { at, end, sum }, Ok(bytes)) => {
+                let (at, sum) = (at + bytes.len() as u32, crc_step(sum, bytes));
+                if bytes.is_empty() {
+                    return Some(Answer::Failed);
+                }
+                if at >= end {
+                    return Some(Answer::Sum(sum));
+                }
+                self.job = Job::Sum { at, end, sum };
+            }
+            (Job::Erase { .. } | Job::MarkClean(_), Err(Fault)) => self.erasure_failed = true,
+            (Job::Erase { area, at }, Ok(_)) => {
+                let at = at + self.layout.sector_len;
+                let more = at < area.end(&self.layout);
+                self.job = if more { Job::Erase { area, at } } else { Job::MarkClean(area) };
+            }
+            (Job::MarkClean(area), Ok(_)) => *self.condition(area) = Condition::Clean,
+            (Job::MarkUsed(area), Ok(_)) => self.begin(area),
+            (Job::Flush(_), Ok(_)) => self.window.advance(),
+            (Job::FlushRest { slot, done }, Ok(_)) => {
+                let done = done + BLOCK as u32;
+                let more = self.window.front() + done < self.window.file_len();
+                self.job = if more { Job::FlushRest { slot, done } } else { self.begin_check(slot) };
+            }
+            (Job::Check { slot, done, sum, tail }, Ok(bytes)) => self.check(slot, done, sum, tail, bytes),
+            (Job::Seal(area, seal), Ok(_)) => self.job = Job::SealCheck(area, seal),
+            (Job::SealCheck(area, seal), Ok(bytes)) => {
+                if bytes == area::seal(&self.layout, area, &seal).1 {
+                    self.sealed(area, seal);
+                } else {
+                    self.fail(area);
+                }
+            }
+            (Job::Record(record), Ok(bytes)) => self.record(record, bytes),
+            (Job::Record(_), Err(Fault)) => self.fail_record(),
+            (Job::MarkUsed(area) | Job::Seal(area, _) | Job::SealCheck(area, _), Err(Fault)) => {
+                self.fail(area)
+            }
+            (Job::Flush(slot) | Job::FlushRest { slot, .. } | Job::Check { slot, .. }, Err(Fault)) => {
+                self.fail(slot);
+            }
+        }
+        None
+    }
+
+    /// An area is marked as used: what goes into it may come.
+    fn begin(&mut self, area: Area) {
+        *self.condition(area) = Condition::Open;
+        match area {
+            Area::Slot(_) => self.upload = self.upload.map(|(file, _)| (file, UploadState::Taking)),
+            Area::Half(half) => {
+                let at = area.data_at(&self.layout);
+                self.journal.compacting = Some(Compaction { half, at, step: 0, mission: None });
+            }
+        }
+    }
+
+    /// Something of an area failed: it is to be erased.
+    fn fail(&mut self, area: Area) {
+        *self.condition(area) = Condition::Dirty;
+        match area {
+            Area::Slot(_) => self.end(Err(UploadError::Flash)),
+            Area::Half(_) => {
+                self.journal.compacting = None;
+                self.journal.failures += 1;
+                self.unsaved = true;
+            }
+        }
+    }
+
+    fn check(&mut self, slot: Area, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
+        let len = self.window.file_len();
+        if (done == 0 && !Self::is_roadmap(bytes, len)) || bytes.is_empty() {
+            return self.end(Err(UploadError::Damaged));
+        }
+        // The file's own CRC is its last four bytes, and covers all others.
+        let covered = (len - 4).saturating_sub(done) as usize;
+        let (body, end) = bytes.split_at(covered.min(bytes.len()));
+        let sum = crc_step(sum, body);
+        let done = done + bytes.len() as u32;
+        let at = 4 - (len - (done - end.len() as u32)).min(4) as usize;
+        tail[at..at + end.len()].copy_from_slice(end);
+        if done < len {
+            self.job = Job::Check { slot, done, sum, tail };
+            return;
+        }
+        let crc = u32::from_le_bytes(tail);
+        if !sum != crc {
+            return self.end(Err(UploadError::Damaged));
+        }
+        let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
+        let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.forgotten);
+        self.job = Job::Seal(slot, Seal { sequence: newest + 1, len, crc });
+    }
+
+    fn sealed(&mut self, area: Area, seal: Seal) {
+        *self.condition(area) = Condition::Sealed(seal);
+        match area {
+            Area::Slot(_) => self.end(Ok(())),
+            Area::Half(half) => {
+                if let Some(compaction) = self.journal.compacting.take() {
+                    self.journal.active = Some(half);
+                    self.journal.end = compaction.at;
+                    self.journal.mission = compaction.mission;
+                    self.journal.failures = 0;
+                }
+            }
+        }
+    }
+
+    fn record(&mut self, mut record: Record, bytes: &[u8]) {
+        match (record.step, record.source) {
+            (Step::Head, Source::Buffer) => record.step = Step::Data,
+            (Step::Head, _) => record.step = Step::Load,
+            (Step::Load, Source::Flash(_)) => {
+                let count = bytes.len().min(BLOCK);
+                self.buffer.fill(0xFF);
+                self.buffer[..count].copy_from_slice(&bytes[..count]);
+                record.step = Step::Data;
+                self.job = Job::Record(record);
+                return;
+            }
+            (Step::Load | Step::Data, _) => {
+                record.done = (record.done + BLOCK as u32).min(record.len);
+                record.step = if matches!(record.source, Source::Buffer) { Step::Data } else { Step::Load };
+            }
+            (Step::Verify, _) => {
+                record.sum = crc_step(record.sum, bytes);
+                record.done += bytes.len() as u32;
+                if bytes.is_empty() {
+                    return self.fail_record();
+                }
+            }
+        }
+        if record.done < record.len {
+            self.job = Job::Record(record);
+        } else if record.step != Step::Verify && record.len > 0 {
+            self.job = Job::Record(Record { step: Step::Verify, done: 0, ..record });
+        } else if record.len > 0 && !record.sum != record.crc {
+            self.fail_record();
+        } else {
+            self.finish_record(&record);
+        }
+    }
+
+    fn finish_record(&mut self, record: &Record) {
+        let data_at = record.at + WORD as u32;
+        let held = (record.len > 0).then_some(data_at..data_at + record.len);
+        let end = record.at + record_len(record.len);
+        if let Some(compaction) = &mut self.journal.compacting {
+            compaction.at = end;
+            compaction.step += 1;
+            if record.kind == Kind::Mission {
+                compaction.mission = held;
+            }
+            return;
+        }
+        self.journal.end = end;
+        self.journal.failures = 0;
+        if record.kind == Kind::Mission {
+            self.journal.mission = held;
+            self.journal.mission_crc = record.crc;
+            self.journal.removed = false;
+            if record.len > 0 {
+                self.end(Ok(()));
+            }
+        }
+    }
+
+    /// A record did not come out whole: nothing more is written behind it.
+    fn fail_record(&mut self) {
+        if let Some(compaction) = self.journal.compacting.clone() {
+            return self.fail(Area::Half(compaction.half));
+        }
+        self.journal.failures += 1;
+        self.unsaved = true;
+        if let Some(active) = self.journal.active {
+            self.journal.end = Area::Half(active).end(&self.layout);
+        }
+    }
+
+    /// Gives up what was being done for an upload.
+    pub(super) fn drop_job(&mut self) {
+        match self.job {
+            Job::MarkUsed(area @ Area::Slot(_)) => *self.condition(area) = Condition::Dirty,
+            Job::Flush(_) => {}
+            _ => return,
+        }
+        self.job = if self.asked { Job::Ignored } else { Job::None };
+    }
+}

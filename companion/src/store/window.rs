@@ -1,0 +1,148 @@
+//! What was received of a file being uploaded and is not yet in flash: pieces may come in any order within the window.
+
+use super::BLOCK;
+
+/// Bytes of the window: a mission file waits here whole, a roadmap passes through. 4 kB, and 512 bytes of marks.
+pub const WINDOW: usize = 4096;
+
+/// What became of a piece.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Taken {
+    /// It is here, or was already.
+    Yes,
+    /// There is no room for it yet.
+    Later,
+    /// The file would be larger than there is room for.
+    TooLarge,
+}
+
+/// The window. All zero when new.
+#[derive(Clone, Debug)]
+pub struct Window {
+    bytes: [u8; WINDOW],
+    /// A bit for each byte that is here.
+    marks: [u64; WINDOW / 64],
+    /// Place of the first byte in the file; a multiple of [`BLOCK`].
+    front: u32,
+    /// Where the furthest piece ended in the file.
+    high: u32,
+}
+
+impl Default for Window {
+    fn default() -> Self {
+        Self { bytes: [0; WINDOW], marks: [0; WINDOW / 64], front: 0, high: 0 }
+    }
+}
+
+impl Window {
+    /// Begins with an empty file.
+    pub fn reset(&mut self) {
+        self.marks.fill(0);
+        (self.front, self.high) = (0, 0);
+    }
+
+    /// Bytes of the file that are no longer here.
+    pub fn front(&self) -> u32 {
+        self.front
+    }
+
+    /// Length of the file, as far as it is known.
+    pub fn file_len(&self) -> u32 {
+        self.high
+    }
+
+    /// Takes a piece of a file of at most `most` bytes.
+    pub fn take(&mut self, offset: u32, piece: &[u8], most: u32) -> Taken {
+        let Some(end) = offset.checked_add(piece.len() as u32).filter(|end| *end <= most) else {
+            return Taken::TooLarge;
+        };
+        if end > self.front + WINDOW as u32 {
+            return Taken::Later;
+        }
+        self.high = self.high.max(end);
+        // What lies before the window is in flash already.
+        let skipped = self.front.saturating_sub(offset).min(piece.len() as u32);
+        let at = (offset + skipped - self.front.min(offset + skipped)) as usize;
+        let piece = &piece[skipped as usize..];
+        self.bytes[at..at + piece.len()].copy_from_slice(piece);
+        for i in at..at + piece.len() {
+            self.marks[i / 64] |= 1 << (i % 64);
+        }
+        Taken::Yes
+    }
+
+    /// Bytes that are here from the front on, without a gap, at most `most`.
+    fn run(&self, most: usize) -> usize {
+        let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
+        let run = gap.map_or(WINDOW, |i| 64 * i + self.marks[i].trailing_ones() as usize);
+        run.min(most)
+    }
+
+    /// The next block for flash, once it is whole.
+    pub fn block(&self) -> Option<&[u8; BLOCK]> {
+        if self.run(BLOCK) < BLOCK { None } else { self.bytes.first_chunk() }
+    }
+
+    /// The end of the file, if nothing is missing before it.
+    pub fn rest(&self) -> Option<&[u8]> {
+        let len = (self.high - self.front.min(self.high)) as usize;
+        (len <= WINDOW && self.run(len) == len).then(|| &self.bytes[..len])
+    }
+
+    /// Lets the first block go: it is in flash.
+    pub fn advance(&mut self) {
+        self.bytes.copy_within(BLOCK.., 0);
+        self.marks.copy_within(BLOCK / 64.., 0);
+        self.marks[(WINDOW - BLOCK) / 64..].fill(0);
+        self.front += BLOCK as u32;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+    use super::*;
+    use proptest::prelude::*;
+    use std::vec::Vec;
+
+    proptest! {
+        #[test]
+        fn pieces_in_any_order_with_repetitions_make_the_file(
+            len in 1usize..20_000,
+            piece in 1usize..239,
+            order in proptest::collection::vec(any::<u16>(), 64),
+        ) {
+            let file: Vec<u8> = (0..len).map(|i| (i * 7 + i / 251) as u8).collect();
+            let mut window = Window::default();
+            let mut flash = Vec::new();
+            let mut missing: Vec<usize> = (0..len.div_ceil(piece)).collect();
+            let mut turn = 0;
+            while !missing.is_empty() {
+                // One of the next few, as a client with several under way sends them.
+                let pick = usize::from(order[turn % order.len()]) % missing.len().min(5);
+                let start = missing[pick] * piece;
+                let bytes = &file[start..(start + piece).min(len)];
+                if window.take(start as u32, bytes, 20_000) == Taken::Yes && turn % 7 != 0 {
+                    missing.remove(pick);
+                }
+                turn += 1;
+                while let Some(block) = window.block() {
+                    flash.extend_from_slice(block);
+                    window.advance();
+                }
+            }
+            flash.extend_from_slice(window.rest().expect("nothing is missing"));
+            prop_assert_eq!(flash, file);
+        }
+    }
+
+    #[test]
+    fn what_does_not_fit_is_told() {
+        let mut window = Window::default();
+        assert_eq!(window.take(4000, &[0; 100], 9000), Taken::Later);
+        assert_eq!(window.take(8990, &[0; 11], 9000), Taken::TooLarge);
+        assert_eq!(window.take(u32::MAX, &[0; 2], 9000), Taken::TooLarge);
+        assert_eq!(window.take(300, &[1; 10], 9000), Taken::Yes);
+        assert!(window.block().is_none() && window.rest().is_none(), "a hole is seen");
+    }
+}
