@@ -25,4 +25,5 @@ fn link(memory: &Path, device: &str) {
     println!("cargo:rerun-if-changed={}", memory.display());
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
 }

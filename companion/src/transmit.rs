@@ -14,6 +14,7 @@ use crate::guidance::{self, Setpoint};
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
+use crate::outbox::Outgoing;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
@@ -46,6 +47,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         self.outboxes[at].transmit(system, out)
+    }
+
+    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    pub fn say(&mut self, warning: bool, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {

@@ -6,7 +6,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use companion::frame::MAX_SENT;
+use companion::frame::{Framer, MAX_SENT};
+use companion::store::{Fault, FlashRequest, READ, ReadFlash};
 use companion::{Companion, Event, Link, PlanFailure};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -28,6 +29,9 @@ pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
 /// Setpoints further apart than this are late: twice in a row would be its autopilot's failsafe.
 pub const SETPOINT_WITHIN: Duration = Duration::from_millis(150);
 
+/// What was to be said before a restart has this long to go out.
+const FAREWELL_MS: u32 = 200;
+
 type Shared<T> = Signal<CriticalSectionRawMutex, T>;
 
 /// What the tasks share.
@@ -39,6 +43,10 @@ pub struct Shell {
     steps: Shared<()>,
     /// The companion asks for a plan.
     wants_plan: Shared<()>,
+    /// There may be something to do that takes long.
+    works: Shared<()>,
+    /// When a restart was asked for, milliseconds; 0 if none was.
+    restart_ms: AtomicU32,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
     seen_ms: [AtomicU32; TASKS],
     /// When the last setpoint went out, milliseconds.
@@ -49,6 +57,38 @@ pub struct Shell {
     pub line_errors: [AtomicU32; 2],
 }
 
+/// A request of the companion, its bytes aside.
+enum Request {
+    Erase(u32),
+    Program(u32, usize),
+    Read(u32, usize),
+}
+
+/// A board's flash for files and parameters.
+pub trait Flash: ReadFlash {
+    /// Erases the sector that begins at an offset of the storage bank.
+    fn erase(&mut self, at: u32) -> impl Future<Output = Result<(), Fault>>;
+
+    /// Programs words that were erased.
+    fn program(&mut self, at: u32, bytes: &[u8]) -> impl Future<Output = Result<(), Fault>>;
+}
+
+/// The system id of the autopilot: that of the first heartbeat from its component.
+pub async fn hear_system_id(uart: &mut impl Read) -> u8 {
+    let (mut framer, mut chunk) = (Framer::new(), [0; CHUNK]);
+    loop {
+        // A line error loses bytes, no more.
+        let length = uart.read(&mut chunk).await.unwrap_or_default();
+        let mut input = &chunk[..length];
+        while let Some(frame) = framer.next(now(), &mut input) {
+            if frame.message_id == HEARTBEAT && frame.component == companion::AUTOPILOT && frame.system != 0 {
+                return frame.system;
+            }
+        }
+    }
+}
+
+const HEARTBEAT: u32 = 0;
 const TASKS: usize = 5;
 const TIME: usize = 4;
 
@@ -70,6 +110,8 @@ impl Shell {
             sends: [Signal::new(), Signal::new()],
             steps: Signal::new(),
             wants_plan: Signal::new(),
+            works: Signal::new(),
+            restart_ms: ZERO,
             seen_ms: [ZERO; TASKS],
             setpoint_ms: ZERO,
             gap_ms: ZERO,
@@ -90,11 +132,13 @@ impl Shell {
         while let Some(event) = companion.poll_event() {
             match event {
                 Event::PlanRequested => self.wants_plan.signal(()),
+                Event::RestartRequested => self.restart_ms.store(now_ms().max(1), Ordering::Relaxed),
                 Event::StateChanged { .. } => {}
             }
         }
         drop(held);
         self.sends.iter().for_each(|sends| sends.signal(()));
+        self.works.signal(());
         self.steps.signal(());
         result
     }
@@ -158,22 +202,53 @@ impl Shell {
         }
     }
 
-    /// Answers the companion's requests for plans.
-    pub async fn plan(&self, planner: &mut Planner<'_>) -> ! {
+    /// Answers the companion's requests for plans and for its flash, one after the other: the flash is never erased while
+    /// a roadmap in it is planned on.
+    pub async fn work(&self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
         loop {
-            self.wants_plan.wait().await;
-            let detour = {
-                let held = self.companion.lock().await;
-                held.as_ref().and_then(|companion| planner.note_detour(companion))
-            };
-            let answer: Result<_, PlanFailure> = planner.answer(detour.as_ref());
-            self.with(|companion| companion.handle_plan(now(), answer)).await;
+            if self.wants_plan.try_take().is_some() {
+                let detour = {
+                    let held = self.companion.lock().await;
+                    held.as_ref().and_then(|companion| planner.note_detour(companion))
+                };
+                let answer: Result<_, PlanFailure> = planner.answer(detour.as_ref());
+                self.with(|companion| companion.handle_plan(now(), answer)).await;
+            }
+            if !self.serve_flash(flash).await {
+                self.works.wait().await;
+            }
         }
     }
 
-    /// Whether the planner has something to do: asked with interrupts off, before the core sleeps.
-    pub fn wants_plan(&self) -> bool {
-        self.wants_plan.signaled()
+    /// Does one thing that the companion asks of its flash; false if it asks for none.
+    async fn serve_flash(&self, flash: &mut impl Flash) -> bool {
+        let mut bytes = [0; READ];
+        let request = {
+            let mut held = self.companion.lock().await;
+            match held.as_mut().and_then(|companion| companion.poll_flash()) {
+                None => return false,
+                Some(FlashRequest::Erase { at }) => Request::Erase(at),
+                Some(FlashRequest::Read { at, len }) => Request::Read(at, len),
+                Some(FlashRequest::Program { at, bytes: given }) => {
+                    bytes[..given.len()].copy_from_slice(given);
+                    Request::Program(at, given.len())
+                }
+            }
+        };
+        let outcome = match request {
+            Request::Erase(at) => flash.erase(at).await.map(|()| 0),
+            Request::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
+            Request::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
+        };
+        let outcome = outcome.map(|len| &bytes[..len]);
+        self.with(|companion| companion.handle_flash(now(), outcome)).await;
+        true
+    }
+
+    /// Whether a restart was asked for, and what was to be said before has had time to go out.
+    pub fn wants_restart(&self) -> bool {
+        let asked = self.restart_ms.load(Ordering::Relaxed);
+        asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS
     }
 
     /// Whether every task of the links came by lately and setpoints that flow are not late: else the watchdog is left to bite.

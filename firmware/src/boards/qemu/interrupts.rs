@@ -11,6 +11,8 @@ use super::{clock, uart};
 pub const DEVICES: u8 = 0x40;
 /// Priority of links and setpoints, below devices.
 pub const LINKS: u8 = 0x80;
+/// Priority of plans and flash, below all.
+pub const PLANS: u8 = 0xC0;
 
 /// The interrupts that are used.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -28,6 +30,8 @@ pub enum Irq {
     Timer0 = 8,
     /// An alarm is due.
     Timer1 = 9,
+    /// No device has it: it runs the executor of plans and flash.
+    Plans = 30,
     /// No device has it: it runs the executor of links and setpoints.
     Links = 31,
 }
@@ -52,6 +56,7 @@ static __INTERRUPTS: [Handler; 32] = {
     table[Irq::Uart1Tx as usize] = Some(uart1);
     table[Irq::Timer0 as usize] = Some(timer0);
     table[Irq::Timer1 as usize] = Some(timer1);
+    table[Irq::Plans as usize] = Some(plans);
     table[Irq::Links as usize] = Some(links);
     table
 };
@@ -72,17 +77,29 @@ unsafe extern "C" fn timer1() {
     clock::on_timer1();
 }
 
-static EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static LINKS_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
+static PLANS_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
 
 unsafe extern "C" fn links() {
-    // SAFETY: this is the handler; the interrupt is enabled by `start` alone, after which the executor is there.
-    unsafe { EXECUTOR.on_interrupt() }
+    // SAFETY: this is the handler; the interrupt is enabled by `start_links` alone, after which the executor is there.
+    unsafe { LINKS_EXECUTOR.on_interrupt() }
+}
+
+unsafe extern "C" fn plans() {
+    // SAFETY: as above, with `start_plans`.
+    unsafe { PLANS_EXECUTOR.on_interrupt() }
 }
 
 /// Starts the executor of links and setpoints. To be called once.
 pub fn start_links() -> SendSpawner {
     set_priority(Irq::Links, LINKS);
-    EXECUTOR.start(Irq::Links)
+    LINKS_EXECUTOR.start(Irq::Links)
+}
+
+/// Starts the executor of plans and flash. To be called once.
+pub fn start_plans() -> SendSpawner {
+    set_priority(Irq::Plans, PLANS);
+    PLANS_EXECUTOR.start(Irq::Plans)
 }
 
 fn set_priority(irq: Irq, priority: u8) {
