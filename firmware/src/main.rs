@@ -12,7 +12,7 @@ use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
-use firmware::boards::chosen::{self, Flash, LAYOUT, Parts, Receiver, Transmitter};
+use firmware::boards::chosen::{self, LAYOUT, Parts, Receiver, Transmitter};
 use firmware::boards::crash;
 use firmware::capacity::VEHICLES;
 use firmware::planner::{Memory, Planner};
