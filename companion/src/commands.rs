@@ -33,6 +33,8 @@ pub const START: u16 = 300;
 pub const EXCLUDE: u16 = 5004;
 /// REQUEST_MESSAGE.
 pub const REQUEST: u16 = 512;
+/// PREFLIGHT_REBOOT_SHUTDOWN.
+pub const RESTART: u16 = 246;
 
 /// The same frame within this time is a repetition, not a new command.
 const REPEAT: Duration = Duration::from_secs(5);
@@ -44,6 +46,8 @@ pub struct Command {
     pub command: u16,
     /// First parameter.
     pub param1: f32,
+    /// Second parameter.
+    pub param2: f32,
     /// COMMAND_INT: latitude and longitude, 1e-7 degrees, and altitude, metres.
     pub place: Option<(i32, i32, f32)>,
     /// Sender: system and component.
@@ -73,6 +77,7 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
     Some(Command {
         command: u16::from_le_bytes([p[28], p[29]]),
         param1: float(0),
+        param2: float(4),
         place: (frame.message_id == COMMAND_INT).then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_us: target_system == system,

@@ -61,6 +61,14 @@ impl Frame {
         &self.payload
     }
 
+    /// Writes it as a V2 frame with the sender and sequence number it came with, to pass it on; the bytes written, or 0 where
+    /// `out` is too small. A signature is left out.
+    pub fn encode(&self, out: &mut [u8]) -> usize {
+        let Some(extra) = extra_crc(self.message_id) else { return 0 };
+        let header = Header { system: self.system, component: self.component, sequence: self.sequence };
+        encode_raw(header, self.message_id, extra, self.payload(), out)
+    }
+
     /// The message, if the frame is one of type `M` and its enum values are known to the crate.
     pub fn decode<M: MessageData>(&self) -> Option<M> {
         if self.message_id != M::ID {

@@ -3,7 +3,8 @@
 //! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with what a link received,
 //! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and [`Companion::handle_plan`] with the answer to
 //! [`Event::PlanRequested`]. After *each* `handle_*` call it drains [`Companion::poll_transmit`] for both links until 0
-//! and [`Companion::poll_event`] until `None`. Times never go back. Every call does bounded work.
+//! and [`Companion::poll_event`] until `None`; with a flash ([`Companion::mount`]) also [`Companion::poll_flash`], and tells
+//! [`Companion::handle_flash`] how each went, whenever that is. Times never go back. Every call does bounded work.
 //!
 //! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
 //! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`outbox::DEPTH`]; when it is full
@@ -21,8 +22,11 @@ pub mod config;
 mod detour;
 mod events;
 #[cfg(test)]
+mod fake_flash;
+#[cfg(test)]
 mod fake_px4;
 pub mod frame;
+pub mod ftp;
 mod guidance;
 mod inputs;
 pub mod intent;
@@ -35,6 +39,7 @@ pub mod parameters;
 pub mod px4;
 mod requests;
 mod retreat;
+mod services;
 pub mod store;
 pub mod table;
 pub mod telemetry;

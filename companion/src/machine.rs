@@ -3,8 +3,7 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TIMESYNC_DATA,
-    TUNNEL_DATA,
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TUNNEL_DATA,
 };
 use planner_core::Point;
 use planner_core::schedule::VehiclePlan;
@@ -15,11 +14,14 @@ use crate::config::{Config, ConfigError, PlanFailure};
 use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
+use crate::ftp::Ftp;
 use crate::guidance::{Guidance, Scene, setpoints_flow};
 use crate::intent::Intent;
 use crate::mission::{self, Action, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
+use crate::parameters::Parameters;
+use crate::store::Store;
 use crate::telemetry::{Change, Telemetry};
 use crate::time::{Duration, Instant};
 
@@ -69,6 +71,9 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) version_due: [bool; 2],
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
+    pub(crate) store: Option<Store>,
+    pub(crate) parameters: Parameters,
+    pub(crate) ftp: Ftp,
     pub(crate) events: Deque<Event, EVENTS>,
 }
 
@@ -110,6 +115,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             version_due: [false; 2],
             position_due: false,
             intent_due: false,
+            store: None,
+            parameters: Parameters::default(),
+            ftp: Ftp::default(),
             events: Deque::new(),
             config,
         })
@@ -247,16 +255,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             return false;
         }
+        if self.serve(link, frame) {
+            return false;
+        }
         match link {
             Link::Autopilot => {
                 if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
-                    return false;
-                }
-                if let Some(request) = frame.decode::<TIMESYNC_DATA>()
-                    && request.tc1 == 0
-                {
-                    let answer = Outgoing::Timesync(self.now.micros() as i64 * 1000, request.ts1);
-                    self.outboxes[link as usize].push(answer);
                     return false;
                 }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
@@ -304,6 +308,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, command.param1),
             None if command.command == commands::EXCLUDE => self.exclude(command),
+            None if command.command == commands::RESTART
+                && (command.to_component || command.param2 == 1.0) =>
+            {
+                self.restart(command)
+            }
             // To all components: another one's.
             None if !command.to_component => return,
             None => UNSUPPORTED,

@@ -19,7 +19,7 @@ pub(super) fn assert_no_gap(bench: &Bench) {
 fn states(bench: &Bench) -> Vec<State> {
     let to = |e: &Event| match e {
         Event::StateChanged { to, .. } => Some(*to),
-        Event::PlanRequested => None,
+        Event::PlanRequested | Event::RestartRequested => None,
     };
     bench.events.iter().filter_map(to).collect()
 }

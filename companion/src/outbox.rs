@@ -4,11 +4,12 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_SET_DATA, STATUSTEXT_DATA,
-    TIMESYNC_DATA,
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_ERROR_DATA, PARAM_SET_DATA,
+    PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 
 use crate::frame::{self, Header};
+use crate::parameters;
 
 /// Entries a link holds.
 pub const DEPTH: usize = 32;
@@ -28,6 +29,26 @@ pub enum Outgoing {
     Parameter(&'static str, f32),
     /// The answer to a TIMESYNC: our clock and the sender's, nanoseconds.
     Timesync(i64, i64),
+    /// PARAM_VALUE of one of ours.
+    ParameterValue {
+        /// Its index.
+        index: usize,
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// PARAM_ERROR.
+    ParameterError {
+        /// Index asked for; −1 if it was the name.
+        index: i16,
+        /// Name asked for.
+        id: [u8; 16],
+        /// `MAV_PARAM_ERROR`.
+        why: u8,
+        /// Whom: system and component.
+        to: (u8, u8),
+    },
     /// COMPONENT_ARM_DISARM.
     Arm(bool),
     /// COMMAND_ACK.
@@ -113,6 +134,31 @@ impl Outbox {
                     param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
                 };
                 return frame::encode(header, &set, out);
+            }
+            Outgoing::ParameterValue { index, name, value } => {
+                let told = PARAM_VALUE_DATA {
+                    param_value: value,
+                    param_count: parameters::COUNT as u16,
+                    param_index: index as u16,
+                    param_id: name.into(),
+                    param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+                };
+                return frame::encode(header, &told, out);
+            }
+            Outgoing::ParameterError { index, id, why, to } => {
+                // By field: the name may be anything.
+                let mut payload = [0; PARAM_ERROR_DATA::ENCODED_LEN];
+                payload[..2].copy_from_slice(&index.to_le_bytes());
+                (payload[2], payload[3]) = to;
+                payload[4..20].copy_from_slice(&id);
+                payload[20] = why;
+                return frame::encode_raw(
+                    header,
+                    PARAM_ERROR_DATA::ID,
+                    PARAM_ERROR_DATA::EXTRA_CRC,
+                    &payload,
+                    out,
+                );
             }
             Outgoing::Timesync(tc1, ts1) => {
                 return frame::encode(header, &TIMESYNC_DATA { tc1, ts1 }, out);

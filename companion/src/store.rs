@@ -15,6 +15,7 @@
 pub mod area;
 mod jobs;
 mod journal;
+mod records;
 mod upload;
 pub mod window;
 

@@ -2,9 +2,8 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame, MavModeFlag,
-    MavProtocolCapability, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
-    TUNNEL_DATA,
+    FILE_TRANSFER_PROTOCOL_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame,
+    MavModeFlag, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA, TUNNEL_DATA,
 };
 use planner_core::{Point, frames};
 
@@ -15,6 +14,7 @@ use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
 use crate::outbox::Outgoing;
+use crate::services;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
@@ -34,7 +34,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return frame::encode(self.outboxes[at].header(system), &self.heartbeat(), out);
         }
         if core::mem::take(&mut self.version_due[at]) {
-            return frame::encode(self.outboxes[at].header(system), &version(), out);
+            return frame::encode(self.outboxes[at].header(system), &services::version(system), out);
         }
         if link == Link::Swarm && core::mem::take(&mut self.position_due) {
             let data = self.global_position();
@@ -46,7 +46,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let header = self.outboxes[at].header(system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
-        self.outboxes[at].transmit(system, out)
+        let length = self.outboxes[at].transmit(system, out);
+        if length > 0 {
+            return length;
+        }
+        let Some(payload) = self.ftp.poll(at) else { return 0 };
+        let header = self.outboxes[at].header(system);
+        let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
+        frame::encode_raw(header, id, extra, &payload, out)
     }
 
     /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
@@ -181,13 +188,5 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             speed_mps: self.telemetry.velocity.norm(),
             points,
         }
-    }
-}
-
-fn version() -> AUTOPILOT_VERSION_DATA {
-    AUTOPILOT_VERSION_DATA {
-        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2,
-        ..AUTOPILOT_VERSION_DATA::default()
     }
 }

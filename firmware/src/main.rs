@@ -96,7 +96,7 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
     let shell = SHELL.take();
     shell.start(companion);
     let shell: &'static Shell = shell;
-    start_links(links, shell, autopilot, swarm);
+    start_links(links, shell, system_id, autopilot, swarm);
     let mut planner = Planner { roadmap, mission, system_id, memory: MEMORY.take() };
     shell.work(&mut planner, &mut flash).await
 }
@@ -104,12 +104,13 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
 fn start_links(
     links: SendSpawner,
     shell: &'static Shell,
+    system_id: u8,
     autopilot: (Receiver, Transmitter),
     swarm: (Receiver, Transmitter),
 ) {
     let once = "there is one such task for each link";
-    links.spawn(receive(shell, Link::Autopilot, autopilot.0).expect(once));
-    links.spawn(receive(shell, Link::Swarm, swarm.0).expect(once));
+    links.spawn(receive(shell, Link::Autopilot, autopilot.0, system_id).expect(once));
+    links.spawn(receive(shell, Link::Swarm, swarm.0, system_id).expect(once));
     links.spawn(transmit(shell, Link::Autopilot, autopilot.1).expect(once));
     links.spawn(transmit(shell, Link::Swarm, swarm.1).expect(once));
     links.spawn(keep_time(shell).expect(once));
@@ -117,8 +118,8 @@ fn start_links(
 }
 
 #[task(pool_size = 2)]
-async fn receive(shell: &'static Shell, link: Link, uart: Receiver) {
-    shell.receive(link, uart).await
+async fn receive(shell: &'static Shell, link: Link, uart: Receiver, system_id: u8) {
+    shell.receive(link, uart, system_id).await
 }
 
 #[task(pool_size = 2)]

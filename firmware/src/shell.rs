@@ -73,18 +73,42 @@ pub trait Flash: ReadFlash {
     fn program(&mut self, at: u32, bytes: &[u8]) -> impl Future<Output = Result<(), Fault>>;
 }
 
-/// The system id of the autopilot: that of the first heartbeat from its component.
+/// The system id of the autopilot, from its first heartbeat; [`NO_AUTOPILOT`] where none comes in time.
 pub async fn hear_system_id(uart: &mut impl Read) -> u8 {
-    let (mut framer, mut chunk) = (Framer::new(), [0; CHUNK]);
-    loop {
+    let mut ear = Ear::new();
+    let until = Instant::now() + HEAR_WITHIN;
+    let mut chunk = [0; CHUNK];
+    while let Ok(received) =
+        with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
+    {
         // A line error loses bytes, no more.
-        let length = uart.read(&mut chunk).await.unwrap_or_default();
-        let mut input = &chunk[..length];
-        while let Some(frame) = framer.next(now(), &mut input) {
-            if frame.message_id == HEARTBEAT && frame.component == companion::AUTOPILOT && frame.system != 0 {
-                return frame.system;
-            }
+        if let Some(id) = ear.hear(&chunk[..received.unwrap_or_default()]) {
+            return id;
         }
+    }
+    NO_AUTOPILOT
+}
+
+/// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it starts anew.
+pub const NO_AUTOPILOT: u8 = 250;
+/// An autopilot tells of itself once a second.
+const HEAR_WITHIN: Duration = Duration::from_secs(3);
+
+/// Listens for an autopilot's heartbeat.
+struct Ear(Framer);
+
+impl Ear {
+    const fn new() -> Self {
+        Self(Framer::new())
+    }
+
+    fn hear(&mut self, mut input: &[u8]) -> Option<u8> {
+        let mut heard = None;
+        while let Some(frame) = self.0.next(now(), &mut input) {
+            let autopilot = frame.message_id == HEARTBEAT && frame.component == companion::AUTOPILOT;
+            heard = heard.or(Some(frame.system).filter(|id| autopilot && *id != 0));
+        }
+        heard
     }
 }
 
@@ -132,7 +156,7 @@ impl Shell {
         while let Some(event) = companion.poll_event() {
             match event {
                 Event::PlanRequested => self.wants_plan.signal(()),
-                Event::RestartRequested => self.restart_ms.store(now_ms().max(1), Ordering::Relaxed),
+                Event::RestartRequested => self.ask_restart(),
                 Event::StateChanged { .. } => {}
             }
         }
@@ -143,16 +167,28 @@ impl Shell {
         result
     }
 
+    fn ask_restart(&self) {
+        self.restart_ms.store(now_ms().max(1), Ordering::Relaxed);
+    }
+
     fn seen(&self, task: usize) {
         self.seen_ms[task].store(now_ms(), Ordering::Relaxed);
     }
 
     /// Takes what a UART receives to the companion.
-    pub async fn receive(&self, link: Link, mut uart: impl Read) -> ! {
+    ///
+    /// A board that calls itself [`NO_AUTOPILOT`] starts anew when it hears one: `system_id` is what it calls itself.
+    pub async fn receive(&self, link: Link, mut uart: impl Read, system_id: u8) -> ! {
         let mut chunk = [0; CHUNK];
+        let mut ear = (link == Link::Autopilot && system_id == NO_AUTOPILOT).then(Ear::new);
         loop {
             match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
-                Ok(Ok(length)) => self.with(|c| c.handle_bytes(link, now(), &chunk[..length])).await,
+                Ok(Ok(length)) => {
+                    self.with(|c| c.handle_bytes(link, now(), &chunk[..length])).await;
+                    if ear.as_mut().is_some_and(|ear| ear.hear(&chunk[..length]).is_some()) {
+                        self.ask_restart();
+                    }
+                }
                 // Framing, noise or overrun: what was lost the framer finds out.
                 Ok(Err(_)) => _ = self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed),
                 Err(_) => {}

@@ -4,6 +4,7 @@
 pub mod autopilot;
 pub mod capacity;
 pub mod commands;
+pub mod flash;
 pub mod link;
 pub mod map;
 pub mod mission;
@@ -14,3 +15,4 @@ pub mod result;
 pub mod roadmap;
 pub mod scenario;
 pub mod swarm;
+pub mod upload;

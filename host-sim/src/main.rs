@@ -29,6 +29,10 @@ enum Command {
     Autopilot(autopilot::server::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
     Companion(commands::companion::Args),
+    /// Upload a roadmap or mission file to a companion
+    Upload(commands::upload::Args),
+    /// Join the swarm links of boards and processes, with a radio's loss and delay
+    Radio(commands::radio::Args),
 }
 
 /// Exit code for bad input; 1 is a mission that failed.
@@ -43,6 +47,8 @@ fn main() -> ExitCode {
         Command::Fly(args) => commands::fly::run(&args),
         Command::Autopilot(args) => autopilot::server::run(&args),
         Command::Companion(args) => commands::companion::run(&args),
+        Command::Upload(args) => commands::upload::run(&args),
+        Command::Radio(args) => commands::radio::run(&args),
     };
     done.unwrap_or_else(|error| {
         eprintln!("error: {error:#}");

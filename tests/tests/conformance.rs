@@ -84,6 +84,60 @@ fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
     mavsdk("mavsdk_services.py", &["FS_GCS_TIMEOUT", "FS_GCS_ENABLE"], ARDUPILOT);
 }
 
+/// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the two files it may be given.
+struct Onboard {
+    _companion: Guard,
+    files: tempfile::TempDir,
+}
+
+impl Onboard {
+    fn new(port: u16) -> Self {
+        let files = tempfile::tempdir().expect("a directory");
+        let lobby = workspace().join("host-sim/scenarios/lobby.toml");
+        let program = host_sim(Profile::Debug);
+        let plan = Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
+        assert!(plan.expect("host-sim starts").success());
+        let companion = Command::new(program)
+            .args([
+                "companion",
+                "--id",
+                "1",
+                "--autopilot",
+                &format!("udp-listen:127.0.0.1:{port}"),
+                "--flash",
+            ])
+            .arg(files.path().join("flash.bin"))
+            .arg(lobby)
+            .spawn()
+            .expect("host-sim starts");
+        Self { _companion: Guard(companion), files }
+    }
+
+    fn file(&self, name: &str) -> String {
+        self.files.path().join(name).display().to_string()
+    }
+}
+
+/// Runs a script on a link of the autopilot that the companion is not on.
+fn onboard(script: &str, listen: &str, address: impl Fn(&str) -> String) {
+    let Some(python) = python() else { return };
+    let port = free_udp_port();
+    let (_autopilot, at) = autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
+    let companion = Onboard::new(port);
+    run(&python, script, &[&address(&at[0]), &companion.file("roadmap.bin"), &companion.file("mission.bin")]);
+}
+
+#[test]
+fn pymavlink_uses_the_companions_files_and_parameters_through_the_autopilot() {
+    onboard("onboard_pymavlink.py", "udp-listen:127.0.0.1:0", |at| format!("udpout:{at}"));
+}
+
+#[test]
+fn mavsdk_uses_the_companions_files_and_parameters_through_the_autopilot() {
+    let address = format!("127.0.0.1:{}", free_udp_port());
+    onboard("onboard_mavsdk.py", &format!("udp:{address}"), |_| format!("udpin://{address}"));
+}
+
 #[test]
 fn pymavlink_watches_the_swarm_and_talks_to_each_vehicle() {
     let Some(python) = python() else { return };

@@ -1,14 +1,10 @@
 //! What the store does with its flash, one request at a time: which job is next, what it asks for, what follows.
 
-use core::ops::Range;
-
 use super::area::{self, Area, Condition, Seal};
-use super::journal::{self, Kind, record_len};
+use super::journal;
+use super::records::{Compaction, Record, Source, Step};
 use super::upload::{UploadError, UploadState};
-use super::{Answer, BLOCK, CRC_START, Fault, File, FlashRequest, READ, Store, WORD, crc_step, crc32};
-
-/// Tries to write the journal before that is given up until the next start.
-const TRIES: u8 = 4;
+use super::{Answer, BLOCK, CRC_START, Fault, File, FlashRequest, READ, Store, WORD, crc_step};
 
 /// What the store is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -39,46 +35,6 @@ pub enum Job {
     SealCheck(Area, Seal),
     /// A record of the journal.
     Record(Record),
-}
-
-/// A record being written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Record {
-    kind: Kind,
-    /// Where it begins.
-    at: u32,
-    len: u32,
-    crc: u32,
-    source: Source,
-    step: Step,
-    done: u32,
-    sum: u32,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Source {
-    /// In the buffer, whole.
-    Buffer,
-    Window,
-    Flash(u32),
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Step {
-    Head,
-    Load,
-    Data,
-    Verify,
-}
-
-/// The journal's other half being filled.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Compaction {
-    half: usize,
-    at: u32,
-    /// Next: 0 the parameters, 1 the mission, 2 the seal.
-    step: u8,
-    mission: Option<Range<u32>>,
 }
 
 impl Store {
@@ -211,96 +167,9 @@ impl Store {
         Job::Check { slot, done: 0, sum: CRC_START, tail: [0; 4] }
     }
 
-    fn erase(&mut self, area: Area) -> Job {
+    pub(super) fn erase(&mut self, area: Area) -> Job {
         *self.condition(area) = Condition::Dirty;
         Job::Erase { area, at: area.at(&self.layout) }
-    }
-
-    /// The journal's next step.
-    fn choose_record(&mut self, may_erase: bool) -> Option<Job> {
-        if let Some(compaction) = self.journal.compacting.clone() {
-            let Compaction { half, at, step, mission } = compaction;
-            return Some(match (step, self.journal.mission.clone()) {
-                (0, _) => Job::Record(self.parameters_record(at)),
-                (1, Some(kept)) => Job::Record(Record {
-                    kind: Kind::Mission,
-                    at,
-                    len: kept.end - kept.start,
-                    crc: self.journal.mission_crc,
-                    source: Source::Flash(kept.start),
-                    step: Step::Head,
-                    done: 0,
-                    sum: CRC_START,
-                }),
-                _ => {
-                    let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
-                    let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
-                    self.journal.compacting = Some(Compaction { half, at, step: 2, mission });
-                    Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0 })
-                }
-            });
-        }
-        let closing = self.upload == Some((File::Mission, UploadState::Closing));
-        if self.journal.failures >= TRIES {
-            if closing {
-                self.end(Err(UploadError::Flash));
-            }
-            return None;
-        }
-        let (kind, len) = if closing {
-            (Kind::Mission, self.window.file_len())
-        } else if self.journal.removed {
-            (Kind::Mission, 0)
-        } else if self.unsaved {
-            (Kind::Parameters, journal::PARAMETERS_LEN as u32)
-        } else {
-            return None;
-        };
-        let fits = |active: usize| self.journal.end + record_len(len) <= Area::Half(active).end(&self.layout);
-        if !self.journal.active.is_some_and(fits) {
-            return self.begin_compaction(may_erase, closing);
-        }
-        let at = self.journal.end;
-        Some(Job::Record(match kind {
-            Kind::Parameters => self.parameters_record(at),
-            Kind::Mission => {
-                let crc = if len == 0 { crc32(&[]) } else { crc32(self.window.rest().unwrap_or_default()) };
-                let (step, source) = (Step::Head, Source::Window);
-                Record { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
-            }
-        }))
-    }
-
-    fn begin_compaction(&mut self, may_erase: bool, closing: bool) -> Option<Job> {
-        let half = usize::from(self.journal.active == Some(0));
-        match self.journal.halves[half] {
-            Condition::Clean => Some(Job::MarkUsed(Area::Half(half))),
-            _ if may_erase && !self.erasure_failed => Some(self.erase(Area::Half(half))),
-            _ => {
-                if closing {
-                    self.end(Err(if may_erase { UploadError::Flash } else { UploadError::Armed }));
-                }
-                None
-            }
-        }
-    }
-
-    fn parameters_record(&mut self, at: u32) -> Record {
-        let len = journal::PARAMETERS_LEN;
-        self.buffer.fill(0xFF);
-        self.buffer[..4].copy_from_slice(&self.forgotten.to_le_bytes());
-        self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
-        self.unsaved = false;
-        Record {
-            kind: Kind::Parameters,
-            at,
-            len: len as u32,
-            crc: crc32(&self.buffer[..len]),
-            source: Source::Buffer,
-            step: Step::Head,
-            done: 0,
-            sum: CRC_START,
-        }
     }
 
     /// Takes in how the last request went; `Ok` of an erasure or a program holds no bytes.
@@ -349,7 +218,7 @@ impl Store {
             (Job::Record(record), Ok(bytes)) => self.record(record, bytes),
             (Job::Record(_), Err(Fault)) => self.fail_record(),
             (Job::MarkUsed(area) | Job::Seal(area, _) | Job::SealCheck(area, _), Err(Fault)) => {
-                self.fail(area)
+                self.fail(area);
             }
             (Job::Flush(slot) | Job::FlushRest { slot, .. } | Job::Check { slot, .. }, Err(Fault)) => {
                 self.fail(slot);
@@ -371,7 +240,7 @@ impl Store {
     }
 
     /// Something of an area failed: it is to be erased.
-    fn fail(&mut self, area: Area) {
+    pub(super) fn fail(&mut self, area: Area) {
         *self.condition(area) = Condition::Dirty;
         match area {
             Area::Slot(_) => self.end(Err(UploadError::Flash)),
@@ -420,77 +289,6 @@ impl Store {
                     self.journal.failures = 0;
                 }
             }
-        }
-    }
-
-    fn record(&mut self, mut record: Record, bytes: &[u8]) {
-        match (record.step, record.source) {
-            (Step::Head, Source::Buffer) => record.step = Step::Data,
-            (Step::Head, _) => record.step = Step::Load,
-            (Step::Load, Source::Flash(_)) => {
-                let count = bytes.len().min(BLOCK);
-                self.buffer.fill(0xFF);
-                self.buffer[..count].copy_from_slice(&bytes[..count]);
-                record.step = Step::Data;
-                self.job = Job::Record(record);
-                return;
-            }
-            (Step::Load | Step::Data, _) => {
-                record.done = (record.done + BLOCK as u32).min(record.len);
-                record.step = if matches!(record.source, Source::Buffer) { Step::Data } else { Step::Load };
-            }
-            (Step::Verify, _) => {
-                record.sum = crc_step(record.sum, bytes);
-                record.done += bytes.len() as u32;
-                if bytes.is_empty() {
-                    return self.fail_record();
-                }
-            }
-        }
-        if record.done < record.len {
-            self.job = Job::Record(record);
-        } else if record.step != Step::Verify && record.len > 0 {
-            self.job = Job::Record(Record { step: Step::Verify, done: 0, ..record });
-        } else if record.len > 0 && !record.sum != record.crc {
-            self.fail_record();
-        } else {
-            self.finish_record(&record);
-        }
-    }
-
-    fn finish_record(&mut self, record: &Record) {
-        let data_at = record.at + WORD as u32;
-        let held = (record.len > 0).then_some(data_at..data_at + record.len);
-        let end = record.at + record_len(record.len);
-        if let Some(compaction) = &mut self.journal.compacting {
-            compaction.at = end;
-            compaction.step += 1;
-            if record.kind == Kind::Mission {
-                compaction.mission = held;
-            }
-            return;
-        }
-        self.journal.end = end;
-        self.journal.failures = 0;
-        if record.kind == Kind::Mission {
-            self.journal.mission = held;
-            self.journal.mission_crc = record.crc;
-            self.journal.removed = false;
-            if record.len > 0 {
-                self.end(Ok(()));
-            }
-        }
-    }
-
-    /// A record did not come out whole: nothing more is written behind it.
-    fn fail_record(&mut self) {
-        if let Some(compaction) = self.journal.compacting.clone() {
-            return self.fail(Area::Half(compaction.half));
-        }
-        self.journal.failures += 1;
-        self.unsaved = true;
-        if let Some(active) = self.journal.active {
-            self.journal.end = Area::Half(active).end(&self.layout);
         }
     }
 

@@ -8,7 +8,7 @@
 use core::ops::Range;
 
 use super::area::{self, Area, Condition, close, is_closed, u32_at};
-use super::jobs::Compaction;
+use super::records::Compaction;
 use super::{BLOCK, ReadFlash, Store, WORD};
 use crate::parameters::STORED_LEN;
 

@@ -69,6 +69,8 @@ pub struct Config {
     pub ports: usize,
     /// Whether it has one more port, with a ground station's rates.
     pub ground_port: bool,
+    /// Whether it passes on what is for others, from port to port.
+    pub routes: bool,
 }
 
 impl Default for Config {
@@ -93,6 +95,7 @@ impl Default for Config {
             estimator_ready_s: 40.0,
             ports: 1,
             ground_port: false,
+            routes: false,
         }
     }
 }

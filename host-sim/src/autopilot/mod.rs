@@ -39,6 +39,7 @@ pub mod noise;
 pub mod params;
 pub mod port;
 pub mod px4;
+mod routing;
 pub mod server;
 pub mod telemetry;
 pub mod vehicle;
@@ -121,6 +122,9 @@ impl Autopilot {
         }
         let now_us = self.body.time_us;
         while let Some(frame) = self.body.ports[port].next_frame(now_us, &mut bytes) {
+            if self.body.config.routes {
+                routing::forward(&mut self.body.ports, port, self.body.config.system_id, &frame);
+            }
             self.handle_frame(port, &frame);
         }
     }

@@ -24,6 +24,8 @@ pub const GROUND_STREAMS: [(u32, u32); 11] = [
 ];
 /// Nothing is queued beyond this, bytes: a port that nobody drains does not grow.
 const QUEUE: usize = 65_536;
+/// Components remembered as reached by a port.
+const ROUTES: usize = 64;
 
 /// One telemetry stream.
 #[derive(Clone, Copy, Debug)]
@@ -68,6 +70,8 @@ pub struct Port {
     pub param_cursor: Option<usize>,
     /// PING messages sent.
     pub pings: u32,
+    /// Who was heard here: system and component.
+    heard: Vec<(u8, u8)>,
 }
 
 impl Port {
@@ -96,6 +100,7 @@ impl Port {
             once: Vec::new(),
             param_cursor: None,
             pings: 0,
+            heard: Vec::new(),
         }
     }
 
@@ -134,6 +139,27 @@ impl Port {
         }
         self.queue.resize(start + frame::MAX_SENT, 0);
         Some(start)
+    }
+
+    /// Remembers that a component is reached here.
+    pub fn learn(&mut self, sender: (u8, u8)) {
+        if !self.heard.contains(&sender) && self.heard.len() < ROUTES {
+            self.heard.push(sender);
+        }
+    }
+
+    /// Whether somebody whom a message is for was heard here; 0 is all.
+    pub fn leads_to(&self, (system, component): (u8, u8)) -> bool {
+        let meant = |&(s, c): &(u8, u8)| (system == 0 || s == system) && (component == 0 || c == component);
+        self.heard.iter().any(meant)
+    }
+
+    /// Queues a frame of somebody else's as it came.
+    pub fn pass(&mut self, frame: &Frame) {
+        if let Some(start) = self.reserve() {
+            let len = frame.encode(&mut self.queue[start..]);
+            self.queue.truncate(start + len);
+        }
     }
 
     /// Queues a message.

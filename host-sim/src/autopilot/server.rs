@@ -3,7 +3,6 @@
 //! Steps of 4 ms are made when the clock has passed them; between them the process sleeps. A machine too slow for that
 //! (more than a second behind) lets simulated time lag rather than run ever later.
 
-use std::io::Write;
 use std::process::ExitCode;
 use std::str::FromStr;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -15,6 +14,7 @@ use planner_core::frames::Geodetic;
 
 use super::{Autopilot, Config, Personality};
 use crate::link::{Link, LinkUrl};
+use crate::say;
 
 const STEP: Duration = Duration::from_millis(4);
 const LATEST: Duration = Duration::from_secs(1);
@@ -86,13 +86,14 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         estimator_ready_s: args.ready_after,
         boot_unix_us: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_micros() as u64),
         ports: args.listen.len(),
+        routes: true,
         ..Config::default()
     };
     let mut autopilot = Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
     let mut links = Vec::new();
     for url in &args.listen {
         let link = url.open()?;
-        announce(url, &*link)?;
+        say!("listening {}", url.opened(&*link));
         links.push((url, link));
     }
     let ground_up_m = -config.vehicle.radius_m;
@@ -109,16 +110,6 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         }
         std::thread::sleep(next.saturating_duration_since(now));
     }
-}
-
-fn announce(url: &LinkUrl, link: &dyn Link) -> anyhow::Result<()> {
-    let mut out = std::io::stdout().lock();
-    match (url, link.local_address()) {
-        (LinkUrl::TcpListen(_), Some(at)) => writeln!(out, "listening tcp-listen:{at}")?,
-        (LinkUrl::UdpListen(_), Some(at)) => writeln!(out, "listening udp-listen:{at}")?,
-        _ => writeln!(out, "listening {url}")?,
-    }
-    Ok(out.flush()?)
 }
 
 /// Everything that came in, then everything that is to go out.

@@ -6,16 +6,19 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::frame::MAX_SENT;
-use companion::{Event, Instant, Link, State};
+use companion::store::{READ, Store};
+use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
 use super::load;
+use crate::capacity::VEHICLES;
+use crate::flash::{self, DeskFlash};
 use crate::link::{self, LinkUrl};
 use crate::mission::Mission;
 use crate::progress::Progress;
 use crate::say;
 use crate::swarm::ground_station::mission_start;
-use crate::swarm::member::is_finished;
+use crate::swarm::member::{DeskCompanion, is_finished};
 use crate::swarm::{companion_config, new_companion};
 
 /// Arguments of `host-sim companion`.
@@ -36,6 +39,10 @@ pub struct Args {
     /// Start the mission as soon as it is ready, without a ground station's command
     #[arg(long)]
     start: bool,
+    /// Keep what ground stations upload and set in this file, as a board keeps it in its flash; without it that is gone at the
+    /// end
+    #[arg(long, value_name = "FILE")]
+    flash: Option<PathBuf>,
 }
 
 /// Sleep between two looks at the links.
@@ -57,7 +64,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         config.roster =
             config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
     }
-    let mut companion = new_companion(config)?;
+    let mut flash = DeskFlash::open(args.flash.as_deref())?;
+    let mut companion = start(&config, &mut flash)?;
     let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
         links.push((Link::Swarm, swarm.open()?));
@@ -65,6 +73,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Clock::now();
     let now = || Instant::from_micros(began.elapsed().as_micros() as u64);
     let mut buffer = [0; 2048];
+    let mut read = [0; READ];
     let mut finished_at = None;
     loop {
         for (link, io) in &mut links {
@@ -79,8 +88,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         if companion.poll_timeout().is_some_and(|due| due <= now()) {
             companion.handle_timeout(now());
         }
+        while let Some(request) = companion.poll_flash() {
+            let outcome = flash.obey(request, &mut read);
+            companion.handle_flash(now(), outcome);
+        }
+        let mut restarts = false;
         while let Some(event) = companion.poll_event() {
             match event {
+                Event::RestartRequested => restarts = true,
                 Event::PlanRequested => {
                     let mut own = mission.answer(&plan, index, &companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {
@@ -108,6 +123,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 io.send(&buffer[..length])?;
             }
         }
+        if restarts {
+            say!("{:9.3} s  restart commanded", began.elapsed().as_secs_f32());
+            companion = start(&config, &mut flash)?;
+        }
         let state = companion.state();
         if !is_finished(state) {
             finished_at = None;
@@ -116,4 +135,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         }
         sleep(NAP);
     }
+}
+
+/// A companion with its flash and the parameters kept there.
+fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
+    let store = Store::mount(flash::LAYOUT, flash);
+    let mut config = config.clone();
+    store.parameters().apply(&mut config);
+    let mut companion = new_companion(config)?;
+    companion.mount(store);
+    Ok(companion)
 }

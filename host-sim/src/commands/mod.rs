@@ -3,7 +3,9 @@
 pub mod companion;
 pub mod fly;
 pub mod plan;
+pub mod radio;
 pub mod roadmap;
+pub mod upload;
 
 use std::path::Path;
 

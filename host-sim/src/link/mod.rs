@@ -133,6 +133,15 @@ impl LinkUrl {
         })
     }
 
+    /// This URL with the port that was got where 0 was asked for.
+    pub fn opened(&self, link: &dyn Link) -> Self {
+        match (self, link.local_address()) {
+            (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),
+            (Self::UdpListen(_), Some(at)) => Self::UdpListen(at.to_string()),
+            _ => self.clone(),
+        }
+    }
+
     fn open_once(&self, timeout: Duration) -> Result<Box<dyn Link>, LinkError> {
         let failed = |why| LinkError::Open(self.clone(), why);
         match self {

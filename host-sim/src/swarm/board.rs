@@ -3,7 +3,7 @@
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
 //! heard on its radio's port.
 
-use companion::frame::{self, Frame, Framer, Header, MAX_SENT};
+use companion::frame::{Frame, Framer, MAX_SENT};
 use companion::intent::Intent;
 use companion::table::TABLE;
 use companion::{COMPONENT, Instant, State};
@@ -87,11 +87,7 @@ impl Board {
             let mut input = &self.buffer[..length];
             while let Some(frame) = self.framer.next(now, &mut input) {
                 let mut packet = [0; MAX_SENT];
-                let header =
-                    Header { system: frame.system, component: frame.component, sequence: frame.sequence };
-                let extra_crc = frame::extra_crc(frame.message_id).unwrap_or_default();
-                let length =
-                    frame::encode_raw(header, frame.message_id, extra_crc, frame.payload(), &mut packet);
+                let length = frame.encode(&mut packet);
                 sent(&packet[..length]);
                 if frame.component == COMPONENT {
                     note(&frame, &mut self.state, &mut self.progress_m, &mut said);

@@ -269,9 +269,11 @@ impl Member {
         if self.companion.poll_timeout().is_some_and(|due| due <= now) {
             self.companion.handle_timeout(now);
         }
+        let mut restarts = false;
         while let Some(happened) = self.companion.poll_event() {
             match happened {
                 Event::PlanRequested => self.wants_plan = true,
+                Event::RestartRequested => restarts = true,
                 Event::StateChanged { from, to, text, warning } => {
                     self.note(from, to, text, warning);
                     log.push(self.entry(now_us, from, to, text));
@@ -279,6 +281,10 @@ impl Member {
             }
         }
         self.drain(now_us, station, radio, places);
+        if restarts {
+            // It could be made once, so it can again.
+            let _ = self.reset_companion(now_us);
+        }
     }
 
     /// Takes what a ground station sent.

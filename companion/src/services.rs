@@ -1,0 +1,203 @@
+//! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served on either link, to frames
+//! addressed to our own system and component, so a ground station may come by the radio or through the autopilot's routing.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, MavParamError, MavProtocolCapability, PARAM_REQUEST_LIST_DATA,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, TIMESYNC_DATA,
+};
+
+use crate::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use crate::events::{Event, Link};
+use crate::frame::Frame;
+use crate::ftp;
+use crate::machine::Companion;
+use crate::mission::State;
+use crate::outbox::Outgoing;
+use crate::parameters::{self, Parameters, Refused};
+use crate::store::{Fault, FlashRequest, Store};
+use crate::time::{Duration, Instant};
+
+/// `MAV_PARAM_TYPE_REAL32`.
+const REAL32: u8 = 9;
+/// Without an autopilot this long after the start, there is none that could be armed.
+const ALONE_AFTER: Duration = Duration::from_secs(10);
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Gives it a flash to keep its files and parameters in; without one there are no files, and parameters are forgotten.
+    pub fn mount(&mut self, store: Store) {
+        self.store = Some(store);
+    }
+
+    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
+    /// other `poll_*`, but it may take long: nothing else waits for it.
+    pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
+        let may_erase = self.may_erase();
+        let store = self.store.as_mut()?;
+        self.ftp.advance(store, self.now, may_erase);
+        if let Some((warning, text)) = self.ftp.text() {
+            self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+        }
+        store.poll(may_erase)
+    }
+
+    /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
+    pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], Fault>) {
+        self.now = now;
+        if let Some(answer) = self.store.as_mut().and_then(|store| store.handle(outcome)) {
+            self.ftp.answer(answer);
+        }
+    }
+
+    /// Whether a sector may be erased: it may stall the processor for seconds. Only on the ground, disarmed, and not while the
+    /// roadmap is planned on.
+    fn may_erase(&self) -> bool {
+        let idle = matches!(
+            self.state,
+            State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
+        );
+        let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
+        idle && known && !self.telemetry.armed
+    }
+
+    /// Serves a frame, if it is one for the services; whether it was.
+    pub(crate) fn serve(&mut self, link: Link, frame: &Frame) -> bool {
+        let p = frame.padded();
+        let own = (self.config.system_id, crate::COMPONENT);
+        if (frame.system, frame.component) == own {
+            return false;
+        }
+        let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
+        match frame.message_id {
+            ftp::MESSAGE if (p[1], p[2]) == own => {
+                if self.store.is_some() {
+                    self.ftp.handle(link as usize, self.now, frame);
+                }
+            }
+            PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
+                (0..parameters::COUNT).for_each(|index| self.tell_parameter(link, index));
+            }
+            PARAM_REQUEST_READ_DATA::ID if for_us(2) => {
+                let index = i16::from_le_bytes([p[0], p[1]]);
+                let found = match usize::try_from(index) {
+                    Ok(index) => Some(index).filter(|index| *index < parameters::COUNT),
+                    Err(_) => Parameters::index_of(name(&p[4..20])),
+                };
+                match found {
+                    Some(index) => self.tell_parameter(link, index),
+                    None if p[3] == own.1 => {
+                        let mut id = [0; 16];
+                        id.copy_from_slice(&p[4..20]);
+                        self.refuse_parameter(
+                            link,
+                            frame,
+                            index,
+                            id,
+                            MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+                        );
+                    }
+                    None => {}
+                }
+            }
+            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(link, frame),
+            TIMESYNC_DATA::ID => {
+                if let Some(request) = frame.decode::<TIMESYNC_DATA>()
+                    && request.tc1 == 0
+                {
+                    let answer = Outgoing::Timesync(self.now.micros() as i64 * 1000, request.ts1);
+                    self.outboxes[link as usize].push(answer);
+                }
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    fn parameters(&self) -> &Parameters {
+        self.store.as_ref().map_or(&self.parameters, Store::parameters)
+    }
+
+    fn tell_parameter(&mut self, link: Link, index: usize) {
+        if let Some((name, value)) = self.parameters().get(index) {
+            self.outboxes[link as usize].push(Outgoing::ParameterValue { index, name, value });
+        }
+    }
+
+    fn set_parameter(&mut self, link: Link, frame: &Frame) {
+        let p = frame.padded();
+        let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
+        let found = Parameters::index_of(name(&p[6..22]));
+        let result = match found {
+            None => Err(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST),
+            Some(_) if kind != REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
+            Some(index) => {
+                let result = match &mut self.store {
+                    Some(store) => store.set_parameter(index, value),
+                    None => self.parameters.set(index, value).map(|_| ()),
+                };
+                result.map_err(|why| match why {
+                    Refused::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+                    Refused::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
+                })
+            }
+        };
+        // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
+        if let Some(index) = found {
+            self.tell_parameter(link, index);
+        }
+        if let Err(why) = result
+            && p[5] == crate::COMPONENT
+        {
+            let mut id = [0; 16];
+            id.copy_from_slice(&p[6..22]);
+            self.refuse_parameter(link, frame, -1, id, why);
+        }
+    }
+
+    fn refuse_parameter(&mut self, link: Link, frame: &Frame, index: i16, id: [u8; 16], why: MavParamError) {
+        let to = (frame.system, frame.component);
+        let error = Outgoing::ParameterError { index, id, why: why as u8, to };
+        self.outboxes[link as usize].push(error);
+    }
+
+    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion starts anew, unless the vehicle is armed.
+    pub(crate) fn restart(&mut self, command: &Command) -> u8 {
+        let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
+        if !asked {
+            return DENIED;
+        }
+        if self.telemetry.armed {
+            return TEMPORARILY_REJECTED;
+        }
+        // Full only if the shell does not drain: then it is asked again.
+        match self.events.push_back(Event::RestartRequested) {
+            Ok(()) => ACCEPTED,
+            Err(_) => TEMPORARILY_REJECTED,
+        }
+    }
+}
+
+/// A parameter's name as it travels: a zero ends a shorter one.
+fn name(field: &[u8]) -> &[u8] {
+    field.split(|b| *b == 0).next().unwrap_or_default()
+}
+
+/// AUTOPILOT_VERSION: what it can do, and the version of this crate.
+pub(crate) fn version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
+    let [major, minor, patch] =
+        [env!("CARGO_PKG_VERSION_MAJOR"), env!("CARGO_PKG_VERSION_MINOR"), env!("CARGO_PKG_VERSION_PATCH")]
+            .map(|part| part.parse::<u8>().unwrap_or(0));
+    AUTOPILOT_VERSION_DATA {
+        capabilities: MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_COMMAND_INT
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_MAVLINK2
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_C_CAST
+            | MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP,
+        flight_sw_version: u32::from_be_bytes([major, minor, patch, 0]),
+        uid: u64::from(system_id),
+        ..AUTOPILOT_VERSION_DATA::default()
+    }
+}
+
+#[cfg(test)]
+#[path = "services_tests.rs"]
+mod tests;

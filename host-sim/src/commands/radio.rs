@@ -1,0 +1,87 @@
+//! `host-sim radio`: the radio of a swarm whose companions are boards or processes of their own.
+
+use std::process::ExitCode;
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
+
+use anyhow::Context;
+use companion::Instant;
+use companion::frame::{Framer, MAX_SENT};
+use planner_core::Point;
+
+use crate::link::{Link, LinkUrl};
+use crate::say;
+use crate::swarm::radio::{Radio, RadioConfig};
+
+/// Arguments of `host-sim radio`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A companion's or ground station's link, one for each: udp-listen:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT,
+    /// tcp:HOST:PORT or serial:PATH:BAUD
+    #[arg(long, value_name = "URL", required = true)]
+    listen: Vec<LinkUrl>,
+    /// Share of frames that a receiver misses
+    #[arg(long, value_name = "SHARE", default_value_t = 0.0, value_parser = share)]
+    loss: f64,
+    /// Time from sending to hearing, seconds
+    #[arg(long, value_name = "S", default_value_t = 0.05, value_parser = seconds)]
+    delay: f64,
+    /// Seed of the losses
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    seed: u64,
+}
+
+const NAP: Duration = Duration::from_millis(1);
+
+fn number(text: &str, most: f64) -> Result<f64, String> {
+    let sound = text.parse().ok().filter(|value| (0.0..=most).contains(value));
+    sound.ok_or_else(|| format!("expected a number from 0 to {most}"))
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, 1.0)
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    number(text, 60.0)
+}
+
+/// Passes every frame on to all other links until the process is ended. Prints `listening URL` for each.
+///
+/// # Errors
+/// A link that cannot be opened or is lost for good.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let config = RadioConfig { range_m: f32::INFINITY, loss: args.loss, delay_s: args.delay };
+    let mut radio = Radio::new(config, args.listen.len(), args.seed);
+    let places = vec![Point::zeros(); args.listen.len()];
+    let mut links: Vec<(&LinkUrl, Box<dyn Link>, Framer)> = Vec::new();
+    for url in &args.listen {
+        let link = url.open()?;
+        say!("listening {}", url.opened(&*link));
+        links.push((url, link, Framer::new()));
+    }
+    let began = Clock::now();
+    let mut buffer = [0; 2048];
+    loop {
+        let now_us = began.elapsed().as_micros() as u64;
+        for (station, (url, link, framer)) in links.iter_mut().enumerate() {
+            let lost = || format!("link lost: {url}");
+            loop {
+                let length = link.receive(&mut buffer).with_context(lost)?;
+                let mut input = &buffer[..length];
+                while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut input) {
+                    let mut packet = [0; MAX_SENT];
+                    let length = frame.encode(&mut packet);
+                    radio.broadcast(now_us, Some(station), &places, &packet[..length]);
+                }
+                if length == 0 {
+                    break;
+                }
+            }
+            while let Some(packet) = radio.receive(now_us, station) {
+                link.send(&packet).with_context(lost)?;
+            }
+        }
+        sleep(NAP);
+    }
+}

@@ -1,0 +1,63 @@
+//! `host-sim upload`: a roadmap or mission file goes to a companion by MAVLink FTP.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::{Context, anyhow, bail};
+use companion::mission_file::{self, MissionView};
+use companion::store::File;
+use planner_core::roadmap::{self, RoadmapView};
+
+use crate::link::LinkUrl;
+use crate::progress::Progress;
+use crate::say;
+use crate::upload::Client;
+
+/// Arguments of `host-sim upload`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// A roadmap or mission file, as `host-sim plan` writes them
+    file: PathBuf,
+    /// Link to the vehicle's autopilot, which passes it on, or to the companion itself: udp:HOST:PORT, udp-listen:HOST:PORT,
+    /// tcp:HOST:PORT, tcp-listen:HOST:PORT or serial:PATH:BAUD
+    #[arg(long, value_name = "URL")]
+    link: LinkUrl,
+    /// Which vehicle, by its MAVLink system id; the first companion heard if not given
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
+    id: Option<u8>,
+}
+
+/// Uploads, and compares the CRC-32 of what arrived. It is used from the companion's next start on.
+///
+/// # Errors
+/// A file that is neither; no companion heard; a companion that refuses it; a link that fails.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let path = args.file.display();
+    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read {path}"))?;
+    let file = kind(&bytes).with_context(|| format!("not for upload: {path}"))?;
+    let mut client = Client::new(args.link.open()?, args.id);
+    let system = client.find()?;
+    let bar = Progress::on_terminal().steps("upload", bytes.len() as u64);
+    client.upload(file, &bytes, |done| bar.at(done)).with_context(|| format!("upload failed: {path}"))?;
+    drop(bar);
+    say!(
+        "{path} is vehicle {system}'s {} from its next start on: {} bytes, CRC-32 right",
+        file.name(),
+        bytes.len()
+    );
+    Ok(ExitCode::SUCCESS)
+}
+
+fn kind(bytes: &[u8]) -> anyhow::Result<File> {
+    if bytes.starts_with(&roadmap::MAGIC) {
+        RoadmapView::parse(bytes).map_err(|e| anyhow!("the roadmap is not sound: {e:?}"))?;
+        Ok(File::Roadmap)
+    } else if bytes.starts_with(&mission_file::MAGIC) {
+        MissionView::parse(bytes).map_err(|e| anyhow!("the mission is not sound: {e:?}"))?;
+        Ok(File::Mission)
+    } else {
+        bail!(
+            "it begins neither as a roadmap nor as a mission\n  hint: `host-sim plan` writes roadmap.bin and mission.bin"
+        )
+    }
+}

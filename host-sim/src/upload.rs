@@ -1,0 +1,276 @@
+//! A MAVLink FTP client: uploads a file to a companion and compares CRCs.
+//!
+//! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is not answered is sent again
+//! with the same sequence number.
+
+use std::collections::BTreeMap;
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
+
+use anyhow::{Context, bail};
+use companion::frame::{self, Frame, Framer, Header};
+use companion::ftp::{DATA, MESSAGE, PAYLOAD_LEN};
+use companion::store::File;
+use companion::{COMPONENT, Instant};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
+
+use crate::link::Link;
+
+/// System and component id of a ground station.
+const US: (u8, u8) = (255, 190);
+/// Pieces under way at once.
+const UNDER_WAY: usize = 4;
+/// What is not answered is sent again after this time.
+const AGAIN: Duration = Duration::from_millis(400);
+/// The companion may have to erase its flash first: eight sectors of two seconds each.
+const PATIENCE: Duration = Duration::from_secs(30);
+const BEAT: Duration = Duration::from_secs(1);
+const NAP: Duration = Duration::from_millis(1);
+
+const TERMINATE: u8 = 1;
+const RESET: u8 = 2;
+const CREATE: u8 = 6;
+const WRITE: u8 = 7;
+const CRC32: u8 = 14;
+const ACK: u8 = 128;
+
+/// A client on a link.
+pub struct Client {
+    link: Box<dyn Link>,
+    framer: Framer,
+    began: Clock,
+    beat_at: Clock,
+    frames: u8,
+    system: Option<u8>,
+    sequence: u16,
+    session: u8,
+}
+
+struct Answer {
+    sequence: u16,
+    session: u8,
+    yes: bool,
+    answers: u8,
+    data: Vec<u8>,
+}
+
+impl Client {
+    /// A client that talks to the companion of one vehicle, or of the first it hears.
+    pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
+        let now = Clock::now();
+        // Not that of a client before us: a server knows repeated requests by it.
+        let sequence = std::time::SystemTime::now()
+            .duration_since(std::time::UNIX_EPOCH)
+            .map_or(0, |since| (since.as_millis() % 65_536) as u16);
+        Self {
+            link,
+            framer: Framer::new(),
+            began: now,
+            beat_at: now,
+            frames: 0,
+            system,
+            sequence,
+            session: 0,
+        }
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
+        self.frames = self.frames.wrapping_add(1);
+        self.link.send(bytes).context("link lost")
+    }
+
+    fn header(&self) -> Header {
+        Header { system: US.0, component: US.1, sequence: self.frames }
+    }
+
+    /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
+    fn hear(&mut self) -> anyhow::Result<Vec<Frame>> {
+        if Clock::now() >= self.beat_at {
+            self.beat_at += BEAT;
+            let beat = HEARTBEAT_DATA {
+                mavtype: MavType::MAV_TYPE_GCS,
+                autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+                mavlink_version: 3,
+                ..HEARTBEAT_DATA::DEFAULT
+            };
+            let mut out = [0; frame::MAX_SENT];
+            let length = frame::encode(self.header(), &beat, &mut out);
+            self.send(&out[..length])?;
+        }
+        let mut buffer = [0; 2048];
+        let length = self.link.receive(&mut buffer).context("link lost")?;
+        if length == 0 {
+            sleep(NAP);
+        }
+        let now = Instant::from_micros(self.began.elapsed().as_micros() as u64);
+        let mut input = &buffer[..length];
+        let mut frames = Vec::new();
+        while let Some(frame) = self.framer.next(now, &mut input) {
+            let ours = self.system.is_none_or(|system| system == frame.system);
+            frames.extend((ours && frame.component == COMPONENT).then_some(frame));
+        }
+        Ok(frames)
+    }
+
+    /// Waits for a companion; its system id.
+    ///
+    /// # Errors
+    /// None is heard.
+    pub fn find(&mut self) -> anyhow::Result<u8> {
+        let began = Clock::now();
+        while began.elapsed() < PATIENCE {
+            if let Some(frame) = self.hear()?.first() {
+                self.system = Some(frame.system);
+                return Ok(frame.system);
+            }
+        }
+        bail!(
+            "no companion heard: component {COMPONENT}{} said nothing for {} s\n  hint: between two of its ports PX4 passes \
+             messages on where MAV_x_FORWARD is set",
+            self.system.map_or(String::new(), |system| format!(" of system {system}")),
+            PATIENCE.as_secs()
+        )
+    }
+
+    fn request(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
+        let mut payload = [0; PAYLOAD_LEN];
+        (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPONENT);
+        payload[3..5].copy_from_slice(&self.sequence.to_le_bytes());
+        payload[5..8].copy_from_slice(&[self.session, opcode, data.len() as u8]);
+        payload[11..15].copy_from_slice(&offset.to_le_bytes());
+        payload[15..15 + data.len()].copy_from_slice(data);
+        self.sequence = self.sequence.wrapping_add(1);
+        payload
+    }
+
+    fn ask(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
+        let mut out = [0; frame::MAX_SENT];
+        let extra = frame::extra_crc(MESSAGE).context("the dialect has FTP")?;
+        let length = frame::encode_raw(self.header(), MESSAGE, extra, payload, &mut out);
+        self.send(&out[..length])
+    }
+
+    fn answers(&mut self) -> anyhow::Result<Vec<Answer>> {
+        let frames = self.hear()?;
+        let for_us = frames
+            .iter()
+            .map(Frame::padded)
+            .zip(&frames)
+            .filter(|(p, frame)| frame.message_id == MESSAGE && (p[1], p[2]) == US);
+        let read = |p: &[u8; 255]| Answer {
+            sequence: u16::from_le_bytes([p[3], p[4]]),
+            session: p[5],
+            yes: p[6] == ACK,
+            answers: p[8],
+            data: p[15..15 + usize::from(p[7]).min(DATA)].to_vec(),
+        };
+        Ok(for_us.map(|(p, _)| read(p)).collect())
+    }
+
+    /// Asks until it is answered.
+    fn done(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
+        let request = self.request(opcode, 0, data);
+        let (began, mut asked): (_, Option<Clock>) = (Clock::now(), None);
+        while began.elapsed() < PATIENCE {
+            if asked.is_none_or(|at| at.elapsed() > AGAIN) {
+                self.ask(&request)?;
+                asked = Some(Clock::now());
+            }
+            let sequence = self.sequence;
+            let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
+            if let Some(answer) = self.answers()?.into_iter().find(mine) {
+                if !answer.yes {
+                    bail!("{}", why(&answer.data));
+                }
+                return Ok(answer);
+            }
+        }
+        bail!("the companion does not answer")
+    }
+
+    /// Uploads a file; `progress` is told how many bytes have arrived.
+    ///
+    /// # Errors
+    /// The companion refuses it, does not answer, or got something else.
+    pub fn upload(&mut self, file: File, bytes: &[u8], progress: impl Fn(u64)) -> anyhow::Result<()> {
+        self.done(RESET, &[])?;
+        self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
+        let mut pieces = bytes.chunks(DATA).enumerate();
+        let mut under_way: BTreeMap<u16, ([u8; PAYLOAD_LEN], Clock, usize)> = BTreeMap::new();
+        let (mut arrived, mut heard_at) = (0, Clock::now());
+        loop {
+            while under_way.len() < UNDER_WAY
+                && let Some((i, piece)) = pieces.next()
+            {
+                let request = self.request(WRITE, (i * DATA) as u32, piece);
+                self.ask(&request)?;
+                under_way.insert(self.sequence, (request, Clock::now(), piece.len()));
+            }
+            if under_way.is_empty() {
+                break;
+            }
+            for answer in self.answers()? {
+                if answer.answers != WRITE {
+                    continue;
+                }
+                if !answer.yes {
+                    bail!("{}", why(&answer.data));
+                }
+                if let Some((_, _, length)) = under_way.remove(&answer.sequence) {
+                    arrived += length;
+                    heard_at = Clock::now();
+                    progress(arrived as u64);
+                }
+            }
+            if heard_at.elapsed() > PATIENCE {
+                bail!("the companion does not answer any more, after {arrived} bytes");
+            }
+            let late: Vec<_> = under_way.values_mut().filter(|(_, at, _)| at.elapsed() > AGAIN).collect();
+            let mut again = Vec::new();
+            for (request, at, _) in late {
+                *at = Clock::now();
+                again.push(*request);
+            }
+            again.iter().try_for_each(|request| self.ask(request))?;
+        }
+        self.done(TERMINATE, &[]).context("not stored")?;
+        let sum = self.done(CRC32, file.name().as_bytes()).context("cannot compare")?;
+        if sum.data != crc32(bytes).to_le_bytes() {
+            bail!("what arrived has another CRC-32");
+        }
+        Ok(())
+    }
+}
+
+/// FTP's CRC-32: that of zip, but begun at 0 and not inverted.
+fn crc32(bytes: &[u8]) -> u32 {
+    const FTP: crc::Algorithm<u32> =
+        crc::Algorithm { init: 0, xorout: 0, check: 0x2DFD_2D88, residue: 0, ..crc::CRC_32_ISO_HDLC };
+    crc::Crc::<u32>::new(&FTP).checksum(bytes)
+}
+
+fn why(data: &[u8]) -> String {
+    let known = match data {
+        [2, 5, ..] => "the file is no such file, damaged, or the flash failed; the old one was kept",
+        [2, 27, ..] => "the file is too large",
+        [4, ..] => "the companion was started anew",
+        [5, ..] => "another client is uploading",
+        [9, ..] => {
+            "the companion protects its file: the vehicle is armed, or a roadmap waits for a restart already\n  \
+             hint: restart the companion (MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN) and upload again"
+        }
+        _ => return format!("the companion refuses: NAK {data:?}"),
+    };
+    known.to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_crc_is_that_of_the_clients_that_others_wrote() {
+        // PX4's `crc32part` and MAVSDK's `Crc32` of the same digits.
+        assert_eq!(crc32(b"123456789"), 0x2DFD_2D88);
+    }
+}
