@@ -23,7 +23,9 @@ use crate::planner::Planner;
 pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 
 /// Bytes taken from a UART at once.
-const CHUNK: usize = 128;
+const CHUNK: usize = 256;
+/// Between two looks at a UART, so that bytes come in handfuls: each look costs as much as a hundred bytes.
+const GATHER: Duration = Duration::from_millis(1);
 /// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
 /// Setpoints further apart than this are late: twice in a row would be its autopilot's failsafe.
@@ -194,6 +196,7 @@ impl Shell {
                 Err(_) => {}
             }
             self.seen(link as usize);
+            Timer::after(GATHER).await;
         }
     }
 

@@ -59,9 +59,8 @@ pub fn build(board: Board) -> Result<PathBuf> {
     let target = board.target();
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
     let arguments = ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
-    // Products of two boards do not mix: both are called flockmate.
-    let products = target_dir().join("boards").join(board.name());
-    let mut flags = format!("-Dwarnings -Ctarget-cpu={}", board.cpu());
+    let products = target_dir().join("firmware");
+    let mut flags = String::new();
     let mut building = if rustup_has(target) {
         println!("{}: rustup's {target}", board.name());
         cargo()
@@ -69,21 +68,32 @@ pub fn build(board: Board) -> Result<PathBuf> {
         println!("{}: Debian's toolchain builds core for {target}", board.name());
         install::debian(install::BARE_METAL)
             .with_context(|| format!("neither that nor rustup's: rustup target add {target}"))?;
-        flags += " -Clinker-flavor=ld.lld -Clinker=/usr/bin/ld.lld";
+        flags += "-Clinker-flavor=ld.lld ";
         let mut cargo = command("/usr/bin/cargo");
         cargo
             .env("RUSTC_BOOTSTRAP", "1")
             .env("RUSTC", "/usr/bin/rustc")
-            .env("CARGO_UNSTABLE_BUILD_STD", "core,alloc")
-            .env("CARGO_UNSTABLE_BUILD_STD_FEATURES", "compiler-builtins-mem")
+            .env(variable(target, "LINKER"), "/usr/bin/ld.lld")
             .env_remove("RUSTUP_TOOLCHAIN")
             .env_remove("CARGO");
+        cargo.args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"]);
         cargo
     };
-    let flags_of = format!("CARGO_TARGET_{}_RUSTFLAGS", target.to_uppercase().replace(['-', '.'], "_"));
-    building.args(arguments).arg(board.name()).args(programs).env(flags_of, flags);
-    run(building.env("CARGO_TARGET_DIR", &products))?;
-    Ok(products.join(target).join("release"))
+    flags += &format!("-Ctarget-cpu={}", board.cpu());
+    building.args(arguments).arg(board.name()).args(programs).env(variable(target, "RUSTFLAGS"), flags);
+    run(building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info"))?;
+    // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
+    let aside = products.join(board.name());
+    std::fs::create_dir_all(&aside)?;
+    for program in board.programs() {
+        std::fs::copy(products.join(target).join("release").join(program), aside.join(program))?;
+    }
+    Ok(aside)
+}
+
+/// Cargo's environment variable for a target's setting.
+fn variable(target: &str, name: &str) -> String {
+    format!("CARGO_TARGET_{}_{name}", target.to_uppercase().replace(['-', '.'], "_"))
 }
 
 fn rustup_has(target: &str) -> bool {

@@ -4,6 +4,7 @@
 mod bare_metal;
 mod bench;
 mod build;
+mod emulate;
 mod install;
 mod shell;
 mod test;
@@ -21,6 +22,8 @@ enum Command {
     Bench(bench::Args),
     /// The firmware for a board.
     Build(build::Args),
+    /// The demo's first vehicles flown by boards in QEMU.
+    Emulate(emulate::Args),
 }
 
 fn main() -> ExitCode {
@@ -28,6 +31,7 @@ fn main() -> ExitCode {
         Command::Test(args) => test::run(&args),
         Command::Bench(args) => bench::run_bench(&args),
         Command::Build(args) => build::run(&args),
+        Command::Emulate(args) => emulate::run_emulate(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
