@@ -12,7 +12,7 @@ use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
-use firmware::boards::chosen::{self, LAYOUT, Parts, Receiver, Transmitter};
+use firmware::boards::chosen::{self, LAYOUT, Parts, Receiver, Transmitter, Watchdog};
 use firmware::boards::crash;
 use firmware::capacity::VEHICLES;
 use firmware::planner::{Memory, Planner};
@@ -59,7 +59,7 @@ fn main() -> ! {
 /// Brings the companion up, then plans and keeps the flash.
 #[task]
 async fn work(parts: Parts, crashed: Option<String<50>>) {
-    let Parts { links, mut autopilot, swarm, mut flash, .. } = parts;
+    let Parts { links, mut autopilot, swarm, mut flash, watchdog, .. } = parts;
     let store = Store::mount(LAYOUT, &mut flash);
     let roadmap = store
         .roadmap()
@@ -97,6 +97,7 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
     shell.start(companion);
     let shell: &'static Shell = shell;
     start_links(links, shell, system_id, autopilot, swarm);
+    links.spawn(watch(shell, watchdog).expect("there is one such task"));
     let mut planner = Planner { roadmap, mission, system_id, memory: MEMORY.take() };
     shell.work(&mut planner, &mut flash).await
 }
@@ -114,7 +115,6 @@ fn start_links(
     links.spawn(transmit(shell, Link::Autopilot, autopilot.1).expect(once));
     links.spawn(transmit(shell, Link::Swarm, swarm.1).expect(once));
     links.spawn(keep_time(shell).expect(once));
-    links.spawn(watch(shell).expect(once));
 }
 
 #[task(pool_size = 2)]
@@ -134,8 +134,8 @@ async fn keep_time(shell: &'static Shell) {
 
 /// Feeds the watchdog while all is well, and starts anew when that is asked for.
 #[task]
-async fn watch(shell: &'static Shell) {
-    let mut watchdog = chosen::watchdog();
+async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
+    watchdog.wake();
     loop {
         Timer::after(ALIVE_EVERY).await;
         if shell.wants_restart() {

@@ -4,7 +4,8 @@
 //! port to the autopilot by MAVLink FTP; then `host-sim fly` is autopilots, radio and ground station to them, at the speed of
 //! the clock.
 
-use std::net::TcpListener;
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -25,6 +26,12 @@ const SHIFT: &str = "shift=4";
 /// A companion that has heard no autopilot for ten seconds erases its flash; that takes ten more.
 const ALONE_AFTER: Duration = Duration::from_secs(22);
 
+/// Where the stack lies, as in the board's memory map.
+const STACK: u32 = 0x2008_0400;
+const STACK_LEN: usize = 127 << 10;
+/// What no stack has touched since the start.
+const PAINT: u8 = 0xcc;
+
 /// What to fly.
 #[derive(clap::Args)]
 pub struct Args {
@@ -43,8 +50,9 @@ impl Default for Args {
     }
 }
 
-/// Builds, uploads and flies; fails if the mission was not complete and clean.
-pub fn run_emulate(args: &Args) -> Result<()> {
+/// Builds, uploads and flies; fails if the mission was not complete and clean. Returns how much of its stack a board used
+/// at most, bytes.
+pub fn run_emulate(args: &Args) -> Result<usize> {
     install::debian(install::EMULATOR)?;
     let firmware = bare_metal::build(Board::Qemu)?.join("flockmate");
     run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
@@ -60,7 +68,12 @@ pub fn run_emulate(args: &Args) -> Result<()> {
     for file in ["roadmap.bin", "mission.bin"] {
         upload(&boards, &out.join("plan").join(file))?;
     }
-    run(host_sim().arg("fly").arg(&scenario).arg("--out").arg(&out))
+    run(host_sim().arg("fly").arg(&scenario).arg("--out").arg(&out))?;
+    let stacks: Vec<_> =
+        boards.iter().map(|board| board.stack(&out.join("stack.bin"))).collect::<Result<_>>()?;
+    let deepest = stacks.into_iter().max().unwrap_or_default();
+    println!("stack      {deepest} bytes of {STACK_LEN} used at most");
+    Ok(deepest)
 }
 
 fn host_sim() -> Command {
@@ -100,21 +113,37 @@ struct Emulated {
     qemu: Child,
     /// TCP ports of its UARTs: to the autopilot, to the radio.
     ports: [u16; 2],
+    /// QEMU's own.
+    monitor: u16,
 }
 
 impl Emulated {
     fn start(firmware: &Path, out: &Path, id: u8) -> Result<Self> {
-        let ports = free_ports()?;
+        let [autopilot, radio, monitor] = free_ports()?;
+        let ports = [autopilot, radio];
         let log = out.join(format!("board-{id}.defmt"));
         let mut qemu = command("qemu-system-arm");
-        qemu.args(["-machine", "mps2-an500", "-display", "none", "-monitor", "none", "-icount", SHIFT])
+        qemu.args(["-machine", "mps2-an500", "-display", "none", "-icount", SHIFT])
+            .args(["-monitor", &format!("tcp:127.0.0.1:{monitor},server=on,wait=off")])
             .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
             .args(["-chardev", &format!("file,id=log,path={}", log.display())]);
         for port in ports {
             qemu.args(["-serial", &format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on")]);
         }
         let qemu = qemu.arg("-kernel").arg(firmware).stdout(Stdio::null()).spawn();
-        Ok(Self { qemu: qemu.context("qemu-system-arm does not start")?, ports })
+        Ok(Self { qemu: qemu.context("qemu-system-arm does not start")?, ports, monitor })
+    }
+
+    /// Bytes of the stack that were used since the start; `file` is scratch.
+    fn stack(&self, file: &Path) -> Result<usize> {
+        let mut monitor = TcpStream::connect(("127.0.0.1", self.monitor))?;
+        writeln!(monitor, "pmemsave {STACK} {STACK_LEN} \"{}\"", file.display())?;
+        writeln!(monitor, "quit")?;
+        // It says what it does until it has quit.
+        monitor.read_to_end(&mut Vec::new())?;
+        let stack = std::fs::read(file)?;
+        ensure!(stack.len() == STACK_LEN, "QEMU gave {} bytes of stack", stack.len());
+        Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == PAINT).count())
     }
 }
 
@@ -126,8 +155,10 @@ impl Drop for Emulated {
     }
 }
 
-/// Two TCP ports that nobody has now.
-fn free_ports() -> Result<[u16; 2]> {
-    let (a, b) = (TcpListener::bind("127.0.0.1:0")?, TcpListener::bind("127.0.0.1:0")?);
-    Ok([a.local_addr()?.port(), b.local_addr()?.port()])
+/// TCP ports that nobody has now.
+fn free_ports() -> Result<[u16; 3]> {
+    let bind = || TcpListener::bind("127.0.0.1:0");
+    let held = [bind()?, bind()?, bind()?];
+    let [a, b, c] = held.each_ref().map(TcpListener::local_addr);
+    Ok([a?.port(), b?.port(), c?.port()])
 }

@@ -5,8 +5,10 @@ mod bare_metal;
 mod bench;
 mod build;
 mod emulate;
+mod flash;
 mod install;
 mod shell;
+mod size;
 mod test;
 
 use std::process::ExitCode;
@@ -24,6 +26,10 @@ enum Command {
     Build(build::Args),
     /// The demo's first vehicles flown by boards in QEMU.
     Emulate(emulate::Args),
+    /// What the firmware takes of a board's memory.
+    Size(size::Args),
+    /// The firmware onto a board behind a debug probe.
+    Flash(flash::Args),
 }
 
 fn main() -> ExitCode {
@@ -31,7 +37,9 @@ fn main() -> ExitCode {
         Command::Test(args) => test::run(&args),
         Command::Bench(args) => bench::run_bench(&args),
         Command::Build(args) => build::run(&args),
-        Command::Emulate(args) => emulate::run_emulate(&args),
+        Command::Emulate(args) => emulate::run_emulate(&args).map(drop),
+        Command::Size(args) => size::run(&args),
+        Command::Flash(args) => flash::run_flash(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

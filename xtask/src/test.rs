@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::bare_metal::{self, Board};
 use crate::shell::{self, cargo};
-use crate::{emulate, install};
+use crate::{emulate, install, size};
 
 /// Which steps to run.
 #[derive(clap::Args)]
@@ -60,7 +60,17 @@ fn steps(args: &Args) -> Result<()> {
         }
         shell::run(&mut tests)
     })?;
-    step("emulated flight", || emulate::run_emulate(&emulate::Args::default()))
+    let mut stack = 0;
+    step("emulated flight", || {
+        stack = emulate::run_emulate(&emulate::Args::default())?;
+        Ok(())
+    })?;
+    step("sizes", || {
+        for board in Board::ALL {
+            size::rows(board, stack)?;
+        }
+        Ok(())
+    })
 }
 
 /// Runs the steps and says how long each took.

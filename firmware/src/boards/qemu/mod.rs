@@ -27,6 +27,8 @@ pub struct Parts {
     pub swarm: (Receiver, Transmitter),
     /// For files and parameters.
     pub flash: Flash,
+    /// Asleep.
+    pub watchdog: Watchdog,
 }
 
 /// Starts the board. To be called once.
@@ -38,10 +40,6 @@ pub fn start() -> Parts {
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
         swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),
         flash: Flash::new(),
+        watchdog: Watchdog(()),
     }
-}
-
-/// Wakes the watchdog.
-pub fn watchdog() -> Watchdog {
-    Watchdog::new()
 }
