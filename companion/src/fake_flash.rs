@@ -188,6 +188,7 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
         mode: Mode::Labelled,
         method: Method::Priority,
         origin: ORIGIN,
+        cruise_mps: 2.0,
         schedule: ScheduleConfig {
             separation_m: 2.0,
             parked_separation_m: 1.75,

@@ -1,7 +1,8 @@
 //! MAVLink FTP server: `roadmap.bin` and `mission.bin` are listed, read, written, removed and summed.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what clients rely on: an answer has
-//! the request's sequence number plus one, its session and its offset; CRC-32 begins at 0 and is not inverted; a burst ends
+//! the request's sequence number plus one, its session and its offset; the client names the session (`mavftp` writes to it before
+//! it heard that it is open); CRC-32 begins at 0 and is not inverted; a burst ends
 //! with its last packet marked.
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
@@ -13,7 +14,11 @@ mod packet;
 
 use heapless::Deque;
 
-use self::packet::{ACK, EFBIG, EIO, HEAD, NAK, No, Request, Text, chunk, decimal, is_open, op, print, told};
+#[cfg(test)]
+pub(crate) use self::packet::TEXTS;
+use self::packet::{
+    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, print, told,
+};
 use crate::frame::Frame;
 use crate::store::window::Taken;
 use crate::store::{Answer, File, Store, UploadError, UploadState};
@@ -83,7 +88,6 @@ pub struct Ftp {
     queue: Deque<Request, QUEUE>,
     reply: Option<Reply>,
     session: Option<Session>,
-    last_id: u8,
     doing: Doing,
     stream: Option<Stream>,
     done: [Option<Done>; 8],
@@ -98,7 +102,6 @@ impl Default for Ftp {
             queue: Deque::new(),
             reply: None,
             session: None,
-            last_id: 0,
             doing: Doing::Nothing,
             stream: None,
             done: [None; 8],
@@ -161,10 +164,10 @@ impl Ftp {
         match (core::mem::replace(&mut self.doing, Doing::Nothing), answer) {
             (Doing::Read(request, true), Answer::Bytes(bytes)) => match self.stream {
                 Some(stream) if stream.request.is(&request) => self.stream_packet(stream, bytes),
-                _ => self.ack(&request, request.session, bytes),
+                _ => self.ack(&request, bytes),
             },
             (Doing::Sum(request, true), Answer::Sum(sum)) => {
-                self.ack(&request, request.session, &sum.to_le_bytes());
+                self.ack(&request, &sum.to_le_bytes());
             }
             (Doing::Read(request, true) | Doing::Sum(request, true), _) => {
                 self.stream = None;
@@ -208,9 +211,7 @@ impl Ftp {
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
                         self.doing = Doing::Nothing;
-                        let id = self.session.map_or(0, |session| session.id);
                         self.finish(&request, Ok(()));
-                        self.ack(&request, id, &[]);
                     }
                 }
             }
@@ -247,7 +248,7 @@ impl Ftp {
             self.stream = None;
         }
         match request.opcode {
-            op::NONE => self.ack(request, request.session, &[]),
+            op::NONE => self.ack(request, &[]),
             op::TERMINATE => match self.session_of(request) {
                 Ok(Session { writes: true, .. }) => {
                     store.close();
@@ -273,8 +274,8 @@ impl Ftp {
                 None => self.nak(request, No::NotFound),
                 Some((file, size)) => {
                     if self.take_session(request, file, false, store) {
-                        self.finish(request, Ok(()));
-                        self.ack(request, self.last_id, &size.to_le_bytes());
+                        self.remember(request, Ok(()));
+                        self.ack(request, &size.to_le_bytes());
                     }
                 }
             },
@@ -293,7 +294,7 @@ impl Ftp {
             op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
                 Some(file) => {
                     store.remove(file);
-                    self.text = Some((false, "File removed from the next start on"));
+                    self.text = Some(REMOVED);
                     self.finish(request, Ok(()));
                 }
                 None => self.nak(request, No::NotFound),
@@ -327,7 +328,7 @@ impl Ftp {
         if entries.is_empty() {
             self.nak(request, No::EndOfFile);
         } else {
-            self.ack(request, request.session, &entries);
+            self.ack(request, &entries);
         }
     }
 
@@ -359,7 +360,7 @@ impl Ftp {
             return self.nak(request, why.into());
         }
         match store.take(request.offset, request.bytes()) {
-            Taken::Yes => self.ack(request, request.session, &[]),
+            Taken::Yes => self.ack(request, &[]),
             Taken::TooLarge => self.nak(request, No::Errno(EFBIG)),
             Taken::Later => {}
         }
@@ -368,16 +369,19 @@ impl Ftp {
     /// Says once more what a session was opened with.
     fn opened(&mut self, request: &Request, session: &Session, store: &Store) {
         match store.size(session.file) {
-            Some(size) if !session.writes => self.ack(request, session.id, &size.to_le_bytes()),
-            _ => self.ack(request, session.id, &[]),
+            Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
+            _ => self.ack(request, &[]),
         }
     }
 
-    /// The session a request belongs to.
+    /// The session a request belongs to; a request from before it was opened belongs to none.
     fn session_of(&mut self, request: &Request) -> Result<Session, No> {
         let now = self.now;
         match &mut self.session {
             Some(session) if session.client == request.client && session.id == request.session => {
+                if (request.sequence.wrapping_sub(session.opened_by.sequence) as i16) < 0 {
+                    return Err(No::InvalidSession);
+                }
                 session.used = now;
                 Ok(*session)
             }
@@ -397,9 +401,8 @@ impl Ftp {
             return false;
         }
         self.drop_session(store);
-        self.last_id = self.last_id.wrapping_add(1);
-        let (client, used) = (request.client, self.now);
-        self.session = Some(Session { id: self.last_id, client, file, writes, opened_by: *request, used });
+        let Request { client, session: id, .. } = *request;
+        self.session = Some(Session { id, client, file, writes, opened_by: *request, used: self.now });
         true
     }
 
@@ -424,7 +427,7 @@ impl Ftp {
         stream.sequence = stream.sequence.wrapping_add(1);
         let last = stream.left == 0 || bytes.len() < chunk(&request);
         self.stream = (!last).then_some(stream);
-        self.put(&request, ACK, request.session, u8::from(last), bytes);
+        self.put(&request, ACK, u8::from(last), bytes);
     }
 
     fn remembered(&self, request: &Request) -> Option<Result<(), No>> {
@@ -435,25 +438,29 @@ impl Ftp {
 
     /// Answers, and remembers the answer.
     fn finish(&mut self, request: &Request, result: Result<(), No>) {
+        self.remember(request, result);
+        self.respond(request, result);
+    }
+
+    fn remember(&mut self, request: &Request, result: Result<(), No>) {
         self.done[self.next_done] = Some(Done { request: print(request), result, at: self.now });
         self.next_done = (self.next_done + 1) % self.done.len();
-        self.respond(request, result);
     }
 
     fn respond(&mut self, request: &Request, result: Result<(), No>) {
         match result {
-            Ok(()) => self.ack(request, request.session, &[]),
+            Ok(()) => self.ack(request, &[]),
             Err(no) => self.nak(request, no),
         }
     }
 
-    fn ack(&mut self, request: &Request, session: u8, data: &[u8]) {
-        self.put(request, ACK, session, 0, data);
+    fn ack(&mut self, request: &Request, data: &[u8]) {
+        self.put(request, ACK, 0, data);
     }
 
     fn nak(&mut self, request: &Request, no: No) {
         let code = match no {
-            No::Errno(errno) => return self.put(request, NAK, request.session, 0, &[2, errno]),
+            No::Errno(errno) => return self.put(request, NAK, 0, &[2, errno]),
             No::InvalidSize => 3,
             No::InvalidSession => 4,
             No::Sessions => 5,
@@ -462,14 +469,21 @@ impl Ftp {
             No::Protected => 9,
             No::NotFound => 10,
         };
-        self.put(request, NAK, request.session, 0, &[code]);
+        self.put(request, NAK, 0, &[code]);
     }
 
-    fn put(&mut self, request: &Request, opcode: u8, session: u8, burst_complete: u8, data: &[u8]) {
+    fn put(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
         let data = &data[..data.len().min(DATA)];
         let mut packet = [0; HEAD + DATA];
         packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());
-        packet[2..8].copy_from_slice(&[session, opcode, data.len() as u8, request.opcode, burst_complete, 0]);
+        packet[2..8].copy_from_slice(&[
+            request.session,
+            opcode,
+            data.len() as u8,
+            request.opcode,
+            burst_complete,
+            0,
+        ]);
         packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
         packet[HEAD..HEAD + data.len()].copy_from_slice(data);
         self.reply = Some(Reply { link: request.link, to: request.client, packet });

@@ -79,7 +79,9 @@ pub struct MissionHeader {
     pub method: Method,
     /// Origin of the mission frame.
     pub origin: Geodetic,
-    /// Separation and nominal speeds that are planned with.
+    /// Speed along paths, m/s.
+    pub cruise_mps: f32,
+    /// Separation and speeds that are planned with; the schedule reckons with less than the cruise speed.
     pub schedule: ScheduleConfig,
     /// Smallest distance between two vehicles' centres, metres.
     pub safety_distance_m: f32,
@@ -125,8 +127,11 @@ impl MissionHeader {
             return refuse("origin");
         }
         let schedule = &self.schedule;
-        if !positive(schedule.cruise_mps, MAX_SPEED_MPS) {
+        if !positive(self.cruise_mps, MAX_SPEED_MPS) {
             return refuse("cruise_mps");
+        }
+        if !positive(schedule.cruise_mps, MAX_SPEED_MPS) {
+            return refuse("schedule_mps");
         }
         if !positive(schedule.vertical_mps, MAX_SPEED_MPS) {
             return refuse("vertical_mps");
@@ -258,14 +263,13 @@ pub fn write(
     }
     let s = &header.schedule;
     let numbers =
-        [s.cruise_mps, s.vertical_mps, header.safety_distance_m, s.separation_m, s.parked_separation_m];
+        [header.cruise_mps, s.vertical_mps, header.safety_distance_m, s.separation_m, s.parked_separation_m];
     let (low, high) = header.geofence.unwrap_or_default();
     put(
         &mut out[..HEADER_LEN],
         56,
-        numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()),
+        numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()).chain([s.cruise_mps]),
     );
-    out[100..104].fill(0);
     let (to_vehicles, to_goals) = out[HEADER_LEN..].split_at_mut(vehicles.len() * VEHICLE_LEN);
     for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
         to.copy_from_slice(&vehicle.to_bytes());
@@ -330,8 +334,9 @@ impl<'a> MissionView<'a> {
                 _ => return Err(MissionError::Header("method")),
             },
             origin: Geodetic { lat_deg: f64_at(32), lon_deg: f64_at(40), alt_m: f64_at(48) },
+            cruise_mps: f32_at(head, 56),
             schedule: ScheduleConfig {
-                cruise_mps: f32_at(head, 56),
+                cruise_mps: f32_at(head, 100),
                 vertical_mps: f32_at(head, 60),
                 separation_m: f32_at(head, 68),
                 parked_separation_m: f32_at(head, 72),
@@ -440,7 +445,7 @@ impl<'a> MissionView<'a> {
         config.roster.extend(self.vehicles().map(|v| RosterEntry { system_id: v.task.id, start: v.start }));
         config.roster.sort_unstable_by_key(|entry| entry.system_id);
         config.mission_crc = self.crc;
-        config.cruise_mps = libm::fminf(header.schedule.cruise_mps, own.speed_max_mps);
+        config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
         config.climb_mps = header.schedule.vertical_mps;
         config.radius_m = own.radius_m;
         config.required_clearance_m = own.task.required_clearance_m;

@@ -200,3 +200,13 @@ fn the_pilot_outranks_everything_in_the_air() {
         assert_eq!(update(*state, &failsafe).map(|row| row.to), Some(Failsafe), "{state:?}");
     }
 }
+
+#[test]
+fn every_text_is_explained() {
+    let page = include_str!("../../docs/companion.md");
+    let served = crate::ftp::TEXTS.iter().map(|(_, text)| *text);
+    for text in TABLE.iter().map(|row| row.text).filter(|text| !text.is_empty()).chain(served) {
+        assert!(text.len() <= 50, "{text}");
+        assert!(page.contains(&std::format!("\n| {text} | ")), "{text}");
+    }
+}

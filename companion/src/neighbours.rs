@@ -21,11 +21,11 @@ use crate::time::{Duration, Instant};
 const RESTART_MS: u32 = 10_000;
 /// Heard within this time counts as heard: four positions and intents.
 const LATELY: Duration = Duration::from_millis(800);
-/// After this silence a vehicle counts as dead. One that is unheard stops within 4 s (row `NeighboursSilent`) and lands
+/// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
 /// 20 s later; this leaves it 20 s to come down.
 const DEAD: Duration = Duration::from_secs(45);
-/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 2 s, and stops.
-const STRETCH_M: f32 = 8.0;
+/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
+const STRETCH_M: f32 = 6.0;
 /// Spacing of the places on that stretch below which it may lie, metres.
 const STRETCH_STEP_M: f32 = 1.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the

@@ -164,6 +164,16 @@ mod tests {
     }
 
     #[test]
+    fn the_readme_prints_the_table() {
+        extern crate std;
+        let readme = include_str!("../README.md");
+        for p in TABLE {
+            let row = std::format!("| {} | {} | {} | {} |", p.name, p.least, p.most, p.default);
+            assert!(readme.contains(&row), "{row}");
+        }
+    }
+
+    #[test]
     fn kept_values_come_back_and_foreign_ones_do_no_harm() {
         let mut values = Parameters::default();
         values.set(SPEED_MAX, 3.5).unwrap();

@@ -34,6 +34,8 @@ type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
 pub const ACCEL_MPS2: f32 = 1.5;
 /// Nominal speed of take-off and landing, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
+/// Share of the cruise speed that corners, braking and gusts leave over a flight.
+const PACE: f32 = 0.9;
 /// What two vehicles together may stray from their paths, beyond the safety distance, metres.
 const STRAY_M: f32 = 0.5;
 /// Spacing of the places tried as slots around a single goal, metres.
@@ -90,7 +92,7 @@ impl Mission {
             parked_separation_m: safety_m
                 + STRAY_BESIDE_PARKED_M
                 + STRAY_PER_GUST_S * scenario.simulation.gust_mps,
-            cruise_mps: scenario.mission.cruise_mps,
+            cruise_mps: PACE * scenario.mission.cruise_mps,
             vertical_mps: VERTICAL_MPS,
         };
         let goals = goals(&scenario, &map, &schedule)?;
@@ -259,6 +261,7 @@ impl Mission {
             mode: planner_mode(&scenario.mission),
             method: scenario.deconfliction.method,
             origin: scenario.map.origin,
+            cruise_mps: scenario.mission.cruise_mps,
             schedule: self.schedule,
             safety_distance_m: scenario.deconfliction.safety_distance_m,
             geofence: scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max)),

@@ -275,6 +275,18 @@ fn first_allowed(forbidden: &[(f32, f32)], from_s: f32) -> Option<f32> {
     None
 }
 
+/// The largest time ≤ `until_s` outside all of the intervals.
+fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
+    let mut time_s = until_s;
+    for _ in 0..=forbidden.len() {
+        match forbidden.iter().find(|&&(low, high)| low < time_s && time_s < high) {
+            Some(&(low, _)) => time_s = low,
+            None => break,
+        }
+    }
+    time_s
+}
+
 /// What a vehicle that stands at a place may stray from it along its path, metres.
 const STANDING_M: f32 = 0.25;
 

@@ -61,16 +61,32 @@ impl From<UploadError> for No {
 /// What a person is told: whether it is a warning, and the text.
 pub type Text = (bool, &'static str);
 
+/// All that is told.
+pub const TEXTS: [Text; 8] = [
+    (false, "Roadmap stored: used from the next start"),
+    (false, "Mission stored: used from the next start"),
+    (false, "File removed from the next start on"),
+    (true, "Upload refused: armed"),
+    (true, "Upload refused: restart to use the last one"),
+    (true, "Upload incomplete: old file kept"),
+    (true, "Upload is no such file or damaged: old file kept"),
+    (true, "Flash failed: old file kept"),
+];
+
+/// What is told when a file was removed.
+pub const REMOVED: Text = TEXTS[2];
+
+/// What is told when an upload has ended.
 pub fn told(file: File, result: Result<(), UploadError>) -> Text {
-    match (file, result) {
-        (File::Roadmap, Ok(())) => (false, "Roadmap stored: used from the next start"),
-        (File::Mission, Ok(())) => (false, "Mission stored: used from the next start"),
-        (_, Err(UploadError::Armed)) => (true, "Upload refused: armed"),
-        (_, Err(UploadError::Waiting)) => (true, "Upload refused: restart to use the last one"),
-        (_, Err(UploadError::Incomplete)) => (true, "Upload incomplete: old file kept"),
-        (_, Err(UploadError::Damaged)) => (true, "Upload is no such file or damaged: old file kept"),
-        (_, Err(UploadError::Flash)) => (true, "Flash failed: old file kept"),
-    }
+    TEXTS[match (file, result) {
+        (File::Roadmap, Ok(())) => 0,
+        (File::Mission, Ok(())) => 1,
+        (_, Err(UploadError::Armed)) => 3,
+        (_, Err(UploadError::Waiting)) => 4,
+        (_, Err(UploadError::Incomplete)) => 5,
+        (_, Err(UploadError::Damaged)) => 6,
+        (_, Err(UploadError::Flash)) => 7,
+    }]
 }
 
 #[derive(Clone, Copy, Debug)]

@@ -5,6 +5,7 @@
 //! does not help, the others leave it a head start. Rounds are bounded.
 
 use heapless::Vec;
+use libm::fmaxf;
 
 use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
 use crate::Point;
@@ -136,7 +137,8 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(None)
 }
 
-/// The flight that arrives earliest, waiting and stepping aside on its way.
+/// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only to wait for long among the
+/// others; then a later departure is tried, as often as that helps.
 #[expect(clippy::too_many_arguments, reason = "the state of one round")]
 fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
@@ -152,22 +154,48 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     let Some(goal) = flight.goal else { return Ok(flight) };
     let required_m = request.vehicles[index].required_clearance_m;
     let passable = |_: u16, edge: &HalfEdge| view.clears(edge, required_m);
-    let mut found = Err(ScheduleError::Blocked);
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
         let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
-        let route = Route {
+        let mut route = Route {
             from: index as u16,
             to: request.vehicles.len() as u16 + goal,
             not_before_s,
             parked: &parked.pads,
         };
-        let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
-        found = sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight);
-        if found != Err(ScheduleError::Blocked) {
-            break;
+        let mut best: Option<Flight<W>> = None;
+        for _ in 0..DEPARTURES {
+            let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
+            match sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight)
+            {
+                Ok(()) => {}
+                Err(ScheduleError::Blocked) => break,
+                Err(error) => return Err(error),
+            }
+            let (longest_s, all_s) = waits_s(&flight);
+            if best.as_ref().is_none_or(|best| longest_s < waits_s(best).0) {
+                best = Some(flight.clone());
+            }
+            if longest_s <= LONG_WAIT_S {
+                break;
+            }
+            route.not_before_s = flight.depart_s + all_s;
+        }
+        if let Some(best) = best {
+            return Ok(best);
         }
     }
-    found.map(|()| flight)
+    Err(ScheduleError::Blocked)
+}
+
+/// Departures tried for one vehicle.
+const DEPARTURES: usize = 6;
+/// A longer wait in one place in the air is avoided where it can be, seconds: half of what counts as a standstill (20 s).
+const LONG_WAIT_S: f32 = 10.0;
+
+/// The longest wait on the way, and all of them together, seconds.
+fn waits_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
+    let waits = flight.path.waypoints().iter().map(|w| w.leave_s - w.at_s);
+    waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
 }
 
 /// What a path keeps clear of beyond obstacles.

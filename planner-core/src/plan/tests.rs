@@ -150,6 +150,9 @@ fn head_on_in_a_corridor_one_steps_into_the_side_room() {
         let plan = plan(&bytes, &tasks(2, true), 2, Mode::Labelled).unwrap();
         let aside = |f: &Flight<64>| f.path.waypoints().iter().any(|w| w.position.y > 2.0);
         assert!(plan.flights.iter().any(aside), "side room at {side_at_m}, {depth_m} deep");
+        let waits = plan.flights.iter().flat_map(|f| f.path.waypoints()).map(|w| w.leave_s - w.at_s);
+        // It waits on its pad, and in the side room only while the other passes.
+        assert!(waits.fold(0.0, f32::max) < 2.1, "side room at {side_at_m}, {depth_m} deep");
         for speeds in [[1.0, 1.0], [0.3, 2.0], [2.0, 0.3]] {
             let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 20_000);
             let kept = apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3);

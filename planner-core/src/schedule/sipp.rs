@@ -1,5 +1,5 @@
 //! Safe-interval path planning on the roadmap (Phillips and Likhachev 2011): the earliest way past flights that are
-//! already scheduled, with waiting and stepping aside at nodes.
+//! already scheduled, with waiting and stepping aside at nodes. Of the ways that arrive then, the one found leaves as late as it can.
 //!
 //! A node's time falls into *safe intervals*, in which hovering there is clear of every scheduled piece. One search state
 //! is a node with one of its intervals; reaching it earlier is always better, so A* over these states finds the earliest
@@ -13,7 +13,8 @@ use libm::{fmaxf, fminf};
 
 use super::near::Cells;
 use super::{
-    Flight, Forbidden, Piece, ScheduleConfig, ScheduleError, conflict, cut, first_allowed, forbid, parts,
+    Flight, Forbidden, Piece, ScheduleConfig, ScheduleError, conflict, cut, first_allowed, forbid,
+    last_allowed, parts,
 };
 use crate::Point;
 use crate::path::Path;
@@ -90,6 +91,14 @@ pub struct Route<'a> {
     pub parked: &'a [Point],
 }
 
+/// The way from the pad up to the first node.
+struct Climb {
+    pad: Point,
+    /// Somebody else needs the pad's place from then on, seconds.
+    leave_by_s: f32,
+    duration_s: f32,
+}
+
 /// Finds the earliest way for `flight` (its climb and descent are taken, its path and departure are written) that keeps
 /// clear of `scheduled`.
 pub fn route<'a, const N: usize, const P: usize, const W: usize>(
@@ -113,19 +122,19 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     let pad = start - Point::new(0.0, 0.0, flight.climb_m);
     let goal = view.node(route.to);
     let ground = goal - Point::new(0.0, 0.0, flight.descent_m);
-    let climb_s = flight.climb_m / cfg.vertical_mps;
     let descent_s = flight.descent_m / cfg.vertical_mps;
     // Held from −∞, so that it is no conflict with another pad.
     let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
-    let leave_pad_by_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+    let leave_by_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+    let climb = Climb { pad, leave_by_s, duration_s: flight.climb_m / cfg.vertical_mps };
     let land_after_s = ws.near(cfg, &standing(ground, true)).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
     if land_after_s == f32::INFINITY {
         return Err(ScheduleError::Blocked);
     }
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &pad, &start, climb_s, (route.not_before_s, leave_pad_by_s));
-    ws.relax(route.from, None, route.not_before_s, leave_pad_by_s, climb_s, &goal, &start, cfg);
+    ws.forbid_departures(cfg, &pad, &start, climb.duration_s, (route.not_before_s, leave_by_s));
+    ws.relax(route.from, None, route.not_before_s, leave_by_s, climb.duration_s, &goal, &start, cfg);
     while let Some(state) = ws.heap.pop() {
         let reached = ws.states[usize::from(state)];
         if reached.node == route.to {
@@ -133,7 +142,7 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
             let from_s = fmaxf(reached.arrive_s, land_after_s - descent_s);
             let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
             if let Some(land_s) = land_s {
-                return write(view, ws, state, land_s, climb_s, flight);
+                return write(cfg, view, &climb, ws, state, land_s, flight);
             }
         }
         let here = view.node(reached.node);
@@ -315,36 +324,48 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
     }
 }
 
-/// Writes the way that ends in `state`, labelled with seconds after take-off.
+/// Writes the way that ends in `state`, left at `land_s`, labelled with seconds after take-off. Every wait is moved as near to
+/// the pad as the safe intervals allow: who waits in the air is in the way, and its battery drains.
 fn write<const N: usize, const P: usize, const W: usize>(
+    cfg: &ScheduleConfig,
     view: &RoadmapView<'_>,
-    ws: &SippWorkspace<N, P>,
+    climb: &Climb,
+    ws: &mut SippWorkspace<N, P>,
     state: u16,
     land_s: f32,
-    climb_s: f32,
     flight: &mut Flight<W>,
 ) -> Result<(), ScheduleError> {
-    let mut way: Vec<(u16, f32), W> = Vec::new();
+    let mut way: Vec<(u16, f32, f32), W> = Vec::new();
     let (mut at, mut leave_s) = (state, land_s);
     loop {
-        way.push((at, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
-        let State { parent, left_parent_s, .. } = ws.states[usize::from(at)];
-        leave_s = left_parent_s;
-        if parent == at {
+        let reached = ws.states[usize::from(at)];
+        let first = reached.parent == at;
+        let before = ws.states[usize::from(reached.parent)];
+        let here = view.node(reached.node);
+        let (from, until_s) =
+            if first { (climb.pad, climb.leave_by_s) } else { (view.node(before.node), before.until_s) };
+        let duration_s = if first { climb.duration_s } else { (here - from).norm() / cfg.cruise_mps };
+        let earliest_s = reached.left_parent_s;
+        let latest_s = fminf(leave_s - duration_s, until_s);
+        ws.forbid_departures(cfg, &from, &here, duration_s, (earliest_s, latest_s));
+        // Not before the way was found to be free: intervals that are merged for want of room may swallow that time.
+        let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
+        way.push((reached.node, left_s + duration_s, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
+        leave_s = left_s;
+        if first {
             break;
         }
-        at = parent;
+        at = reached.parent;
     }
     // What is left is the departure from the pad.
     flight.depart_s = leave_s;
     flight.path = Path::new();
     let mut before = None;
-    for &(index, leave_s) in way.iter().rev() {
-        let State { node, arrive_s, .. } = ws.states[usize::from(index)];
+    for &(node, arrive_s, leave_s) in way.iter().rev() {
         let edge = before.and_then(|before| view.edge_between(before, node));
         let clearance_m = edge.map_or(view.header().max_clearance_m, |edge| edge.clearance_m);
         flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::PiecesFull)?;
-        let at_s = if before.is_none() { climb_s } else { arrive_s - flight.depart_s };
+        let at_s = if before.is_none() { climb.duration_s } else { arrive_s - flight.depart_s };
         flight.path.label_last(at_s, fmaxf(leave_s - flight.depart_s, at_s));
         before = Some(node);
     }

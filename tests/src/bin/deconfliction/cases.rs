@@ -16,13 +16,15 @@ const RESOLUTION_M: f32 = 0.25;
 const DOORWAY_RESOLUTION_M: f32 = 0.2;
 /// Height of starts and goals over the floor's top, metres.
 const HEIGHT_M: f32 = 1.5;
-/// The gusts of every case.
-const GUSTS: &str = "gust_mps = 3.0\n";
+/// The gusts of every case: what a mission is planned for.
+pub const GUSTS: &str = "gust_mps = 3.0\n";
 
 /// A map and who flies on it: planned once a seed, flown once for each disturbance and method.
 pub struct Meeting {
-    /// What is flown, one row of the table each: the name, and more lines of `[simulation]`.
+    /// What is flown, one row of the table each: the name, and more lines of `[simulation]` and `[[faults]]`.
     pub cases: Vec<(&'static str, &'static str)>,
+    /// The vehicle that faults strike when it has taken off; `None`: another with each seed, somewhere on its way.
+    struck: Option<u8>,
     map: PathBuf,
     vehicles: Vec<(Point, Point)>,
     resolution_m: f32,
@@ -37,6 +39,14 @@ pub struct Meeting {
 }
 
 impl Meeting {
+    /// Whom the faults of the cases strike, and which share of its flight it has behind it then.
+    pub fn strikes(&self, seed: u64) -> (u8, f32) {
+        match self.struck {
+            Some(id) => (id, 0.0),
+            None => ((1 + seed % self.vehicles.len() as u64) as u8, (seed * 37 % 100) as f32 * 0.01),
+        }
+    }
+
     /// Whether more than twenty meet.
     pub fn is_large(&self) -> bool {
         self.vehicles.len() > 20
@@ -78,6 +88,16 @@ impl Meeting {
 const THREE: [&str; 3] =
     [GUSTS, "gust_mps = 3.0\nradio_loss = 0.3\n", "gust_mps = 3.0\nradio_delay_s = 0.3\n"];
 
+/// Radios that fail for good.
+const FAILED: [&str; 3] = [
+    "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"tx\"\n",
+    "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\ndirection = \"rx\"\n",
+    "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"radio-cut\"\n",
+];
+/// The pilot stops a vehicle and keeps it where it is.
+const STOPPED: &str =
+    "gust_mps = 3.0\n[[faults]]\nat_s = AT_S\nvehicle = VEHICLE\nkind = \"pilot-takeover\"\n";
+
 fn three(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
     names.into_iter().zip(THREE).collect()
 }
@@ -86,6 +106,7 @@ fn three(names: [&'static str; 3]) -> Vec<(&'static str, &'static str)> {
 fn indoors() -> Meeting {
     Meeting {
         cases: Vec::new(),
+        struck: None,
         map: PathBuf::new(),
         vehicles: Vec::new(),
         resolution_m: RESOLUTION_M,
@@ -111,7 +132,18 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
     };
     let crossing = Meeting {
         cases: three(["crossing, 8", "crossing, 30 % radio loss", "crossing, 300 ms radio delay"]),
-        map: crossing(dir)?,
+        map: crossing_map(dir, "crossing.bt", 3.5)?,
+        vehicles: crossing_vehicles(z),
+        nodes: 400,
+        ..indoors()
+    };
+    // High enough to fly over a vehicle that lies somewhere on the floor.
+    let radios = Meeting {
+        cases: ["radio only hears, crossing", "radio only sends, crossing", "radio is dead, crossing"]
+            .into_iter()
+            .zip(FAILED)
+            .collect(),
+        map: crossing_map(dir, "high.bt", 4.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
         ..indoors()
@@ -161,7 +193,22 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         safety_margin_m: 0.3,
         ..indoors()
     };
-    Ok(vec![corridor, crossing, doorway, twenty, hundred])
+    let stopped = Meeting {
+        struck: Some(3),
+        vehicles: vec![
+            (Point::new(3.0, 3.0, z), Point::new(14.0, 3.0, z)),
+            (Point::new(14.0, 6.0, z), Point::new(3.0, 6.0, z)),
+            // The others wait for it to leave the doorway: that is the short way.
+            (Point::new(8.4, 4.4, z), Point::new(14.0, 8.0, z)),
+        ],
+        map: doorway.map.clone(),
+        cases: vec![("doorway, one is stopped in it", STOPPED)],
+        resolution_m: DOORWAY_RESOLUTION_M,
+        nodes: 600,
+        safety_margin_m: 0.3,
+        ..indoors()
+    };
+    Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, hundred])
 }
 
 /// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
@@ -223,8 +270,8 @@ fn doorway(dir: &Path) -> Result<PathBuf> {
 }
 
 /// Two corridors 4 m wide that cross at (15, 15).
-fn crossing(dir: &Path) -> Result<PathBuf> {
-    carve(dir, "crossing.bt", RESOLUTION_M, Point::new(30.0, 30.0, 3.5), |p| {
+fn crossing_map(dir: &Path, name: &str, height_m: f32) -> Result<PathBuf> {
+    carve(dir, name, RESOLUTION_M, Point::new(30.0, 30.0, height_m), |p| {
         let across = |v: f32| (13.0..17.0).contains(&v);
         let along = |v: f32| (0.25..29.75).contains(&v);
         (across(p.x) && along(p.y)) || (across(p.y) && along(p.x))

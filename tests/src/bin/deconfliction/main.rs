@@ -24,6 +24,8 @@ use cases::Meeting;
 const METHODS: [&str; 2] = ["priority", "algorithm2"];
 /// A separation at which nobody is in anybody's way, metres.
 const ALONE_M: f32 = 1e-3;
+/// From the beginning of a simulation to the first vehicle at its height, seconds.
+const STARTED_S: f32 = 8.0;
 
 #[derive(Parser)]
 #[command(about = "Hard meetings of vehicles, flown over many seeds")]
@@ -179,7 +181,8 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
 fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     let mut rows = rows(meeting);
     rows.iter_mut().for_each(|row| row.seeds = 1);
-    let mut mission = Mission::prepare(parsed(meeting, "off", "", seed, dir)?, &Progress::hidden())?;
+    let mut mission =
+        Mission::prepare(parsed(meeting, "off", cases::GUSTS, seed, dir)?, &Progress::hidden())?;
     let plan = match mission.plan() {
         Ok(plan) => plan,
         Err(error) => {
@@ -195,16 +198,32 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
     mission.schedule = apart;
+    let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
-    for (row, (&(_, simulation), method)) in rows.iter_mut().zip(cases) {
-        mission.scenario = parsed(meeting, method, simulation, seed, dir)?;
+    for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases) {
+        let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck);
+        mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
         count(row, &flight.result, &alone);
+        if !flight.result.complete {
+            let file = dir.join(format!("{name}, {method}, seed {seed}.toml"));
+            std::fs::write(&file, meeting.scenario(method, &simulation, seed))
+                .with_context(|| format!("cannot write {}", file.display()))?;
+        }
         let errors = flight.log.iter().filter(|event| event.level == Level::Error);
         row.incidents
             .extend(errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)));
     }
     Ok(rows)
+}
+
+/// The vehicle that faults strike, and when: what a scenario says of it.
+fn strike(meeting: &Meeting, plan: &SwarmPlan, alone: &MissionResult, seed: u64) -> (String, String) {
+    let (id, share) = meeting.strikes(seed);
+    let index = usize::from(id) - 1;
+    let flying_s = share * (alone.vehicles[index].flight_time_s as f32);
+    let at_s = STARTED_S + plan.flights[index].depart_s + flying_s;
+    (id.to_string(), format!("{at_s:.1}"))
 }
 
 fn parsed(
