@@ -288,7 +288,8 @@ impl<'a> Monitor<'a> {
         if now.phase != Phase::Flying || now.ordered || moved {
             vehicle.best_progress_m = vehicle.best_progress_m.max(now.progress_m);
             vehicle.progressed_s = t_s;
-            if std::mem::take(&mut vehicle.stuck) && moved && self.waits_end {
+            let ends = moved || now.phase == Phase::TakeOffOrLanding;
+            if std::mem::take(&mut vehicle.stuck) && ends && self.waits_end {
                 self.deadlocks -= 1;
             }
         } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
@@ -403,6 +404,13 @@ mod tests {
             }
             assert_eq!(monitor.deadlocks, 1);
             monitor.observe(30.0, &on_path(2.5));
+            assert_eq!(monitor.deadlocks, 0);
+            for step in 301..600 {
+                monitor.observe(f64::from(step) * 0.1, &on_path(2.5));
+            }
+            assert_eq!(monitor.deadlocks, 1);
+            let lands = [at(2.5, 2.0, 5.0, Phase::TakeOffOrLanding), at(5.0, 5.0, 5.0, Phase::Grounded)];
+            monitor.observe(60.0, &lands);
             assert_eq!(monitor.deadlocks, 0);
         });
     }

@@ -14,7 +14,7 @@ use clap::Parser;
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
 use host_sim::report::Level;
-use host_sim::result::MissionResult;
+use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::{scenario, swarm};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -63,6 +63,8 @@ struct Row {
     violations: u32,
     wall_contacts: u32,
     deadlocks: u32,
+    /// Vehicles that no fault struck and that landed short of their goals, for want of a way.
+    held_up: usize,
     /// Smallest separation seen, metres.
     min_separation_m: f64,
     /// Mean share by which flights, from take-off to landing, take longer than alone.
@@ -82,7 +84,7 @@ fn main() -> Result<()> {
     let dir = args.keep.as_deref().unwrap_or(scratch.path());
     std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
     println!(
-        "{:30} {:10} {:>9} {:>9} {:>10} {:>8} {:>9} {:>9} {:>7} {:>8}",
+        "{:30} {:10} {:>9} {:>9} {:>10} {:>8} {:>9} {:>7} {:>9} {:>7} {:>8}",
         "case",
         "method",
         "complete",
@@ -90,6 +92,7 @@ fn main() -> Result<()> {
         "violations",
         "contacts",
         "deadlocks",
+        "held up",
         "nearest",
         "flight",
         "makespan"
@@ -103,7 +106,7 @@ fn main() -> Result<()> {
         let began = Instant::now();
         for row in fly_all(&meeting, &args, dir)? {
             println!(
-                "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7.2} m {:>5.0} % {:>6.0} %",
+                "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7} {:>7.2} m {:>5.0} % {:>6.0} %",
                 row.name,
                 row.method,
                 row.complete,
@@ -112,6 +115,7 @@ fn main() -> Result<()> {
                 row.violations,
                 row.wall_contacts,
                 row.deadlocks,
+                row.held_up,
                 row.min_separation_m,
                 row.extra_flight * 100.0,
                 row.extra_makespan * 100.0,
@@ -144,6 +148,7 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
         sum.violations += row.violations;
         sum.wall_contacts += row.wall_contacts;
         sum.deadlocks += row.deadlocks;
+        sum.held_up += row.held_up;
         sum.min_separation_m = sum.min_separation_m.min(row.min_separation_m);
         sum.extra_flight += row.extra_flight;
         sum.extra_makespan += row.extra_makespan;
@@ -168,6 +173,7 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
         violations: 0,
         wall_contacts: 0,
         deadlocks: 0,
+        held_up: 0,
         min_separation_m: f64::INFINITY,
         extra_flight: 0.0,
         extra_makespan: 0.0,
@@ -201,10 +207,12 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
     for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases) {
-        let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck);
+        let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck.to_string());
         mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
         count(row, &flight.result, &alone);
+        let struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
+        row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !struck(v)).count();
         if !flight.result.complete {
             let file = dir.join(format!("{name}, {method}, seed {seed}.toml"));
             std::fs::write(&file, meeting.scenario(method, &simulation, seed))
@@ -218,12 +226,12 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
 }
 
 /// The vehicle that faults strike, and when: what a scenario says of it.
-fn strike(meeting: &Meeting, plan: &SwarmPlan, alone: &MissionResult, seed: u64) -> (String, String) {
+fn strike(meeting: &Meeting, plan: &SwarmPlan, alone: &MissionResult, seed: u64) -> (u8, String) {
     let (id, share) = meeting.strikes(seed);
     let index = usize::from(id) - 1;
     let flying_s = share * (alone.vehicles[index].flight_time_s as f32);
     let at_s = STARTED_S + plan.flights[index].depart_s + flying_s;
-    (id.to_string(), format!("{at_s:.1}"))
+    (id, format!("{at_s:.1}"))
 }
 
 fn parsed(
