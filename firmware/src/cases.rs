@@ -129,8 +129,13 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
         }
         (0..LOOKS).for_each(|_| look(&mut rng, &path, scales_crc));
     }
-    let [costs, assignment, paths, scales] = case.map(|digest| digest.finalize());
+    let [costs, assignment, paths, scales] = case.map(finished);
     PlanCase { costs, assignment, paths, scales }
+}
+
+/// By its type: the crate has one of each width.
+fn finished(digest: Digest<'_, u32, Table<1>>) -> u32 {
+    digest.finalize()
 }
 
 fn look(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Table<1>>) {
@@ -190,7 +195,7 @@ impl StepCase {
         let reach_m = if hard { 3.0 } else { path.length_m() };
         let gate = |rng: &mut Pcg32| Gate {
             at_m: along_m + uniform(rng, 0.0, reach_m),
-            id: 2 + below(rng, neighbours) as u8,
+            id: 2 + below(rng, neighbours.max(1)) as u8,
             until_m: uniform(rng, 0.0, 60.0),
         };
         let mut gates: Vec<_, GATES> = (0..below(rng, GATES + 1)).map(|_| gate(rng)).collect();

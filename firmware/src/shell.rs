@@ -4,17 +4,20 @@
 //! executor; [`plan`](Shell::plan) is below them, in thread mode, so a long plan never holds a setpoint up. The companion is held
 //! only for the time of one of its calls, never across an `await`.
 
+use core::fmt::Write as _;
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use companion::frame::{Framer, MAX_SENT};
 use companion::store::{Fault, FlashRequest, READ, ReadFlash};
-use companion::{Companion, Event, Link, PlanFailure};
+use companion::{Companion, Event, Link, PlanFailure, State};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::mutex::Mutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
+use heapless::String;
+use static_cell::StaticCell;
 
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::planner::Planner;
@@ -28,8 +31,8 @@ const CHUNK: usize = 256;
 const GATHER: Duration = Duration::from_millis(1);
 /// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// Setpoints further apart than this are late: twice in a row would be its autopilot's failsafe.
-pub const SETPOINT_WITHIN: Duration = Duration::from_millis(150);
+/// A stream of setpoints that paused for longer had ended, milliseconds.
+const STREAM_ENDS_MS: u32 = 1000;
 
 /// What was to be said before a restart has this long to go out.
 const FAREWELL_MS: u32 = 200;
@@ -53,8 +56,10 @@ pub struct Shell {
     seen_ms: [AtomicU32; TASKS],
     /// When the last setpoint went out, milliseconds.
     setpoint_ms: AtomicU32,
-    /// The longest time between two setpoints, milliseconds.
+    /// The longest time between two setpoints of a flight, milliseconds.
     gap_ms: AtomicU32,
+    /// What is said of it after the first flight.
+    gap_text: StaticCell<String<50>>,
     /// Errors that the UARTs reported.
     pub line_errors: [AtomicU32; 2],
 }
@@ -130,18 +135,18 @@ fn now_ms() -> u32 {
 impl Shell {
     /// Without a companion.
     pub const fn new() -> Self {
-        const ZERO: AtomicU32 = AtomicU32::new(0);
         Self {
             companion: Mutex::new(None),
             sends: [Signal::new(), Signal::new()],
             steps: Signal::new(),
             wants_plan: Signal::new(),
             works: Signal::new(),
-            restart_ms: ZERO,
-            seen_ms: [ZERO; TASKS],
-            setpoint_ms: ZERO,
-            gap_ms: ZERO,
-            line_errors: [ZERO; 2],
+            restart_ms: AtomicU32::new(0),
+            seen_ms: [const { AtomicU32::new(0) }; TASKS],
+            setpoint_ms: AtomicU32::new(0),
+            gap_ms: AtomicU32::new(0),
+            gap_text: StaticCell::new(),
+            line_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
 
@@ -151,7 +156,7 @@ impl Shell {
     }
 
     /// Does something with the companion and hands on what came of it.
-    async fn with<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
+    async fn with<T>(&'static self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
         let mut held = self.companion.lock().await;
         let companion = held.as_mut().expect("the companion is put in before any task starts");
         let result = work(companion);
@@ -159,6 +164,7 @@ impl Shell {
             match event {
                 Event::PlanRequested => self.wants_plan.signal(()),
                 Event::RestartRequested => self.ask_restart(),
+                Event::StateChanged { to: State::Done, .. } => self.tell_gap(companion),
                 Event::StateChanged { .. } => {}
             }
         }
@@ -167,6 +173,17 @@ impl Shell {
         self.works.signal(());
         self.steps.signal(());
         result
+    }
+
+    /// Says after the first flight how far apart setpoints were, by the board's own time.
+    fn tell_gap(&'static self, companion: &mut BoardCompanion) {
+        let gap = self.gap_ms.load(Ordering::Relaxed);
+        let mut text = String::new();
+        // It fits.
+        let _ = write!(text, "Setpoints were at most {gap} ms apart");
+        if let Some(kept) = self.gap_text.try_init(text).filter(|_| gap > 0) {
+            companion.say(false, kept.as_str());
+        }
     }
 
     fn ask_restart(&self) {
@@ -180,7 +197,7 @@ impl Shell {
     /// Takes what a UART receives to the companion.
     ///
     /// A board that calls itself [`NO_AUTOPILOT`] starts anew when it hears one: `system_id` is what it calls itself.
-    pub async fn receive(&self, link: Link, mut uart: impl Read, system_id: u8) -> ! {
+    pub async fn receive(&'static self, link: Link, mut uart: impl Read, system_id: u8) -> ! {
         let mut chunk = [0; CHUNK];
         let mut ear = (link == Link::Autopilot && system_id == NO_AUTOPILOT).then(Ear::new);
         loop {
@@ -201,7 +218,7 @@ impl Shell {
     }
 
     /// Takes what the companion has for a link to its UART.
-    pub async fn transmit(&self, link: Link, mut uart: impl Write) -> ! {
+    pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
         let mut frame = [0; MAX_SENT];
         loop {
             let length = {
@@ -224,7 +241,7 @@ impl Shell {
     }
 
     /// Lets the companion's time pass.
-    pub async fn keep_time(&self) -> ! {
+    pub async fn keep_time(&'static self) -> ! {
         loop {
             let due = {
                 let held = self.companion.lock().await;
@@ -243,7 +260,7 @@ impl Shell {
 
     /// Answers the companion's requests for plans and for its flash, one after the other: the flash is never erased while
     /// a roadmap in it is planned on.
-    pub async fn work(&self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
+    pub async fn work(&'static self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
         loop {
             if self.wants_plan.try_take().is_some() {
                 let detour = {
@@ -260,11 +277,11 @@ impl Shell {
     }
 
     /// Does one thing that the companion asks of its flash; false if it asks for none.
-    async fn serve_flash(&self, flash: &mut impl Flash) -> bool {
+    async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         let mut bytes = [0; READ];
         let request = {
             let mut held = self.companion.lock().await;
-            match held.as_mut().and_then(|companion| companion.poll_flash()) {
+            match held.as_mut().and_then(BoardCompanion::poll_flash) {
                 None => return false,
                 Some(FlashRequest::Erase { at }) => Request::Erase(at),
                 Some(FlashRequest::Read { at, len }) => Request::Read(at, len),
@@ -290,7 +307,7 @@ impl Shell {
         asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS
     }
 
-    /// Whether every task of the links came by lately and setpoints that flow are not late: else the watchdog is left to bite.
+    /// Whether every task of the links and of time came by lately: else the watchdog is left to bite.
     pub fn is_alive(&self) -> bool {
         let now = now_ms();
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
@@ -300,8 +317,7 @@ impl Shell {
     fn note_setpoint(&self) {
         let now = now_ms();
         let gap = now.wrapping_sub(self.setpoint_ms.swap(now, Ordering::Relaxed));
-        // A longer one is no gap: they had not flowed.
-        if gap < 1000 {
+        if gap < STREAM_ENDS_MS {
             self.gap_ms.fetch_max(gap, Ordering::Relaxed);
         }
     }

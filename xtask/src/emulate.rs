@@ -4,7 +4,7 @@
 //! port to the autopilot by MAVLink FTP; then `host-sim fly` is autopilots, radio and ground station to them, at the speed of
 //! the clock.
 
-use std::io::{Read, Write};
+use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -29,6 +29,8 @@ const ALONE_AFTER: Duration = Duration::from_secs(22);
 /// Where the stack lies, as in the board's memory map.
 const STACK: u32 = 0x2008_0400;
 const STACK_LEN: usize = 127 << 10;
+/// Setpoints may be no further apart by a board's own time, milliseconds.
+const GAP_MS: u32 = 150;
 /// What no stack has touched since the start.
 const PAINT: u8 = 0xcc;
 
@@ -68,12 +70,28 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     for file in ["roadmap.bin", "mission.bin"] {
         upload(&boards, &out.join("plan").join(file))?;
     }
-    run(host_sim().arg("fly").arg(&scenario).arg("--out").arg(&out))?;
+    let gaps = fly(&scenario, &out)?;
+    ensure!(gaps.len() == boards.len(), "{} of {} boards told of their setpoints", gaps.len(), boards.len());
+    ensure!(gaps.iter().all(|gap| *gap <= GAP_MS), "setpoints were {gaps:?} ms apart: {GAP_MS} are allowed");
     let stacks: Vec<_> =
         boards.iter().map(|board| board.stack(&out.join("stack.bin"))).collect::<Result<_>>()?;
     let deepest = stacks.into_iter().max().unwrap_or_default();
     println!("stack      {deepest} bytes of {STACK_LEN} used at most");
     Ok(deepest)
+}
+
+/// Flies, and shows what comes of it; what each board told of its setpoints, milliseconds.
+fn fly(scenario: &Path, out: &Path) -> Result<Vec<u32>> {
+    let mut fly = host_sim().arg("fly").arg(scenario).arg("--out").arg(out).stdout(Stdio::piped()).spawn()?;
+    let mut gaps = Vec::new();
+    for line in BufReader::new(fly.stdout.take().context("its output is piped")?).lines() {
+        let line = line?;
+        println!("{line}");
+        let gap = line.split_once("Setpoints were at most ").and_then(|(_, rest)| rest.split_once(" ms"));
+        gaps.extend(gap.and_then(|(gap, _)| gap.parse::<u32>().ok()));
+    }
+    ensure!(fly.wait()?.success(), "the mission was not complete and clean");
+    Ok(gaps)
 }
 
 fn host_sim() -> Command {

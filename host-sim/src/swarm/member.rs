@@ -13,6 +13,7 @@ use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
 use crate::report::{self, Level};
+use crate::say;
 
 /// A companion with the desk's capacities.
 pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
@@ -241,6 +242,7 @@ impl Member {
                 self.down.write(now_us, &buffer[..length]);
             }
             let mut said = |text: &str| {
+                say!("board {id}: {text}");
                 let t_s = (now_us as f64 * 1e-6) as f32;
                 log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
             };
