@@ -13,6 +13,7 @@ use crate::guidance::{self, Setpoint};
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
+use crate::outbox::Outgoing;
 use crate::services;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -53,6 +54,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let header = self.outboxes[at].header(system);
         let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
         frame::encode_raw(header, id, extra, &payload, out)
+    }
+
+    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    pub fn say(&mut self, warning: bool, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {

@@ -213,19 +213,9 @@ impl Mission {
             }
         }
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
-        let mut own = Box::new(OwnPlan {
-            goal: Some(request.goal),
-            descent_m: request.descent_m,
-            ..OwnPlan::default()
-        });
-        detour::plan(
-            &self.view(),
-            request,
-            obstacles,
-            &mut search,
-            &mut heapless::Vec::new(),
-            &mut own.path,
-        )?;
+        let mut own = Box::new(OwnPlan::default());
+        let mut nodes = heapless::Vec::new();
+        detour::plan_vehicle(&self.view(), request, obstacles, &mut search, &mut nodes, &mut own)?;
         Ok(own)
     }
 

@@ -13,7 +13,7 @@ use libm::{fmaxf, fminf, sqrtf};
 use crate::Point;
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::segments_distance_sq;
+use crate::schedule::{VehiclePlan, segments_distance_sq};
 use crate::search::{self, SearchError, SearchWorkspace};
 
 /// Coming nearer by less than this is none: a hovering vehicle sways, metres.
@@ -191,6 +191,23 @@ pub fn plan<const N: usize, const W: usize>(
         }
     }
     failed
+}
+
+/// As [`plan`], as the plan of one vehicle: without gates, since all others stand while it is flown.
+pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
+    view: &RoadmapView<'_>,
+    request: &DetourRequest,
+    obstacles: &mut [KeepOff],
+    ws: &mut SearchWorkspace<N>,
+    nodes: &mut Vec<u16, W>,
+    out: &mut VehiclePlan<W, G>,
+) -> Result<(), DetourError> {
+    plan(view, request, obstacles, ws, nodes, &mut out.path)?;
+    out.goal = Some(request.goal);
+    (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
+    out.gates.clear();
+    out.plan_crc = 0;
+    Ok(())
 }
 
 fn write<const W: usize>(
