@@ -11,6 +11,7 @@ fn sphere(at: Point, radius_m: f32) -> Command {
     Command {
         command: EXCLUDE,
         param1: radius_m,
+        param2: 0.0,
         place: Some((
             (place.lat_deg * 1e7).round() as i32,
             (place.lon_deg * 1e7).round() as i32,
