@@ -13,6 +13,7 @@ use crate::guidance::{self, Setpoint};
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
+use crate::outbox::Outgoing;
 use crate::services;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -53,6 +54,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let header = self.outboxes[at].header(system);
         let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
         frame::encode_raw(header, id, extra, &payload, out)
+    }
+
+    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    pub fn say(&mut self, warning: bool, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
@@ -116,13 +122,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
-        let t = &self.telemetry;
         let told = self.told_place();
         let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
         let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
-            // When the position was heard, so that a copy is known as one.
-            time_boot_ms: t.position_at.unwrap_or_default().boot_ms(),
+            // When the position was known, so that a copy is known as one.
+            time_boot_ms: told.at.boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
@@ -159,14 +164,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.is_out();
-        let flags =
-            if grounded && !(out && self.told_place().vague) { intent::GROUNDED } else { intent::FLYING }
-                | flag(intent::LANDED, self.state == Done)
-                | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
-                | flag(intent::OUT, out)
-                | flag(intent::WAITING, self.waits())
-                | flag(intent::BLOCKED, self.around.blocked)
-                | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
+        let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
+            | flag(intent::LANDED, self.state == Done)
+            | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
+            | flag(intent::OUT, out)
+            | flag(intent::WAITING, self.waits())
+            | flag(intent::BLOCKED, self.around.blocked)
+            | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
         let plan = self.plan.as_ref();
         let mut points = heapless::Vec::new();
         let along_m = self.guidance.progress_m(self.state, &self.scene());

@@ -4,6 +4,7 @@
 //! schedule: before each stretch that conflicts with one an earlier-labelled vehicle has yet to leave, it stops (the
 //! gates of [`crate::schedule`]); a vehicle that is out of the plan opens its gates, and is flown around ([`crate::detour`]). A neighbour that flies no plan we know is an obstacle to stop in front of.
 
+use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
 use crate::Point;
@@ -154,8 +155,9 @@ fn priority<const W: usize>(
         }
     }
     let unplanned = |n: &&Neighbour| n.progress_m.is_none() || n.detours || own.detours;
+    let ahead = Ahead::new(cfg, own);
     for n in neighbours.iter().filter(|n| !n.grounded).filter(unplanned) {
-        if let Some(distance) = first_contact(cfg, own, n) {
+        if let Some(distance) = ahead.first_contact(cfg, own, n) {
             stop(distance, n.id);
         }
     }
@@ -164,18 +166,36 @@ fn priority<const W: usize>(
     advice
 }
 
-/// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
-/// heard; `None` if not within the look-ahead, or if flying on only takes us further apart.
-fn first_contact<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>, n: &Neighbour) -> Option<f32> {
-    let now = (n.position + n.velocity * n.age_s - own.position).norm();
-    let step_m = cfg.cruise_mps * LOOK_EVERY_S;
-    let looks = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(LOOKS);
-    looks.zip(1u8..).find_map(|(there, look)| {
-        let after_s = f32::from(look) * LOOK_EVERY_S;
-        let apart = (n.position + n.velocity * (n.age_s + after_s) - there).norm();
-        let before_m = f32::from(look - 1) * step_m;
-        (apart < cfg.safety_distance_m && apart < now).then_some(before_m)
-    })
+/// The own path ahead, as far as it is looked at: the points where this vehicle will be, one after each look.
+struct Ahead {
+    points: Vec<Point, LOOKS>,
+    step_m: f32,
+}
+
+impl Ahead {
+    fn new<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>) -> Self {
+        let step_m = cfg.cruise_mps * LOOK_EVERY_S;
+        let points = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(LOOKS);
+        Self { points: points.collect(), step_m }
+    }
+
+    /// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
+    /// heard; `None` if not within the look-ahead, or if flying on only takes us further apart. Squares are compared: a board
+    /// takes its square roots by software.
+    fn first_contact<const W: usize>(
+        &self,
+        cfg: &DeconflictConfig,
+        own: &Own<'_, W>,
+        n: &Neighbour,
+    ) -> Option<f32> {
+        let now = (n.position + n.velocity * n.age_s - own.position).norm_squared();
+        let near = fminf(cfg.safety_distance_m * cfg.safety_distance_m, now);
+        self.points.iter().zip(1u8..).find_map(|(there, look)| {
+            let after_s = f32::from(look) * LOOK_EVERY_S;
+            let apart = (n.position + n.velocity * (n.age_s + after_s) - there).norm_squared();
+            (apart < near).then_some(f32::from(look - 1) * self.step_m)
+        })
+    }
 }
 
 #[cfg(test)]

@@ -107,7 +107,8 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
 /// Scratch of [`plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
 /// which one steps aside.
 pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
-    search: SearchWorkspace<N>,
+    /// Scratch of searches, also for [`crate::detour`].
+    pub search: SearchWorkspace<N>,
     sipp: SippWorkspace<N, P>,
     assignment: AssignmentWorkspace<V>,
     /// Starts × goals, packed from the front.

@@ -1,5 +1,6 @@
 //! Helpers shared by the cross-crate tests.
 
+pub mod board;
 pub mod logs;
 
 use std::io::{BufRead, BufReader};

@@ -1,36 +1,102 @@
-//! The pure crates for a bare-metal Cortex-M7: by rustup's target where there is one, else by Debian's toolchain.
+//! Programs for boards: by rustup's target where there is one, else by Debian's toolchain, which builds `core` itself.
 
-use anyhow::Result;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
 
 use crate::install;
 use crate::shell::{cargo, command, run, target_dir};
 
-const TARGET: &str = "thumbv7em-none-eabihf";
-/// Crates that go on the board.
-const CRATES: &[&str] = &["planner-core", "companion"];
-
-/// Builds `planner-core` and `companion` without std.
-pub fn build() -> Result<()> {
-    let packages = CRATES.iter().flat_map(|name| ["-p", name]);
-    if rustup_has_target() {
-        println!("bare metal: rustup's {TARGET}");
-        return run(cargo().args(["build", "--release", "--target", TARGET]).args(packages));
-    }
-    println!("bare metal: Debian's toolchain builds core for {TARGET}");
-    install::debian(install::BARE_METAL)?;
-    run(command("/usr/bin/cargo")
-        .args(["build", "--release", "--target", TARGET])
-        .args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"])
-        .args(packages)
-        .env("RUSTC_BOOTSTRAP", "1")
-        .env("RUSTC", "/usr/bin/rustc")
-        .env_remove("RUSTUP_TOOLCHAIN")
-        .env_remove("CARGO")
-        // Products of two compilers do not mix.
-        .env("CARGO_TARGET_DIR", target_dir().join("bare-metal")))
+/// A board of the firmware.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Board {
+    /// QEMU's mps2-an500, a Cortex-M7 with the memory of the STM32H743.
+    Qemu,
+    /// ST's NUCLEO-H743ZI.
+    NucleoH743,
+    /// Raspberry Pi Pico 2: RP2350, Cortex-M33.
+    Pico2,
 }
 
-fn rustup_has_target() -> bool {
+impl Board {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Qemu, Self::NucleoH743, Self::Pico2];
+
+    /// Its name, which is the firmware's feature.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Qemu => "qemu",
+            Self::NucleoH743 => "nucleo-h743",
+            Self::Pico2 => "pico2",
+        }
+    }
+
+    fn target(self) -> &'static str {
+        match self {
+            Self::Qemu | Self::NucleoH743 => "thumbv7em-none-eabihf",
+            Self::Pico2 => "thumbv8m.main-none-eabihf",
+        }
+    }
+
+    fn cpu(self) -> &'static str {
+        match self {
+            Self::Qemu | Self::NucleoH743 => "cortex-m7",
+            Self::Pico2 => "cortex-m33",
+        }
+    }
+
+    /// The programs made for it.
+    pub fn programs(self) -> &'static [&'static str] {
+        match self {
+            Self::Qemu => &["flockmate", "measure"],
+            Self::NucleoH743 | Self::Pico2 => &["flockmate"],
+        }
+    }
+}
+
+/// Builds a board's programs; the directory they are in.
+pub fn build(board: Board) -> Result<PathBuf> {
+    let target = board.target();
+    let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
+    let arguments = ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
+    let products = target_dir().join("firmware");
+    let mut flags = String::new();
+    let mut building = if rustup_has(target) {
+        println!("{}: rustup's {target}", board.name());
+        cargo()
+    } else {
+        println!("{}: Debian's toolchain builds core for {target}", board.name());
+        install::debian(install::BARE_METAL)
+            .with_context(|| format!("neither that nor rustup's: rustup target add {target}"))?;
+        flags += "-Clinker-flavor=ld.lld ";
+        let mut cargo = command("/usr/bin/cargo");
+        cargo
+            .env("RUSTC_BOOTSTRAP", "1")
+            .env("RUSTC", "/usr/bin/rustc")
+            .env(variable(target, "LINKER"), "/usr/bin/ld.lld")
+            .env_remove("RUSTUP_TOOLCHAIN")
+            .env_remove("CARGO");
+        cargo.args(["-Zbuild-std=core,alloc", "-Zbuild-std-features=compiler-builtins-mem"]);
+        cargo
+    };
+    flags += &format!("-Ctarget-cpu={}", board.cpu());
+    building.args(arguments).arg(board.name()).args(programs).env(variable(target, "RUSTFLAGS"), flags);
+    run(building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info"))?;
+    // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
+    let aside = products.join(board.name());
+    std::fs::create_dir_all(&aside)?;
+    for program in board.programs() {
+        std::fs::copy(products.join(target).join("release").join(program), aside.join(program))?;
+    }
+    Ok(aside)
+}
+
+/// Cargo's environment variable for a target's setting.
+fn variable(target: &str, name: &str) -> String {
+    format!("CARGO_TARGET_{}_{name}", target.to_uppercase().replace(['-', '.'], "_"))
+}
+
+fn rustup_has(target: &str) -> bool {
     let installed = command("rustup").args(["target", "list", "--installed"]).output();
-    installed.is_ok_and(|out| String::from_utf8_lossy(&out.stdout).lines().any(|line| line == TARGET))
+    installed.is_ok_and(|out| String::from_utf8_lossy(&out.stdout).lines().any(|line| line == target))
 }

@@ -22,6 +22,8 @@ pub const BARE_METAL: &[Package] = &[
     Package { name: "rust-web-src", file: "/usr/share/doc/rust-web-src/copyright" },
     Package { name: "lld", file: "/usr/bin/ld.lld" },
 ];
+/// What emulates a board.
+pub const EMULATOR: &[Package] = &[Package { name: "qemu-system-arm", file: "/usr/bin/qemu-system-arm" }];
 /// The browser that opens reports.
 pub const BROWSER: &[Package] = &[Package { name: "chromium", file: "/usr/bin/chromium" }];
 /// The program the roadmap bench is measured beside.

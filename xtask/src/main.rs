@@ -1,10 +1,14 @@
-//! The developer's one entry: `cargo xtask test`, `cargo xtask bench`.
+//! The developer's one entry: `cargo xtask test`, `bench`, and the firmware's `build`.
 #![forbid(unsafe_code)]
 
 mod bare_metal;
 mod bench;
+mod build;
+mod emulate;
+mod flash;
 mod install;
 mod shell;
+mod size;
 mod test;
 
 use std::process::ExitCode;
@@ -18,12 +22,24 @@ enum Command {
     Test(test::Args),
     /// Our times beside those of other programs.
     Bench(bench::Args),
+    /// The firmware for a board.
+    Build(build::Args),
+    /// The demo's first vehicles flown by boards in QEMU.
+    Emulate(emulate::Args),
+    /// What the firmware takes of a board's memory.
+    Size(size::Args),
+    /// The firmware onto a board behind a debug probe.
+    Flash(flash::Args),
 }
 
 fn main() -> ExitCode {
     let done = match Command::parse() {
         Command::Test(args) => test::run(&args),
         Command::Bench(args) => bench::run_bench(&args),
+        Command::Build(args) => build::run(&args),
+        Command::Emulate(args) => emulate::run_emulate(&args).map(drop),
+        Command::Size(args) => size::run(&args),
+        Command::Flash(args) => flash::run_flash(&args),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use anyhow::Result;
 
+use crate::bare_metal::{self, Board};
 use crate::shell::{self, cargo};
-use crate::{bare_metal, install};
+use crate::{emulate, install, size};
 
 /// Which steps to run.
 #[derive(clap::Args)]
@@ -32,7 +33,14 @@ fn steps(args: &Args) -> Result<()> {
     if args.quick {
         return step("host tests", || shell::run(cargo().args(["test", "--workspace", "--locked"])));
     }
-    step("bare metal", bare_metal::build)?;
+    let mut firmware = None;
+    step("boards", || {
+        for board in Board::ALL {
+            let programs = bare_metal::build(board)?;
+            firmware = firmware.take().or((board == Board::Qemu).then_some(programs));
+        }
+        install::debian(install::EMULATOR)
+    })?;
     step("browser", || install::debian(install::BROWSER))?;
     let mut python = None;
     step("Python clients", || {
@@ -47,7 +55,21 @@ fn steps(args: &Args) -> Result<()> {
         if let Some(python) = &python {
             tests.env("FLOCKMATE_PYTHON", python);
         }
+        if let Some(firmware) = &firmware {
+            tests.env("FLOCKMATE_FIRMWARE", firmware);
+        }
         shell::run(&mut tests)
+    })?;
+    let mut stack = 0;
+    step("emulated flight", || {
+        stack = emulate::run_emulate(&emulate::Args::default())?;
+        Ok(())
+    })?;
+    step("sizes", || {
+        for board in Board::ALL {
+            size::rows(board, stack)?;
+        }
+        Ok(())
     })
 }
 

@@ -17,6 +17,7 @@ use planner_core::Point;
 use planner_core::frames::Geodetic;
 
 pub use crate::autopilot::Personality;
+use crate::link::LinkUrl;
 use crate::map::Unknown;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
@@ -170,8 +171,13 @@ pub struct Vehicle {
 pub enum Companion {
     /// In this process.
     InProcess,
-    /// Behind a link.
-    Url(String),
+    /// On a board, or in another process.
+    Url {
+        /// Its port for the autopilot.
+        autopilot: LinkUrl,
+        /// Its port for the radio.
+        radio: LinkUrl,
+    },
 }
 
 /// `[deconfliction]`

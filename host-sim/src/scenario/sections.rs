@@ -12,6 +12,7 @@ use super::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission, Mode,
     Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Unbuilt, Vehicle,
 };
+use crate::link::LinkUrl;
 use crate::map::{Source, Unknown};
 
 /// Most vehicles of a swarm: the system ids there are.
@@ -329,11 +330,10 @@ fn vehicle(
         None => Companion::InProcess,
         Some(value) => match value.str()? {
             "in-process" => Companion::InProcess,
-            url if url.contains(':') => {
-                unsupported.push(not_yet(table.text, &value.span, "a companion behind a URL"));
-                Companion::Url(url.into())
+            _ => {
+                let radio = table.need("radio", "the URL of the board's port for the radio")?;
+                Companion::Url { autopilot: link(&value)?, radio: link(&radio)? }
             }
-            _ => return Err(value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\"")),
         },
     };
     let vehicle = Vehicle {
@@ -358,6 +358,11 @@ fn vehicle(
     table.finish()?;
     let spans = VehicleSpans { start: start.span, goal: goal.map(|v| v.span), table: table.span.clone() };
     Ok((vehicle, spans))
+}
+
+fn link(value: &Value<'_>) -> Result<LinkUrl> {
+    let parsed = value.str()?.parse();
+    parsed.map_err(|_| value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\""))
 }
 
 fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {

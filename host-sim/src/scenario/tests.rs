@@ -213,11 +213,6 @@ fn what_is_not_built_yet_is_refused_by_name() {
         ("[mission]", "[area]\nheight_m = 20\n[mission]", "not available yet: [area]"),
         ("[mission]", "[formation]\npure = true\n[mission]", "not available yet: [formation]"),
         ("[mission]", "[mission]\nmode = \"coverage\"", "not available yet: this mission.mode"),
-        (
-            "id = 2",
-            "id = 2\ncompanion = \"tcp:127.0.0.1:5000\"",
-            "not available yet: a companion behind a URL",
-        ),
         ("id = 2", "id = 2\nendurance_s = 900", "not available yet: endurance_s"),
     ];
     for (from, to, why) in cases {

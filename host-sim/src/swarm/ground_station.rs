@@ -62,7 +62,7 @@ impl GroundStation {
 
     /// Commands the start once all are ready, and again to each that has not heard it.
     pub fn step(&mut self, now_us: u64, members: &[Member], radio: &mut Radio, places: &[Point]) {
-        let state = |m: &Member| m.companion.state();
+        let state = |m: &Member| m.state();
         if self.first_us.is_none() {
             let ready = || members.iter().filter(|m| state(m) == State::Ready);
             if ready().next().is_some() {

@@ -3,6 +3,7 @@
 use companion::{Companion, Config, Event, Instant, Link, State};
 use planner_core::Point;
 
+use super::board::Board;
 use super::monitor::{Observation, Phase};
 use super::new_companion;
 use super::radio::Radio;
@@ -12,6 +13,7 @@ use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
 use crate::report::{self, Level};
+use crate::say;
 
 /// A companion with the desk's capacities.
 pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
@@ -39,8 +41,10 @@ pub enum Planner {
 pub struct Member {
     /// What flies.
     pub autopilot: Autopilot,
-    /// What decides.
+    /// What decides, unless a board does.
     pub companion: Box<DeskCompanion>,
+    /// A board that decides in its place.
+    board: Option<Board>,
     /// Whether the companion waits for a plan.
     pub wants_plan: bool,
     /// How it is answered.
@@ -76,6 +80,7 @@ impl Member {
         Ok(Self {
             autopilot: Autopilot::new(autopilot)?,
             companion: new_companion(config.clone())?,
+            board: None,
             config,
             wants_plan: false,
             planner: Planner::Sound,
@@ -91,6 +96,16 @@ impl Member {
             killed: false,
             wrecked: false,
         })
+    }
+
+    /// From now on a board decides.
+    pub fn put_on(&mut self, board: Board) {
+        self.board = Some(board);
+    }
+
+    /// Where its mission is.
+    pub fn state(&self) -> State {
+        self.board.as_ref().map_or_else(|| self.companion.state(), Board::state)
     }
 
     /// MAVLink system id.
@@ -165,7 +180,6 @@ impl Member {
         log: &mut Vec<report::Event>,
     ) {
         let now_us = (step + 1) * STEP_US;
-        let now = self.companion_now(now_us);
         if step % GROUND_STEPS == station as u64 % GROUND_STEPS {
             self.ground_m = map.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
         }
@@ -185,6 +199,69 @@ impl Member {
             }
         }
         self.up.read(now_us, &mut self.bytes);
+        if self.board.is_some() {
+            self.step_board(now_us, station, radio, places, log);
+        } else {
+            self.step_companion(now_us, station, radio, places, log);
+        }
+        self.down.read(now_us, &mut self.bytes);
+        if !self.bytes.is_empty() && !booting {
+            self.autopilot.handle_bytes(&self.bytes);
+        }
+        let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.truth());
+        if !truth.touching && truth.armed {
+            self.took_off_s.get_or_insert(t_s);
+        }
+        if self.took_off_s.is_some() && truth.touching && !truth.armed {
+            self.landed_s.get_or_insert(t_s);
+        }
+    }
+
+    /// Carries bytes between the board, its autopilot and the radio.
+    fn step_board(
+        &mut self,
+        now_us: u64,
+        station: usize,
+        radio: &mut Radio,
+        places: &[Point],
+        log: &mut Vec<report::Event>,
+    ) {
+        let (now, id) = (self.companion_now(now_us), self.system_id());
+        let Some(board) = &mut self.board else { return };
+        let mut buffer = [0; 512];
+        let mut exchange = || {
+            board.tell_autopilot(&self.bytes)?;
+            while let Some(packet) = radio.receive(now_us, station) {
+                board.tell_radio(&packet)?;
+            }
+            loop {
+                let length = board.hear_autopilot(&mut buffer)?;
+                if length == 0 {
+                    break;
+                }
+                self.down.write(now_us, &buffer[..length]);
+            }
+            let mut said = |text: &str| {
+                say!("board {id}: {text}");
+                let t_s = (now_us as f64 * 1e-6) as f32;
+                log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
+            };
+            board.hear_radio(now, |packet| radio.broadcast(now_us, Some(station), places, packet), &mut said)
+        };
+        // A board that is gone is silent, as one without power.
+        let _: std::io::Result<()> = exchange();
+    }
+
+    /// Lets the companion in this process have what has come by now.
+    fn step_companion(
+        &mut self,
+        now_us: u64,
+        station: usize,
+        radio: &mut Radio,
+        places: &[Point],
+        log: &mut Vec<report::Event>,
+    ) {
+        let now = self.companion_now(now_us);
         if !self.bytes.is_empty() {
             self.companion.handle_bytes(Link::Autopilot, now, &self.bytes);
         }
@@ -209,17 +286,6 @@ impl Member {
         if restarts {
             // It could be made once, so it can again.
             let _ = self.reset_companion(now_us);
-        }
-        self.down.read(now_us, &mut self.bytes);
-        if !self.bytes.is_empty() && !booting {
-            self.autopilot.handle_bytes(&self.bytes);
-        }
-        let (t_s, truth) = (now_us as f64 * 1e-6, self.autopilot.truth());
-        if !truth.touching && truth.armed {
-            self.took_off_s.get_or_insert(t_s);
-        }
-        if self.took_off_s.is_some() && truth.touching && !truth.armed {
-            self.landed_s.get_or_insert(t_s);
         }
     }
 
@@ -266,8 +332,8 @@ impl Member {
     pub fn end(&self) -> String {
         match (self.killed, self.cause) {
             (true, _) => "Killed".to_owned(),
-            (false, Some(cause)) => format!("{:?}: {cause}", self.companion.state()),
-            (false, None) => format!("{:?}", self.companion.state()),
+            (false, Some(cause)) => format!("{:?}: {cause}", self.state()),
+            (false, None) => format!("{:?}", self.state()),
         }
     }
 
@@ -299,7 +365,7 @@ impl Member {
     /// What the referee sees.
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.truth();
-        let state = self.companion.state();
+        let state = self.state();
         let phase = match (truth.touching, on_path(state)) {
             (touching, _) if self.wrecked => {
                 if touching {
@@ -314,7 +380,8 @@ impl Member {
         };
         // Who stands by order of a person is in no deadlock.
         let ordered = matches!(state, State::Paused | State::PilotControl);
-        Observation { position: truth.position, phase, ordered, progress_m: self.companion.progress_m() }
+        let progress_m = self.board.as_ref().map_or_else(|| self.companion.progress_m(), Board::progress_m);
+        Observation { position: truth.position, phase, ordered, progress_m }
     }
 }
 

@@ -4,6 +4,7 @@
 //! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
 //! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and tells nobody.
 
+pub mod board;
 pub mod faults;
 pub mod gateway;
 pub mod ground_station;
@@ -20,6 +21,7 @@ use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
 
+use self::board::Board;
 use self::faults::{Script, World};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
@@ -33,6 +35,7 @@ use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::scenario;
 
 /// A vehicle within this distance of its goal has reached it, metres.
 const REACHED_M: f32 = 0.5;
@@ -115,6 +118,8 @@ fn simulate(
     let mut log = Vec::new();
     let mut nearest_goal_m = vec![f32::INFINITY; members.len()];
     let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
+    // A board's time is the clock's.
+    let has_boards = scenario.vehicles.iter().any(|v| v.companion != scenario::Companion::InProcess);
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.steps("flight", settings.time_limit_s as u64);
     let began = Clock::now();
@@ -156,7 +161,7 @@ fn simulate(
             bar.at(t_s as u64);
             let started = ground_station.started();
             let done = |i: usize| {
-                let at_rest = is_finished(members[i].companion.state()) || members[i].killed();
+                let at_rest = is_finished(members[i].state()) || members[i].killed();
                 at_rest || (plan.flights[i].goal.is_none() && started) || left_to_pilot(&members[i])
             };
             let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
@@ -171,7 +176,7 @@ fn simulate(
         if t_s >= ends_at_s {
             break;
         }
-        if realtime {
+        if realtime || has_boards {
             let due = Duration::from_micros(now_us);
             std::thread::sleep(due.saturating_sub(began.elapsed()));
         }
@@ -189,7 +194,7 @@ fn simulate(
         script.struck(i)
             && (member.killed()
                 || member.took_off_s.is_none()
-                || is_finished(member.companion.state())
+                || is_finished(member.state())
                 || left_to_pilot(member))
     };
     let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
@@ -230,7 +235,7 @@ fn simulate(
 
 /// Whether a pilot has the vehicle: nobody knows for how long.
 fn left_to_pilot(member: &Member) -> bool {
-    member.companion.state() == State::PilotControl
+    member.state() == State::PilotControl
 }
 
 /// What planning on a roadmap with one bit changed comes to.
@@ -307,6 +312,9 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             let mut member =
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
+            if let scenario::Companion::Url { autopilot, radio } = &vehicle.companion {
+                member.put_on(Board::open(autopilot, radio)?);
+            }
             Ok(member)
         })
         .collect()

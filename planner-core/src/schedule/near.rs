@@ -25,7 +25,8 @@ pub(super) struct Cells {
 
 impl Cells {
     pub(super) const fn new() -> Self {
-        Self { min: [0.0; 2], cell_m: 1.0, half_m: 0.0, starts: [0; SIDE * SIDE + 1] }
+        // All zero; `sort` sets the size before a piece is looked for.
+        Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; SIDE * SIDE + 1] }
     }
 
     /// Sorts `pieces`, at most `u16::MAX` of them, into cells.

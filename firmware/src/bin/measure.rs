@@ -1,0 +1,131 @@
+//! What the board's work costs, in instructions, and what it computes, bit by bit: run in QEMU with `-icount shift=0`, read by
+//! `tests/tests/board.rs`. A roadmap lies in bank 2, a map beyond it. Every line is a name and numbers.
+#![no_std]
+#![no_main]
+
+use core::hint::black_box;
+
+use firmware::boards::chosen::{clock, memory};
+use firmware::boards::stack;
+use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
+use firmware::cases::{self, StepCase};
+use firmware::scratch::{Planner, Scratch};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::plan::{self, Goals, PlanRequest, SwarmPlan};
+use planner_core::prm::Config;
+use planner_core::roadmap::{HalfEdge, RoadmapView};
+use planner_core::search::{self, SearchWorkspace};
+use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+use semihosting::println;
+use static_cell::ConstStaticCell;
+
+type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
+
+static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static PLAN: ConstStaticCell<Plan> = ConstStaticCell::new(Plan::new());
+static CASES: ConstStaticCell<cases::Workspace> = ConstStaticCell::new(cases::Workspace::new());
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    println!("panic {info}");
+    semihosting::process::exit(1)
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    clock::start();
+    let view = counted("parse", || RoadmapView::parse(memory::bank2())).expect("a roadmap lies in bank 2");
+    println!("roadmap {} {} {:08x}", view.node_count(), view.half_edge_count(), view.crc());
+    let scratch = SCRATCH.take();
+    plan_swarm(&view, scratch.planner());
+    steps();
+    build(scratch, 0.0);
+    build(scratch, cases::CLEARANCE_M);
+    let ws = CASES.take();
+    for number in 0..cases::PLANS {
+        let case = cases::plan_case(&view, number, ws);
+        let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
+        println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
+    }
+    println!("stack {} {}", stack::used(), stack::size());
+    semihosting::process::exit(0)
+}
+
+/// Instructions that the work takes, those of asking the clock left out.
+fn instructions<T>(work: impl FnOnce() -> T) -> (T, u64) {
+    let idle = clock::instructions();
+    let before = clock::instructions();
+    let result = black_box(work());
+    (result, (clock::instructions() - before).saturating_sub(before - idle))
+}
+
+fn counted<T>(name: &str, work: impl FnOnce() -> T) -> T {
+    let (result, count) = instructions(work);
+    println!("count {name} {count}");
+    result
+}
+
+/// The plan of a swarm of ten, step by step.
+fn plan_swarm(view: &RoadmapView<'_>, ws: &mut Planner) {
+    let plan = PLAN.take();
+    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
+    let request = PlanRequest {
+        vehicles: &vehicles,
+        descents_m: &descents_m,
+        mode: cases::MODE,
+        schedule: cases::SCHEDULE,
+    };
+    let mut goals = Goals::new();
+    counted("costs", || plan::costs(view, &request, ws)).expect("a cost matrix");
+    counted("assign", || plan::assign(&request, ws, &mut goals)).expect("an assignment");
+    counted("paths", || paths(view, &goals, &mut ws.search));
+    counted("schedule", || plan::schedule(view, &request, &goals, ws, plan)).expect("a schedule");
+    println!("plan {:08x}", plan.crc);
+}
+
+/// The shortest path of each vehicle to its goal.
+fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWorkspace<ROADMAP_NODES>) {
+    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+    for (start, goal) in (0u16..).zip(goals) {
+        let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
+        let target = view.header().starts + goal.expect("every vehicle has a goal");
+        search::astar(view, start, target, passable, search, &mut nodes).expect("a path");
+        black_box(&nodes);
+    }
+}
+
+/// One look at 32 neighbours; the worst of many.
+fn steps() {
+    let mut rng = Pcg32::seed_from_u64(1);
+    let (mut worst, mut sum) = (0, 0);
+    for number in 0..cases::STEPS {
+        let case = StepCase::new(&mut rng, VEHICLES, number % 2 == 0);
+        let (_, count) = instructions(|| black_box(&case).advise());
+        worst = worst.max(count);
+        sum += count;
+    }
+    println!("count step {worst}");
+    println!("count mean-step {}", sum / cases::STEPS as u64);
+}
+
+/// A roadmap built from the map.
+fn build(scratch: &mut Scratch, clearance_m: f32) {
+    let (head, words) = memory::map();
+    let word =
+        |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
+    let shape = GridShape {
+        dims: [word(0), word(1), word(2)],
+        min: Point::new(f32::from_bits(word(3)), f32::from_bits(word(4)), f32::from_bits(word(5))),
+        resolution_m: f32::from_bits(word(6)),
+    };
+    let grid = VoxelGrid::new(shape, Outside::Blocked, words).expect("a map lies beyond bank 2");
+    let builder = scratch.builder();
+    let config = Config { clearance_m, ..cases::BUILT };
+    let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };
+    counted(name, || builder.build(&grid, &[], &config)).expect("a roadmap");
+    let (nodes, edges) = (builder.nodes(), builder.edges());
+    println!("{name} {} {} {:08x}", nodes.len(), edges.len(), cases::roadmap_crc(nodes, edges));
+}

@@ -1,0 +1,72 @@
+//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start.
+#![expect(unsafe_code, reason = "memory that the start does not touch")]
+
+use core::fmt::Write;
+use core::mem::MaybeUninit;
+use core::panic::PanicInfo;
+
+use heapless::String;
+
+/// Longest text of a STATUSTEXT.
+const TEXT: usize = 50;
+/// Says that a record was written.
+const MAGIC: u32 = 0x464c_4b21;
+
+#[derive(Clone, Copy)]
+#[repr(C)]
+struct Record {
+    magic: u32,
+    len: u32,
+    text: [u8; TEXT],
+}
+
+#[unsafe(link_section = ".crash")]
+static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
+
+/// What the last start left, once.
+pub fn take() -> Option<String<TEXT>> {
+    let record = &raw mut RECORD;
+    // SAFETY: called once at the start, when nothing else runs; any bytes are a `Record`.
+    let found = unsafe {
+        let found = record.cast::<Record>().read_volatile();
+        record.cast::<Record>().write_volatile(Record { magic: 0, ..found });
+        found
+    };
+    let text = found.text.get(..found.len as usize).filter(|_| found.magic == MAGIC)?;
+    String::try_from(core::str::from_utf8(text).ok()?).ok()
+}
+
+fn keep(text: &str) {
+    let mut record = Record { magic: MAGIC, len: 0, text: [0; TEXT] };
+    let bytes = text.as_bytes();
+    let len = bytes.len().min(TEXT);
+    record.text[..len].copy_from_slice(&bytes[..len]);
+    record.len = len as u32;
+    let to = &raw mut RECORD;
+    // SAFETY: interrupts are off, and nobody comes back from here.
+    unsafe { to.cast::<Record>().write_volatile(record) };
+}
+
+/// Keeps where it was and starts anew.
+pub fn panicked(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
+    let mut text = String::<200>::new();
+    if let Some(place) = info.location() {
+        let file = place.file().rsplit('/').next().unwrap_or_default();
+        // What does not fit is left out.
+        let _ = write!(text, "Restarted: panic at {file}:{}", place.line());
+    }
+    defmt::error!("{=str}", text.as_str());
+    keep(&text);
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+/// Keeps the program counter of a fault and starts anew.
+pub fn faulted(pc: u32) -> ! {
+    let mut text = String::<TEXT>::new();
+    // It fits.
+    let _ = write!(text, "Restarted: fault at {pc:#010x}");
+    defmt::error!("{=str}", text.as_str());
+    keep(&text);
+    cortex_m::peripheral::SCB::sys_reset()
+}

@@ -1,0 +1,23 @@
+//! What differs from board to board: registers, clocks, memory. The only place with `unsafe`.
+
+#[cfg(all(target_os = "none", feature = "board"))]
+pub mod crash;
+#[cfg(all(target_os = "none", feature = "nucleo-h743"))]
+pub mod nucleo_h743;
+#[cfg(all(target_os = "none", feature = "pico2"))]
+pub mod pico2;
+#[cfg(all(target_os = "none", feature = "qemu"))]
+pub mod qemu;
+#[cfg(all(target_os = "none", feature = "board"))]
+pub mod stack;
+
+#[cfg(all(target_os = "none", feature = "nucleo-h743"))]
+pub use nucleo_h743 as chosen;
+#[cfg(all(target_os = "none", feature = "pico2"))]
+pub use pico2 as chosen;
+#[cfg(all(target_os = "none", feature = "qemu"))]
+pub use qemu as chosen;
+
+/// The watchdog resets the board so long after it was last fed, microseconds.
+#[cfg(all(target_os = "none", feature = "board"))]
+pub(crate) const BITES_AFTER_US: u32 = 1_000_000;

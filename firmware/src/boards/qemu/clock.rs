@@ -1,0 +1,117 @@
+//! Time: CMSDK timer 0 counts, timer 1 wakes.
+//!
+//! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts instructions in forties.
+
+use core::cell::{Cell, RefCell};
+use core::task::Waker;
+
+use critical_section::{CriticalSection, Mutex};
+use embassy_time_driver::Driver;
+use embassy_time_queue_utils::Queue;
+
+use super::interrupts::{self, Irq};
+use super::registers::Register;
+
+/// Counts in a microsecond.
+const COUNTS_US: u64 = 25;
+/// Instructions of `-icount shift=0` in a count.
+const INSTRUCTIONS: u64 = 40;
+const TIMER0: usize = 0x4000_0000;
+const TIMER1: usize = 0x4000_1000;
+const CTRL: usize = 0;
+const VALUE: usize = 4;
+const RELOAD: usize = 8;
+const INTSTATUS: usize = 12;
+const ENABLE: u32 = 1;
+const INTERRUPT: u32 = 8;
+
+struct Clock {
+    /// How often timer 0 has gone round.
+    rounds: Mutex<Cell<u32>>,
+    queue: Mutex<RefCell<Queue>>,
+}
+
+embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
+    rounds: Mutex::new(Cell::new(0)),
+    queue: Mutex::new(RefCell::new(Queue::new())),
+});
+
+/// Starts both timers.
+pub fn start() {
+    Register::new(TIMER0, RELOAD).write(u32::MAX);
+    Register::new(TIMER0, CTRL).write(ENABLE | INTERRUPT);
+    // Without a reload value it runs down once.
+    Register::new(TIMER1, VALUE).write(u32::MAX);
+    Register::new(TIMER1, CTRL).write(ENABLE | INTERRUPT);
+    interrupts::enable(Irq::Timer0, interrupts::DEVICES);
+    interrupts::enable(Irq::Timer1, interrupts::DEVICES);
+}
+
+/// Timer 0 has gone round.
+pub fn on_timer0() {
+    critical_section::with(CLOCK_NOW);
+}
+
+/// An alarm is due.
+pub fn on_timer1() {
+    critical_section::with(|cs| {
+        Register::new(TIMER1, INTSTATUS).write(1);
+        CLOCK.arm(cs);
+    });
+}
+
+/// Counts since the start. Notes a round that has not been noted yet.
+const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
+    let rounds = CLOCK.rounds.borrow(cs);
+    let before = Register::new(TIMER0, VALUE).read();
+    let ended = Register::new(TIMER0, INTSTATUS).read() != 0;
+    let mut value = before;
+    if ended {
+        Register::new(TIMER0, INTSTATUS).write(1);
+        rounds.set(rounds.get() + 1);
+        // Read again: the first may be from before the round's end.
+        value = Register::new(TIMER0, VALUE).read();
+    }
+    u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)
+};
+
+/// Instructions since the start, under `-icount shift=0`, to the next forty.
+pub fn instructions() -> u64 {
+    critical_section::with(CLOCK_NOW) * INSTRUCTIONS
+}
+
+impl Clock {
+    /// Wakes who is due, and sets timer 1 for who is next.
+    fn arm(&self, cs: CriticalSection<'_>) {
+        let mut queue = self.queue.borrow(cs).borrow_mut();
+        loop {
+            let now = CLOCK_NOW(cs);
+            let next_us = queue.next_expiration(now / COUNTS_US);
+            if next_us == u64::MAX {
+                return;
+            }
+            let due = next_us.saturating_mul(COUNTS_US);
+            if due > now {
+                // Far alarms are looked at again when the timer has run down.
+                let wait = (due - now).min(u64::from(u32::MAX)) as u32;
+                Register::new(TIMER1, VALUE).write(wait);
+                return;
+            }
+        }
+    }
+}
+
+impl Driver for Clock {
+    fn now(&self) -> u64 {
+        critical_section::with(CLOCK_NOW) / COUNTS_US
+    }
+
+    fn schedule_wake(&self, at: u64, waker: &Waker) {
+        critical_section::with(|cs| {
+            let changed = self.queue.borrow(cs).borrow_mut().schedule_wake(at, waker);
+            if changed {
+                self.arm(cs);
+            }
+        });
+    }
+}

@@ -1,0 +1,110 @@
+//! Bank 2 of the STM32H743's flash, emulated in memory that a warm reset leaves alone: 8 sectors of 128 kB, words of 32 bytes
+//! that are programmed once between two erasures, and torn ones that cannot be read.
+#![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
+
+use companion::store::{Fault, Layout, ReadFlash, WORD};
+use embassy_time::{Duration, Timer};
+
+/// Where the bank lies.
+const BANK: usize = 0x6000_0000;
+/// A byte for each word: what happened to it last. Real flash keeps a checksum there.
+const MARKS: usize = 0x6020_0000;
+/// Says that bank and marks were made; memory is zero when the power comes.
+const MADE: usize = 0x6030_0000;
+const MAGIC: u32 = 0x464c_4153;
+const LEN: usize = LAYOUT.len() as usize;
+const ERASED: u8 = 0;
+const WHOLE: u8 = 1;
+const TORN: u8 = 2;
+/// What erasing a sector of 128 kB takes, by the data sheet between 1.1 and 4 s at 8 and 64 bit parallelism.
+const ERASE: Duration = Duration::from_millis(1100);
+/// What programming a word takes, by the same.
+const PROGRAM: Duration = Duration::from_micros(100);
+
+/// The emulated bank is the real one's size.
+pub const LAYOUT: Layout = Layout::H743;
+
+/// The bank; there is one.
+pub struct Flash(());
+
+impl Flash {
+    /// To be called once, at the start: the bank is empty if the power was off.
+    pub(super) fn new() -> Self {
+        // SAFETY: memory of this board; nobody else uses it yet.
+        unsafe {
+            if (MADE as *const u32).read_volatile() != MAGIC {
+                (BANK as *mut u8).write_bytes(0xFF, LEN);
+                (MARKS as *mut u8).write_bytes(ERASED, LEN / WORD);
+                (MADE as *mut u32).write_volatile(MAGIC);
+            }
+        }
+        Self(())
+    }
+
+    /// A roadmap as it lies in the bank; `None` where it cannot be read.
+    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
+        let at = at as usize;
+        let end = at.checked_add(len).filter(|end| *end <= LEN)?;
+        if (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN) {
+            return None;
+        }
+        // SAFETY: inside the bank. The store never erases or programs the slot that a start uses, until the next start.
+        Some(unsafe { core::slice::from_raw_parts((BANK + at) as *const u8, len) })
+    }
+}
+
+impl crate::shell::Flash for Flash {
+    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+        let (at, len) = (at as usize, LAYOUT.sector_len as usize);
+        if !at.is_multiple_of(len) || at + len > LEN {
+            return Err(Fault);
+        }
+        // A cut while it lasts leaves words that are neither.
+        for word in at / WORD..(at + len) / WORD {
+            set_mark(word, TORN);
+        }
+        Timer::after(ERASE).await;
+        // SAFETY: inside the bank, and no view of this sector is held (see `view`).
+        unsafe { ((BANK + at) as *mut u8).write_bytes(0xFF, len) };
+        for word in at / WORD..(at + len) / WORD {
+            set_mark(word, ERASED);
+        }
+        Ok(())
+    }
+
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+        let at = at as usize;
+        if !at.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) || at + bytes.len() > LEN {
+            return Err(Fault);
+        }
+        for (i, word) in bytes.chunks(WORD).enumerate() {
+            let place = at / WORD + i;
+            if mark(place) != ERASED {
+                return Err(Fault);
+            }
+            set_mark(place, TORN);
+            Timer::after(PROGRAM).await;
+            // SAFETY: inside the bank, and no view of this word is held (see `view`).
+            unsafe { ((BANK + place * WORD) as *mut u8).copy_from_nonoverlapping(word.as_ptr(), WORD) };
+            set_mark(place, WHOLE);
+        }
+        Ok(())
+    }
+}
+
+impl ReadFlash for Flash {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+        out.copy_from_slice(self.view(at, out.len()).ok_or(Fault)?);
+        Ok(())
+    }
+}
+
+fn mark(word: usize) -> u8 {
+    // SAFETY: the callers keep `word` below the number of words, and each has a mark.
+    unsafe { ((MARKS + word) as *const u8).read_volatile() }
+}
+
+fn set_mark(word: usize, mark: u8) {
+    // SAFETY: as above.
+    unsafe { ((MARKS + word) as *mut u8).write_volatile(mark) }
+}

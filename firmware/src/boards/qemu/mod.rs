@@ -1,0 +1,45 @@
+//! QEMU's `mps2-an500`: a Cortex-M7 with FPU, linked against the memory of the STM32H743.
+
+use defmt_semihosting as _;
+use embassy_executor::SendSpawner;
+
+pub mod clock;
+pub mod flash;
+pub mod interrupts;
+pub mod memory;
+mod registers;
+pub mod uart;
+mod watchdog;
+
+pub use flash::{Flash, LAYOUT};
+pub use uart::{Receiver, Transmitter};
+pub use watchdog::Watchdog;
+
+/// The board, ready.
+pub struct Parts {
+    /// Runs links and setpoints, by interrupt.
+    pub links: SendSpawner,
+    /// Runs what takes long, by an interrupt below that.
+    pub plans: SendSpawner,
+    /// To the autopilot.
+    pub autopilot: (Receiver, Transmitter),
+    /// To the swarm's radio.
+    pub swarm: (Receiver, Transmitter),
+    /// For files and parameters.
+    pub flash: Flash,
+    /// Asleep.
+    pub watchdog: Watchdog,
+}
+
+/// Starts the board. To be called once.
+pub fn start() -> Parts {
+    clock::start();
+    Parts {
+        links: interrupts::start_links(),
+        plans: interrupts::start_plans(),
+        autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
+        swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),
+        flash: Flash::new(),
+        watchdog: Watchdog(()),
+    }
+}

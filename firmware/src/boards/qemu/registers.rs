@@ -1,0 +1,23 @@
+//! Device registers.
+#![expect(unsafe_code, reason = "registers are memory")]
+
+/// A 32-bit register of this board.
+#[derive(Clone, Copy)]
+pub struct Register(usize);
+
+impl Register {
+    /// The register `offset` bytes into the device at `base`, one of the addresses that application note AN500 gives.
+    pub(super) const fn new(base: usize, offset: usize) -> Self {
+        Self(base + offset)
+    }
+
+    pub fn read(self) -> u32 {
+        // SAFETY: `new` is only given addresses of registers, aligned and always there.
+        unsafe { (self.0 as *const u32).read_volatile() }
+    }
+
+    pub fn write(self, value: u32) {
+        // SAFETY: as above; no register of ours lets a device write to memory.
+        unsafe { (self.0 as *mut u32).write_volatile(value) }
+    }
+}

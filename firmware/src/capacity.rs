@@ -1,0 +1,21 @@
+//! Capacities of a board, and what each costs in RAM. The RP2350 has half a megabyte in all, so it takes half.
+
+/// Half on the smaller board.
+const fn share(of: usize) -> usize {
+    if cfg!(feature = "pico2") { of / 2 } else { of }
+}
+
+/// Nodes of a roadmap, terminals among them: 70 bytes each in scratch.
+pub const ROADMAP_NODES: usize = share(4096);
+/// Half-edges of a roadmap: 4 bytes each, in flash; 8 bytes for each pair of them while a roadmap is built on board.
+pub const HALF_EDGES: usize = share(65_536);
+/// Cubes the nodes are sorted into while a roadmap is built: 2 bytes each. Enough for 100 × 100 × 50 m at Dmax 8 m.
+pub const ROADMAP_CUBES: usize = share(8192);
+/// Vehicles of a swarm, and goals: 1.7 kB each, the most of it in the swarm's plan.
+pub const VEHICLES: usize = share(32);
+/// Waypoints of a path: 24 bytes each.
+pub const WAYPOINTS: usize = 64;
+/// Gates of one vehicle: 12 bytes each.
+pub const GATES: usize = 128;
+/// Pieces of flights among which a vehicle steps aside: 44 bytes each.
+pub const PIECES: usize = share(2048);

@@ -1,0 +1,255 @@
+//! Random cases that a board and the desk compute alike, to be compared bit by bit, and that tests count instructions of.
+//!
+//! All come from a seed and are the same everywhere: PCG numbers, f32, no clock.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::assignment::{self, AssignmentWorkspace};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
+use planner_core::path::Path;
+use planner_core::plan::{Mode, Objective, VehicleTask};
+use planner_core::prm::{Config, Sampling};
+use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
+use planner_core::schedule::{Gate, ScheduleConfig};
+use planner_core::search::{self, SearchWorkspace};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
+
+/// Cases of [`PlanCase`] that board and desk are compared in.
+pub const PLANS: u64 = 200;
+/// Cases of [`StepCase`] of which the worst counts.
+pub const STEPS: usize = 10_000;
+/// Most vehicles of a [`PlanCase`].
+const SWARM: usize = 10;
+/// Looks at neighbours along each path of a [`PlanCase`].
+const LOOKS: usize = 4;
+const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+
+/// How every swarm of these cases flies.
+pub const SCHEDULE: ScheduleConfig =
+    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.75, cruise_mps: 2.0, vertical_mps: 1.0 };
+/// Radius and safety margin of every vehicle of these cases, metres.
+pub const CLEARANCE_M: f32 = 0.8;
+/// How goals are given out in the cases of whole swarms.
+pub const MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
+
+/// A swarm for the terminals of a roadmap: one vehicle a start.
+pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
+    let starts = view.header().starts.min(VEHICLES as u16);
+    let task = |i: u16| VehicleTask {
+        id: 1 + i as u8,
+        required_clearance_m: CLEARANCE_M,
+        climb_m: 1.0,
+        goal: Some(i),
+    };
+    (0..starts).map(task).collect()
+}
+
+/// Height of every goal above its ground, metres.
+pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
+    (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
+}
+
+/// Scratch of [`plan_case`].
+pub struct Workspace {
+    search: SearchWorkspace<ROADMAP_NODES>,
+    assignment: AssignmentWorkspace<VEHICLES>,
+}
+
+impl Workspace {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self { search: SearchWorkspace::new(), assignment: AssignmentWorkspace::new() }
+    }
+}
+
+impl Default for Workspace {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// CRC-32 of every bit of a case's results.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PlanCase {
+    /// Of the cost matrix.
+    pub costs: u32,
+    /// Of who flies where, and the total.
+    pub assignment: u32,
+    /// Of the nodes, places, arc lengths and clearances of all paths.
+    pub paths: u32,
+    /// Of the speed scales and stops that random neighbours leave, by both methods.
+    pub scales: u32,
+}
+
+/// One case: up to ten vehicles between random nodes, edges blocked at random, then random neighbours along every path.
+pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
+    let mut rng = Pcg32::seed_from_u64(number);
+    let nodes = view.node_count();
+    let swarm = 1 + below(&mut rng, SWARM);
+    let draw =
+        |rng: &mut Pcg32| -> Vec<u16, SWARM> { (0..swarm).map(|_| below(rng, nodes) as u16).collect() };
+    let (starts, goals) = (draw(&mut rng), draw(&mut rng));
+    let required_m = uniform(&mut rng, 0.1, 1.0);
+    let blocked = below(&mut rng, nodes) as u16;
+    let passable = |from: u16, edge: &HalfEdge| {
+        view.clears(edge, required_m) && from % 97 != blocked % 97 && edge.target != blocked
+    };
+    let mut case = [CRC32.digest(), CRC32.digest(), CRC32.digest(), CRC32.digest()];
+    let [costs_crc, assignment_crc, paths_crc, scales_crc] = &mut case;
+    let mut costs = [0.0; SWARM * SWARM];
+    let costs = &mut costs[..swarm * swarm];
+    let found = search::cost_matrix(view, &starts, &goals, passable, &mut ws.search, costs);
+    costs_crc.update(&[u8::from(found.is_ok())]);
+    costs.iter().for_each(|cost| costs_crc.update(&cost.to_bits().to_le_bytes()));
+    let mut assigned = [None; SWARM];
+    let assigned = &mut assigned[..swarm];
+    if let Ok(assignment) = assignment::assign(costs, swarm, swarm, &mut ws.assignment, assigned) {
+        assignment_crc.update(&assignment.total.to_bits().to_le_bytes());
+    }
+    for (&start, goal) in starts.iter().zip(assigned.iter()) {
+        assignment_crc.update(&goal.unwrap_or(u16::MAX).to_le_bytes());
+        let Some(goal) = goal else { continue };
+        let mut way: Vec<u16, WAYPOINTS> = Vec::new();
+        let target = goals[usize::from(*goal)];
+        let length = search::astar(view, start, target, passable, &mut ws.search, &mut way);
+        paths_crc.update(&length.unwrap_or(f32::INFINITY).to_bits().to_le_bytes());
+        let mut path: Path<WAYPOINTS> = Path::new();
+        for &node in &way {
+            paths_crc.update(&node.to_le_bytes());
+            // A path as long as the nodes it is made of.
+            let _ = path.push(view.node(node), CLEARANCE_M);
+        }
+        for waypoint in path.waypoints() {
+            let numbers = waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
+            numbers.for_each(|number| paths_crc.update(&number.to_bits().to_le_bytes()));
+        }
+        (0..LOOKS).for_each(|_| look(&mut rng, &path, scales_crc));
+    }
+    let [costs, assignment, paths, scales] = case.map(finished);
+    PlanCase { costs, assignment, paths, scales }
+}
+
+/// By its type: the crate has one of each width.
+fn finished(digest: Digest<'_, u32, Table<1>>) -> u32 {
+    digest.finalize()
+}
+
+fn look(rng: &mut Pcg32, path: &Path<WAYPOINTS>, scales: &mut Digest<'_, u32, Table<1>>) {
+    let along_m = uniform(rng, 0.0, path.length_m());
+    let Some(position) = path.point_at(along_m) else { return };
+    let neighbours: Vec<Neighbour, VEHICLES> =
+        (0..VEHICLES).map(|k| neighbour(rng, k, &position, 12.0)).collect();
+    let own = Own { rank: 3, position, along_m, path, detours: false };
+    for method in [Method::Priority, Method::Algorithm2] {
+        let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
+        let advice = deconflict::advise(&cfg, &own, &[], &neighbours);
+        scales.update(&advice.speed_scale.to_bits().to_le_bytes());
+        scales.update(&advice.stop_within_m.to_bits().to_le_bytes());
+        scales.update(&[advice.waiting_for]);
+    }
+}
+
+fn neighbour(rng: &mut Pcg32, k: usize, around: &Point, reach_m: f32) -> Neighbour {
+    Neighbour {
+        id: 2 + k as u8,
+        rank: 1 + k as u16,
+        position: around + anywhere(rng, reach_m),
+        velocity: anywhere(rng, 3.0),
+        age_s: uniform(rng, 0.0, 2.0),
+        ..Neighbour::default()
+    }
+}
+
+/// A moment of a flight: one vehicle among its neighbours.
+pub struct StepCase {
+    cfg: DeconflictConfig,
+    position: Point,
+    along_m: f32,
+    path: Path<WAYPOINTS>,
+    gates: Vec<Gate, GATES>,
+    neighbours: Vec<Neighbour, VEHICLES>,
+}
+
+impl StepCase {
+    /// A random case beside so many neighbours, at most [`VEHICLES`]. A hard one has everybody near and without a shared
+    /// plan, every gate within reach and passed.
+    pub fn new(rng: &mut Pcg32, neighbours: usize, hard: bool) -> Self {
+        let cfg = DeconflictConfig {
+            method: Method::Priority,
+            safety_distance_m: uniform(rng, 0.5, 3.0),
+            cruise_mps: uniform(rng, 0.5, 5.0),
+            accel_mps2: 1.5,
+        };
+        let mut path = Path::new();
+        let mut at = Point::zeros();
+        for _ in 0..2 + below(rng, WAYPOINTS - 1) {
+            path.push(at, 1.0).expect("there is room");
+            at += anywhere(rng, 5.0);
+        }
+        let along_m = uniform(rng, -1.0, path.length_m());
+        let position = path.point_at(along_m).expect("a path") + anywhere(rng, 0.2);
+        let reach_m = if hard { 3.0 } else { path.length_m() };
+        let gate = |rng: &mut Pcg32| Gate {
+            at_m: along_m + uniform(rng, 0.0, reach_m),
+            id: 2 + below(rng, neighbours.max(1)) as u8,
+            until_m: uniform(rng, 0.0, 60.0),
+        };
+        let mut gates: Vec<_, GATES> = (0..below(rng, GATES + 1)).map(|_| gate(rng)).collect();
+        gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
+        let unplanned = if hard { 1.0 } else { uniform(rng, 0.0, 1.0) };
+        // Half of the hard cases pass all gates, the other half have nobody's progress.
+        let passed = hard && rng.next_u32().is_multiple_of(2);
+        let neighbours = (0..neighbours.min(VEHICLES))
+            .map(|k| Neighbour {
+                progress_m: match passed {
+                    true => Some(100.0),
+                    false => (uniform(rng, 0.0, 1.0) > unplanned).then(|| uniform(rng, 0.0, 60.0)),
+                },
+                grounded: !hard && rng.next_u32().is_multiple_of(8),
+                ..neighbour(rng, k, &position, if hard { 12.0 } else { 40.0 })
+            })
+            .collect();
+        Self { cfg, position, along_m, path, gates, neighbours }
+    }
+
+    /// What is counted.
+    pub fn advise(&self) -> Advice {
+        let Self { position, along_m, path, .. } = self;
+        let own = Own { rank: 0, position: *position, along_m: *along_m, path, detours: false };
+        deconflict::advise(&self.cfg, &own, &self.gates, &self.neighbours)
+    }
+}
+
+fn below(rng: &mut Pcg32, limit: usize) -> usize {
+    rng.next_u32() as usize % limit
+}
+
+fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
+    low + (rng.next_u32() >> 8) as f32 / (1u32 << 24) as f32 * (high - low)
+}
+
+fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
+    Point::from_fn(|_, _| uniform(rng, -reach_m, reach_m))
+}
+
+/// What is built on board: P3D's building with 2300 nodes.
+pub const BUILT: Config = Config {
+    nodes: 2300,
+    edge_min_m: 0.5,
+    edge_max_m: 8.0,
+    clearance_m: 0.0,
+    seed: 1,
+    sampling: Sampling::Uniform,
+};
+
+/// CRC-32 over every bit of a roadmap's nodes and edges.
+pub fn roadmap_crc(nodes: &[Point], edges: &[Edge]) -> u32 {
+    let mut digest = CRC32.digest();
+    nodes.iter().flatten().for_each(|c| digest.update(&c.to_bits().to_le_bytes()));
+    edges.iter().for_each(|e| [e.a, e.b].iter().for_each(|node| digest.update(&node.to_le_bytes())));
+    digest.finalize()
+}

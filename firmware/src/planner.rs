@@ -1,0 +1,125 @@
+//! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
+//! way around what is in its way.
+
+use companion::PlanFailure;
+use companion::mission_file::MissionView;
+use heapless::Vec;
+use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::path::Path;
+use planner_core::plan::{self, PlanError, SwarmPlan};
+use planner_core::roadmap::RoadmapView;
+use planner_core::schedule::{ScheduleError, VehiclePlan};
+use planner_core::search::SearchError;
+
+use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::scratch::Scratch;
+use crate::shell::BoardCompanion;
+
+/// Most things that are flown around: the vehicles of the swarm, and as many obstacles.
+const OBSTACLES: usize = 2 * VEHICLES;
+
+/// What planning needs beside roadmap and mission.
+pub struct Memory {
+    scratch: Scratch,
+    plan: SwarmPlan<VEHICLES, WAYPOINTS>,
+    own: VehiclePlan<WAYPOINTS, GATES>,
+    obstacles: Vec<KeepOff, OBSTACLES>,
+    nodes: Vec<u16, WAYPOINTS>,
+}
+
+impl Memory {
+    /// All zeros, so a static costs .bss alone.
+    pub const fn new() -> Self {
+        Self {
+            scratch: Scratch::new(),
+            plan: SwarmPlan::new(),
+            own: VehiclePlan {
+                goal: None,
+                path: Path::new(),
+                climb_m: 0.0,
+                descent_m: 0.0,
+                depart_s: 0.0,
+                gates: Vec::new(),
+                plan_crc: 0,
+            },
+            obstacles: Vec::new(),
+            nodes: Vec::new(),
+        }
+    }
+}
+
+impl Default for Memory {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A planner over a roadmap and a mission that belong together, or over none.
+pub struct Planner<'a> {
+    /// What to plan on.
+    pub roadmap: Option<RoadmapView<'a>>,
+    /// What to plan.
+    pub mission: Option<MissionView<'a>>,
+    /// Whose plan it is.
+    pub system_id: u8,
+    /// Its memory.
+    pub memory: &'a mut Memory,
+}
+
+impl Planner<'_> {
+    /// What the companion would have flown around; `None` if it asks for the mission's plan.
+    pub fn note_detour(&mut self, companion: &BoardCompanion) -> Option<DetourRequest> {
+        let obstacles = &mut self.memory.obstacles;
+        obstacles.clear();
+        // One more than there is room for cannot be: vehicles and obstacles are as many at most.
+        companion.detour(|obstacle| _ = obstacles.push(obstacle))
+    }
+
+    /// The plan asked for.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn answer(
+        &mut self,
+        detour: Option<&DetourRequest>,
+    ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+        let (Some(roadmap), Some(mission)) = (&self.roadmap, &self.mission) else {
+            return Err(PlanFailure::NoRoadmap);
+        };
+        let memory = &mut *self.memory;
+        let ws = memory.scratch.planner();
+        if let Some(request) = detour {
+            detour::plan_vehicle(
+                roadmap,
+                request,
+                &mut memory.obstacles,
+                &mut ws.search,
+                &mut memory.nodes,
+                &mut memory.own,
+            )
+            .map_err(|_| PlanFailure::Unreachable)?;
+            return Ok(&memory.own);
+        }
+        let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
+        let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
+        let request = mission.request(&mut tasks, &mut descents_m).map_err(|_| PlanFailure::Capacity)?;
+        plan::plan_swarm(roadmap, &request, ws, &mut memory.plan).map_err(|error| failure(&error))?;
+        plan::vehicle_plan(&memory.plan, index, &request.schedule, &mut ws.schedule, &mut memory.own)
+            .map_err(|_| PlanFailure::Capacity)?;
+        Ok(&memory.own)
+    }
+}
+
+fn failure(error: &PlanError) -> PlanFailure {
+    match error {
+        PlanError::Terminals | PlanError::BadGoal(_) => PlanFailure::NoRoadmap,
+        PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
+        | PlanError::SwarmFull
+        | PlanError::Path(..)
+        | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
+            PlanFailure::Capacity
+        }
+        PlanError::Schedule(_, ScheduleError::Blocked) => PlanFailure::Blocked,
+        PlanError::Search(..) | PlanError::Assignment(_) => PlanFailure::Unreachable,
+    }
+}

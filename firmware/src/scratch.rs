@@ -1,0 +1,109 @@
+//! What a board plans with: one piece of memory, for planning on a roadmap or for building one.
+//!
+//! An enum would do but for its change from one use to the other, which the compiler makes on the stack, where there is no
+//! room for it.
+#![expect(unsafe_code, reason = "two uses of one piece of memory")]
+
+use core::mem::ManuallyDrop;
+
+use planner_core::Point;
+use planner_core::plan::PlanWorkspace;
+use planner_core::prm::{self, Config, PrmError};
+use planner_core::roadmap::Edge;
+use planner_core::voxel::VoxelGrid;
+
+use crate::capacity::{HALF_EDGES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
+
+/// Scratch of planning a swarm.
+pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
+
+/// The memory; a board has one. The smaller use lies in the memory of the larger.
+pub struct Scratch {
+    memory: Memory,
+    builds: bool,
+}
+
+union Memory {
+    plan: ManuallyDrop<Planner>,
+    build: ManuallyDrop<Builder>,
+}
+
+impl Scratch {
+    /// All zeros, so a static costs .bss alone.
+    pub const fn new() -> Self {
+        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, builds: false }
+    }
+
+    /// For planning from here on.
+    pub fn planner(&mut self) -> &mut Planner {
+        self.turn(false);
+        // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner was written since.
+        unsafe { &mut self.memory.plan }
+    }
+
+    /// For building from here on; empty.
+    pub fn builder(&mut self) -> &mut Builder {
+        self.turn(true);
+        // SAFETY: as above; all zeros is an empty builder.
+        unsafe { &mut self.memory.build }
+    }
+
+    /// Zeros where the use changes.
+    fn turn(&mut self, builds: bool) {
+        if self.builds != builds {
+            // SAFETY: neither use has anything to drop, and any bytes may be written over their memory.
+            unsafe { (&raw mut self.memory).write_bytes(0, 1) };
+            self.builds = builds;
+        }
+    }
+}
+
+impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Nodes and edges of a roadmap that is built on board.
+pub struct Builder {
+    nodes: [Point; ROADMAP_NODES],
+    node_count: usize,
+    index: prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>,
+    edges: [Edge; HALF_EDGES / 2],
+    edge_count: usize,
+}
+
+impl Builder {
+    /// Samples nodes and joins them: Algorithm 1 of P3D. Every edge carries the clearance it was tested at.
+    ///
+    /// # Errors
+    /// The map has no room, or the roadmap is larger than this board's.
+    pub fn build(
+        &mut self,
+        grid: &VoxelGrid<'_>,
+        terminals: &[Point],
+        config: &Config,
+    ) -> Result<(), PrmError> {
+        let Self { nodes, node_count, index, edges, edge_count } = self;
+        *edge_count = 0;
+        *node_count = prm::sample_nodes(grid, None, terminals, config, nodes)?;
+        let nodes = &nodes[..*node_count];
+        index.index(nodes, config)?;
+        prm::connect_range(grid, index, config, 0..nodes.len(), |edge| {
+            let to = edges.get_mut(*edge_count).ok_or(PrmError::RoadmapFull)?;
+            *to = Edge { a: edge.a, b: edge.b, clearance_m: config.clearance_m };
+            *edge_count += 1;
+            Ok(())
+        })
+    }
+
+    /// Its nodes.
+    pub fn nodes(&self) -> &[Point] {
+        &self.nodes[..self.node_count]
+    }
+
+    /// Its edges.
+    pub fn edges(&self) -> &[Edge] {
+        &self.edges[..self.edge_count]
+    }
+}

@@ -1,0 +1,335 @@
+//! The shell around the companion: what moves bytes, keeps time and plans.
+//!
+//! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`keep_time`](Shell::keep_time) are tasks of an interrupt's
+//! executor; [`plan`](Shell::plan) is below them, in thread mode, so a long plan never holds a setpoint up. The companion is held
+//! only for the time of one of its calls, never across an `await`.
+
+use core::fmt::Write as _;
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use companion::frame::{Framer, MAX_SENT};
+use companion::store::{Fault, FlashRequest, READ, ReadFlash};
+use companion::{Companion, Event, Link, PlanFailure, State};
+use embassy_futures::select::select;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::mutex::Mutex;
+use embassy_sync::signal::Signal;
+use embassy_time::{Duration, Instant, Timer, with_timeout};
+use embedded_io_async::{Read, Write};
+use heapless::String;
+use static_cell::StaticCell;
+
+use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::planner::Planner;
+
+/// A companion with a board's capacities.
+pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
+
+/// Bytes taken from a UART at once.
+const CHUNK: usize = 256;
+/// Between two looks at a UART, so that bytes come in handfuls: each look costs as much as a hundred bytes.
+const GATHER: Duration = Duration::from_millis(1);
+/// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
+pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
+/// A stream of setpoints that paused for longer had ended, milliseconds.
+const STREAM_ENDS_MS: u32 = 1000;
+
+/// What was to be said before a restart has this long to go out.
+const FAREWELL_MS: u32 = 200;
+
+type Shared<T> = Signal<CriticalSectionRawMutex, T>;
+
+/// What the tasks share.
+pub struct Shell {
+    companion: Mutex<CriticalSectionRawMutex, Option<BoardCompanion>>,
+    /// Something may be to be sent.
+    sends: [Shared<()>; 2],
+    /// The companion's next step may be due earlier than thought.
+    steps: Shared<()>,
+    /// The companion asks for a plan.
+    wants_plan: Shared<()>,
+    /// There may be something to do that takes long.
+    works: Shared<()>,
+    /// When a restart was asked for, milliseconds; 0 if none was.
+    restart_ms: AtomicU32,
+    /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
+    seen_ms: [AtomicU32; TASKS],
+    /// When the last setpoint went out, milliseconds.
+    setpoint_ms: AtomicU32,
+    /// The longest time between two setpoints of a flight, milliseconds.
+    gap_ms: AtomicU32,
+    /// What is said of it after the first flight.
+    gap_text: StaticCell<String<50>>,
+    /// Errors that the UARTs reported.
+    pub line_errors: [AtomicU32; 2],
+}
+
+/// A request of the companion, its bytes aside.
+enum Request {
+    Erase(u32),
+    Program(u32, usize),
+    Read(u32, usize),
+}
+
+/// A board's flash for files and parameters.
+pub trait Flash: ReadFlash {
+    /// Erases the sector that begins at an offset of the storage bank.
+    fn erase(&mut self, at: u32) -> impl Future<Output = Result<(), Fault>>;
+
+    /// Programs words that were erased.
+    fn program(&mut self, at: u32, bytes: &[u8]) -> impl Future<Output = Result<(), Fault>>;
+}
+
+/// The system id of the autopilot, from its first heartbeat; [`NO_AUTOPILOT`] where none comes in time.
+pub async fn hear_system_id(uart: &mut impl Read) -> u8 {
+    let mut ear = Ear::new();
+    let until = Instant::now() + HEAR_WITHIN;
+    let mut chunk = [0; CHUNK];
+    while let Ok(received) =
+        with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
+    {
+        // A line error loses bytes, no more.
+        if let Some(id) = ear.hear(&chunk[..received.unwrap_or_default()]) {
+            return id;
+        }
+    }
+    NO_AUTOPILOT
+}
+
+/// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it starts anew.
+pub const NO_AUTOPILOT: u8 = 250;
+/// An autopilot tells of itself once a second.
+const HEAR_WITHIN: Duration = Duration::from_secs(3);
+
+/// Listens for an autopilot's heartbeat.
+struct Ear(Framer);
+
+impl Ear {
+    const fn new() -> Self {
+        Self(Framer::new())
+    }
+
+    fn hear(&mut self, mut input: &[u8]) -> Option<u8> {
+        let mut heard = None;
+        while let Some(frame) = self.0.next(now(), &mut input) {
+            let autopilot = frame.message_id == HEARTBEAT && frame.component == companion::AUTOPILOT;
+            heard = heard.or(Some(frame.system).filter(|id| autopilot && *id != 0));
+        }
+        heard
+    }
+}
+
+const HEARTBEAT: u32 = 0;
+const TASKS: usize = 5;
+const TIME: usize = 4;
+
+/// Now, as the companion counts time.
+pub fn now() -> companion::Instant {
+    companion::Instant::from_micros(Instant::now().as_micros())
+}
+
+fn now_ms() -> u32 {
+    Instant::now().as_millis() as u32
+}
+
+impl Shell {
+    /// Without a companion.
+    pub const fn new() -> Self {
+        Self {
+            companion: Mutex::new(None),
+            sends: [Signal::new(), Signal::new()],
+            steps: Signal::new(),
+            wants_plan: Signal::new(),
+            works: Signal::new(),
+            restart_ms: AtomicU32::new(0),
+            seen_ms: [const { AtomicU32::new(0) }; TASKS],
+            setpoint_ms: AtomicU32::new(0),
+            gap_ms: AtomicU32::new(0),
+            gap_text: StaticCell::new(),
+            line_errors: [const { AtomicU32::new(0) }; 2],
+        }
+    }
+
+    /// Puts the companion in, before any task starts.
+    pub fn start(&mut self, companion: BoardCompanion) {
+        *self.companion.get_mut() = Some(companion);
+    }
+
+    /// Does something with the companion and hands on what came of it.
+    async fn with<T>(&'static self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
+        let mut held = self.companion.lock().await;
+        let companion = held.as_mut().expect("the companion is put in before any task starts");
+        let result = work(companion);
+        while let Some(event) = companion.poll_event() {
+            match event {
+                Event::PlanRequested => self.wants_plan.signal(()),
+                Event::RestartRequested => self.ask_restart(),
+                Event::StateChanged { to: State::Done, .. } => self.tell_gap(companion),
+                Event::StateChanged { .. } => {}
+            }
+        }
+        drop(held);
+        self.sends.iter().for_each(|sends| sends.signal(()));
+        self.works.signal(());
+        self.steps.signal(());
+        result
+    }
+
+    /// Says after the first flight how far apart setpoints were, by the board's own time.
+    fn tell_gap(&'static self, companion: &mut BoardCompanion) {
+        let gap = self.gap_ms.load(Ordering::Relaxed);
+        let mut text = String::new();
+        // It fits.
+        let _ = write!(text, "Setpoints were at most {gap} ms apart");
+        if let Some(kept) = self.gap_text.try_init(text).filter(|_| gap > 0) {
+            companion.say(false, kept.as_str());
+        }
+    }
+
+    fn ask_restart(&self) {
+        self.restart_ms.store(now_ms().max(1), Ordering::Relaxed);
+    }
+
+    fn seen(&self, task: usize) {
+        self.seen_ms[task].store(now_ms(), Ordering::Relaxed);
+    }
+
+    /// Takes what a UART receives to the companion.
+    ///
+    /// A board that calls itself [`NO_AUTOPILOT`] starts anew when it hears one: `system_id` is what it calls itself.
+    pub async fn receive(&'static self, link: Link, mut uart: impl Read, system_id: u8) -> ! {
+        let mut chunk = [0; CHUNK];
+        let mut ear = (link == Link::Autopilot && system_id == NO_AUTOPILOT).then(Ear::new);
+        loop {
+            match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
+                Ok(Ok(length)) => {
+                    self.with(|c| c.handle_bytes(link, now(), &chunk[..length])).await;
+                    if ear.as_mut().is_some_and(|ear| ear.hear(&chunk[..length]).is_some()) {
+                        self.ask_restart();
+                    }
+                }
+                // Framing, noise or overrun: what was lost the framer finds out.
+                Ok(Err(_)) => _ = self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed),
+                Err(_) => {}
+            }
+            self.seen(link as usize);
+            Timer::after(GATHER).await;
+        }
+    }
+
+    /// Takes what the companion has for a link to its UART.
+    pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
+        let mut frame = [0; MAX_SENT];
+        loop {
+            let length = {
+                let mut held = self.companion.lock().await;
+                held.as_mut().map_or(0, |companion| companion.poll_transmit(link, &mut frame))
+            };
+            if length == 0 {
+                // Late or not, it comes by.
+                let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
+            } else {
+                if link == Link::Autopilot && is_setpoint(&frame[..length]) {
+                    self.note_setpoint();
+                }
+                if uart.write_all(&frame[..length]).await.is_err() {
+                    self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
+                }
+            }
+            self.seen(2 + link as usize);
+        }
+    }
+
+    /// Lets the companion's time pass.
+    pub async fn keep_time(&'static self) -> ! {
+        loop {
+            let due = {
+                let held = self.companion.lock().await;
+                held.as_ref().and_then(BoardCompanion::poll_timeout)
+            };
+            let now = now();
+            let due = due.unwrap_or(now + companion::Duration::from_micros(ALIVE_EVERY.as_micros()));
+            if due <= now {
+                self.with(|companion| companion.handle_timeout(now)).await;
+            } else {
+                select(Timer::at(Instant::from_micros(due.micros())), self.steps.wait()).await;
+            }
+            self.seen(TIME);
+        }
+    }
+
+    /// Answers the companion's requests for plans and for its flash, one after the other: the flash is never erased while
+    /// a roadmap in it is planned on.
+    pub async fn work(&'static self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
+        loop {
+            if self.wants_plan.try_take().is_some() {
+                let detour = {
+                    let held = self.companion.lock().await;
+                    held.as_ref().and_then(|companion| planner.note_detour(companion))
+                };
+                let answer: Result<_, PlanFailure> = planner.answer(detour.as_ref());
+                self.with(|companion| companion.handle_plan(now(), answer)).await;
+            }
+            if !self.serve_flash(flash).await {
+                self.works.wait().await;
+            }
+        }
+    }
+
+    /// Does one thing that the companion asks of its flash; false if it asks for none.
+    async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
+        let mut bytes = [0; READ];
+        let request = {
+            let mut held = self.companion.lock().await;
+            match held.as_mut().and_then(BoardCompanion::poll_flash) {
+                None => return false,
+                Some(FlashRequest::Erase { at }) => Request::Erase(at),
+                Some(FlashRequest::Read { at, len }) => Request::Read(at, len),
+                Some(FlashRequest::Program { at, bytes: given }) => {
+                    bytes[..given.len()].copy_from_slice(given);
+                    Request::Program(at, given.len())
+                }
+            }
+        };
+        let outcome = match request {
+            Request::Erase(at) => flash.erase(at).await.map(|()| 0),
+            Request::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
+            Request::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
+        };
+        let outcome = outcome.map(|len| &bytes[..len]);
+        self.with(|companion| companion.handle_flash(now(), outcome)).await;
+        true
+    }
+
+    /// Whether a restart was asked for, and what was to be said before has had time to go out.
+    pub fn wants_restart(&self) -> bool {
+        let asked = self.restart_ms.load(Ordering::Relaxed);
+        asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS
+    }
+
+    /// Whether every task of the links and of time came by lately: else the watchdog is left to bite.
+    pub fn is_alive(&self) -> bool {
+        let now = now_ms();
+        let limit = 4 * ALIVE_EVERY.as_millis() as u32;
+        self.seen_ms.iter().all(|seen| now.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
+    }
+
+    fn note_setpoint(&self) {
+        let now = now_ms();
+        let gap = now.wrapping_sub(self.setpoint_ms.swap(now, Ordering::Relaxed));
+        if gap < STREAM_ENDS_MS {
+            self.gap_ms.fetch_max(gap, Ordering::Relaxed);
+        }
+    }
+}
+
+impl Default for Shell {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// SET_POSITION_TARGET_LOCAL_NED, by the message id of a MAVLink 2 frame.
+fn is_setpoint(frame: &[u8]) -> bool {
+    frame.get(7..10) == Some(&[84, 0, 0])
+}

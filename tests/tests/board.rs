@@ -1,0 +1,85 @@
+//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure` in QEMU.
+//!
+//! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time. They are its instructions, not
+//! cycles of the chip.
+
+use std::collections::HashMap;
+
+use firmware::cases::{self, Workspace};
+use flockmate_tests::{board, workspace};
+use host_sim::map::{Unknown, building};
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario;
+use planner_core::plan::{self, PlanRequest, PlanWorkspace, SwarmPlan};
+use planner_core::prm::{self, Config};
+
+/// Most instructions, by the name of what is counted.
+const LIMITS: [(&str, u64); 3] = [("replan", 40_000_000), ("build", 100_000_000), ("step", 60_000)];
+
+#[test]
+fn the_board_computes_what_the_desk_computes() {
+    let Some(program) = board::program("measure") else { return };
+    let scenario =
+        scenario::load(&workspace().join("host-sim/scenarios/demo.toml")).expect("the demo is good");
+    let mission = Mission::prepare(scenario, &Progress::on_terminal()).expect("the demo can be prepared");
+    let map =
+        building::building(building::DEFAULT_SEED, 0.5).expect("the building").voxel_map(Unknown::Blocked);
+    let lines = board::measure(&program, &mission.roadmap_file, &board::map_image(&map.grid()));
+
+    let view = mission.view();
+    let mut ws = Box::new(Workspace::new());
+    for number in 0..cases::PLANS {
+        let case = cases::plan_case(&view, number, &mut ws);
+        let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
+        let line = format!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
+        assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
+    }
+    assert!(lines.contains(&format!("plan {:08x}", swarm_crc(&mission))), "{}", lines.join("\n"));
+    for (name, clearance_m) in [("build", 0.0), ("build-with-clearance", cases::CLEARANCE_M)] {
+        let config = Config { clearance_m, ..cases::BUILT };
+        let line = format!("{name} {}", built(&map.grid(), &config));
+        assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
+    }
+
+    let mut counts: HashMap<&str, u64> = lines
+        .iter()
+        .filter_map(|line| line.strip_prefix("count ")?.split_once(' '))
+        .map(|(name, count)| (name, count.parse().expect("a number")))
+        .collect();
+    counts.insert("replan", ["costs", "assign", "paths"].iter().map(|part| counts[part]).sum());
+    for (name, count) in &counts {
+        println!("{name}: {count} instructions");
+    }
+    for (name, limit) in LIMITS {
+        assert!(counts[name] <= limit, "{name}: {} of {limit} instructions", counts[name]);
+    }
+}
+
+/// CRC of the plan for the whole swarm.
+fn swarm_crc(mission: &Mission) -> u32 {
+    let view = mission.view();
+    let (vehicles, descents_m) = (cases::tasks(&view), cases::descents(&view));
+    let request = PlanRequest {
+        vehicles: &vehicles,
+        descents_m: &descents_m,
+        mode: cases::MODE,
+        schedule: cases::SCHEDULE,
+    };
+    let mut ws = host_sim::capacity::on_heap(PlanWorkspace::<4096, 32, 2048>::new);
+    let mut plan = Box::new(SwarmPlan::<32, 64>::new());
+    plan::plan_swarm(&view, &request, &mut ws, &mut plan).expect("a plan");
+    plan.crc
+}
+
+/// What `measure` says of a roadmap that is built.
+fn built(grid: &planner_core::voxel::VoxelGrid<'_>, config: &Config) -> String {
+    let mut nodes = vec![planner_core::Point::zeros(); config.nodes];
+    prm::sample_nodes(grid, None, &[], config, &mut nodes).expect("free space");
+    let mut index = Box::new(prm::Workspace::<4096, 8192>::new());
+    let mut edges = vec![prm::Edge::default(); 1 << 15];
+    let count = prm::connect(grid, &nodes, config, &mut index, &mut edges).expect("it connects");
+    let edge = |e: &prm::Edge| planner_core::roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 };
+    let edges: Vec<_> = edges[..count].iter().map(edge).collect();
+    format!("{} {} {:08x}", nodes.len(), edges.len(), cases::roadmap_crc(&nodes, &edges))
+}

@@ -1,0 +1,182 @@
+//! `cargo xtask emulate`: the demo's first vehicles flown by boards in QEMU.
+//!
+//! Each board is the firmware as it is flashed, with its two UARTs as TCP ports. Roadmap and mission are uploaded through the
+//! port to the autopilot by MAVLink FTP; then `host-sim fly` is autopilots, radio and ground station to them, at the speed of
+//! the clock.
+
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::{TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::bare_metal::{self, Board};
+use crate::install;
+use crate::shell::{cargo, command, root, run, target_dir};
+
+/// The scenario whose first vehicles fly.
+const DEMO: &str = "host-sim/scenarios/demo.toml";
+/// Where the tables of its vehicles begin.
+const VEHICLE: &str = "[[vehicles]]";
+/// An instruction takes 2⁴ ns of a board's time: 62 million a second, which a loaded machine can keep up with.
+const SHIFT: &str = "shift=4";
+
+/// A companion that has heard no autopilot for ten seconds erases its flash; that takes ten more.
+const ALONE_AFTER: Duration = Duration::from_secs(22);
+
+/// Where the stack lies, as in the board's memory map.
+const STACK: u32 = 0x2008_0400;
+const STACK_LEN: usize = 127 << 10;
+/// Setpoints may be no further apart by a board's own time, milliseconds.
+const GAP_MS: u32 = 150;
+/// What no stack has touched since the start.
+const PAINT: u8 = 0xcc;
+
+/// What to fly.
+#[derive(clap::Args)]
+pub struct Args {
+    /// How many boards
+    #[arg(long, value_name = "N", default_value_t = 3, value_parser = clap::value_parser!(u8).range(1..=10))]
+    vehicles: u8,
+    /// Directory for what `host-sim fly` writes, and what each board logs
+    #[arg(long, value_name = "DIR", default_value = "out/emulate")]
+    out: PathBuf,
+}
+
+impl Default for Args {
+    /// What CI flies.
+    fn default() -> Self {
+        Self { vehicles: 3, out: target_dir().join("emulate") }
+    }
+}
+
+/// Builds, uploads and flies; fails if the mission was not complete and clean. Returns how much of its stack a board used
+/// at most, bytes.
+pub fn run_emulate(args: &Args) -> Result<usize> {
+    install::debian(install::EMULATOR)?;
+    let firmware = bare_metal::build(Board::Qemu)?.join("flockmate");
+    run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
+    let out = std::path::absolute(&args.out)?;
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot write {}", out.display()))?;
+    let boards: Vec<_> =
+        (1..=args.vehicles).map(|id| Emulated::start(&firmware, &out, id)).collect::<Result<_>>()?;
+    let scenario = out.join("scenario.toml");
+    std::fs::write(&scenario, cut_demo(&boards)?)?;
+    run(host_sim().arg("plan").arg(&scenario).arg("--out").arg(out.join("plan")))?;
+    println!("waiting until the boards have found that no autopilot is there, which could be armed");
+    std::thread::sleep(ALONE_AFTER);
+    for file in ["roadmap.bin", "mission.bin"] {
+        upload(&boards, &out.join("plan").join(file))?;
+    }
+    let gaps = fly(&scenario, &out)?;
+    ensure!(gaps.len() == boards.len(), "{} of {} boards told of their setpoints", gaps.len(), boards.len());
+    ensure!(gaps.iter().all(|gap| *gap <= GAP_MS), "setpoints were {gaps:?} ms apart: {GAP_MS} are allowed");
+    let stacks: Vec<_> =
+        boards.iter().map(|board| board.stack(&out.join("stack.bin"))).collect::<Result<_>>()?;
+    let deepest = stacks.into_iter().max().unwrap_or_default();
+    println!("stack      {deepest} bytes of {STACK_LEN} used at most");
+    Ok(deepest)
+}
+
+/// Flies, and shows what comes of it; what each board told of its setpoints, milliseconds.
+fn fly(scenario: &Path, out: &Path) -> Result<Vec<u32>> {
+    let mut fly = host_sim().arg("fly").arg(scenario).arg("--out").arg(out).stdout(Stdio::piped()).spawn()?;
+    let mut gaps = Vec::new();
+    for line in BufReader::new(fly.stdout.take().context("its output is piped")?).lines() {
+        let line = line?;
+        println!("{line}");
+        let gap = line.split_once("Setpoints were at most ").and_then(|(_, rest)| rest.split_once(" ms"));
+        gaps.extend(gap.and_then(|(gap, _)| gap.parse::<u32>().ok()));
+    }
+    ensure!(fly.wait()?.success(), "the mission was not complete and clean");
+    Ok(gaps)
+}
+
+fn host_sim() -> Command {
+    command(target_dir().join("release/host-sim"))
+}
+
+/// The demo with as many vehicles as boards, each with the URLs of its board.
+fn cut_demo(boards: &[Emulated]) -> Result<String> {
+    let demo = std::fs::read_to_string(root().join(DEMO)).with_context(|| format!("cannot read {DEMO}"))?;
+    let mut parts = demo.split(VEHICLE);
+    let mut scenario = parts.next().unwrap_or_default().to_owned();
+    let vehicles: Vec<_> = parts.take(boards.len()).collect();
+    ensure!(vehicles.len() == boards.len(), "{DEMO} has only {} vehicles", vehicles.len());
+    for (vehicle, board) in vehicles.iter().zip(boards) {
+        let [autopilot, radio] = board.ports.map(|port| format!("tcp:127.0.0.1:{port}"));
+        scenario += &format!("{VEHICLE}{}", vehicle.trim_end());
+        scenario += &format!("\ncompanion = \"{autopilot}\"\nradio = \"{radio}\"\n\n");
+    }
+    Ok(scenario)
+}
+
+/// Gives all boards a file, at the same time.
+fn upload(boards: &[Emulated], file: &Path) -> Result<()> {
+    let start = |board: &Emulated| {
+        let link = format!("tcp:127.0.0.1:{}", board.ports[0]);
+        host_sim().arg("upload").args(["--link", &link]).arg(file).spawn().context("host-sim does not start")
+    };
+    let uploads: Vec<_> = boards.iter().map(start).collect::<Result<_>>()?;
+    for mut upload in uploads {
+        ensure!(upload.wait()?.success(), "the upload of {} failed", file.display());
+    }
+    Ok(())
+}
+
+/// A board in QEMU; it ends with us.
+struct Emulated {
+    qemu: Child,
+    /// TCP ports of its UARTs: to the autopilot, to the radio.
+    ports: [u16; 2],
+    /// QEMU's own.
+    monitor: u16,
+}
+
+impl Emulated {
+    fn start(firmware: &Path, out: &Path, id: u8) -> Result<Self> {
+        let [autopilot, radio, monitor] = free_ports()?;
+        let ports = [autopilot, radio];
+        let log = out.join(format!("board-{id}.defmt"));
+        let mut qemu = command("qemu-system-arm");
+        qemu.args(["-machine", "mps2-an500", "-display", "none", "-icount", SHIFT])
+            .args(["-monitor", &format!("tcp:127.0.0.1:{monitor},server=on,wait=off")])
+            .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
+            .args(["-chardev", &format!("file,id=log,path={}", log.display())]);
+        for port in ports {
+            qemu.args(["-serial", &format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on")]);
+        }
+        let qemu = qemu.arg("-kernel").arg(firmware).stdout(Stdio::null()).spawn();
+        Ok(Self { qemu: qemu.context("qemu-system-arm does not start")?, ports, monitor })
+    }
+
+    /// Bytes of the stack that were used since the start; `file` is scratch.
+    fn stack(&self, file: &Path) -> Result<usize> {
+        let mut monitor = TcpStream::connect(("127.0.0.1", self.monitor))?;
+        writeln!(monitor, "pmemsave {STACK} {STACK_LEN} \"{}\"", file.display())?;
+        writeln!(monitor, "quit")?;
+        // It says what it does until it has quit.
+        monitor.read_to_end(&mut Vec::new())?;
+        let stack = std::fs::read(file)?;
+        ensure!(stack.len() == STACK_LEN, "QEMU gave {} bytes of stack", stack.len());
+        Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == PAINT).count())
+    }
+}
+
+impl Drop for Emulated {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.qemu.kill();
+        let _ = self.qemu.wait();
+    }
+}
+
+/// TCP ports that nobody has now.
+fn free_ports() -> Result<[u16; 3]> {
+    let bind = || TcpListener::bind("127.0.0.1:0");
+    let held = [bind()?, bind()?, bind()?];
+    let [a, b, c] = held.each_ref().map(TcpListener::local_addr);
+    Ok([a?.port(), b?.port(), c?.port()])
+}

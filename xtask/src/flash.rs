@@ -1,0 +1,27 @@
+//! `cargo xtask flash`: builds the firmware and gives it to a board on the desk, by probe-rs.
+
+use anyhow::{Result, bail, ensure};
+
+use crate::bare_metal::{self, Board};
+use crate::shell::{command, find, run};
+
+/// What to flash.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The board, behind a debug probe
+    #[arg(long, value_name = "BOARD", default_value = "nucleo-h743")]
+    board: Board,
+}
+
+/// Builds and flashes.
+pub fn run_flash(args: &Args) -> Result<()> {
+    let chip = match args.board {
+        Board::Qemu => bail!("the board qemu is not flashed: cargo xtask emulate"),
+        Board::NucleoH743 => "STM32H743ZITx",
+        Board::Pico2 => "RP235x",
+    };
+    ensure!(find("probe-rs").is_some(), "probe-rs is not on the path: cargo install probe-rs-tools --locked");
+    let program = bare_metal::build(args.board)?.join("flockmate");
+    run(command("probe-rs").args(["download", "--chip", chip, "--verify"]).arg(&program))?;
+    run(command("probe-rs").args(["reset", "--chip", chip]))
+}

@@ -1,0 +1,108 @@
+//! `cargo xtask size`: what the firmware takes of a board's memory, by part.
+//!
+//! Flash and statics are read from the linked program. The stack is measured in emulation: it is painted at the start, and what
+//! lost its paint in the emulated flight was used. The other boards run the same code, on nearly the same core: they get the
+//! same figure.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use crate::bare_metal::{self, Board};
+use crate::emulate;
+
+/// Most bytes of statics and stack, and of code, on the default board.
+const RAM: usize = 576 << 10;
+const FLASH: usize = 512 << 10;
+
+/// What to size.
+#[derive(clap::Args)]
+pub struct Args {
+    /// The board
+    #[arg(long, value_name = "BOARD", default_value = "nucleo-h743")]
+    board: Board,
+    /// Write the rows to this file as JSON
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
+/// Builds, flies for the stack, prints.
+pub fn run(args: &Args) -> Result<()> {
+    let stack = emulate::run_emulate(&emulate::Args::default())?;
+    let rows = rows(args.board, stack)?;
+    if let Some(out) = &args.out {
+        let row = |(name, ours, theirs): &(&str, usize, usize)| {
+            let ratio = *theirs as f64 / *ours as f64;
+            format!(
+                "{{\"name\": \"{name}\", \"ours\": {ours}, \"theirs\": {theirs}, \"ratio\": {ratio:.3}, \
+                 \"unit\": \"bytes\", \"n\": 1}}"
+            )
+        };
+        let rows: Vec<_> = rows.iter().map(row).collect();
+        std::fs::write(out, format!("[{}]\n", rows.join(",\n ")))
+            .with_context(|| format!("cannot write {}", out.display()))?;
+    }
+    Ok(())
+}
+
+/// The rows of a board, printed: name, bytes, bytes there are. Too much is an error.
+pub fn rows(board: Board, stack: usize) -> Result<Vec<(&'static str, usize, usize)>> {
+    let program = bare_metal::build(board)?.join("flockmate");
+    let Parts { code, constants, initialised, zeroed } = parts(&program)?;
+    let (flash, statics) = (code + constants + initialised, initialised + zeroed);
+    let rows = vec![
+        ("code_bytes", code, FLASH),
+        ("constants_bytes", constants, FLASH),
+        ("flash_bytes", flash, FLASH),
+        ("statics_bytes", statics, RAM),
+        ("stack_bytes", stack, RAM),
+        ("ram_bytes", statics + stack, RAM),
+    ];
+    println!("{}", board.name());
+    for (name, ours, most) in &rows {
+        println!("  {name:16} {ours:>8} of {most}");
+    }
+    ensure!(flash <= FLASH, "{}: more than {FLASH} bytes of flash", board.name());
+    ensure!(statics + stack <= RAM, "{}: more than {RAM} bytes of memory", board.name());
+    Ok(rows)
+}
+
+/// Bytes of a program.
+#[derive(Default)]
+struct Parts {
+    code: usize,
+    constants: usize,
+    /// In flash and in memory.
+    initialised: usize,
+    zeroed: usize,
+}
+
+/// Adds up the sections of a 32-bit little-endian ELF file that take memory.
+fn parts(program: &Path) -> Result<Parts> {
+    const ALLOCATED: usize = 2;
+    const WRITABLE: usize = 1;
+    const EXECUTABLE: usize = 4;
+    const NOBITS: usize = 8;
+    let elf = std::fs::read(program).with_context(|| format!("cannot read {}", program.display()))?;
+    let number = |at: usize, len: usize| -> Result<usize> {
+        let bytes = elf.get(at..at + len).context("the program's file is cut")?;
+        Ok(bytes.iter().rev().fold(0, |sum, byte| sum << 8 | usize::from(*byte)))
+    };
+    ensure!(elf.starts_with(b"\x7fELF\x01\x01"), "{} is no program for a board", program.display());
+    let (first, each, count) = (number(32, 4)?, number(46, 2)?, number(48, 2)?);
+    let mut parts = Parts::default();
+    for header in (0..count).map(|i| first + i * each) {
+        let (kind, flags, size) = (number(header + 4, 4)?, number(header + 8, 4)?, number(header + 20, 4)?);
+        if flags & ALLOCATED == 0 {
+            continue;
+        }
+        let part = match (kind == NOBITS, flags & WRITABLE != 0, flags & EXECUTABLE != 0) {
+            (true, _, _) => &mut parts.zeroed,
+            (false, true, _) => &mut parts.initialised,
+            (false, false, true) => &mut parts.code,
+            (false, false, false) => &mut parts.constants,
+        };
+        *part += size;
+    }
+    Ok(parts)
+}
