@@ -1,5 +1,7 @@
 //! Where to be now: the setpoint of each state, made from the path, the neighbours and the autopilot's position.
 
+mod brakes;
+
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
@@ -9,7 +11,6 @@ use planner_core::schedule::VehiclePlan;
 use crate::config::Config;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
-use crate::retreat;
 use crate::telemetry::Telemetry;
 use crate::time::Instant;
 
@@ -19,8 +20,6 @@ const ARRIVED_M: f32 = 0.35;
 const STANDING_MPS: f32 = 0.5;
 /// A reference slower than this stands, m/s.
 const STANDING_REFERENCE_MPS: f32 = 0.05;
-/// A stop further ahead is no place to wait at yet, metres.
-const WAITS_WITHIN_M: f32 = 8.0;
 /// This near its top the climb is done, metres.
 const CLIMBED_M: f32 = 0.12;
 /// This near the lower end of the guided descent it is done, metres.
@@ -183,16 +182,6 @@ impl Guidance {
         self.run(now);
     }
 
-    /// Stops the reference within its braking distance; off the path, where the vehicle is.
-    pub fn brake(&mut self, position: &Point) {
-        if self.on_path {
-            let braking = self.tracker.speed_mps * self.tracker.speed_mps / (2.0 * self.track.accel_mps2);
-            self.brake_at_m = self.tracker.along_m + braking;
-        } else {
-            self.hold = *position;
-        }
-    }
-
     /// Goes on from the nearest point of the path.
     pub fn rejoin<const W: usize>(&mut self, path: &Path<W>, position: &Point, now: Instant) {
         let along_m =
@@ -308,54 +297,6 @@ impl Guidance {
                 self.progress_at = now;
             }
         }
-    }
-
-    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to.
-    fn retreat<const V: usize, const W: usize>(
-        &mut self,
-        state: State,
-        path: &Path<W>,
-        advice: &mut Advice,
-        neighbours: &mut Neighbours<V>,
-        now: Instant,
-        dt_s: f32,
-    ) -> Option<Reference> {
-        let safety_m = self.deconflict.safety_distance_m;
-        let along_m = self.tracker.along_m;
-        // On its way down it goes on, and on its way aside.
-        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning)
-            && self.descended_m.is_none()
-            && !(self.aside && state == State::Follow);
-        let wait_m = along_m + advice.stop_within_m.max(0.0);
-        let beside_m = safety_m + retreat::BESIDE_M;
-        let unsafe_at =
-            |m: f32| path.point_at(m).is_some_and(|p| neighbours.comes_down_on(now, &p, beside_m));
-        let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
-        let (to_m, nowhere) = if waits_there && unsafe_at(wait_m) {
-            let to_m = retreat::elsewhere(wait_m, unsafe_at);
-            (to_m, to_m.is_none())
-        } else {
-            (None, false)
-        };
-        self.retreating = to_m.is_some();
-        if let Some(to_m) = to_m {
-            advice.stop_within_m = (to_m - along_m).max(0.0);
-        }
-        let back = to_m.filter(|to_m| *to_m < along_m);
-        let step = back.and_then(|to_m| {
-            retreat::step(path, &mut self.tracker, to_m, neighbours.at(now), safety_m, dt_s)
-        });
-        if nowhere || (back.is_some() && step.is_none()) {
-            self.trapped_since.get_or_insert(now);
-        } else {
-            self.trapped_since = None;
-        }
-        if step.is_some() {
-            self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
-        } else {
-            self.tracker.speed_mps = self.tracker.speed_mps.max(0.0);
-        }
-        step
     }
 
     /// Time since the reference last moved on.

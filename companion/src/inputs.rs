@@ -9,7 +9,7 @@ use crate::mission::{Inputs, State};
 use crate::time::Duration;
 
 /// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
-const LANDING_DRIFT_M: f32 = 1.0;
+pub(crate) const LANDING_DRIFT_M: f32 = 1.0;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.

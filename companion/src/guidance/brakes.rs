@@ -1,0 +1,96 @@
+//! Where the reference stops on its path, and when it steps back from there.
+
+use planner_core::Point;
+use planner_core::deconflict::Advice;
+use planner_core::path::{Path, Reference};
+
+use super::Guidance;
+use crate::mission::State;
+use crate::neighbours::Neighbours;
+use crate::retreat;
+use crate::time::Instant;
+
+/// A stop further ahead is no place to wait at yet, metres.
+const WAITS_WITHIN_M: f32 = 8.0;
+/// How far beyond the braking distance a better place to stop is looked for, metres.
+const BRAKES_WITHIN_M: f32 = 1.5;
+
+impl Guidance {
+    /// Stops the reference within its braking distance; off the path, where the vehicle is.
+    pub fn brake(&mut self, position: &Point) {
+        if self.on_path {
+            let braking = self.tracker.speed_mps * self.tracker.speed_mps / (2.0 * self.track.accel_mps2);
+            self.brake_at_m = self.tracker.along_m + braking;
+        } else {
+            self.hold = *position;
+        }
+    }
+
+    /// Brakes so as to stop at the next place that is `good`, where there is one within [`BRAKES_WITHIN_M`] and before
+    /// whoever is to be waited for.
+    pub fn brake_where<const W: usize>(
+        &mut self,
+        position: &Point,
+        path: Option<&Path<W>>,
+        good: impl Fn(&Point) -> bool,
+    ) {
+        self.brake(position);
+        let Some(path) = path.filter(|_| self.on_path) else { return };
+        let reach_m = BRAKES_WITHIN_M
+            .min(self.advice.stop_within_m + self.tracker.along_m - self.brake_at_m)
+            .min(path.length_m() - self.brake_at_m);
+        let mut places = (0..=6u8).map(|i| f32::from(i) * 0.25).take_while(|m| *m <= reach_m);
+        let first = self.brake_at_m;
+        if let Some(further_m) = places.find(|m| path.point_at(first + m).is_some_and(|p| good(&p))) {
+            self.brake_at_m += further_m;
+        }
+    }
+
+    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to.
+    pub(super) fn retreat<const V: usize, const W: usize>(
+        &mut self,
+        state: State,
+        path: &Path<W>,
+        advice: &mut Advice,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        dt_s: f32,
+    ) -> Option<Reference> {
+        let safety_m = self.deconflict.safety_distance_m;
+        let along_m = self.tracker.along_m;
+        // On its way down it goes on, and on its way aside.
+        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning)
+            && self.descended_m.is_none()
+            && !(self.aside && state == State::Follow);
+        let wait_m = along_m + advice.stop_within_m.max(0.0);
+        let beside_m = safety_m + retreat::BESIDE_M;
+        let unsafe_at =
+            |m: f32| path.point_at(m).is_some_and(|p| neighbours.comes_down_on(now, &p, beside_m));
+        let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
+        let (to_m, nowhere) = if waits_there && unsafe_at(wait_m) {
+            let to_m = retreat::elsewhere(wait_m, unsafe_at);
+            (to_m, to_m.is_none())
+        } else {
+            (None, false)
+        };
+        self.retreating = to_m.is_some();
+        if let Some(to_m) = to_m {
+            advice.stop_within_m = (to_m - along_m).max(0.0);
+        }
+        let back = to_m.filter(|to_m| *to_m < along_m);
+        let step = back.and_then(|to_m| {
+            retreat::step(path, &mut self.tracker, to_m, neighbours.at(now), safety_m, dt_s)
+        });
+        if nowhere || (back.is_some() && step.is_none()) {
+            self.trapped_since.get_or_insert(now);
+        } else {
+            self.trapped_since = None;
+        }
+        if step.is_some() {
+            self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
+        } else {
+            self.tracker.speed_mps = self.tracker.speed_mps.max(0.0);
+        }
+        step
+    }
+}
