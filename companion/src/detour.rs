@@ -10,7 +10,7 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
 use planner_core::frames::{self, Geodetic};
 use planner_core::schedule::VehiclePlan;
 
@@ -19,6 +19,7 @@ use crate::config::PlanFailure;
 use crate::events::Event;
 use crate::machine::{Companion, STANDING_MPS};
 use crate::mission::State;
+use crate::retreat;
 use crate::time::{Duration, Instant};
 
 /// Time between two looks along the path.
@@ -65,14 +66,16 @@ pub(crate) struct Around {
     pub(crate) left: bool,
     /// The path is one around.
     pub(crate) flying: bool,
+    /// That path, or the one asked for, leads aside only, out from under a vehicle that lands.
+    pub(crate) aside: bool,
     /// Progress on the plan when it was left for a way around, metres.
     pub(crate) left_at_m: f32,
     /// The way around asked for has come.
     pub(crate) ready: bool,
     /// Ways around not found in a row.
     pub(crate) failed: u8,
-    /// Where it was before its position jumped.
-    pub(crate) lost_at: Option<Point>,
+    /// Where and when it was before its position jumped.
+    pub(crate) lost_at: Option<(Point, Instant)>,
     pub(crate) quiet_since: Option<Instant>,
     pub(crate) looked_at: Instant,
 }
@@ -81,8 +84,8 @@ pub(crate) struct Around {
 pub(crate) struct Told {
     pub(crate) position: Point,
     pub(crate) velocity: Point,
-    /// It may be metres away, or lower.
-    pub(crate) vague: bool,
+    /// When that was known.
+    pub(crate) at: Instant,
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -112,8 +115,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn told_place(&self) -> Told {
         let t = &self.telemetry;
         let vague = self.around.lost_at.is_some() || t.position_age(self.now) > FRESH;
-        let position = self.around.lost_at.unwrap_or(t.position);
-        Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, vague }
+        let (position, at) = self.around.lost_at.unwrap_or((t.position, t.position_at.unwrap_or_default()));
+        Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
     /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.
@@ -122,7 +125,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::PositionLost if self.around.lost_at.is_none() && self.telemetry.is_settling(self.now) => {
                 let path = self.plan.as_ref().map(|plan| &plan.path);
                 let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
-                self.around.lost_at = Some(on_path.unwrap_or(self.telemetry.position));
+                self.around.lost_at = Some((on_path.unwrap_or(self.telemetry.position), self.now));
             }
             State::Follow | State::WaitPosition => self.around.lost_at = None,
             _ => {}
@@ -146,7 +149,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
-        let astray = self.around.left && !self.around.flying;
+        let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
+        let astray = self.around.left && (!self.around.flying || aside);
         let dead_end = self.waits() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
         self.around.blocked =
             !self.guidance.returning && (stuck || astray || dead_end || self.is_in_the_way(on_ground));
@@ -186,7 +190,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.obstacles.known.iter().any(told) {
             return ACCEPTED;
         }
-        match self.obstacles.known.push(KeepOff { from: centre, to: centre, radius_m }) {
+        match self.obstacles.known.push(KeepOff { from: centre, to: centre, radius_m, nature: Nature::Solid })
+        {
             Ok(()) => ACCEPTED,
             Err(_) => TEMPORARILY_REJECTED,
         }
@@ -202,10 +207,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             + TURN_S * self.neighbours.blocked_before(self.config.system_id)
             + RETRY_S * u64::from(self.around.failed);
         self.around.blocked
+            && self.neighbours.all_stand(self.now)
             && self.around.quiet_since.is_some_and(|at| self.now - at >= Duration::from_secs(wait_s))
     }
 
-    pub(crate) fn request_detour(&mut self) {
+    /// Asks the shell for a way around, or just aside.
+    pub(crate) fn request_detour(&mut self, aside: bool) {
+        self.around.aside = aside;
+        self.guidance.trapped_since = None;
         self.plan_failure = None;
         self.around.ready = false;
         // Full only if the shell does not drain; then the way around is late.
@@ -224,9 +233,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
+        let apart_m = self.config.safety_distance_m;
         self.obstacles.known.iter().for_each(|obstacle| tell(*obstacle));
-        self.neighbours.places(self.now, self.config.safety_distance_m + MARGIN_M, tell);
+        self.neighbours.places(self.now, apart_m + MARGIN_M, &mut tell);
+        if self.around.aside {
+            self.neighbours.landing_columns(self.now, apart_m + retreat::BESIDE_M, tell);
+        }
         Some(DetourRequest {
+            aside: self.around.aside,
             here: plan.path.point_at(along_m)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
@@ -252,15 +266,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan.gates.clear();
             plan.depart_s = 0.0;
         }
-        self.around =
-            Around { left: true, flying: true, left_at_m: self.around.left_at_m, ..Around::default() };
-        self.around.ready = true;
+        let Around { aside, left_at_m, .. } = self.around;
+        self.around = Around { left: true, flying: true, ready: true, aside, left_at_m, ..Around::default() };
         self.neighbours.avoid(self.now);
         self.obstacles.avoided = self.obstacles.known.len();
     }
 
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {
         self.plan_failure = Some(failure);
-        self.around.failed = self.around.failed.saturating_add(1);
+        // Where no way aside is found there may yet be one around.
+        if !self.around.aside {
+            self.around.failed = self.around.failed.saturating_add(1);
+        }
     }
 }
+
+#[cfg(test)]
+#[path = "detour_tests.rs"]
+mod tests;

@@ -71,6 +71,8 @@ pub struct Bench {
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Vehicle 77 as it tells itself five times a second: place, flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
+    /// When it last knew where it is; none: always.
+    pub neighbour_clock: Option<Instant>,
     told: u8,
 }
 
@@ -133,6 +135,7 @@ impl Bench {
             answer_plan: Some(Ok(plan())),
             answer_detour: Some(Ok(())),
             neighbour: None,
+            neighbour_clock: None,
             told: 0,
         }
     }
@@ -400,7 +403,7 @@ impl Bench {
         let len = intent.encode(&mut payload);
         let place = frames::enu_to_geodetic(&ORIGIN, &place);
         let place = GLOBAL_POSITION_INT_DATA {
-            time_boot_ms: self.now.boot_ms(),
+            time_boot_ms: self.neighbour_clock.unwrap_or(self.now).boot_ms(),
             lat: (place.lat_deg * 1e7) as i32,
             lon: (place.lon_deg * 1e7) as i32,
             alt: (place.alt_m * 1e3) as i32,

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Neighbour, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
 use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
@@ -81,6 +81,10 @@ pub struct Guidance {
     pub returning: bool,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
+    /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
+    pub trapped_since: Option<Instant>,
+    /// Whether its path leads aside only: it does not land at its end.
+    pub aside: bool,
     /// How far the reference has gone down below the end of the path, metres; none before the descent.
     descended_m: Option<f32>,
     /// Height over the ground at which the autopilot lands by itself, metres.
@@ -126,6 +130,8 @@ impl Guidance {
             progress_at: Instant::ZERO,
             returning: false,
             retreating: false,
+            trapped_since: None,
+            aside: false,
             descended_m: None,
             low_m: config.required_clearance_m - config.radius_m,
         }
@@ -137,6 +143,7 @@ impl Guidance {
         self.reference = None;
         self.on_path = false;
         self.returning = false;
+        self.aside = false;
         self.descended_m = None;
         self.advice = NOT_ASKED;
     }
@@ -172,6 +179,7 @@ impl Guidance {
     pub fn begin_path(&mut self, now: Instant) {
         self.tracker = Tracker::default();
         self.descended_m = None;
+        self.aside = false;
         self.run(now);
     }
 
@@ -242,7 +250,12 @@ impl Guidance {
 
     /// Whether the shared plan's path was flown to its end.
     pub fn at_goal<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        !self.returning && scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+        !self.returning && !self.aside && scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    }
+
+    /// Whether the reference has come to the end of the path.
+    pub fn is_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
     }
 
     fn reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
@@ -284,7 +297,7 @@ impl Guidance {
                 Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
             };
             self.reference =
-                self.retreat(state, &plan.path, &mut advice, neighbours.at(now), dt_s).or_else(|| {
+                self.retreat(state, &plan.path, &mut advice, neighbours, now, dt_s).or_else(|| {
                     path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s)
                 });
             if state == State::Follow {
@@ -298,32 +311,45 @@ impl Guidance {
     }
 
     /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to.
-    fn retreat<const W: usize>(
+    fn retreat<const V: usize, const W: usize>(
         &mut self,
         state: State,
         path: &Path<W>,
         advice: &mut Advice,
-        neighbours: &[Neighbour],
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
         dt_s: f32,
     ) -> Option<Reference> {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
-        // On its way down it goes on.
-        let waits =
-            matches!(state, State::Follow | State::Blocked | State::Replanning) && self.descended_m.is_none();
+        // On its way down it goes on, and on its way aside.
+        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning)
+            && self.descended_m.is_none()
+            && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
-        let to_m = if waits && advice.stop_within_m < WAITS_WITHIN_M {
-            retreat::elsewhere(path, wait_m, neighbours, safety_m)
+        let beside_m = safety_m + retreat::BESIDE_M;
+        let unsafe_at =
+            |m: f32| path.point_at(m).is_some_and(|p| neighbours.comes_down_on(now, &p, beside_m));
+        let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
+        let (to_m, nowhere) = if waits_there && unsafe_at(wait_m) {
+            let to_m = retreat::elsewhere(wait_m, unsafe_at);
+            (to_m, to_m.is_none())
         } else {
-            None
+            (None, false)
         };
         self.retreating = to_m.is_some();
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
         let back = to_m.filter(|to_m| *to_m < along_m);
-        let step =
-            back.and_then(|to_m| retreat::step(path, &mut self.tracker, to_m, neighbours, safety_m, dt_s));
+        let step = back.and_then(|to_m| {
+            retreat::step(path, &mut self.tracker, to_m, neighbours.at(now), safety_m, dt_s)
+        });
+        if nowhere || (back.is_some() && step.is_none()) {
+            self.trapped_since.get_or_insert(now);
+        } else {
+            self.trapped_since = None;
+        }
         if step.is_some() {
             self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
         } else {
@@ -401,6 +427,7 @@ impl Guidance {
     fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
         let (Some(plan), Some(reference)) = (scene.plan, self.reference) else { return false };
         self.on_path
+            && !self.aside
             && reference.finished
             && (reference.position - scene.telemetry.position).norm() < ARRIVED_M
             && scene.telemetry.velocity.norm() < STANDING_MPS

@@ -75,6 +75,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
             detours_failed: self.around.failed,
+            underneath: self.guidance.trapped_since.map_or(Duration::default(), |at| now - at),
             standing: self.guidance.stands() && t.velocity.norm() < STANDING_MPS,
         }
     }

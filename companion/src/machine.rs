@@ -423,9 +423,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::AskDisarm => self.outboxes[Link::Autopilot as usize].push(Outgoing::Arm(false)),
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
-            Action::RequestDetour => self.request_detour(),
+            Action::RequestDetour => self.request_detour(false),
+            Action::RequestAside => {
+                self.guidance.brake(&position);
+                self.request_detour(true);
+            }
             Action::MissDetour => self.miss_detour(PlanFailure::Late),
-            Action::FlyDetour => self.guidance.begin_path(now),
+            Action::FlyDetour => {
+                self.guidance.begin_path(now);
+                self.guidance.aside = self.around.aside;
+            }
             Action::BrakeOnPath => self.guidance.brake(&position),
             Action::Rejoin => {
                 if let Some(plan) = &self.plan {

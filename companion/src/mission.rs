@@ -134,7 +134,7 @@ pub enum Guard {
     BatteryCritical,
     /// Battery charge below the configured limit, and no neighbour below.
     BatteryLow,
-    /// Outside the configured volume.
+    /// Outside the configured volume, and no neighbour below.
     OutsideGeofence,
     /// Of the neighbours that fly, none was heard for the limit.
     NeighboursSilent,
@@ -154,6 +154,8 @@ pub enum Guard {
     DetourFailed,
     /// There was none several times, and no neighbour is below.
     NoWayAround,
+    /// For the limit it waited where a vehicle lands without looking, and its own path led to no better place.
+    Underneath,
     /// Standing still.
     Standing,
 }
@@ -191,6 +193,8 @@ pub enum Action {
     AskLand,
     /// Ask the shell for a way around, from here.
     RequestDetour,
+    /// Ask the shell for a way aside, from here.
+    RequestAside,
     /// Give the shell up, this time.
     MissDetour,
     /// Fly it.
@@ -293,6 +297,8 @@ pub struct Inputs {
     pub detour_ready: bool,
     /// Ways around that were not found, in a row.
     pub detours_failed: u8,
+    /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
+    pub underneath: Duration,
     /// Slower than a hovering vehicle sways.
     pub standing: bool,
 }
@@ -343,7 +349,7 @@ impl Guard {
             Self::ReturnCommanded => i.turn_back,
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below,
-            Self::OutsideGeofence => i.outside,
+            Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground,
@@ -353,6 +359,7 @@ impl Guard {
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
             Self::NoWayAround => i.detours_failed >= DETOURS_TRIED && i.room_below,
+            Self::Underneath => i.underneath > limit,
             Self::Standing => i.standing,
         }
     }

@@ -125,7 +125,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::ReturnCommanded => i.turn_back = true,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
-        G::OutsideGeofence => i.outside = true,
+        G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
         G::NeighboursSilent => i.neighbour_age = long,
         G::NeighbourHeard => i.neighbour_heard = true,
         G::OnGround => i.on_ground = true,
@@ -135,6 +135,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::DetourReady => i.detour_ready = true,
         G::DetourFailed => i.plan_failed = true,
         G::NoWayAround => (i.detours_failed, i.room_below) = (9, true),
+        G::Underneath => i.underneath = long,
         G::Standing => i.standing = true,
     }
     i

@@ -9,7 +9,7 @@ use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
-use planner_core::detour::KeepOff;
+use planner_core::detour::{KeepOff, Nature};
 use planner_core::frames::{self, Geodetic};
 
 use crate::config::RosterEntry;
@@ -24,6 +24,8 @@ const LATELY: Duration = Duration::from_millis(800);
 /// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
 /// 20 s later; this leaves it 20 s to come down.
 const DEAD: Duration = Duration::from_secs(45);
+/// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
+const DOWN: Duration = Duration::from_secs(75);
 /// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
 const STRETCH_M: f32 = 6.0;
 /// Spacing of the places on that stretch below which it may lie, metres.
@@ -31,6 +33,14 @@ const STRETCH_STEP_M: f32 = 1.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
 /// ground.
 const COLUMN_M: f32 = 60.0;
+/// An airborne vehicle of which nothing is heard for this long may land before more is heard.
+const SILENT: Duration = Duration::from_secs(3);
+/// Further below a vehicle whose height is known there is time until it is nearer, metres.
+const BELOW_M: f32 = 15.0;
+/// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
+const LANDS_MPS: f32 = 2.0;
+/// A vehicle this little below may yet be above in a moment, metres.
+const LEVEL_M: f32 = 1.0;
 /// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
 const VAGUE_M: f32 = 0.5;
 /// What two vehicles in the air may stray together, one of which hovers, metres.
@@ -61,6 +71,11 @@ impl Contact {
         self.heard_at.is_some_and(|at| now - at >= DEAD)
     }
 
+    /// Whether it speaks, but has not known for long where it is.
+    fn is_vague(&self) -> bool {
+        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= SILENT)
+    }
+
     fn tells(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
@@ -69,35 +84,75 @@ impl Contact {
         self.tells(OUT) || self.is_dead(now)
     }
 
+    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
+    fn comes_down(&self, now: Instant) -> bool {
+        let silent = !self.heard_within(now, SILENT);
+        !self.tells(GROUNDED | LANDED)
+            && !self.is_out(now)
+            && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
+    }
+
+    /// The columns it may come down in.
+    fn columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let here = self.state.position;
+        let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
+        let mut column = |from: Point, below_m: f32| {
+            tell(KeepOff {
+                from: from + up(LEVEL_M),
+                to: from - up(below_m),
+                radius_m: apart_m,
+                nature: Nature::Landing,
+            });
+        };
+        if !self.heard_within(now, SILENT) {
+            self.stretch(|place| column(place, COLUMN_M));
+        } else {
+            let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
+            column(here, (BELOW_M + LANDS_MPS * age_s).min(COLUMN_M));
+        }
+    }
+
+    /// Places along its path as far as it may come unheard.
+    fn stretch(&self, mut tell: impl FnMut(Point)) {
+        let (mut at, mut left_m) = (self.state.position, STRETCH_M);
+        tell(at);
+        for next in &self.points {
+            let leg_m = (next - at).norm();
+            let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
+            for step in 1..=steps {
+                let along_m = step as f32 * STRETCH_STEP_M;
+                tell(at + (next - at) * (along_m / leg_m));
+            }
+            if leg_m >= left_m {
+                break;
+            }
+            left_m -= leg_m;
+            at = *next;
+            tell(at);
+        }
+    }
+
     /// Where it may be from now on, with `margin_m` beyond `apart_m`.
     fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let here = self.state.position;
-        let mut column = |from: Point, radius_m: f32| {
-            tell(KeepOff { from, to: from - Point::new(0.0, 0.0, COLUMN_M), radius_m });
+        let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
+        let column = |from: Point, nature: Nature| {
+            let to = from - Point::new(0.0, 0.0, COLUMN_M);
+            KeepOff { from, to, radius_m: apart_m + VAGUE_M, nature }
         };
-        if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
-            tell(KeepOff { from: here, to: here, radius_m: apart_m });
+        if self.tells(GROUNDED) && self.tells(OUT) && self.is_vague() {
+            tell(column(here, Nature::Lying));
+        } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
+            tell(place(apart_m));
         } else if self.tells(OUT) {
-            column(here, apart_m + VAGUE_M);
+            tell(column(here, Nature::Solid));
+            // Where it is it may not be come near from above or the side, whatever its column leaves.
+            tell(place(apart_m + SWAY_M));
         } else if self.is_dead(now) {
-            let (mut at, mut left_m) = (here, STRETCH_M);
-            column(at, apart_m + VAGUE_M);
-            for next in &self.points {
-                let leg_m = (next - at).norm();
-                let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
-                for step in 1..=steps {
-                    let along_m = step as f32 * STRETCH_STEP_M;
-                    column(at + (next - at) * (along_m / leg_m), apart_m + VAGUE_M);
-                }
-                if leg_m >= left_m {
-                    break;
-                }
-                left_m -= leg_m;
-                at = *next;
-                column(at, apart_m + VAGUE_M);
-            }
+            let down = !self.heard_within(now, DOWN);
+            self.stretch(|at| tell(column(at, if down { Nature::Lying } else { Nature::Solid })));
         } else {
-            tell(KeepOff { from: here, to: here, radius_m: apart_m + SWAY_M });
+            tell(place(apart_m + SWAY_M));
         }
     }
 }
@@ -290,6 +345,19 @@ impl<const V: usize> Neighbours<V> {
     pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts.iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+    }
+
+    /// Where vehicles that land without looking may come nearer than `apart_m`.
+    pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.comes_down(now));
+        placed.for_each(|c| c.columns(now, apart_m, &mut tell));
+    }
+
+    /// Whether one of these columns holds `place`.
+    pub fn comes_down_on(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
+        let mut on_it = false;
+        self.landing_columns(now, apart_m, |column| on_it |= column.holds(place));
+        on_it
     }
 
     /// Whether a neighbour of the roster was heard within `span`, and one told that it hears us.

@@ -12,11 +12,7 @@ use planner_core::deconflict::Neighbour;
 use planner_core::path::{Path, Reference, Tracker};
 
 /// What the one that comes down may drift, and the one below sways, metres.
-const BESIDE_M: f32 = 0.6;
-/// Further below there is time until it is nearer, metres.
-const BELOW_M: f32 = 15.0;
-/// A vehicle this little below may yet be above in a moment, metres.
-const LEVEL_M: f32 = 1.0;
+pub const BESIDE_M: f32 = 0.6;
 /// What two may stray together, metres.
 const FOLLOWER_M: f32 = 0.6;
 /// Spacing and number of the places looked at.
@@ -28,28 +24,10 @@ const CORNER_MPS: f32 = 0.6;
 /// Acceleration, m/s².
 const ACCEL_MPS2: f32 = 1.0;
 
-/// Where to wait instead of at `wait_m`, metres along the path; `None` if it may be there, or nowhere is better.
-pub fn elsewhere<const W: usize>(
-    path: &Path<W>,
-    wait_m: f32,
-    neighbours: &[Neighbour],
-    safety_m: f32,
-) -> Option<f32> {
-    let unsafe_at = |along_m: f32| {
-        let place = path.point_at(along_m).unwrap_or_else(Point::zeros);
-        neighbours.iter().any(|n| comes_down_on(n, &place, safety_m + BESIDE_M))
-    };
-    if !unsafe_at(wait_m) {
-        return None;
-    }
+/// The nearest place before `wait_m`, metres along the path, that is not `unsafe_at`; `None` if there is none within reach.
+pub fn elsewhere(wait_m: f32, unsafe_at: impl Fn(f32) -> bool) -> Option<f32> {
     let places = (1..=STEPS).map(|i| wait_m - f32::from(i) * STEP_M);
     places.take_while(|m| *m >= 0.0).find(|m| !unsafe_at(*m))
-}
-
-fn comes_down_on(n: &Neighbour, place: &Point, beside_m: f32) -> bool {
-    let unplanned = n.progress_m.is_none() && !n.grounded && !n.detours && !n.out;
-    let above_m = n.position.z - place.z;
-    unplanned && (-LEVEL_M..BELOW_M).contains(&above_m) && (n.position - place).xy().norm() < beside_m
 }
 
 /// One step of `dt_s` back towards `to_m`; `None` if somebody is behind.
@@ -112,18 +90,13 @@ mod tests {
     #[test]
     fn a_place_below_one_that_comes_down_is_exchanged_for_one_before_it() {
         let path = path();
-        let down = [above(6.0, 3.0, 8.0)];
-        let to_m = elsewhere(&path, 9.0, &down, 1.5).unwrap();
+        let unsafe_at = |along_m: f32| {
+            let place = path.point_at(along_m).unwrap();
+            (place.xy() - Point::new(6.0, 3.0, 8.0).xy()).norm() < 2.1
+        };
+        let to_m = elsewhere(9.0, unsafe_at).unwrap();
         assert!((5.0..7.0).contains(&to_m), "{to_m}");
-        assert_eq!(elsewhere(&path, 3.0, &down, 1.5), None, "beside it");
-        for harmless in [
-            above(6.0, 3.0, -2.0),
-            above(6.0, 3.0, 30.0),
-            Neighbour { grounded: true, ..down[0] },
-            Neighbour { progress_m: Some(0.0), ..down[0] },
-        ] {
-            assert_eq!(elsewhere(&path, 9.0, &[harmless], 1.5), None, "{harmless:?}");
-        }
+        assert_eq!(elsewhere(9.0, |_| true), None, "nowhere is better");
     }
 
     #[test]

@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::*;
 use crate::fake_px4::*;
-use crate::intent::{GROUNDED, ON_PLAN, OUT};
+use crate::intent::{FLYING, GROUNDED, ON_PLAN, OUT};
 use crate::{RosterEntry, px4};
 
 /// Vehicle 77 on its pad, or lying below the path, with these flags beside "grounded".
@@ -269,6 +269,17 @@ fn every_row_has_its_scene() {
         Done,
         120.0,
     );
+    // One comes down on the first stretch of the path: there is no place before it, so it goes aside, as often as need be.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.answer_detour = None;
+            b.neighbour = Some((Point::new(9.5, 12.0, 2.8), FLYING, 0.0, 5));
+        },
+        Replanning,
+        6.0,
+    );
     // A third vehicle is never heard: nobody knows that it stands.
     let mut three = two_vehicles();
     three.roster.push(RosterEntry { system_id: 78, ..three.roster[1] }).unwrap();
@@ -280,6 +291,17 @@ fn every_row_has_its_scene() {
         },
         Done,
         60.0,
+    );
+    // Nobody hears it on the ground.
+    scene(
+        Bench::new(two_vehicles()),
+        &|b| {
+            b.until(Ready, 6.0);
+            b.start();
+            b.run(12.0);
+        },
+        Scheduled,
+        1.0,
     );
     // The same before take-off.
     let grounded = |answer| {

@@ -164,6 +164,8 @@ pub struct Store {
     window: Window,
     upload: Option<(File, UploadState)>,
     job: Job,
+    /// An erasure that lets a read go first, between two sectors.
+    paused: Job,
     /// Whether the shell is at work for us.
     asked: bool,
     buffer: [u8; BLOCK],
@@ -187,6 +189,7 @@ impl Store {
             window: Window::default(),
             upload: None,
             job: Job::None,
+            paused: Job::None,
             asked: false,
             buffer: [0; BLOCK],
             word: [0; WORD],
@@ -267,11 +270,13 @@ impl Store {
     }
 
     fn read_at(&mut self, job: Job) -> bool {
-        let free = self.job == Job::None;
-        if free {
-            self.job = job;
+        match self.job {
+            Job::None => {}
+            Job::Erase { .. } if !self.asked => self.paused = self.job,
+            _ => return false,
         }
-        free
+        self.job = job;
+        true
     }
 
     /// The newest sealed roadmap that was not removed.

@@ -1,6 +1,8 @@
 //! The store over a simulated flash.
 
 extern crate std;
+use std::vec::Vec;
+
 use planner_core::roadmap::RoadmapView;
 use rand_core::Rng;
 
@@ -143,6 +145,37 @@ fn parameters_outlive_many_changes_and_the_mission_with_them() {
         assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", value)));
         assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
     }
+}
+
+#[test]
+fn a_read_goes_first_between_two_sectors() {
+    let mut flash = Flash::new(8);
+    let mut store = started(&mut flash);
+    let road = roadmap(40);
+    upload(&mut store, &mut flash, File::Roadmap, &road, 239).unwrap().unwrap();
+    // One slot is to be erased, as after a restart with a new roadmap.
+    flash.bytes[LAYOUT.slot_len as usize..2 * LAYOUT.slot_len as usize].fill(0);
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    let (mut erased, mut read, mut given) = (Vec::new(), [0; READ], 0);
+    for turn in 0..100 {
+        if turn % 2 == 1 {
+            store.read(File::Roadmap, 0, 100);
+        }
+        let Some(request) = store.poll(true) else { break };
+        if let FlashRequest::Erase { at } = request {
+            erased.push(at);
+        }
+        let outcome = obey(&mut flash, request, true, &mut read).expect("the power is on");
+        if let Some(answer) = store.handle(outcome.map(|len| &read[..len])) {
+            assert_eq!(answer, Answer::Bytes(&road[..100]));
+            given += 1;
+        }
+    }
+    assert_eq!(given, 2, "one between each two sectors");
+    let sectors: Vec<u32> = (0..3).map(|i| LAYOUT.slot_len + i * LAYOUT.sector_len).collect();
+    assert_eq!(erased, sectors, "each once");
+    run(&mut store, &mut flash, true).unwrap();
+    assert_eq!(store.open(File::Roadmap, false), Ok(()), "and it is ready");
 }
 
 /// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or `after`, whole.

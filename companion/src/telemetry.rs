@@ -28,7 +28,10 @@ const ON_GROUND: u8 = 1;
 const JUMP_M: f32 = 1.0;
 /// More than any vehicle flown so changes its velocity between two positions, m/s.
 const JUMP_MPS: f32 = 5.0;
-/// After a jump the position is not used for this long; another one starts it anew.
+/// No gap is longer than the mission waits for its autopilot, seconds.
+const GAP_MOST_S: f32 = 60.0;
+/// After a jump, or so long without one, the position is not used for this long; another one starts it anew. What comes first
+/// after a silence may have waited on the way.
 pub const SETTLE: Duration = Duration::from_millis(1000);
 /// After this long without a frame the sequence starts afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
@@ -96,6 +99,8 @@ pub struct Telemetry {
     /// When a position was last read, used or not.
     read_at: Option<Instant>,
     settled_at: Instant,
+    /// After a silence positions count from then on.
+    counts_from: Instant,
     estimator_ready: bool,
 }
 
@@ -221,7 +226,9 @@ impl Telemetry {
         if fields.iter().any(|f| !f.is_finite()) || stale {
             return Change::None;
         }
-        self.boot_ms = d.time_boot_ms;
+        // By the autopilot's clock: what waited on the way comes all at once.
+        let passed_s =
+            d.time_boot_ms.wrapping_sub(core::mem::replace(&mut self.boot_ms, d.time_boot_ms)) as f32 * 1e-3;
         let Some(kind) = self.kind.filter(|kind| *kind == Kind::Px4 || self.estimator_ready) else {
             return Change::None;
         };
@@ -232,7 +239,10 @@ impl Telemetry {
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
         if let Some(at) = self.read_at {
-            let dt_s = (now - at).secs_f32();
+            let dt_s = passed_s.min(GAP_MOST_S);
+            if now - at > SETTLE {
+                self.counts_from = now + SETTLE;
+            }
             let led_to = self.position + self.velocity * dt_s;
             if (position - led_to).norm() > JUMP_M + JUMP_MPS * dt_s {
                 return self.lose_position(now);
@@ -242,7 +252,7 @@ impl Telemetry {
         self.position = position;
         // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
-        if !self.is_settling(now) {
+        if !self.is_settling(now) && now >= self.counts_from {
             self.position_at = Some(now);
         }
         Change::Updated

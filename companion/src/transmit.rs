@@ -122,13 +122,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
-        let t = &self.telemetry;
         let told = self.told_place();
         let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
         let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
-            // When the position was heard, so that a copy is known as one.
-            time_boot_ms: t.position_at.unwrap_or_default().boot_ms(),
+            // When the position was known, so that a copy is known as one.
+            time_boot_ms: told.at.boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
@@ -165,14 +164,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.is_out();
-        let flags =
-            if grounded && !(out && self.told_place().vague) { intent::GROUNDED } else { intent::FLYING }
-                | flag(intent::LANDED, self.state == Done)
-                | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
-                | flag(intent::OUT, out)
-                | flag(intent::WAITING, self.waits())
-                | flag(intent::BLOCKED, self.around.blocked)
-                | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
+        let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
+            | flag(intent::LANDED, self.state == Done)
+            | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
+            | flag(intent::OUT, out)
+            | flag(intent::WAITING, self.waits())
+            | flag(intent::BLOCKED, self.around.blocked)
+            | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
         let plan = self.plan.as_ref();
         let mut points = heapless::Vec::new();
         let along_m = self.guidance.progress_m(self.state, &self.scene());

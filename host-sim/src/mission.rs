@@ -7,7 +7,7 @@ use anyhow::{anyhow, bail};
 use companion::PlanFailure;
 use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::prm::Config;
@@ -206,8 +206,11 @@ impl Mission {
     ) -> Result<Box<OwnPlan>, DetourError> {
         for obstacle in obstacles.iter_mut().filter(|o| o.to.z < o.from.z) {
             // What lies on the ground has its centre a radius above it; nothing falls through a floor.
-            obstacle.to.z =
-                obstacle.to.z.max(self.map.ground_below(&obstacle.from).unwrap_or(f32::NEG_INFINITY));
+            let Some(ground_z) = self.map.ground_below(&obstacle.from) else { continue };
+            obstacle.to.z = obstacle.to.z.max(ground_z);
+            if obstacle.nature == Nature::Lying {
+                obstacle.from.z = obstacle.to.z;
+            }
         }
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());

@@ -28,6 +28,19 @@ pub struct KeepOff {
     pub to: Point,
     /// Distance to keep, metres.
     pub radius_m: f32,
+    /// What is there.
+    pub nature: Nature,
+}
+
+/// What is to be kept off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Nature {
+    /// Something, all along the stretch for all one knows.
+    Solid,
+    /// Somebody at `from` who comes down to `to`: not to be rested below, nor flown up to.
+    Landing,
+    /// Somebody who lies on the ground below `from`: who knows the ground keeps off that place only.
+    Lying,
 }
 
 impl KeepOff {
@@ -35,6 +48,26 @@ impl KeepOff {
     fn seen_from(&self, here: &Point) -> Self {
         let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - SWAY_M, 0.0)), ..*self }
+    }
+
+    /// What of it is not to be flown through. One who comes down may be met half way by who flies up as fast: of its column
+    /// the lower third of what is above `here` is left to cross.
+    fn solid(&self, here: &Point) -> Self {
+        if self.nature != Nature::Landing {
+            return *self;
+        }
+        let room_m = self.from.z - here.z - self.radius_m;
+        if room_m > 0.0 {
+            let low_z = fmaxf(here.z + self.radius_m + room_m / 3.0, self.to.z);
+            Self { to: Point::new(self.to.x, self.to.y, low_z), ..*self }
+        } else {
+            Self { radius_m: 0.0, ..*self }
+        }
+    }
+
+    /// Whether a place is too near.
+    pub fn holds(&self, place: &Point) -> bool {
+        self.touches(place, place)
     }
 
     fn touches(&self, a: &Point, b: &Point) -> bool {
@@ -68,6 +101,8 @@ pub fn is_blocked<const W: usize>(
 /// What to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
+    /// Whether it is not the goal that is sought but the nearest node to rest at, away from all there is to keep off.
+    pub aside: bool,
     /// Where the vehicle hovers, on a leg whose ends follow.
     pub here: Point,
     /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour began.
@@ -93,8 +128,11 @@ pub enum DetourError {
     GoalBlocked,
 }
 
-/// The shortest path to the goal that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer already
-/// the distance is shortened; `nodes` is scratch.
+/// The way aside is no longer than this, nor its end further away, metres.
+const ASIDE_M: f32 = 20.0;
+
+/// The shortest path to the goal, or aside, that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer
+/// already the distance is shortened; `nodes` is scratch.
 pub fn plan<const N: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &DetourRequest,
@@ -104,18 +142,34 @@ pub fn plan<const N: usize, const W: usize>(
     out: &mut Path<W>,
 ) -> Result<(), DetourError> {
     let here = request.here;
-    obstacles.iter_mut().for_each(|obstacle| *obstacle = obstacle.seen_from(&here));
-    let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.touches(a, b));
+    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
+        *obstacle = obstacle.seen_from(&here);
+    }
+    let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.solid(&here).touches(a, b));
     let goal = view.header().starts + request.goal;
     if usize::from(goal) >= view.node_count() {
         return Err(DetourError::Search(SearchError::BadNode(goal)));
     }
     let above = view.node(goal);
-    if !clear(&above, &(above - Point::new(0.0, 0.0, request.descent_m))) {
+    if !request.aside && !clear(&above, &(above - Point::new(0.0, 0.0, request.descent_m))) {
         return Err(DetourError::GoalBlocked);
     }
     let passable = |from: u16, edge: &HalfEdge| {
-        view.clears(edge, request.required_clearance_m) && clear(&view.node(from), &view.node(edge.target))
+        let to = view.node(edge.target);
+        let near = !request.aside || (to - here).norm() < ASIDE_M;
+        near && view.clears(edge, request.required_clearance_m) && clear(&view.node(from), &to)
+    };
+    let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
+        if !request.aside {
+            return search::astar(view, entry, goal, passable, ws, nodes);
+        }
+        search::dijkstra_all(view, entry, passable, ws)?;
+        let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.holds(&view.node(*node)));
+        let reached = (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < ASIDE_M);
+        let nearest = reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
+        let nearest = nearest.ok_or(SearchError::NoPath)?;
+        ws.path_to(nearest, nodes)?;
+        Ok(ws.distance_m(nearest))
     };
     let mut best = f32::INFINITY;
     let mut failed = Err(DetourError::Search(SearchError::NoPath));
@@ -123,7 +177,7 @@ pub fn plan<const N: usize, const W: usize>(
         let Some(entry) = (0..view.node_count() as u16).find(|&node| view.node(node) == *end) else {
             continue;
         };
-        let length_m = match search::astar(view, entry, goal, passable, ws, nodes) {
+        let length_m = match search(entry, nodes) {
             Ok(length_m) => length_m + (end - here).norm(),
             Err(SearchError::NoPath) => continue,
             Err(error) => {
@@ -170,3 +224,6 @@ fn write<const W: usize>(
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests;

@@ -218,6 +218,22 @@ pub fn astar<const N: usize, const P: usize>(
     Ok(ws.distance_m(to))
 }
 
+/// The shortest passable paths from `from` to every node that can be reached: [`SearchWorkspace::distance_m`] and
+/// [`SearchWorkspace::path_to`] tell them.
+pub fn dijkstra_all<const N: usize>(
+    graph: &impl Graph,
+    from: u16,
+    passable: impl Fn(u16, &HalfEdge) -> bool,
+    ws: &mut SearchWorkspace<N>,
+) -> Result<(), SearchError> {
+    begin(graph.view(), from, ws)?;
+    let mut gains = [0; 256];
+    while let Some(node) = ws.heap.pop() {
+        relax(graph, node, &passable, |_| 0.0, ws, &mut gains);
+    }
+    Ok(())
+}
+
 /// Lengths in metres of the shortest passable paths from `from` to each of `targets`, into `out`; infinite where there is
 /// none. One row of the cost matrix; stops when all targets are settled.
 ///

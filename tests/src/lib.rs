@@ -84,17 +84,12 @@ impl Drop for Guard {
     }
 }
 
-/// Starts `host-sim autopilot` on these links; it tells the address each got, `127.0.0.1:PORT` or a path.
+/// Starts a `host-sim` that listens on as many links; it tells the address each got, `127.0.0.1:PORT` or a path.
 ///
 /// # Panics
 /// It does not start.
-pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
-    let mut command = Command::new(host_sim(Profile::Debug));
-    command.arg("autopilot").args(options).stdout(Stdio::piped());
-    for url in listen {
-        command.args(["--listen", url]);
-    }
-    let mut child = command.spawn().expect("host-sim starts");
+pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
+    let mut child = command.stdout(Stdio::piped()).spawn().expect("host-sim starts");
     let lines = BufReader::new(child.stdout.take().expect("stdout is piped")).lines();
     let guard = Guard(child);
     let address = |line: std::io::Result<String>| {
@@ -102,9 +97,22 @@ pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
         let url = line.strip_prefix("listening ").unwrap_or_else(|| panic!("no link in {line:?}"));
         url.split_once(':').map_or(url, |(_, address)| address).to_owned()
     };
-    let addresses: Vec<_> = lines.take(listen.len()).map(address).collect();
-    assert_eq!(addresses.len(), listen.len(), "not every link was opened");
+    let addresses: Vec<_> = lines.take(links).map(address).collect();
+    assert_eq!(addresses.len(), links, "not every link was opened");
     (guard, addresses)
+}
+
+/// Starts `host-sim autopilot` on these links; it tells the address each got.
+///
+/// # Panics
+/// It does not start.
+pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
+    let mut command = Command::new(host_sim(Profile::Debug));
+    command.arg("autopilot").args(options);
+    for url in listen {
+        command.args(["--listen", url]);
+    }
+    listening(command, listen.len())
 }
 
 /// A UDP port that nobody has now.

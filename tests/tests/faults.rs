@@ -1,18 +1,20 @@
 //! Every kind of fault strikes a vehicle of the ten-UAV building mission, each seed another vehicle and another time.
 //!
-//! Whatever strikes, no other vehicle touches anything, none comes too near another that was not struck, and all others reach
-//! their goals. The vehicle struck ends in a row of the companion's table, and the log says so. A fault that passes leaves the
-//! mission complete.
+//! Whatever strikes, no other vehicle touches anything, none comes nearer than the safety distance to another that was not
+//! struck, and all others reach their goals. The vehicle struck ends in a row of the companion's table, and the log says so. A
+//! fault that passes leaves the mission complete. One thing nobody can help is let pass: to be hit by a vehicle that falls, where
+//! it is shown that there was no time to leave ([`is_unavoidable`]).
 //!
-//! What is counted and not asserted: vehicles too near the one struck, where that comes down without looking, or falls.
-//! `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose lines hold that. `FLOCKMATE_FAULT_SEEDS=20 cargo test -p flockmate-tests --test
-//! faults -- --nocapture` sweeps twenty seeds and prints a line for each kind.
+//! What is counted and not asserted: vehicles nearer than the safety distance to the one struck, where that comes down without
+//! looking; touching it is asserted. `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture`
+//! sweeps twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose lines hold that,
+//! `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
 use host_sim::report::Event;
 use host_sim::result::VehicleResult;
-use host_sim::scenario::{self, Fault};
+use host_sim::scenario::{self, Fault, Geofence};
 use host_sim::swarm::{self, Flight};
 use planner_core::Point;
 use rayon::prelude::*;
@@ -46,6 +48,8 @@ struct Case {
 const STOPPED: &str = "Autopilot failsafe: setpoints stopped";
 const FOUND: &str = "Found in flight: no mission";
 const AT_GOAL: &str = "At the goal: landing";
+/// No fault of the script: a fence that the paths of some vehicles leave.
+const GEOFENCE: &str = "geofence";
 const RETURNED: &str =
     "kind = 'pilot-takeover'\n[[faults]]\nkind = 'pilot-return'\nat_s = LATER\nvehicle = ID";
 #[rustfmt::skip]
@@ -72,6 +76,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'companion-reset'", then: Out, says: &[FOUND] },
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
+    Case { script: GEOFENCE, then: Out, says: &["Geofence reached: landing"] },
     Case { script: "kind = 'bad-roadmap'", then: Out, says: &["Roadmap missing or wrong: mission aborted"] },
 ];
 
@@ -122,69 +127,135 @@ fn fly(mission: &Mission, plan: &SwarmPlan) -> Flight {
 /// What came of one flight; whatever must not be is a text in `wrong`.
 struct Outcome {
     complete: bool,
-    held_up: usize,
+    hit: usize,
     too_near: usize,
     notes: Vec<String>,
     wrong: Vec<String>,
 }
 
-fn judge(case: &Case, flight: &Flight, at_s: f32, vehicle: u8) -> Outcome {
+fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     let result = &flight.result;
     let (mut wrong, mut notes) = (Vec::new(), Vec::new());
-    let log: Vec<&Event> = flight.log.iter().filter(|e| e.vehicle == Some(vehicle)).collect();
-    let said = |text: &str| log.iter().any(|e| e.text.contains(text));
+    let is_struck = |e: &Event| e.vehicle.is_some_and(|id| struck.contains(&id));
+    let said = |text: &str| flight.log.iter().any(|e| is_struck(e) && e.text.contains(text));
     // A vehicle that is out comes down where it is, whatever is there.
     let own_contacts_count = case.then == GoesOn;
     // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet up, the autopilot disarms.
     let goes_on = case.then == GoesOn && !said("start cancelled") && !said("Disarmed in flight");
-    let mut too_near = 0;
+    let (mut too_near, mut hit) = (0, 0);
     for e in &flight.log {
         let by_or_at_struck =
-            e.vehicle == Some(vehicle) || e.text.ends_with(&format!("vehicle no. {vehicle}"));
-        let own_wall = e.text.contains("touches an obstacle") && e.vehicle == Some(vehicle);
-        let near = e.text.contains("nearer than") || e.text.contains("is hit by falling");
-        let is_wrong = if near {
+            is_struck(e) || struck.iter().any(|id| e.text.ends_with(&format!("vehicle no. {id}")));
+        let own_wall = e.text.contains("touches an obstacle") && is_struck(e);
+        let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
+        let is_wrong = if e.text.contains("nearer than") {
             too_near += 1;
-            notes.push(format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text));
+            notes.push(text.clone());
             goes_on || !by_or_at_struck
+        } else if e.text.contains("is hit by falling") {
+            hit += 1;
+            notes.push(text.clone());
+            !is_unavoidable(flight, at_s, e)
         } else {
             e.text.contains("touches") && (!own_wall || own_contacts_count)
         };
         if is_wrong {
-            wrong.push(format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text));
+            wrong.push(text);
         }
     }
     let did_its_task = |v: &&VehicleResult| v.reached && v.landed && v.end == "Done";
-    let mut held_up = 0;
     for v in result.vehicles.iter().filter(|v| !did_its_task(v)) {
-        if v.id != vehicle {
-            held_up += 1;
-        }
         let state = v.end.split(':').next().unwrap_or_default();
-        if goes_on || v.id != vehicle || !RESTS.contains(&state) {
+        if goes_on || !struck.contains(&v.id) || !RESTS.contains(&state) {
             wrong.push(format!("vehicle {} ends in {}", v.id, v.end));
         }
     }
-    let by = |text: &str, t_s: f32| log.iter().any(|e| e.t_s < t_s && e.text.contains(text));
-    let on_path = by("Following the path", at_s) && !by(AT_GOAL, at_s + 3.0);
-    let says = |text: &&str| log.iter().any(|e| e.t_s >= at_s && e.text.contains(*text));
-    if (on_path || case.on_ground()) && !case.says.iter().any(says) {
-        let said: Vec<_> = log.iter().map(|e| e.text.as_str()).collect();
-        wrong.push(format!("vehicle {vehicle} did not say {:?} but {said:?}", case.says));
+    for vehicle in struck {
+        let log: Vec<&Event> = flight.log.iter().filter(|e| e.vehicle == Some(*vehicle)).collect();
+        let by = |text: &str, t_s: f32| log.iter().any(|e| e.t_s < t_s && e.text.contains(text));
+        let on_path = by("Following the path", at_s) && !by(AT_GOAL, at_s + 3.0);
+        let says = |text: &&str| log.iter().any(|e| e.t_s >= at_s && e.text.contains(*text));
+        if (on_path || case.on_ground() || case.script == GEOFENCE) && !case.says.iter().any(says) {
+            let said: Vec<_> = log.iter().map(|e| e.text.as_str()).collect();
+            wrong.push(format!("vehicle {vehicle} did not say {:?} but {said:?}", case.says));
+        }
     }
-    Outcome { complete: result.complete, held_up, too_near, notes, wrong }
+    Outcome { complete: result.complete, hit, too_near, notes, wrong }
+}
+
+/// Whether nobody could have got out of the way of a wreck. Nobody knows that a vehicle falls before there was a second without
+/// positions (a shorter gap is everyday: see the stall of 0.8 s), 0.2 s to the next word, 0.05 s on the air and two steps of
+/// 0.05 s; the airframe answers 0.55 s later, and then gains room at 1.5 m/s². What was missing is what the bodies (0.3 m each)
+/// overlap across the fall.
+fn is_unavoidable(flight: &Flight, at_s: f32, hit: &Event) -> bool {
+    let wreck = hit.text.rsplit(' ').next().and_then(|n| n.parse::<usize>().ok());
+    let (Some(wreck), Some(vehicle)) = (wreck, hit.vehicle) else { return false };
+    // The track nearest to the hit: positions are recorded every 0.2 s.
+    let place = |i: usize| {
+        let off = |point: &&(f32, Point)| (point.0 - hit.t_s).abs();
+        flight.tracks[i].iter().min_by(|a, b| off(a).total_cmp(&off(b))).map(|point| point.1)
+    };
+    let (Some(a), Some(b)) = (place(usize::from(vehicle) - 1), place(wreck - 1)) else { return false };
+    let missing_m = 0.6 - (a - b).xy().norm();
+    let left_s = (hit.t_s - at_s - 1.0 - 0.2 - 0.05 - 0.1 - 0.55).max(0.0);
+    missing_m > 0.5 * 1.5 * left_s * left_s
+}
+
+/// A box that the paths of one to three vehicles leave and those of the others keep off by most, and these vehicles.
+fn fence_for_some(plan: &SwarmPlan) -> (Vec<u8>, Geofence) {
+    let reach = |axis: usize, sign: f32, i: usize| {
+        let points = plan.flights[i].path.waypoints().iter();
+        points.map(|w| sign * w.position[axis]).fold(f32::NEG_INFINITY, f32::max)
+    };
+    let mut best = (0.0, Vec::new(), 0, 1.0, 0.0);
+    for (axis, sign) in [(0, -1.0), (0, 1.0), (1, -1.0), (1, 1.0), (2, 1.0)] {
+        let mut reaches: Vec<_> =
+            (0..plan.flights.len()).map(|i| (reach(axis, sign, i), plan.flights[i].id)).collect();
+        reaches.sort_by(|a, b| b.0.total_cmp(&a.0));
+        for out in 1..=3 {
+            let (last, next) = (reaches[out - 1].0, reaches[out].0);
+            if last - next > best.0 {
+                let ids = reaches[..out].iter().map(|reach| reach.1).collect();
+                best = (last - next, ids, axis, sign, 0.5 * (last + next));
+            }
+        }
+    }
+    let (gap_m, outside, axis, sign, at_m) = best;
+    assert!(gap_m > 0.8, "nobody flies far enough from the others: {gap_m} m");
+    let (mut min, mut max) = (Point::repeat(-1e3), Point::repeat(1e3));
+    let corner = if sign < 0.0 { &mut min } else { &mut max };
+    corner[axis] = sign * at_m;
+    (outside, Geofence { min, max })
+}
+
+/// Which seeds are flown; whether their logs are printed.
+fn seeds() -> (std::ops::RangeInclusive<u64>, bool) {
+    let asked = |name| std::env::var(name).ok().map(|n| n.parse().expect("a number"));
+    match (asked("FLOCKMATE_FAULT_SEED"), asked("FLOCKMATE_FAULT_SEEDS")) {
+        (Some(seed), _) => (seed..=seed, true),
+        (None, seeds) => (1..=seeds.unwrap_or(SEEDS), false),
+    }
+}
+
+fn print_log(flight: &Flight) {
+    let mut log: Vec<&Event> = flight.log.iter().collect();
+    log.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    for e in log {
+        println!("{:7.2} s {:?} {}", e.t_s, e.vehicle, e.text);
+    }
 }
 
 #[test]
 fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
-    let seeds =
-        std::env::var("FLOCKMATE_FAULT_SEEDS").map_or(SEEDS, |n| n.parse().expect("a number of seeds"));
+    let (seeds, tells) = seeds();
+    let only = std::env::var("FLOCKMATE_FAULT_ONLY").unwrap_or_default();
+    let chosen = |case: &Case| case.script.contains(&only);
     let by_seed = |seed: u64| -> Vec<Outcome> {
         let (mut mission, plan) = prepare(seed);
         let strike = |(k, case): (usize, &Case)| {
             let k = k as u64;
-            let vehicle = (1 + (seed * 7 + k) % 10) as u8;
-            let at_s = if case.on_ground() {
+            let mut struck = vec![(1 + (seed * 7 + k) % 10) as u8];
+            let at_s = if case.on_ground() || case.script == GEOFENCE {
                 0.0
             } else if case.script.contains("AHEAD") {
                 // Before anyone can have come there.
@@ -192,27 +263,38 @@ fn whatever_strikes_the_others_touch_nothing_and_the_log_says_why() {
             } else {
                 (6 + (seed * 13 + k * 5) % 26) as f32
             };
-            mission.scenario.faults = case.faults(at_s, vehicle, &plan);
-            let outcome = judge(case, &fly(&mission, &plan), at_s, vehicle);
+            mission.scenario.mission.geofence = None;
+            if case.script == GEOFENCE {
+                let (outside, fence) = fence_for_some(&plan);
+                struck = outside;
+                mission.scenario.mission.geofence = Some(fence);
+                mission.scenario.faults.clear();
+            } else {
+                mission.scenario.faults = case.faults(at_s, struck[0], &plan);
+            }
+            let flight = fly(&mission, &plan);
+            if tells {
+                print_log(&flight);
+            }
+            let outcome = judge(case, &flight, at_s, &struck);
             let tell =
-                |wrong| format!("seed {seed}, vehicle {vehicle} at {at_s} s, {}: {wrong}", case.script);
+                |wrong| format!("seed {seed}, vehicle {struck:?} at {at_s} s, {}: {wrong}", case.script);
             let notes = outcome.notes.into_iter().map(tell).collect();
             Outcome { wrong: outcome.wrong.into_iter().map(tell).collect(), notes, ..outcome }
         };
-        let only = std::env::var("FLOCKMATE_FAULT_ONLY").unwrap_or_default();
-        CASES.iter().enumerate().filter(|(_, case)| case.script.contains(&only)).map(strike).collect()
+        CASES.iter().enumerate().filter(|(_, case)| chosen(case)).map(strike).collect()
     };
-    let flown: Vec<Vec<Outcome>> = (1..=seeds).into_par_iter().map(by_seed).collect();
-    println!("{:62} flights complete held-up too-near wrong", "fault");
-    let only = std::env::var("FLOCKMATE_FAULT_ONLY").unwrap_or_default();
-    for (k, case) in CASES.iter().filter(|case| case.script.contains(&only)).enumerate() {
+    let flown: Vec<Vec<Outcome>> = seeds.into_par_iter().map(by_seed).collect();
+    println!("{:62} flights complete hit too-near wrong", "fault");
+    for (k, case) in CASES.iter().filter(|case| chosen(case)).enumerate() {
         let sum =
             |count: fn(&Outcome) -> usize| flown.iter().map(|outcomes| count(&outcomes[k])).sum::<usize>();
         println!(
-            "{:62} {seeds:7} {:8} {:7} {:8} {:5}",
+            "{:62} {:7} {:8} {:3} {:8} {:5}",
             case.script.replace('\n', ", "),
+            flown.len(),
             sum(|o| usize::from(o.complete)),
-            sum(|o| o.held_up),
+            sum(|o| o.hit),
             sum(|o| o.too_near),
             sum(|o| o.wrong.len())
         );

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant as Clock};
 
 use companion::Instant;
 use companion::frame::{self, Framer, Header};
-use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, listening, workspace};
 use host_sim::link::{Link, LinkUrl};
 use serialport::TTYPort;
 
@@ -132,6 +132,24 @@ fn assert_done((code, lines): (Option<i32>, Vec<String>)) {
     assert!(code == Some(0) && lines.iter().any(|line| line.contains("Landed")), "{code:?} {lines:#?}");
 }
 
+/// A radio with this share of losses, and the addresses of its links.
+fn radio(links: usize, loss: &str) -> (Guard, Vec<String>) {
+    let mut command = Command::new(host_sim(Profile::Debug));
+    command.args(["radio", "--delay", "0.02", "--loss", loss]);
+    (0..links).for_each(|_| {
+        command.args(["--listen", "udp-listen:127.0.0.1:0"]);
+    });
+    listening(command, links)
+}
+
+/// Uploads a file; what is printed.
+fn upload(link: &str, file: &std::path::Path) -> String {
+    let done = Command::new(host_sim(Profile::Debug)).args(["upload", "--link", link]).arg(file).output();
+    let done = done.expect("the upload starts");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    String::from_utf8_lossy(&done.stdout).into_owned()
+}
+
 /// Two pseudo terminals joined by a wire: the paths of its ends.
 fn wire() -> [String; 2] {
     let ends = [(), ()].map(|()| {
@@ -222,4 +240,28 @@ fn an_arducopter_that_reboots_in_flight_ends_the_mission_on_the_ground() {
     flight.until("Disarmed in flight: mission over", || ());
     let (code, lines) = flight.end();
     assert_eq!(code, Some(1), "{lines:#?}");
+}
+
+#[test]
+fn files_go_up_through_the_autopilot_and_over_a_radio_that_loses() {
+    let files = tempfile::tempdir().expect("a directory");
+    let lobby = workspace().join("host-sim/scenarios/lobby.toml");
+    let mut plan = Command::new(host_sim(Profile::Debug));
+    plan.arg("plan").arg(&lobby).arg("--out").arg(files.path()).stdout(Stdio::null());
+    assert!(plan.status().expect("host-sim starts").success());
+    let port = free_udp_port();
+    let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
+    let (_radio, ends) = radio(2, "0.1");
+    let companion = Command::new(host_sim(Profile::Debug))
+        .args(["companion", "--id", "1", "--autopilot", &format!("udp-listen:127.0.0.1:{port}")])
+        .args(["--swarm", &format!("udp:{}", ends[0])])
+        .arg(&lobby)
+        .stdout(Stdio::null())
+        .spawn()
+        .expect("the companion starts");
+    let _companion = Guard(companion);
+    let said = upload(&format!("udp:{}", ends[1]), &files.path().join("mission.bin"));
+    assert!(said.contains("vehicle 1's mission.bin") && said.contains("CRC-32 right"), "{said}");
+    let said = upload(&format!("udp:{}", at[1]), &files.path().join("roadmap.bin"));
+    assert!(said.contains("vehicle 1's roadmap.bin") && said.contains("CRC-32 right"), "{said}");
 }

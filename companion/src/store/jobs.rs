@@ -158,6 +158,9 @@ impl Store {
         if let Some(job) = self.choose_record(may_erase) {
             return Some(job);
         }
+        if let Job::Erase { .. } = self.paused {
+            return Some(core::mem::replace(&mut self.paused, Job::None));
+        }
         let uploads = matches!(self.upload, Some((_, UploadState::Taking | UploadState::Closing)));
         let area = self.stale().filter(|_| may_erase && !uploads && !self.erasure_failed)?;
         Some(self.erase(area))
@@ -169,6 +172,7 @@ impl Store {
 
     pub(super) fn erase(&mut self, area: Area) -> Job {
         *self.condition(area) = Condition::Dirty;
+        self.paused = Job::None;
         Job::Erase { area, at: area.at(&self.layout) }
     }
 

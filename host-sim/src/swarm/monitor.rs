@@ -80,6 +80,7 @@ pub struct Monitor<'a> {
     safety_distance_m: f32,
     vehicles: Vec<Watched>,
     too_near: Vec<bool>,
+    touching: Vec<bool>,
     recorded_s: f64,
     window: Sample,
     /// Whether a standstill that ends was none: where faults strike, vehicles wait until it is known what became of the one
@@ -128,6 +129,7 @@ impl<'a> Monitor<'a> {
             safety_distance_m,
             vehicles: radii_m.iter().map(watched).collect(),
             too_near: vec![false; radii_m.len() * radii_m.len()],
+            touching: vec![false; radii_m.len() * radii_m.len()],
             recorded_s: f64::NEG_INFINITY,
             window: NOTHING,
             waits_end: false,
@@ -259,11 +261,13 @@ impl<'a> Monitor<'a> {
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
                     self.violations += 1;
-                    self.incidents.push((
-                        t_s,
-                        i,
-                        format!("nearer than the safety distance to vehicle no. {}", j + 1),
-                    ));
+                    let text = format!("nearer than the safety distance to vehicle no. {}", j + 1);
+                    self.incidents.push((t_s, i, text));
+                }
+                let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
+                let was_touching = std::mem::replace(&mut self.touching[i * n + j], touches);
+                if touches && !was_touching {
+                    self.incidents.push((t_s, i, format!("touches vehicle no. {}", j + 1)));
                 }
             }
         }

@@ -1,0 +1,106 @@
+extern crate std;
+use std::vec::Vec;
+
+use super::*;
+use crate::commands::EXCLUDE;
+use crate::fake_px4::*;
+use crate::intent::{FLYING, GROUNDED, OUT};
+
+fn sphere(at: Point, radius_m: f32) -> Command {
+    let place = frames::enu_to_geodetic(&ORIGIN, &at);
+    Command {
+        command: EXCLUDE,
+        param1: radius_m,
+        param2: 0.0,
+        place: Some((
+            (place.lat_deg * 1e7).round() as i32,
+            (place.lon_deg * 1e7).round() as i32,
+            place.alt_m as f32,
+        )),
+        from: (255, 190),
+        to_us: true,
+        to_component: true,
+    }
+}
+
+#[test]
+fn a_sphere_told_by_command_is_an_obstacle_with_the_clearance_around_it() {
+    let mut bench = Bench::new(config());
+    let at = Point::new(14.0, 12.0, 1.5);
+    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED);
+    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED, "told twice");
+    let known = bench.companion.obstacles.known.clone();
+    assert_eq!(known.len(), 1);
+    assert!((known[0].from - at).norm() < 0.05 && known[0].to == known[0].from, "{known:?}");
+    assert!((known[0].radius_m - 1.3).abs() < 1e-6, "radius and required clearance: {known:?}");
+}
+
+#[test]
+fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
+    let mut bench = Bench::new(config());
+    let at = |x: f32| Point::new(x, 30.0, 1.5);
+    for radius_m in [-1.0, f32::NAN, f32::INFINITY, 1001.0] {
+        assert_eq!(bench.companion.exclude(&sphere(at(0.0), radius_m)), DENIED, "{radius_m}");
+    }
+    let nowhere = Command { place: None, ..sphere(at(0.0), 1.0) };
+    assert_eq!(bench.companion.exclude(&nowhere), DENIED, "COMMAND_LONG has no place");
+    let no_earth = Command { place: Some((i32::MAX, 0, 700.0)), ..nowhere };
+    assert_eq!(bench.companion.exclude(&no_earth), DENIED);
+    for i in 0..OBSTACLES {
+        assert_eq!(bench.companion.exclude(&sphere(at(i as f32), 0.5)), ACCEPTED);
+    }
+    assert_eq!(bench.companion.exclude(&sphere(at(99.0), 0.5)), TEMPORARILY_REJECTED);
+}
+
+#[test]
+fn a_sphere_on_the_path_is_flown_around_and_one_beside_it_is_none() {
+    for (y, blocks) in [(16.0, false), (12.0, true)] {
+        let mut bench = Bench::following(config());
+        bench.companion.exclude(&sphere(Point::new(14.0, y, 1.5), 0.5));
+        bench.run(1.0);
+        assert_eq!(bench.state() == State::Blocked, blocks, "{y}");
+        bench.until(State::Done, 60.0);
+        assert_eq!(bench.texts.iter().any(|text| text == "Flying around"), blocks);
+    }
+}
+
+/// What is kept off vehicle 77 half a minute on.
+fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
+    let mut bench = Bench::accompanied(two_vehicles());
+    let at = Point::new(8.0, 40.0, 9.0);
+    bench.neighbour = Some((at, flags, 0.0, 5));
+    bench.run(1.0);
+    if !moves {
+        bench.neighbour_clock = Some(bench.now);
+    }
+    bench.run(30.0);
+    let mut told = Vec::new();
+    bench.companion.neighbours.places(bench.now, 1.5, |place| told.push(place));
+    told
+}
+
+#[test]
+fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
+    let known = kept_off(GROUNDED | OUT, true);
+    assert!(matches!(known[..], [KeepOff { nature: Nature::Solid, .. }]) && known[0].from == known[0].to);
+    let vague = kept_off(GROUNDED | OUT, false);
+    assert!(matches!(vague[..], [KeepOff { nature: Nature::Lying, .. }]) && vague[0].to.z < -40.0);
+}
+
+#[test]
+fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
+    let depth_m = |moves: bool| {
+        let mut bench = Bench::accompanied(two_vehicles());
+        bench.neighbour = Some((Point::new(8.0, 40.0, 9.0), FLYING, 0.0, 5));
+        bench.run(1.0);
+        if !moves {
+            bench.neighbour_clock = Some(bench.now);
+        }
+        bench.run(10.0);
+        let mut depth_m = 0.0;
+        bench.companion.neighbours.landing_columns(bench.now, 2.0, |column| depth_m = 9.0 - column.to.z);
+        depth_m
+    };
+    assert!((depth_m(true) - 15.0).abs() < 1.0, "{}", depth_m(true));
+    assert!((depth_m(false) - 35.0).abs() < 2.0, "{}", depth_m(false));
+}
