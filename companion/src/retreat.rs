@@ -1,8 +1,8 @@
 //! Out from under a vehicle that comes down: who waits below it flies back along its path until it is beside the column.
 //!
 //! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
-//! [`BESIDE_M`] beyond the safety distance of its vertical, down to [`BELOW_M`] below it: a place to wait that is there is
-//! exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
+//! [`BESIDE_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
+//! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
 //! who follows behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`STEPS`] places against each neighbour, only while one comes down near the place to wait.

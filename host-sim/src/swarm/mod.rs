@@ -325,7 +325,10 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     mission.index_of(id)?;
     let config = mission.mission_view().config(id);
     let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e:?}", mission.scenario.path))?;
-    Ok(Config { accel_mps2: ACCEL_MPS2, ..config })
+    // One plan may be flown by other rules and inside another fence than its mission file says.
+    let scenario = &mission.scenario;
+    let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
+    Ok(Config { accel_mps2: ACCEL_MPS2, method: scenario.deconfliction.method, geofence, ..config })
 }
 
 /// A companion on the heap: it is too large for a stack.
