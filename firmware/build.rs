@@ -22,16 +22,38 @@ fn main() {
     }
 }
 
-fn write(name: &str, bytes: &[u8]) {
-    let out = PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"));
-    fs::write(out.join(name), bytes).expect("OUT_DIR can be written");
-    println!("cargo:rustc-link-search={}", out.display());
+fn out() -> PathBuf {
+    PathBuf::from(env::var_os("OUT_DIR").expect("cargo sets it"))
 }
 
+fn write(name: &str, bytes: &[u8]) {
+    fs::write(out().join(name), bytes).expect("OUT_DIR can be written");
+    println!("cargo:rustc-link-search={}", out().display());
+}
+
+/// Cortex-m-rt's script includes `memory.x`, and a linker looks for that where it was started first: at the top of the checkout,
+/// which is right for the default board alone. So the script is copied to include the chosen board's map instead.
 fn link(memory: &Path) {
-    write("memory.x", &fs::read(memory).expect("the board has a memory map"));
     println!("cargo:rerun-if-changed={}", memory.display());
+    write("board-memory.x", &fs::read(memory).expect("the board has a memory map"));
+    let script = link_script().expect("cortex-m-rt is built before us: it declares what it links");
+    let included = script.replace("INCLUDE memory.x", "INCLUDE board-memory.x");
+    assert_ne!(script, included, "cortex-m-rt's link.x includes memory.x");
+    write("board-link.x", included.as_bytes());
     println!("cargo:rustc-link-arg-bins=--nmagic");
-    println!("cargo:rustc-link-arg-bins=-Tlink.x");
+    println!("cargo:rustc-link-arg-bins=-Tboard-link.x");
     println!("cargo:rustc-link-arg-bins=-Tdefmt.x");
+}
+
+/// The `link.x` that cortex-m-rt's build script wrote last; all are alike.
+fn link_script() -> Option<String> {
+    // BUILD/firmware-HASH/out and BUILD/cortex-m-rt-HASH/out
+    let built = out().ancestors().nth(2)?.to_owned();
+    let scripts = fs::read_dir(built).ok()?.flatten().filter(|entry| {
+        let name = entry.file_name();
+        name.to_string_lossy().starts_with("cortex-m-rt-")
+    });
+    let scripts = scripts.map(|entry| entry.path().join("out/link.x"));
+    let newest = scripts.max_by_key(|script| script.metadata().and_then(|m| m.modified()).ok())?;
+    fs::read_to_string(newest).ok()
 }

@@ -84,8 +84,8 @@ unsafe fn SWI_IRQ_1() {
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     let p = embassy_rp::init(embassy_rp::config::Config::default());
-    interrupt::SWI_IRQ_0.set_priority(Priority::P8);
-    interrupt::SWI_IRQ_1.set_priority(Priority::P12);
+    interrupt::SWI_IRQ_0.set_priority(Priority::P1);
+    interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
         let mut config = uart::Config::default();
         config.baudrate = baudrate;
