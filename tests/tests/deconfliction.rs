@@ -18,9 +18,11 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
     assert!(suite.unwrap().success());
     let rows: Vec<Value> = serde_json::from_str(&std::fs::read_to_string(rows).unwrap()).unwrap();
     let ours: Vec<&Value> = rows.iter().filter(|row| row["method"] == "priority").collect();
-    assert!(ours.len() >= 12, "{} cases", ours.len());
+    assert!(ours.len() >= 16, "{} cases", ours.len());
     for row in ours {
-        assert_eq!(row["complete"], SEEDS, "{row}");
+        // Where one may lie anywhere on a stretch, another's goal may be out of reach.
+        let lost = row["name"].as_str().is_some_and(|name| name.starts_with("radio"));
+        assert!(lost || row["complete"] == SEEDS, "{row}");
         for count in ["violations", "wall_contacts", "deadlocks"] {
             assert_eq!(row[count], 0, "{row}");
         }
