@@ -41,7 +41,7 @@ const SETTLED: Duration = Duration::from_secs(5);
 /// A position older than this is vague.
 const FRESH: Duration = Duration::from_secs(2);
 /// Beyond the safety distance, so that what strays a little does not block the way again, metres.
-const MARGIN_M: f32 = 0.35;
+const MARGIN_M: f32 = 0.5;
 
 /// Obstacles that were not on the map.
 const OBSTACLES: usize = 16;

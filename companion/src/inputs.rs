@@ -9,7 +9,9 @@ use crate::mission::{Inputs, State};
 use crate::time::Duration;
 
 /// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
-pub(crate) const LANDING_DRIFT_M: f32 = 1.0;
+const LANDING_DRIFT_M: f32 = 1.0;
+/// The same of a vehicle that stood still.
+const STANDING_DRIFT_M: f32 = 0.3;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
@@ -26,6 +28,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let away = t.position - self.start;
         let follow = self.state == State::Follow;
         let fence = self.config.geofence;
+        let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
+        let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let charge_below = |percent| (0..percent).contains(&t.battery_percent);
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
@@ -67,16 +71,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             battery_low: charge_below(self.config.battery_low_percent),
             battery_critical: charge_below(self.config.battery_low_percent / 2),
-            room_below: !self
-                .neighbours
-                .any_below(&t.position, self.config.safety_distance_m + LANDING_DRIFT_M),
+            room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
             outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             blocked: self.around.blocked,
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
             detours_failed: self.around.failed,
             underneath: self.guidance.trapped_since.map_or(Duration::default(), |at| now - at),
-            standing: self.guidance.stands() && t.velocity.norm() < STANDING_MPS,
+            standing,
         }
     }
 }

@@ -16,7 +16,6 @@ use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
 use crate::guidance::{Guidance, Scene, setpoints_flow};
-use crate::inputs::LANDING_DRIFT_M;
 use crate::intent::Intent;
 use crate::mission::{self, Action, Row, State};
 use crate::neighbours::Neighbours;
@@ -435,11 +434,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.aside = self.around.aside;
             }
             Action::BrakeOnPath => self.guidance.brake(&position),
-            Action::BrakeToLand => {
-                let apart_m = self.config.safety_distance_m + LANDING_DRIFT_M;
-                let room_below = |place: &Point| !self.neighbours.any_below(place, apart_m);
-                self.guidance.brake_where(&position, self.plan.as_ref().map(|plan| &plan.path), room_below);
-            }
             Action::Rejoin => {
                 if let Some(plan) = &self.plan {
                     self.guidance.rejoin(&plan.path, &position, now);

@@ -185,8 +185,6 @@ pub enum Action {
     RunPath,
     /// Brake the reference along the path.
     BrakeOnPath,
-    /// The same, at the next place on it, not far, where it may land.
-    BrakeToLand,
     /// Go on from the nearest point of the path.
     Rejoin,
     /// Fly the path flown so far back to the start.

@@ -26,9 +26,8 @@ const LATELY: Duration = Duration::from_millis(800);
 const DEAD: Duration = Duration::from_secs(45);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 const DOWN: Duration = Duration::from_secs(75);
-/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops
-/// where it may land, 1.5 m later at most.
-const STRETCH_M: f32 = 7.5;
+/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
+const STRETCH_M: f32 = 6.0;
 /// Spacing of the places on that stretch below which it may lie, metres.
 const STRETCH_STEP_M: f32 = 1.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the

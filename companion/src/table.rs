@@ -111,7 +111,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
     info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
-    warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeToLand, "Neighbours silent: stopping"),
+    warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
     warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
     warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
     info(&[Blocked],          G::PathClear,        NOW,    Follow,          A::RunPath,     "Path clear again"),

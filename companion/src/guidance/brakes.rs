@@ -12,9 +12,6 @@ use crate::time::Instant;
 
 /// A stop further ahead is no place to wait at yet, metres.
 const WAITS_WITHIN_M: f32 = 8.0;
-/// How far beyond the braking distance a better place to stop is looked for, metres.
-const BRAKES_WITHIN_M: f32 = 1.5;
-
 impl Guidance {
     /// Stops the reference within its braking distance; off the path, where the vehicle is.
     pub fn brake(&mut self, position: &Point) {
@@ -23,26 +20,6 @@ impl Guidance {
             self.brake_at_m = self.tracker.along_m + braking;
         } else {
             self.hold = *position;
-        }
-    }
-
-    /// Brakes so as to stop at the next place that is `good`, where there is one within [`BRAKES_WITHIN_M`] and before
-    /// whoever is to be waited for.
-    pub fn brake_where<const W: usize>(
-        &mut self,
-        position: &Point,
-        path: Option<&Path<W>>,
-        good: impl Fn(&Point) -> bool,
-    ) {
-        self.brake(position);
-        let Some(path) = path.filter(|_| self.on_path) else { return };
-        let reach_m = BRAKES_WITHIN_M
-            .min(self.advice.stop_within_m + self.tracker.along_m - self.brake_at_m)
-            .min(path.length_m() - self.brake_at_m);
-        let mut places = (0..=6u8).map(|i| f32::from(i) * 0.25).take_while(|m| *m <= reach_m);
-        let first = self.brake_at_m;
-        if let Some(further_m) = places.find(|m| path.point_at(first + m).is_some_and(|p| good(&p))) {
-            self.brake_at_m += further_m;
         }
     }
 
