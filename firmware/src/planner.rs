@@ -15,8 +15,9 @@ use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::scratch::Scratch;
 use crate::shell::BoardCompanion;
 
-/// Most things that are flown around: the vehicles of the swarm, and as many obstacles.
-const OBSTACLES: usize = 2 * VEHICLES;
+/// Most things that are flown around. A vehicle that fell silent may lie below a dozen places, any other is one or two; more
+/// than these and there is no way around, not one past what was left out.
+const OBSTACLES: usize = 6 * VEHICLES;
 
 /// What planning needs beside roadmap and mission.
 pub struct Memory {
@@ -24,6 +25,8 @@ pub struct Memory {
     plan: SwarmPlan<VEHICLES, WAYPOINTS>,
     own: VehiclePlan<WAYPOINTS, GATES>,
     obstacles: Vec<KeepOff, OBSTACLES>,
+    /// Whether there were more.
+    crowded: bool,
     nodes: Vec<u16, WAYPOINTS>,
 }
 
@@ -43,6 +46,7 @@ impl Memory {
                 plan_crc: 0,
             },
             obstacles: Vec::new(),
+            crowded: false,
             nodes: Vec::new(),
         }
     }
@@ -69,10 +73,10 @@ pub struct Planner<'a> {
 impl Planner<'_> {
     /// What the companion would have flown around; `None` if it asks for the mission's plan.
     pub fn note_detour(&mut self, companion: &BoardCompanion) -> Option<DetourRequest> {
-        let obstacles = &mut self.memory.obstacles;
+        let Memory { obstacles, crowded, .. } = &mut *self.memory;
         obstacles.clear();
-        // One more than there is room for cannot be: vehicles and obstacles are as many at most.
-        companion.detour(|obstacle| _ = obstacles.push(obstacle))
+        *crowded = false;
+        companion.detour(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
     /// The plan asked for.
@@ -89,6 +93,9 @@ impl Planner<'_> {
         let memory = &mut *self.memory;
         let ws = memory.scratch.planner();
         if let Some(request) = detour {
+            if memory.crowded {
+                return Err(PlanFailure::Capacity);
+            }
             detour::plan_vehicle(
                 roadmap,
                 request,
