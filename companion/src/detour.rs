@@ -40,6 +40,8 @@ const KEPT: Duration = Duration::from_secs(20);
 const SETTLED: Duration = Duration::from_secs(5);
 /// A position older than this is vague.
 const FRESH: Duration = Duration::from_secs(2);
+/// What a vehicle may stray from its path, metres: a path that comes nearer to what lies there by that much is blocked.
+const STRAY_M: f32 = 0.25;
 /// Beyond the safety distance, so that what strays a little does not block the way again, metres.
 const MARGIN_M: f32 = 0.5;
 
@@ -170,7 +172,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, obstacle)
         };
         let mut blocked = self.obstacles.known[self.obstacles.avoided..].iter().any(ahead);
-        self.neighbours.obstacles(self.now, self.config.safety_distance_m, |obstacle| {
+        self.neighbours.obstacles(self.now, self.config.safety_distance_m + STRAY_M, |obstacle| {
             blocked |= ahead(&obstacle);
         });
         blocked
