@@ -1,8 +1,8 @@
 //! The shell around the companion: what moves bytes, keeps time and plans.
 //!
 //! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`keep_time`](Shell::keep_time) are tasks of an interrupt's
-//! executor; [`plan`](Shell::plan) is below them, in thread mode, so a long plan never holds a setpoint up. The companion is held
-//! only for the time of one of its calls, never across an `await`.
+//! executor; [`work`](Shell::work) is a task of another one below it, so a long plan never holds a setpoint up. The companion is
+//! held only for the time of one of its calls, never across an `await`.
 
 use core::fmt::Write as _;
 use core::sync::atomic::{AtomicU32, Ordering};
