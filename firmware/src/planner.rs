@@ -17,7 +17,7 @@ use crate::shell::BoardCompanion;
 
 /// Most things that are flown around. A vehicle that fell silent may lie below a dozen places, any other is one or two; more
 /// than these and there is no way around, not one past what was left out.
-const OBSTACLES: usize = 6 * VEHICLES;
+const OBSTACLES: usize = 4 * VEHICLES;
 
 /// What planning needs beside roadmap and mission.
 pub struct Memory {
