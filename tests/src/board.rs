@@ -1,12 +1,29 @@
 //! Boards in QEMU: the built firmware, and what it is run with.
 
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
 
+use companion::Link as Port;
+use companion::store::{Layout, WORD};
+use host_sim::link::{Link, LinkUrl};
 use planner_core::voxel::VoxelGrid;
+
+use crate::Guard;
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
+/// Where a byte for each of its words tells what happened to that last, and the one for a word that is being programmed or
+/// erased.
+const MARKS: u32 = 0x6020_0000;
+const TORN: u8 = 2;
+/// A loaded machine starts nothing at once.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// What QEMU's monitor says when it waits for an order.
+const PROMPT: &[u8] = b"(qemu) ";
 /// Where a map for measurements lies.
 const MAP: u32 = 0x6080_0000;
 
@@ -20,17 +37,125 @@ pub fn program(name: &str) -> Option<PathBuf> {
     Some(Path::new(&folder).join(name))
 }
 
-/// QEMU with a program on the board. One instruction takes 2^`shift` nanoseconds of the board's time.
-pub fn qemu(program: &Path, shift: u32) -> Command {
+/// QEMU with a program on the board.
+fn qemu(program: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
-        .args(["-machine", "mps2-an500", "-display", "none", "-monitor", "none"])
-        .args(["-icount", &format!("shift={shift}")])
-        .args(["-semihosting-config", "enable=on,target=native"])
+        .args(["-machine", "mps2-an500", "-display", "none"])
         .arg("-kernel")
         .arg(program)
         .stdin(Stdio::null());
     command
+}
+
+/// A board in QEMU that runs the firmware; it ends with us.
+pub struct Emulated {
+    monitor: TcpStream,
+    /// TCP ports of its UARTs: to the autopilot, to the radio.
+    ports: [u16; 2],
+    scratch: tempfile::TempDir,
+    _qemu: Guard,
+}
+
+impl Emulated {
+    /// Switches it on, its flash empty. It runs as fast as this machine, or with `shift` so that an instruction
+    /// takes 2^`shift` nanoseconds of its time, which is never ahead of the clock.
+    ///
+    /// # Panics
+    /// QEMU does not start.
+    pub fn start(program: &Path, shift: Option<u32>) -> Self {
+        let scratch = tempfile::tempdir().expect("a temporary directory");
+        let [autopilot, radio, monitor] = free_ports();
+        let ports = [autopilot, radio];
+        let listen = |port: u16| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
+        let mut qemu = qemu(program);
+        qemu.args(["-monitor", &listen(monitor), "-serial", &listen(autopilot), "-serial", &listen(radio)])
+            .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
+            .args(["-chardev", &format!("file,id=log,path={}", scratch.path().join("log").display())]);
+        if let Some(shift) = shift {
+            qemu.args(["-icount", &format!("shift={shift}")]);
+        }
+        let qemu = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
+        let monitor = connect(monitor);
+        let mut board = Self { monitor, ports, scratch, _qemu: qemu };
+        board.answer();
+        board
+    }
+
+    /// Plugs a cable into one of its ports, once the one before is gone.
+    ///
+    /// # Panics
+    /// The port is not there.
+    pub fn plug(&self, port: Port) -> Box<dyn Link> {
+        let url = LinkUrl::Tcp(format!("127.0.0.1:{}", self.ports[port as usize]));
+        url.open().expect("the board's port is open")
+    }
+
+    /// Presses reset; the flash keeps what it holds, torn words too.
+    pub fn reset(&mut self) {
+        self.order("system_reset");
+    }
+
+    /// Halts the board where it is, or lets it run on.
+    pub fn halt(&mut self, halted: bool) {
+        self.order(if halted { "stop" } else { "cont" });
+    }
+
+    /// Words of its flash that are being programmed or erased, in its order. It should be halted.
+    ///
+    /// # Panics
+    /// QEMU gives no memory.
+    pub fn torn(&mut self) -> Vec<usize> {
+        let marks = self.memory(MARKS, Layout::H743.len() as usize / WORD);
+        (0..marks.len()).filter(|word| marks[*word] == TORN).collect()
+    }
+
+    /// Its memory from an address on.
+    fn memory(&mut self, address: u32, length: usize) -> Vec<u8> {
+        let file = self.scratch.path().join("memory");
+        self.order(&format!("pmemsave {address} {length} \"{}\"", file.display()));
+        let bytes = std::fs::read(file).expect("QEMU wrote it");
+        assert_eq!(bytes.len(), length);
+        bytes
+    }
+
+    /// Has QEMU's monitor do something.
+    fn order(&mut self, line: &str) {
+        writeln!(self.monitor, "{line}").expect("QEMU listens");
+        self.answer();
+    }
+
+    fn answer(&mut self) {
+        let mut heard = Vec::new();
+        let mut buffer = [0; 4096];
+        // The line is echoed before it is obeyed, and the prompt comes after.
+        while !heard.ends_with(PROMPT) {
+            let length = self.monitor.read(&mut buffer).expect("QEMU answers");
+            assert!(length > 0, "QEMU ended: {}", String::from_utf8_lossy(&heard));
+            heard.extend_from_slice(&buffer[..length]);
+        }
+    }
+}
+
+/// TCP ports that nobody has now.
+fn free_ports() -> [u16; 3] {
+    let held = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
+    held.each_ref().map(|listener| listener.local_addr().expect("it is bound").port())
+}
+
+/// Connects to what is about to listen.
+fn connect(port: u16) -> TcpStream {
+    let began = Clock::now();
+    loop {
+        match TcpStream::connect(("127.0.0.1", port)) {
+            Ok(stream) => {
+                stream.set_read_timeout(Some(PATIENCE)).expect("a timeout can be set");
+                return stream;
+            }
+            Err(error) => assert!(began.elapsed() < PATIENCE, "QEMU does not listen: {error}"),
+        }
+        sleep(Duration::from_millis(20));
+    }
 }
 
 /// A map as `measure` finds it.
@@ -55,7 +180,9 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
         file.display().to_string()
     };
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
-    let out = qemu(program, 0)
+    // An instruction takes a nanosecond of the board's time.
+    let out = qemu(program)
+        .args(["-monitor", "none", "-icount", "shift=0", "-semihosting-config", "enable=on,target=native"])
         .args(["-device", &format!("loader,file={roadmap},addr={BANK2:#x},force-raw=on")])
         .args(["-device", &format!("loader,file={map},addr={MAP:#x},force-raw=on")])
         .output()
