@@ -140,7 +140,7 @@ async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
         Timer::after(ALIVE_EVERY).await;
         if shell.wants_restart() {
             // What waits has had time to go out.
-            cortex_m::peripheral::SCB::sys_reset();
+            crash::restart();
         }
         if shell.is_alive() {
             watchdog.feed();

@@ -1,4 +1,5 @@
-//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start.
+//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start. While it runs the
+//! record says so, and a start that finds that follows a reset by hand or by the watchdog.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::fmt::Write;
@@ -11,6 +12,10 @@ use heapless::String;
 const TEXT: usize = 50;
 /// Says that a record was written.
 const MAGIC: u32 = 0x464c_4b21;
+/// Says that the firmware runs.
+const RUNS: u32 = 0x464c_4b22;
+/// What is told where nothing was written.
+const UNKNOWN: &str = "Restarted: reset or watchdog";
 
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -23,17 +28,27 @@ struct Record {
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 
-/// What the last start left, once.
+/// What the last start left, once; nothing after the power came.
 pub fn take() -> Option<String<TEXT>> {
     let record = &raw mut RECORD;
     // SAFETY: called once at the start, when nothing else runs; any bytes are a `Record`.
     let found = unsafe {
         let found = record.cast::<Record>().read_volatile();
-        record.cast::<Record>().write_volatile(Record { magic: 0, ..found });
+        record.cast::<Record>().write_volatile(Record { magic: RUNS, ..found });
         found
     };
+    if found.magic == RUNS {
+        return String::try_from(UNKNOWN).ok();
+    }
     let text = found.text.get(..found.len as usize).filter(|_| found.magic == MAGIC)?;
     String::try_from(core::str::from_utf8(text).ok()?).ok()
+}
+
+/// Starts anew because that was asked for: the next start tells nothing.
+pub fn restart() -> ! {
+    cortex_m::interrupt::disable();
+    write(Record { magic: 0, len: 0, text: [0; TEXT] });
+    cortex_m::peripheral::SCB::sys_reset()
 }
 
 fn keep(text: &str) {
@@ -42,6 +57,10 @@ fn keep(text: &str) {
     let len = bytes.len().min(TEXT);
     record.text[..len].copy_from_slice(&bytes[..len]);
     record.len = len as u32;
+    write(record);
+}
+
+fn write(record: Record) {
     let to = &raw mut RECORD;
     // SAFETY: interrupts are off, and nobody comes back from here.
     unsafe { to.cast::<Record>().write_volatile(record) };
