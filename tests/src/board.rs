@@ -8,7 +8,10 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::Link as Port;
-use companion::store::{Layout, WORD};
+use companion::ftp::DATA;
+use companion::store::window::Taken;
+use companion::store::{Erasing, File, READ, Store, UploadState, WORD};
+use host_sim::flash::{DeskFlash, LAYOUT};
 use host_sim::link::{Link, LinkUrl};
 use planner_core::voxel::VoxelGrid;
 
@@ -16,10 +19,14 @@ use crate::Guard;
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
-/// Where a byte for each of its words tells what happened to that last, and the one for a word that is being programmed or
-/// erased.
+/// Where a byte for each of its words tells what happened to that last: nothing since it was erased, or it was programmed, or
+/// it is being programmed or erased.
 const MARKS: u32 = 0x6020_0000;
+const ERASED: u8 = 0;
+const WHOLE: u8 = 1;
 const TORN: u8 = 2;
+/// Where it is noted that the bank holds something.
+const MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 /// A loaded machine starts nothing at once.
 const PATIENCE: Duration = Duration::from_secs(30);
 /// What QEMU's monitor says when it waits for an order.
@@ -58,12 +65,12 @@ pub struct Emulated {
 }
 
 impl Emulated {
-    /// Switches it on, its flash empty. It runs as fast as this machine, or with `shift` so that an instruction
+    /// Switches it on, with what `bank` says in its flash at every reset; else it is empty and keeps what comes. It runs as fast as this machine, or with `shift` so that an instruction
     /// takes 2^`shift` nanoseconds of its time, which is never ahead of the clock.
     ///
     /// # Panics
     /// QEMU does not start.
-    pub fn start(program: &Path, shift: Option<u32>) -> Self {
+    pub fn start(program: &Path, shift: Option<u32>, bank: Option<&[u8]>) -> Self {
         let scratch = tempfile::tempdir().expect("a temporary directory");
         let [autopilot, radio, monitor] = free_ports();
         let ports = [autopilot, radio];
@@ -74,6 +81,17 @@ impl Emulated {
             .args(["-chardev", &format!("file,id=log,path={}", scratch.path().join("log").display())]);
         if let Some(shift) = shift {
             qemu.args(["-icount", &format!("shift={shift}")]);
+        }
+        if let Some(bank) = bank {
+            let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
+            let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
+            for (name, bytes, at) in
+                [("bank", bank, BANK2), ("marks", &marks, MARKS), ("made", &MADE.1.to_le_bytes(), MADE.0)]
+            {
+                let file = scratch.path().join(name);
+                std::fs::write(&file, bytes).expect("it can be written");
+                qemu.args(["-device", &loader(&file, at)]);
+            }
         }
         let qemu = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
         let monitor = connect(monitor);
@@ -106,7 +124,7 @@ impl Emulated {
     /// # Panics
     /// QEMU gives no memory.
     pub fn torn(&mut self) -> Vec<usize> {
-        let marks = self.memory(MARKS, Layout::H743.len() as usize / WORD);
+        let marks = self.memory(MARKS, LAYOUT.len() as usize / WORD);
         (0..marks.len()).filter(|word| marks[*word] == TORN).collect()
     }
 
@@ -135,6 +153,42 @@ impl Emulated {
             heard.extend_from_slice(&buffer[..length]);
         }
     }
+}
+
+/// What a bank of flash holds after these files were uploaded to an empty one, its other slot erased.
+///
+/// # Panics
+/// A file is refused.
+pub fn bank(roadmap: &[u8], mission: &[u8]) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let file = folder.path().join("bank");
+    let mut flash = DeskFlash::open(Some(&file)).expect("it can be made");
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    let mut settle = |store: &mut Store| {
+        let mut read = [0; READ];
+        while let Some(request) = store.poll(Erasing::Allowed) {
+            let outcome = flash.obey(request, &mut read);
+            store.handle(outcome);
+        }
+    };
+    settle(&mut store);
+    for (file, bytes) in [(File::Roadmap, roadmap), (File::Mission, mission)] {
+        store.open(file, Erasing::Allowed).expect("an idle store takes uploads");
+        settle(&mut store);
+        for (i, piece) in bytes.chunks(DATA).enumerate() {
+            assert_eq!(store.take((i * DATA) as u32, piece), Taken::Yes);
+            settle(&mut store);
+        }
+        store.close();
+        settle(&mut store);
+        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    }
+    std::fs::read(&file).expect("it was written")
+}
+
+/// QEMU's option that puts a file into memory at every reset.
+fn loader(file: &Path, at: u32) -> String {
+    format!("loader,file={},addr={at:#x},force-raw=on", file.display())
 }
 
 /// TCP ports that nobody has now.
@@ -177,14 +231,13 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let file = |name: &str, bytes: &[u8]| {
         let file = folder.path().join(name);
         std::fs::write(&file, bytes).expect("it can be written");
-        file.display().to_string()
+        file
     };
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
     // An instruction takes a nanosecond of the board's time.
     let out = qemu(program)
         .args(["-monitor", "none", "-icount", "shift=0", "-semihosting-config", "enable=on,target=native"])
-        .args(["-device", &format!("loader,file={roadmap},addr={BANK2:#x},force-raw=on")])
-        .args(["-device", &format!("loader,file={map},addr={MAP:#x},force-raw=on")])
+        .args(["-device", &loader(&roadmap, BANK2), "-device", &loader(&map, MAP)])
         .output()
         .expect("qemu-system-arm runs");
     let text = String::from_utf8_lossy(&out.stdout);

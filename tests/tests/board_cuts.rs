@@ -239,7 +239,7 @@ fn halt(board: &mut Emulated, part: Part, moves_on: bool, rng: &mut Pcg32) -> Ve
 /// Cuts uploads to one board again and again.
 fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let mut board = Emulated::start(program, None);
+    let mut board = Emulated::start(program, None, None);
     let mut tally = Tally::default();
     let file = roadmap(20, seed as f32);
     let mut old = crc32(&file);
@@ -287,7 +287,7 @@ fn an_upload_cut_anywhere_leaves_the_old_or_the_new() {
 #[test]
 fn an_armed_board_erases_nothing() {
     let Some(program) = board::program("flockmate") else { return };
-    let mut board = Emulated::start(&program, None);
+    let mut board = Emulated::start(&program, None, None);
     let file = roadmap(20, 0.0);
     let mut client = uncut(&board, Some(true));
     for _ in 0..3 {
