@@ -342,6 +342,17 @@ fn nothing_is_erased_while_armed() {
     let refused = world.ask(0, op::CREATE, 0, b"roadmap.bin");
     assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
     assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+    world.heard.clear();
+    // What was asked before that was known waits, and is refused once it is.
+    world.erasing = Erasing::NotYet;
+    let opens = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
+    world.send(&opens);
+    (0..3).for_each(|_| world.step());
+    assert!(world.heard.is_empty());
+    world.erasing = Erasing::Forbidden;
+    let refused = world.ask_again(&opens);
+    assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
+    assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
     world.erasing = Erasing::Allowed;
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }

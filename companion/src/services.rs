@@ -56,10 +56,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
         );
         let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
-        match (idle && !self.telemetry.armed, known) {
-            (false, _) => Erasing::Forbidden,
-            (true, false) => Erasing::NotYet,
-            (true, true) => Erasing::Allowed,
+        match self.state {
+            _ if self.telemetry.armed => Erasing::Forbidden,
+            _ if idle && known => Erasing::Allowed,
+            _ if idle => Erasing::NotYet,
+            State::Planning => Erasing::NotYet,
+            _ => Erasing::Forbidden,
         }
     }
 

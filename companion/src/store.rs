@@ -124,7 +124,8 @@ pub enum Erasing {
     Allowed,
     /// The vehicle is armed, or about to be.
     Forbidden,
-    /// It is soon known whether there is an autopilot, and whether it is armed: what needs it waits.
+    /// The roadmap is planned on, or it is soon known whether there is an autopilot, and whether it is armed: what needs it
+    /// waits.
     NotYet,
 }
 

@@ -5,7 +5,6 @@
 //! held only for the time of one of its calls, never across an `await`, and both executors wait for so long ([`HoldsExecutors`]).
 
 use core::cell::RefCell;
-use core::fmt::Write as _;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::frame::{Framer, MAX_SENT};
@@ -17,8 +16,7 @@ use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use heapless::{String, Vec};
-use static_cell::StaticCell;
+use heapless::Vec;
 
 use crate::boards::HoldsExecutors;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
@@ -33,8 +31,11 @@ const CHUNK: usize = 256;
 const GATHER: Duration = Duration::from_millis(1);
 /// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// A stream of setpoints that paused for longer had ended, milliseconds.
-const STREAM_ENDS_MS: u32 = 1000;
+/// Errors of a line are told at once, and then no more often than this.
+const TELL_EVERY: Duration = Duration::from_secs(10);
+/// What is said of them: errors that the UART reported, and frames that were damaged or cut.
+const LINE_TEXTS: [&str; 2] =
+    ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
 /// What was to be said before a restart has this long to go out.
 const FAREWELL_MS: u32 = 200;
@@ -58,12 +59,7 @@ pub struct Shell {
     writes: AtomicBool,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
     seen_ms: [AtomicU32; TASKS],
-    /// When the last setpoint went out, milliseconds.
-    setpoint_ms: AtomicU32,
-    /// The longest time between two setpoints of a flight, milliseconds.
-    gap_ms: AtomicU32,
-    /// What is said of it after the first flight.
-    gap_text: StaticCell<String<50>>,
+    setpoints: Setpoints,
     /// Errors that the UARTs reported.
     pub line_errors: [AtomicU32; 2],
 }
@@ -170,9 +166,7 @@ impl Shell {
             restart_ms: AtomicU32::new(0),
             writes: AtomicBool::new(false),
             seen_ms: [const { AtomicU32::new(0) }; TASKS],
-            setpoint_ms: AtomicU32::new(0),
-            gap_ms: AtomicU32::new(0),
-            gap_text: StaticCell::new(),
+            setpoints: Setpoints::new(),
             line_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
@@ -197,9 +191,16 @@ impl Shell {
                 match event {
                     Event::PlanRequested => self.wants_plan.signal(()),
                     Event::RestartRequested => self.ask_restart(),
-                    Event::StateChanged { to: State::Done, .. } => self.tell_gap(companion),
+                    Event::StateChanged { to: State::Done | State::Aborted, .. } => {
+                        if let Some(told) = self.setpoints.take(now_ms()) {
+                            companion.say_count(false, "Setpoints: #, at most # ms apart", told);
+                        }
+                    }
                     Event::StateChanged { .. } => {}
                 }
+            }
+            if !companion.streams() {
+                self.setpoints.end(now_ms());
             }
             result
         });
@@ -207,17 +208,6 @@ impl Shell {
         self.works.signal(());
         self.steps.signal(());
         result
-    }
-
-    /// Says after the first flight how far apart setpoints were, by the board's own time.
-    fn tell_gap(&'static self, companion: &mut BoardCompanion) {
-        let gap = self.gap_ms.load(Ordering::Relaxed);
-        let mut text = String::new();
-        // It fits.
-        let _ = write!(text, "Setpoints were at most {gap} ms apart");
-        if let Some(kept) = self.gap_text.try_init(text).filter(|_| gap > 0) {
-            companion.say(false, kept.as_str());
-        }
     }
 
     /// Once asked for, it is not put off by being asked for again.
@@ -235,6 +225,8 @@ impl Shell {
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
         let mut chunk = [0; CHUNK];
         let mut ear = for_autopilot.then(Ear::new);
+        let errors = &self.line_errors[link as usize];
+        let (mut told, mut tells_at) = (0, Instant::MIN);
         loop {
             match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
@@ -247,8 +239,17 @@ impl Shell {
                     }
                 }
                 // Framing, noise or overrun: what was lost the framer finds out.
-                Ok(Err(_)) => _ = self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed),
+                Ok(Err(_)) => _ = errors.fetch_add(1, Ordering::Relaxed),
                 Err(_) => {}
+            }
+            let count = errors.load(Ordering::Relaxed);
+            if count != told && Instant::now() >= tells_at {
+                (told, tells_at) = (count, Instant::now() + TELL_EVERY);
+                self.with(|companion, _| {
+                    let counters = companion.counters(link);
+                    let damaged = counters.bad_crc.wrapping_add(counters.expired);
+                    companion.say_count(true, LINE_TEXTS[link as usize], [count, damaged]);
+                });
             }
             self.seen(link as usize);
             Timer::after(GATHER).await;
@@ -265,7 +266,7 @@ impl Shell {
                 let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
-                    self.note_setpoint();
+                    self.setpoints.note(now_ms());
                 }
                 // What waited for room to be said may go on.
                 self.works.signal(());
@@ -353,19 +354,52 @@ impl Shell {
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
     }
-
-    fn note_setpoint(&self) {
-        let now = now_ms();
-        let gap = now.wrapping_sub(self.setpoint_ms.swap(now, Ordering::Relaxed));
-        if gap < STREAM_ENDS_MS {
-            self.gap_ms.fetch_max(gap, Ordering::Relaxed);
-        }
-    }
 }
 
 impl Default for Shell {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// How many setpoints went out in a flight and how far apart, by the board's own time. A stream lasts as long as the companion
+/// says so, not until a pause: else the longest pauses would not be seen.
+struct Setpoints {
+    count: AtomicU32,
+    /// The longest time between two, or between the last and the stream's end, milliseconds.
+    gap_ms: AtomicU32,
+    /// When the last went out, milliseconds; 0 while there is no stream.
+    last_ms: AtomicU32,
+}
+
+impl Setpoints {
+    const fn new() -> Self {
+        Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
+    }
+
+    /// One goes out.
+    fn note(&self, now_ms: u32) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+        self.mark(now_ms, now_ms.max(1));
+    }
+
+    /// The companion streams none, for now.
+    fn end(&self, now_ms: u32) {
+        self.mark(now_ms, 0);
+    }
+
+    fn mark(&self, now_ms: u32, next_ms: u32) {
+        let last_ms = self.last_ms.swap(next_ms, Ordering::Relaxed);
+        if last_ms != 0 {
+            self.gap_ms.fetch_max(now_ms.wrapping_sub(last_ms), Ordering::Relaxed);
+        }
+    }
+
+    /// Number and longest gap of a flight that is over; none if it had none.
+    fn take(&self, now_ms: u32) -> Option<[u32; 2]> {
+        self.end(now_ms);
+        let told = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
+        (told[0] > 0).then_some(told)
     }
 }
 

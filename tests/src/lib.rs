@@ -2,6 +2,7 @@
 
 pub mod board;
 pub mod logs;
+pub mod vehicle;
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;

@@ -136,7 +136,14 @@ impl Store {
                         self.end(Err(UploadError::Flash));
                         None
                     }
-                    _ => may_erase.then(|| self.erase(Area::Slot(slot))),
+                    _ => match erasing {
+                        Erasing::Allowed => Some(self.erase(Area::Slot(slot))),
+                        Erasing::NotYet => None,
+                        Erasing::Forbidden => {
+                            self.end(Err(UploadError::Armed));
+                            None
+                        }
+                    },
                 };
             }
             Some((File::Roadmap, state)) => {

@@ -28,7 +28,7 @@ struct Record {
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 
-/// What the last start left, once.
+/// What the last start left, once; nothing after the power came.
 pub fn take() -> Option<String<TEXT>> {
     let record = &raw mut RECORD;
     // SAFETY: called once at the start, when nothing else runs; any bytes are a `Record`.
