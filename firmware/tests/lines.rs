@@ -90,7 +90,7 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     shell.start(BoardCompanion::new(config).expect("the settings are good"));
     let shell: &'static Shell = Box::leak(shell);
     let lines = [Line::default(), Line::default()];
-    let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), 1));
+    let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), false));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
     let mut tells = pin!(shell.transmit(Link::Swarm, End(&lines[1])));
     let mut keeps_time = pin!(shell.keep_time());
