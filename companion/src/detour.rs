@@ -6,6 +6,10 @@
 //! system id asks its shell for a way around everybody and flies it to its goal. All the while it tells the progress at which it
 //! left the plan: whoever waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
 //!
+//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle tells that its path is
+//! blocked and no longer that it waits, for [`CLAIM`], longer than a word takes to be heard. It begins only if all others
+//! wait then; who hears a lower system id claim waits again.
+//!
 //! ENU metres. Cost: every half second, each leg ahead against each vehicle that is out.
 
 use heapless::Vec;
@@ -26,6 +30,8 @@ use crate::time::{Duration, Instant};
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
 const QUIET_S: u64 = 3;
+/// A turn is claimed for this long before it is taken.
+const CLAIM: Duration = Duration::from_secs(1);
 /// Each blocked vehicle with a lower id is given this time to begin.
 const TURN_S: u64 = 2;
 /// After a way around was not found the next is sought so much later.
@@ -79,6 +85,8 @@ pub(crate) struct Around {
     /// Where and when it was before its position jumped.
     pub(crate) lost_at: Option<(Point, Instant)>,
     pub(crate) quiet_since: Option<Instant>,
+    /// Since when it claims its turn.
+    pub(crate) claimed_since: Option<Instant>,
     pub(crate) looked_at: Instant,
 }
 
@@ -102,8 +110,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether it stands until somebody else moves.
+    /// Whether it stands until somebody else moves: it does not claim the turn to move itself.
     pub(crate) fn waits(&self) -> bool {
+        self.is_held() && self.around.claimed_since.is_none()
+    }
+
+    fn is_held(&self) -> bool {
         let held = self.guidance.advice.waiting_for != 0;
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
@@ -146,14 +158,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let stopped = matches!(self.state, State::Blocked | State::Replanning);
         if !on_ground && !stopped && self.state != State::Follow {
             self.around.blocked = false;
-            self.around.quiet_since = None;
+            (self.around.quiet_since, self.around.claimed_since) = (None, None);
             return;
         }
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
         let astray = self.around.left && (!self.around.flying || aside);
-        let dead_end = self.waits() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
+        let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
         self.around.blocked =
             !self.guidance.returning && (stuck || astray || dead_end || self.is_in_the_way(on_ground));
         if !self.neighbours.all_stand(now) {
@@ -162,6 +174,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         } else if self.around.quiet_since.is_none() {
             self.around.quiet_since = Some(now);
         }
+        let claims = self.is_due() && !self.neighbours.claimed_before(self.config.system_id, now);
+        self.around.claimed_since = self.around.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
     fn is_in_the_way(&self, on_ground: bool) -> bool {
@@ -203,14 +217,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.start - Point::new(0.0, 0.0, self.plan.as_ref().map_or(0.0, |plan| plan.climb_m))
     }
 
-    /// Whether it may fly around now.
-    pub(crate) fn is_our_turn(&self) -> bool {
+    /// Whether it may claim its turn to fly around.
+    fn is_due(&self) -> bool {
         let wait_s = QUIET_S
             + TURN_S * self.neighbours.blocked_before(self.config.system_id)
             + RETRY_S * u64::from(self.around.failed);
         self.around.blocked
             && self.neighbours.all_stand(self.now)
             && self.around.quiet_since.is_some_and(|at| self.now - at >= Duration::from_secs(wait_s))
+    }
+
+    /// Whether it may fly around now.
+    pub(crate) fn is_our_turn(&self) -> bool {
+        self.is_due()
+            && self.around.claimed_since.is_some_and(|at| self.now - at >= CLAIM)
+            && self.neighbours.all_wait(self.now)
     }
 
     /// Asks the shell for a way around, or just aside.

@@ -4,7 +4,7 @@ use std::vec::Vec;
 use super::*;
 use crate::commands::EXCLUDE;
 use crate::fake_px4::*;
-use crate::intent::{FLYING, GROUNDED, OUT};
+use crate::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
 
 fn sphere(at: Point, radius_m: f32) -> Command {
     let place = frames::enu_to_geodetic(&ORIGIN, &at);
@@ -62,6 +62,48 @@ fn a_sphere_on_the_path_is_flown_around_and_one_beside_it_is_none() {
         bench.until(State::Done, 60.0);
         assert_eq!(bench.texts.iter().any(|text| text == "Flying around"), blocks);
     }
+}
+
+#[test]
+fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
+    let mut bench = Bench::accompanied(two_vehicles());
+    bench.until(State::Follow, 20.0);
+    bench.companion.exclude(&sphere(Point::new(14.0, 12.0, 1.5), 0.5));
+    let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
+    bench.neighbour = other(BLOCKED | WAITING);
+    bench.until(State::Blocked, 3.0);
+    while bench.companion.around.claimed_since.is_none() {
+        bench.run(0.05);
+    }
+    // It claims; the other began to claim at the same time.
+    bench.neighbour = other(BLOCKED);
+    bench.run(4.0);
+    assert_eq!(bench.state(), State::Blocked, "two would begin at once");
+    assert!(!bench.companion.waits(), "the lower system id goes on claiming");
+    bench.neighbour = other(BLOCKED | WAITING);
+    bench.until(State::Follow, 1.0);
+}
+
+#[test]
+fn who_hears_a_lower_system_id_claim_waits_again() {
+    let mut config = two_vehicles();
+    config.roster[1].system_id = 7;
+    config.roster.sort_unstable_by_key(|entry| entry.system_id);
+    let mut bench = Bench::accompanied(config);
+    bench.until(State::Follow, 20.0);
+    bench.companion.exclude(&sphere(Point::new(14.0, 12.0, 1.5), 0.5));
+    let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
+    bench.neighbour = other(BLOCKED);
+    bench.until(State::Blocked, 3.0);
+    bench.run(8.0);
+    assert!(bench.companion.waits() && bench.state() == State::Blocked);
+    // It flies: what was quiet is not any more.
+    bench.neighbour = other(DETOURS);
+    bench.run(1.0);
+    bench.neighbour = other(BLOCKED | WAITING);
+    bench.run(4.0);
+    assert!(bench.companion.waits() && bench.state() == State::Blocked, "it waits anew");
+    bench.until(State::Follow, 5.0);
 }
 
 /// What is kept off vehicle 77 half a minute on.

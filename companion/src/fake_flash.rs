@@ -16,7 +16,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 
 use crate::mission_file::{self, MissionHeader, MissionVehicle};
-use crate::store::{BLOCK, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
+use crate::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
 
 /// As the H743's bank, but smaller, so that many cuts are tried in little time.
 pub const LAYOUT: Layout = Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10 };
@@ -125,12 +125,12 @@ impl ReadFlash for Flash {
 pub fn obey(
     flash: &mut Flash,
     request: FlashRequest<'_>,
-    may_erase: bool,
+    erasing: Erasing,
     read: &mut [u8; READ],
 ) -> Result<Result<usize, Fault>, Cut> {
     match request {
         FlashRequest::Erase { at } => {
-            assert!(may_erase, "erased while armed");
+            assert_eq!(erasing, Erasing::Allowed, "erased while armed");
             flash.erase(at)?;
             Ok(Ok(0))
         }
@@ -146,11 +146,11 @@ pub fn obey(
 }
 
 /// Does what the store asks until it asks for nothing.
-pub fn run(store: &mut Store, flash: &mut Flash, may_erase: bool) -> Result<(), Cut> {
+pub fn run(store: &mut Store, flash: &mut Flash, erasing: Erasing) -> Result<(), Cut> {
     let mut read = [0; READ];
     for _ in 0..100_000 {
-        let Some(request) = store.poll(may_erase) else { return Ok(()) };
-        let outcome = obey(flash, request, may_erase, &mut read)?;
+        let Some(request) = store.poll(erasing) else { return Ok(()) };
+        let outcome = obey(flash, request, erasing, &mut read)?;
         store.handle(outcome.map(|len| &read[..len]));
     }
     panic!("it asks for ever");
@@ -159,7 +159,7 @@ pub fn run(store: &mut Store, flash: &mut Flash, may_erase: bool) -> Result<(), 
 /// Tidies the flash up as a board that stands idle does.
 pub fn started(flash: &mut Flash) -> Store {
     let mut store = Store::mount(LAYOUT, flash);
-    run(&mut store, flash, true).expect("the power is on");
+    run(&mut store, flash, Erasing::Allowed).expect("the power is on");
     store
 }
 

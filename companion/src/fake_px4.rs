@@ -69,7 +69,7 @@ pub struct Bench {
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
     /// Whether there is a way around: by y = 16.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
-    /// Vehicle 77 as it tells itself five times a second: place, flags of its intent, progress, CRC of its plan.
+    /// The first other vehicle of the roster, or 77, as it tells itself five times a second: place, flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
     /// When it last knew where it is; none: always.
     pub neighbour_clock: Option<Instant>,
@@ -385,12 +385,14 @@ impl Bench {
 
     fn tell_neighbour(&mut self) {
         let Some((place, flags, progress_m, plan_crc)) = self.neighbour else { return };
+        let roster = &self.companion.config.roster;
+        let id = roster.iter().map(|entry| entry.system_id).find(|id| *id != SYSTEM).unwrap_or(77);
         self.told = self.told.wrapping_add(1);
         if !self.told.is_multiple_of(4) {
             return;
         }
         let intent = Intent {
-            system_id: 77,
+            system_id: id,
             flags,
             mission_crc: 0xC0FFEE,
             plan_crc,
@@ -409,7 +411,7 @@ impl Bench {
             alt: (place.alt_m * 1e3) as i32,
             ..Default::default()
         };
-        let head = |sequence| Header { system: 77, component: crate::COMPONENT, sequence };
+        let head = |sequence| Header { system: id, component: crate::COMPONENT, sequence };
         let mut out = [0; MAX_SENT];
         let (id, seed) = (TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC);
         let n = frame::encode_raw(head(self.told), id, seed, &payload[..len], &mut out);

@@ -21,7 +21,7 @@ use self::packet::{
 };
 use crate::frame::Frame;
 use crate::store::window::Taken;
-use crate::store::{Answer, File, Store, UploadError, UploadState};
+use crate::store::{Answer, Erasing, File, Store, UploadError, UploadState};
 use crate::time::{Duration, Instant};
 
 /// FILE_TRANSFER_PROTOCOL.
@@ -143,7 +143,7 @@ impl Ftp {
     }
 
     /// Goes on as far as the flash and the link let it.
-    pub fn advance(&mut self, store: &mut Store, now: Instant, may_erase: bool) {
+    pub fn advance(&mut self, store: &mut Store, now: Instant, erasing: Erasing) {
         self.now = now;
         while self.reply.is_none() {
             if !matches!(self.doing, Doing::Nothing) {
@@ -151,7 +151,7 @@ impl Ftp {
                 return;
             }
             if let Some(request) = self.queue.pop_front() {
-                self.begin(&request, store, may_erase);
+                self.begin(&request, store, erasing);
             } else {
                 self.next_of_stream(store);
                 return;
@@ -234,7 +234,7 @@ impl Ftp {
         self.finish(request, result.map_err(No::from));
     }
 
-    fn begin(&mut self, request: &Request, store: &mut Store, may_erase: bool) {
+    fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
         if let Some(done) = self.remembered(request) {
             if !is_open(request) {
                 self.respond(request, done);
@@ -289,7 +289,7 @@ impl Ftp {
                 }
                 Err(no) => self.nak(request, no),
             },
-            op::CREATE | op::OPEN_WRITE => self.open(request, store, may_erase),
+            op::CREATE | op::OPEN_WRITE => self.open(request, store, erasing),
             op::WRITE => self.write(request, store),
             op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
                 Some(file) => {
@@ -332,12 +332,12 @@ impl Ftp {
         }
     }
 
-    fn open(&mut self, request: &Request, store: &mut Store, may_erase: bool) {
+    fn open(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
         let Some(file) = request.file() else { return self.nak(request, No::Protected) };
         if !self.take_session(request, file, true, store) {
             return;
         }
-        match store.open(file, may_erase) {
+        match store.open(file, erasing) {
             Ok(()) => self.doing = Doing::Open(*request),
             Err(why) => {
                 self.session = None;

@@ -33,7 +33,7 @@ struct World {
     flash: Flash,
     store: Store,
     ftp: Ftp,
-    may_erase: bool,
+    erasing: Erasing,
     now: Instant,
     rng: Pcg32,
     /// Share of frames lost, and share repeated, in 256ths.
@@ -55,7 +55,7 @@ impl World {
             flash,
             store,
             ftp: Ftp::default(),
-            may_erase: true,
+            erasing: Erasing::Allowed,
             now: Instant::from_millis(1),
             rng: Pcg32::seed_from_u64(seed),
             loss,
@@ -116,7 +116,7 @@ impl World {
         }
         let mut read = [0; READ];
         for _ in 0..2000 {
-            self.ftp.advance(&mut self.store, self.now, self.may_erase);
+            self.ftp.advance(&mut self.store, self.now, self.erasing);
             self.texts.extend(self.ftp.text().map(|(_, text)| text));
             assert!(self.ftp.poll(0).is_none(), "answered where it was asked");
             let answer = self.ftp.poll(LINK);
@@ -135,13 +135,13 @@ impl World {
                     });
                 }
             }
-            let Some(request) = self.store.poll(self.may_erase) else {
+            let Some(request) = self.store.poll(self.erasing) else {
                 if answer.is_none() {
                     return;
                 }
                 continue;
             };
-            let outcome = obey(&mut self.flash, request, self.may_erase, &mut read).expect("no power cut");
+            let outcome = obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
             if let Some(answer) = self.store.handle(outcome.map(|len| &read[..len])) {
                 self.ftp.answer(answer);
             }
@@ -330,7 +330,7 @@ fn a_damaged_upload_keeps_the_old_file_and_says_so() {
 fn nothing_is_erased_while_armed() {
     let mut world = World::new(53, 0, 0);
     let file = roadmap(60);
-    world.may_erase = false;
+    world.erasing = Erasing::Forbidden;
     // Two areas were erased ahead; a third roadmap would need one.
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
     let mut store = Store::mount(LAYOUT, &mut world.flash);
@@ -342,7 +342,18 @@ fn nothing_is_erased_while_armed() {
     let refused = world.ask(0, op::CREATE, 0, b"roadmap.bin");
     assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
     assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
-    world.may_erase = true;
+    world.heard.clear();
+    // What was asked before that was known waits, and is refused once it is.
+    world.erasing = Erasing::NotYet;
+    let opens = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
+    world.send(&opens);
+    (0..3).for_each(|_| world.step());
+    assert!(world.heard.is_empty());
+    world.erasing = Erasing::Forbidden;
+    let refused = world.ask_again(&opens);
+    assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
+    assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+    world.erasing = Erasing::Allowed;
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 

@@ -78,6 +78,8 @@ pub struct Guidance {
     progress_at: Instant,
     /// Whether it flies back the way it came.
     pub returning: bool,
+    /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
+    linked_m: f32,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
@@ -128,6 +130,7 @@ impl Guidance {
             progress_m: 0.0,
             progress_at: Instant::ZERO,
             returning: false,
+            linked_m: f32::INFINITY,
             retreating: false,
             trapped_since: None,
             aside: false,
@@ -160,6 +163,7 @@ impl Guidance {
     pub fn run(&mut self, now: Instant) {
         self.on_path = true;
         self.brake_at_m = f32::INFINITY;
+        self.linked_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
     }

@@ -128,6 +128,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.state
     }
 
+    /// Whether setpoints are to go out, one each 50 ms.
+    pub fn streams(&self) -> bool {
+        setpoints_flow(self.state)
+    }
+
     /// The autopilot as last heard.
     pub fn telemetry(&self) -> &Telemetry {
         &self.telemetry

@@ -14,6 +14,7 @@ use planner_core::frames::{self, Geodetic};
 
 use crate::config::RosterEntry;
 use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
+use crate::machine::STANDING_MPS;
 use crate::telemetry::SequenceFilter;
 use crate::time::{Duration, Instant};
 
@@ -82,6 +83,19 @@ impl Contact {
 
     fn is_out(&self, now: Instant) -> bool {
         self.tells(OUT) || self.is_dead(now)
+    }
+
+    /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
+    fn waits(&self, now: Instant) -> bool {
+        self.is_out(now) || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
+    }
+
+    /// Whether it stands and is about to fly around.
+    fn claims(&self, now: Instant) -> bool {
+        self.tells(BLOCKED)
+            && !self.waits(now)
+            && self.heard_within(now, LATELY)
+            && self.state.velocity.norm() < STANDING_MPS
     }
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
@@ -315,10 +329,18 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand and wait.
+    pub fn all_wait(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.waits(now))
+    }
+
+    /// The same, but some may have claimed the turn to fly around.
     pub fn all_stand(&self, now: Instant) -> bool {
-        let stands =
-            |c: &Contact| c.is_out(now) || (c.tells(WAITING | LANDED) && c.heard_within(now, LATELY));
-        self.contacts[..self.roster].iter().all(stands)
+        self.contacts[..self.roster].iter().all(|c| c.waits(now) || c.claims(now))
+    }
+
+    /// Whether a vehicle with a lower system id than `id` claims the turn to fly around.
+    pub fn claimed_before(&self, id: u8, now: Instant) -> bool {
+        self.contacts.iter().any(|c| c.id < id && c.claims(now))
     }
 
     /// How many blocked vehicles have a lower system id than `id`.

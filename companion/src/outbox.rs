@@ -1,7 +1,9 @@
 //! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here: they are made
 //! fresh when the link is polled. A full queue refuses the newest and counts it.
 
-use heapless::Deque;
+use core::fmt::Write as _;
+
+use heapless::{Deque, String};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_ERROR_DATA, PARAM_SET_DATA,
@@ -66,6 +68,15 @@ pub enum Outgoing {
         warning: bool,
         /// At most 50 bytes.
         text: &'static str,
+    },
+    /// STATUSTEXT with numbers: each `#` of the text stands for one.
+    Count {
+        /// Warning, else information.
+        warning: bool,
+        /// At most 50 bytes with the numbers in it.
+        text: &'static str,
+        /// What the first `#` stands for, and the second.
+        numbers: [u32; 2],
     },
 }
 
@@ -179,11 +190,51 @@ impl Outbox {
                 );
             }
             Outgoing::Text { warning, text } => {
-                let severity =
-                    if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO };
+                let severity = severity(warning);
                 return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.into() }, out);
+            }
+            Outgoing::Count { warning, text, numbers } => {
+                let (severity, text) = (severity(warning), filled(text, numbers));
+                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.as_str().into() }, out);
             }
         };
         frame::encode(header, &long, out)
+    }
+}
+
+fn severity(warning: bool) -> MavSeverity {
+    if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
+}
+
+/// A text with its numbers in it; what is beyond 50 bytes is left out.
+fn filled(text: &str, numbers: [u32; 2]) -> String<50> {
+    let mut out = String::new();
+    let mut numbers = numbers.iter();
+    for piece in text.split_inclusive('#') {
+        let (words, number) = match piece.strip_suffix('#') {
+            Some(words) => (words, numbers.next()),
+            None => (piece, None),
+        };
+        // Full: what is left out is the end.
+        let _ = match number {
+            Some(number) => write!(out, "{words}{number}"),
+            None => out.write_str(words),
+        };
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stand_where_the_text_says() {
+        assert_eq!(
+            filled("Setpoints: #, at most # ms apart", [1234, 55]),
+            "Setpoints: 1234, at most 55 ms apart"
+        );
+        assert_eq!(filled("Nothing", [1, 2]), "Nothing");
+        assert_eq!(filled("# # #", [u32::MAX, 0]), "4294967295 0 ");
     }
 }

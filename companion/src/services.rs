@@ -15,7 +15,7 @@ use crate::machine::Companion;
 use crate::mission::State;
 use crate::outbox::Outgoing;
 use crate::parameters::{self, Parameters, Refused};
-use crate::store::{Fault, FlashRequest, Store};
+use crate::store::{Erasing, Fault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
 /// `MAV_PARAM_TYPE_REAL32`.
@@ -32,13 +32,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
     /// other `poll_*`, but it may take long: nothing else waits for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
-        let may_erase = self.may_erase();
+        let erasing = self.erasing();
         let store = self.store.as_mut()?;
-        self.ftp.advance(store, self.now, may_erase);
+        self.ftp.advance(store, self.now, erasing);
         if let Some((warning, text)) = self.ftp.text() {
             self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
         }
-        store.poll(may_erase)
+        store.poll(erasing)
     }
 
     /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
@@ -49,15 +49,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Whether a sector may be erased: it may stall the processor for seconds. Only on the ground, disarmed, and not while the
-    /// roadmap is planned on.
-    fn may_erase(&self) -> bool {
+    /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
+    fn erasing(&self) -> Erasing {
         let idle = matches!(
             self.state,
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
         );
         let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
-        idle && known && !self.telemetry.armed
+        match self.state {
+            _ if self.telemetry.armed => Erasing::Forbidden,
+            _ if idle && known => Erasing::Allowed,
+            _ if idle => Erasing::NotYet,
+            State::Planning => Erasing::NotYet,
+            _ => Erasing::Forbidden,
+        }
     }
 
     /// Serves a frame, if it is one for the services; whether it was.

@@ -42,7 +42,8 @@ impl Ground {
         loop {
             let mut idle = true;
             while let Some(request) = self.bench.companion.poll_flash() {
-                let outcome = obey(&mut self.flash, request, true, &mut read).expect("no power cut");
+                let outcome =
+                    obey(&mut self.flash, request, Erasing::Allowed, &mut read).expect("no power cut");
                 self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
             }
             loop {

@@ -117,6 +117,18 @@ pub enum FlashRequest<'a> {
     },
 }
 
+/// Whether areas may be erased now: it may stall the processor for seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Erasing {
+    /// Nothing flies.
+    Allowed,
+    /// The vehicle is armed, or about to be.
+    Forbidden,
+    /// The roadmap is planned on, or it is soon known whether there is an autopilot, and whether it is armed: what needs it
+    /// waits.
+    NotYet,
+}
+
 /// A file as ground tools see it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum File {

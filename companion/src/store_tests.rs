@@ -18,16 +18,16 @@ fn upload(
     bytes: &[u8],
     piece: usize,
 ) -> Result<Result<(), UploadError>, Cut> {
-    if let Err(why) = store.open(file, true) {
+    if let Err(why) = store.open(file, Erasing::Allowed) {
         return Ok(Err(why));
     }
-    run(store, flash, true)?;
+    run(store, flash, Erasing::Allowed)?;
     for (i, part) in bytes.chunks(piece).enumerate() {
         assert_eq!(store.take((i * piece) as u32, part), Taken::Yes);
-        run(store, flash, true)?;
+        run(store, flash, Erasing::Allowed)?;
     }
     store.close();
-    run(store, flash, true)?;
+    run(store, flash, Erasing::Allowed)?;
     match store.upload() {
         Some(UploadState::Ended(result)) => Ok(result),
         other => panic!("{other:?}"),
@@ -47,7 +47,11 @@ fn files_come_back_after_a_restart() {
         }
         assert_eq!(store.roadmap().is_some(), round > 0, "used from the next start on");
         if round > 0 {
-            assert_eq!(store.open(File::Roadmap, true), Err(UploadError::Waiting), "one waits already");
+            assert_eq!(
+                store.open(File::Roadmap, Erasing::Allowed),
+                Err(UploadError::Waiting),
+                "one waits already"
+            );
         }
         store = started(&mut flash);
         assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
@@ -56,7 +60,7 @@ fn files_come_back_after_a_restart() {
     }
     store.remove(File::Roadmap);
     store.remove(File::Mission);
-    run(&mut store, &mut flash, false).unwrap();
+    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     assert_eq!((store.size(File::Roadmap), store.size(File::Mission)), (None, None));
     store = started(&mut flash);
     assert_eq!((store.roadmap(), store.mission()), (None, None));
@@ -84,8 +88,8 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
             assert_eq!(upload(&mut store, &mut flash, file, bytes, 100).unwrap(), Err(why));
         }
         store = started(&mut flash);
-        store.open(file, true).unwrap();
-        run(&mut store, &mut flash, true).unwrap();
+        store.open(file, Erasing::Allowed).unwrap();
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
         assert_eq!(store.take(0, &whole[..100]), Taken::Yes);
         assert_eq!(store.take(101, &whole[101..150]), Taken::Yes);
         store.close();
@@ -94,10 +98,10 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
     store = started(&mut flash);
     assert_eq!(held(&flash, store.roadmap()), Some(road.as_slice()));
     assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
-    assert_eq!(store.open(File::Mission, true), Ok(()));
+    assert_eq!(store.open(File::Mission, Erasing::Allowed), Ok(()));
     assert_eq!(store.take(4000, &[0; 97]), Taken::TooLarge);
-    assert_eq!(store.open(File::Roadmap, true), Ok(()));
-    run(&mut store, &mut flash, true).unwrap();
+    assert_eq!(store.open(File::Roadmap, Erasing::Allowed), Ok(()));
+    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
     assert_eq!(store.take(24 << 10, &[0; 1]), Taken::TooLarge);
 }
 
@@ -105,24 +109,24 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
 fn nothing_is_erased_while_armed() {
     let mut flash = Flash::new(3);
     let mut store = Store::mount(LAYOUT, &mut flash);
-    assert_eq!(store.open(File::Roadmap, false), Err(UploadError::Armed));
+    assert_eq!(store.open(File::Roadmap, Erasing::Forbidden), Err(UploadError::Armed));
     store.set_parameter(0, 2.5).unwrap();
-    run(&mut store, &mut flash, false).unwrap();
+    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     assert!(store.is_unsaved(), "there is no clean half to keep it in yet");
-    run(&mut store, &mut flash, true).unwrap();
+    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
     assert!(!store.is_unsaved());
     // With areas erased ahead, parameters are kept and a roadmap is taken in while armed.
     store.set_parameter(0, 3.5).unwrap();
-    run(&mut store, &mut flash, false).unwrap();
+    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     let road = roadmap(50);
-    store.open(File::Roadmap, false).unwrap();
-    run(&mut store, &mut flash, false).unwrap();
+    store.open(File::Roadmap, Erasing::Forbidden).unwrap();
+    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     for (i, part) in road.chunks(200).enumerate() {
         assert_eq!(store.take(200 * i as u32, part), Taken::Yes);
-        run(&mut store, &mut flash, false).unwrap();
+        run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     }
     store.close();
-    run(&mut store, &mut flash, false).unwrap();
+    run(&mut store, &mut flash, Erasing::Forbidden).unwrap();
     assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
     let store = Store::mount(LAYOUT, &mut flash);
     assert_eq!(store.parameters().get(0), Some(("FLK_ACCEL", 3.5)));
@@ -138,7 +142,7 @@ fn parameters_outlive_many_changes_and_the_mission_with_them() {
     for i in 0..300u32 {
         let value = 0.5 + (i % 40) as f32 * 0.1;
         store.set_parameter(0, value).unwrap();
-        run(&mut store, &mut flash, true).unwrap();
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
         if i % 13 == 0 {
             store = started(&mut flash);
         }
@@ -161,11 +165,11 @@ fn a_read_goes_first_between_two_sectors() {
         if turn % 2 == 1 {
             store.read(File::Roadmap, 0, 100);
         }
-        let Some(request) = store.poll(true) else { break };
+        let Some(request) = store.poll(Erasing::Allowed) else { break };
         if let FlashRequest::Erase { at } = request {
             erased.push(at);
         }
-        let outcome = obey(&mut flash, request, true, &mut read).expect("the power is on");
+        let outcome = obey(&mut flash, request, Erasing::Allowed, &mut read).expect("the power is on");
         if let Some(answer) = store.handle(outcome.map(|len| &read[..len])) {
             assert_eq!(answer, Answer::Bytes(&road[..100]));
             given += 1;
@@ -174,8 +178,8 @@ fn a_read_goes_first_between_two_sectors() {
     assert_eq!(given, 2, "one between each two sectors");
     let sectors: Vec<u32> = (0..3).map(|i| LAYOUT.slot_len + i * LAYOUT.sector_len).collect();
     assert_eq!(erased, sectors, "each once");
-    run(&mut store, &mut flash, true).unwrap();
-    assert_eq!(store.open(File::Roadmap, false), Ok(()), "and it is ready");
+    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    assert_eq!(store.open(File::Roadmap, Erasing::Forbidden), Ok(()), "and it is ready");
 }
 
 /// Cuts the power at a random word of `change`; afterwards a fresh start must find `before` or `after`, whole.
@@ -192,7 +196,7 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
         store = started(&mut flash);
         assert!(store.parameters().get(0).unwrap().1 == 1.5, "never asked to keep it");
         store.set_parameter(0, 1.0).unwrap();
-        run(&mut store, &mut flash, true).unwrap();
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
         // How many words the change takes, from a first go without a cut.
         let (bytes, torn, rng) = (flash.bytes.clone(), flash.torn.clone(), flash.rng.clone());
         let begun = flash.programmed;
@@ -206,7 +210,7 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
         if cut % 3 == 0 {
             flash.power = Some(flash.rng.next_u32() % 40);
             let mut store = Store::mount(LAYOUT, &mut flash);
-            let _ = run(&mut store, &mut flash, true);
+            let _ = run(&mut store, &mut flash, Erasing::Allowed);
             flash.power = None;
         }
         let mut store = started(&mut flash);
@@ -239,10 +243,10 @@ fn cut_anywhere(seed: u64, change: impl Fn(&mut Store, &mut Flash) -> Result<(),
 fn a_cut_anywhere_leaves_the_old_roadmap_or_the_new_one_whole() {
     let change = |store: &mut Store, flash: &mut Flash| {
         let road = roadmap(500);
-        run(store, flash, true)?;
+        run(store, flash, Erasing::Allowed)?;
         upload(store, flash, File::Roadmap, &road, 239)?.expect("it is sound");
         *store = Store::mount(LAYOUT, flash);
-        run(store, flash, true)
+        run(store, flash, Erasing::Allowed)
     };
     cut_anywhere(1000, change, 300);
 }
@@ -251,11 +255,11 @@ fn a_cut_anywhere_leaves_the_old_roadmap_or_the_new_one_whole() {
 fn a_cut_anywhere_leaves_the_old_mission_or_the_new_one_whole() {
     let change = |store: &mut Store, flash: &mut Flash| {
         let flown = mission(50);
-        run(store, flash, true)?;
+        run(store, flash, Erasing::Allowed)?;
         for _ in 0..5 {
             upload(store, flash, File::Mission, &flown, 239)?.expect("it is sound");
             store.set_parameter(0, 2.0).unwrap();
-            run(store, flash, true)?;
+            run(store, flash, Erasing::Allowed)?;
         }
         Ok(())
     };
@@ -268,12 +272,12 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
         let mut flash = Flash::new(6);
         let mut store = started(&mut flash);
         store.set_parameter(0, 2.0).unwrap();
-        let opened = store.open(File::Roadmap, true);
+        let opened = store.open(File::Roadmap, Erasing::Allowed);
         assert_eq!(opened, Ok(()));
         let mut asked = 0;
         let road = roadmap(50);
         loop {
-            while let Some(request) = store.poll(true) {
+            while let Some(request) = store.poll(Erasing::Allowed) {
                 asked += 1;
                 assert!(asked < 10_000, "it asks for ever");
                 let bad = match request {
@@ -291,5 +295,31 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                 _ => break,
             }
         }
+    }
+}
+
+#[test]
+fn an_upload_waits_until_it_is_known_whether_the_vehicle_is_armed() {
+    for (file, bytes) in [(File::Roadmap, roadmap(60)), (File::Mission, mission(3))] {
+        // As it comes: nothing was erased ahead of time.
+        let mut flash = Flash::new(77);
+        let mut store = Store::mount(LAYOUT, &mut flash);
+        store.open(file, Erasing::NotYet).expect("it may be allowed yet");
+        run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+        if file == File::Roadmap {
+            assert_eq!(store.upload(), Some(UploadState::Opening));
+            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        }
+        for (i, part) in bytes.chunks(200).enumerate() {
+            assert_eq!(store.take(i as u32 * 200, part), Taken::Yes);
+            run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+        }
+        store.close();
+        run(&mut store, &mut flash, Erasing::NotYet).unwrap();
+        if file == File::Mission {
+            assert_eq!(store.upload(), Some(UploadState::Closing));
+            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        }
+        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))), "{file:?}");
     }
 }

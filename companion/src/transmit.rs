@@ -61,6 +61,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
+    /// The same with numbers: each `#` of the text stands for one.
+    pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+    }
+
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.kind();

@@ -16,7 +16,7 @@ use firmware::boards::chosen::{self, LAYOUT, Parts, Receiver, Transmitter, Watch
 use firmware::boards::crash;
 use firmware::capacity::VEHICLES;
 use firmware::planner::{Memory, Planner};
-use firmware::shell::{ALIVE_EVERY, BoardCompanion, Shell, hear_system_id};
+use firmware::shell::{ALIVE_EVERY, BoardCompanion, NO_AUTOPILOT, Shell, hear_system_id};
 use heapless::String;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -73,10 +73,11 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
         MissionView::parse(bytes).ok()
     });
     let mission = mission.filter(|m| roadmap.as_ref().is_some_and(|roadmap| m.fits(roadmap)));
-    let system_id = match store.parameters().system_id() {
-        Some(id) => id,
+    let known = match store.parameters().system_id() {
+        Some(id) => Some(id),
         None => hear_system_id(&mut autopilot.0).await,
     };
+    let system_id = known.unwrap_or(NO_AUTOPILOT);
     defmt::info!(
         "system {=u8}, roadmap {=bool}, mission {=bool}",
         system_id,
@@ -96,7 +97,7 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
     let shell = SHELL.take();
     shell.start(companion);
     let shell: &'static Shell = shell;
-    start_links(links, shell, system_id, autopilot, swarm);
+    start_links(links, shell, known.is_none(), autopilot, swarm);
     links.spawn(watch(shell, watchdog).expect("there is one such task"));
     let mut planner = Planner { roadmap, mission, system_id, memory: MEMORY.take() };
     shell.work(&mut planner, &mut flash).await
@@ -105,21 +106,21 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
 fn start_links(
     links: SendSpawner,
     shell: &'static Shell,
-    system_id: u8,
+    for_autopilot: bool,
     autopilot: (Receiver, Transmitter),
     swarm: (Receiver, Transmitter),
 ) {
     let once = "there is one such task for each link";
-    links.spawn(receive(shell, Link::Autopilot, autopilot.0, system_id).expect(once));
-    links.spawn(receive(shell, Link::Swarm, swarm.0, system_id).expect(once));
+    links.spawn(receive(shell, Link::Autopilot, autopilot.0, for_autopilot).expect(once));
+    links.spawn(receive(shell, Link::Swarm, swarm.0, false).expect(once));
     links.spawn(transmit(shell, Link::Autopilot, autopilot.1).expect(once));
     links.spawn(transmit(shell, Link::Swarm, swarm.1).expect(once));
     links.spawn(keep_time(shell).expect(once));
 }
 
 #[task(pool_size = 2)]
-async fn receive(shell: &'static Shell, link: Link, uart: Receiver, system_id: u8) {
-    shell.receive(link, uart, system_id).await
+async fn receive(shell: &'static Shell, link: Link, uart: Receiver, for_autopilot: bool) {
+    shell.receive(link, uart, for_autopilot).await
 }
 
 #[task(pool_size = 2)]
@@ -139,8 +140,7 @@ async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {
         Timer::after(ALIVE_EVERY).await;
         if shell.wants_restart() {
-            // What waits has had time to go out.
-            cortex_m::peripheral::SCB::sys_reset();
+            crash::restart();
         }
         if shell.is_alive() {
             watchdog.feed();

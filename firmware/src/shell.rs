@@ -2,23 +2,23 @@
 //!
 //! [`receive`](Shell::receive), [`transmit`](Shell::transmit) and [`keep_time`](Shell::keep_time) are tasks of an interrupt's
 //! executor; [`work`](Shell::work) is a task of another one below it, so a long plan never holds a setpoint up. The companion is
-//! held only for the time of one of its calls, never across an `await`.
+//! held only for the time of one of its calls, never across an `await`, and both executors wait for so long ([`HoldsExecutors`]).
 
-use core::fmt::Write as _;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::cell::RefCell;
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::frame::{Framer, MAX_SENT};
 use companion::store::{Fault, FlashRequest, READ, ReadFlash};
 use companion::{Companion, Event, Link, PlanFailure, State};
 use embassy_futures::select::select;
+use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-use embassy_sync::mutex::Mutex;
 use embassy_sync::signal::Signal;
 use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
-use heapless::String;
-use static_cell::StaticCell;
+use heapless::Vec;
 
+use crate::boards::HoldsExecutors;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::planner::Planner;
 
@@ -31,8 +31,11 @@ const CHUNK: usize = 256;
 const GATHER: Duration = Duration::from_millis(1);
 /// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// A stream of setpoints that paused for longer had ended, milliseconds.
-const STREAM_ENDS_MS: u32 = 1000;
+/// Errors of a line are told at once, and then no more often than this.
+const TELL_EVERY: Duration = Duration::from_secs(10);
+/// What is said of them: errors that the UART reported, and frames that were damaged or cut.
+const LINE_TEXTS: [&str; 2] =
+    ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
 /// What was to be said before a restart has this long to go out.
 const FAREWELL_MS: u32 = 200;
@@ -41,7 +44,7 @@ type Shared<T> = Signal<CriticalSectionRawMutex, T>;
 
 /// What the tasks share.
 pub struct Shell {
-    companion: Mutex<CriticalSectionRawMutex, Option<BoardCompanion>>,
+    companion: Mutex<HoldsExecutors, RefCell<Option<BoardCompanion>>>,
     /// Something may be to be sent.
     sends: [Shared<()>; 2],
     /// The companion's next step may be due earlier than thought.
@@ -52,14 +55,11 @@ pub struct Shell {
     works: Shared<()>,
     /// When a restart was asked for, milliseconds; 0 if none was.
     restart_ms: AtomicU32,
+    /// Whether the flash is at work.
+    writes: AtomicBool,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
     seen_ms: [AtomicU32; TASKS],
-    /// When the last setpoint went out, milliseconds.
-    setpoint_ms: AtomicU32,
-    /// The longest time between two setpoints of a flight, milliseconds.
-    gap_ms: AtomicU32,
-    /// What is said of it after the first flight.
-    gap_text: StaticCell<String<50>>,
+    setpoints: Setpoints,
     /// Errors that the UARTs reported.
     pub line_errors: [AtomicU32; 2],
 }
@@ -80,42 +80,64 @@ pub trait Flash: ReadFlash {
     fn program(&mut self, at: u32, bytes: &[u8]) -> impl Future<Output = Result<(), Fault>>;
 }
 
-/// The system id of the autopilot, from its first heartbeat; [`NO_AUTOPILOT`] where none comes in time.
-pub async fn hear_system_id(uart: &mut impl Read) -> u8 {
+/// The system id of the autopilot: of those whose heartbeat comes within a while after the first one, that of which most is
+/// heard, since an autopilot may pass on those of others. `None` where none comes in time.
+pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
     let mut ear = Ear::new();
-    let until = Instant::now() + HEAR_WITHIN;
+    let mut until = Instant::now() + HEAR_WITHIN;
     let mut chunk = [0; CHUNK];
     while let Ok(received) =
         with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
     {
+        let known = ear.loudest().is_some();
         // A line error loses bytes, no more.
-        if let Some(id) = ear.hear(&chunk[..received.unwrap_or_default()]) {
-            return id;
+        ear.hear(&chunk[..received.unwrap_or_default()]);
+        if !known && ear.loudest().is_some() {
+            until = Instant::now() + COMPARE_FOR;
         }
     }
-    NO_AUTOPILOT
+    ear.loudest()
 }
 
 /// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it starts anew.
 pub const NO_AUTOPILOT: u8 = 250;
 /// An autopilot tells of itself once a second.
 const HEAR_WITHIN: Duration = Duration::from_secs(3);
+/// So long after the first, every autopilot on the line has told of itself.
+const COMPARE_FOR: Duration = Duration::from_millis(1100);
+/// Autopilots told apart.
+const HEARD: usize = 8;
 
-/// Listens for an autopilot's heartbeat.
-struct Ear(Framer);
+/// Listens for autopilots.
+struct Ear {
+    framer: Framer,
+    /// System id, frames, and whether a heartbeat was among them.
+    heard: Vec<(u8, u32, bool), HEARD>,
+}
 
 impl Ear {
     const fn new() -> Self {
-        Self(Framer::new())
+        Self { framer: Framer::new(), heard: Vec::new() }
     }
 
-    fn hear(&mut self, mut input: &[u8]) -> Option<u8> {
-        let mut heard = None;
-        while let Some(frame) = self.0.next(now(), &mut input) {
-            let autopilot = frame.message_id == HEARTBEAT && frame.component == companion::AUTOPILOT;
-            heard = heard.or(Some(frame.system).filter(|id| autopilot && *id != 0));
+    fn hear(&mut self, mut input: &[u8]) {
+        while let Some(frame) = self.framer.next(now(), &mut input) {
+            if frame.component != companion::AUTOPILOT || frame.system == 0 {
+                continue;
+            }
+            let beats = frame.message_id == HEARTBEAT;
+            match self.heard.iter_mut().find(|(id, ..)| *id == frame.system) {
+                Some((_, frames, beat)) => (*frames, *beat) = (*frames + 1, *beat || beats),
+                // More than these are not told apart.
+                None => _ = self.heard.push((frame.system, 1, beats)),
+            }
         }
-        heard
+    }
+
+    /// The system id of the autopilot of which most is heard; the first of several.
+    fn loudest(&self) -> Option<u8> {
+        let beating = self.heard.iter().filter(|(_, _, beats)| *beats);
+        beating.rev().max_by_key(|(_, frames, _)| *frames).map(|(id, ..)| *id)
     }
 }
 
@@ -136,58 +158,61 @@ impl Shell {
     /// Without a companion.
     pub const fn new() -> Self {
         Self {
-            companion: Mutex::new(None),
+            companion: Mutex::new(RefCell::new(None)),
             sends: [Signal::new(), Signal::new()],
             steps: Signal::new(),
             wants_plan: Signal::new(),
             works: Signal::new(),
             restart_ms: AtomicU32::new(0),
+            writes: AtomicBool::new(false),
             seen_ms: [const { AtomicU32::new(0) }; TASKS],
-            setpoint_ms: AtomicU32::new(0),
-            gap_ms: AtomicU32::new(0),
-            gap_text: StaticCell::new(),
+            setpoints: Setpoints::new(),
             line_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
 
     /// Puts the companion in, before any task starts.
     pub fn start(&mut self, companion: BoardCompanion) {
-        *self.companion.get_mut() = Some(companion);
+        *self.companion.get_mut().get_mut() = Some(companion);
     }
 
-    /// Does something with the companion and hands on what came of it.
-    async fn with<T>(&'static self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
-        let mut held = self.companion.lock().await;
-        let companion = held.as_mut().expect("the companion is put in before any task starts");
-        let result = work(companion);
-        while let Some(event) = companion.poll_event() {
-            match event {
-                Event::PlanRequested => self.wants_plan.signal(()),
-                Event::RestartRequested => self.ask_restart(),
-                Event::StateChanged { to: State::Done, .. } => self.tell_gap(companion),
-                Event::StateChanged { .. } => {}
+    /// Holds the companion for the time of `work`.
+    fn hold<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
+        self.companion.lock(|held| {
+            work(held.borrow_mut().as_mut().expect("the companion is put in before any task starts"))
+        })
+    }
+
+    /// Does something with the companion, at a time no earlier than that of the last, and hands on what came of it.
+    fn with<T>(&'static self, work: impl FnOnce(&mut BoardCompanion, companion::Instant) -> T) -> T {
+        let result = self.hold(|companion| {
+            let result = work(companion, now());
+            while let Some(event) = companion.poll_event() {
+                match event {
+                    Event::PlanRequested => self.wants_plan.signal(()),
+                    Event::RestartRequested => self.ask_restart(),
+                    Event::StateChanged { to: State::Done | State::Aborted, .. } => {
+                        if let Some(told) = self.setpoints.take(now_ms()) {
+                            companion.say_count(false, "Setpoints: #, at most # ms apart", told);
+                        }
+                    }
+                    Event::StateChanged { .. } => {}
+                }
             }
-        }
-        drop(held);
+            if !companion.streams() {
+                self.setpoints.end(now_ms());
+            }
+            result
+        });
         self.sends.iter().for_each(|sends| sends.signal(()));
         self.works.signal(());
         self.steps.signal(());
         result
     }
 
-    /// Says after the first flight how far apart setpoints were, by the board's own time.
-    fn tell_gap(&'static self, companion: &mut BoardCompanion) {
-        let gap = self.gap_ms.load(Ordering::Relaxed);
-        let mut text = String::new();
-        // It fits.
-        let _ = write!(text, "Setpoints were at most {gap} ms apart");
-        if let Some(kept) = self.gap_text.try_init(text).filter(|_| gap > 0) {
-            companion.say(false, kept.as_str());
-        }
-    }
-
+    /// Once asked for, it is not put off by being asked for again.
     fn ask_restart(&self) {
-        self.restart_ms.store(now_ms().max(1), Ordering::Relaxed);
+        let _ = self.restart_ms.compare_exchange(0, now_ms().max(1), Ordering::Relaxed, Ordering::Relaxed);
     }
 
     fn seen(&self, task: usize) {
@@ -196,21 +221,35 @@ impl Shell {
 
     /// Takes what a UART receives to the companion.
     ///
-    /// A board that calls itself [`NO_AUTOPILOT`] starts anew when it hears one: `system_id` is what it calls itself.
-    pub async fn receive(&'static self, link: Link, mut uart: impl Read, system_id: u8) -> ! {
+    /// A board without an autopilot starts anew when it hears one, if `for_autopilot`.
+    pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
         let mut chunk = [0; CHUNK];
-        let mut ear = (link == Link::Autopilot && system_id == NO_AUTOPILOT).then(Ear::new);
+        let mut ear = for_autopilot.then(Ear::new);
+        let errors = &self.line_errors[link as usize];
+        let (mut told, mut tells_at) = (0, Instant::MIN);
         loop {
             match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
-                    self.with(|c| c.handle_bytes(link, now(), &chunk[..length])).await;
-                    if ear.as_mut().is_some_and(|ear| ear.hear(&chunk[..length]).is_some()) {
-                        self.ask_restart();
+                    self.with(|companion, now| companion.handle_bytes(link, now, &chunk[..length]));
+                    if let Some(ear) = &mut ear {
+                        ear.hear(&chunk[..length]);
+                        if ear.loudest().is_some() {
+                            self.ask_restart();
+                        }
                     }
                 }
                 // Framing, noise or overrun: what was lost the framer finds out.
-                Ok(Err(_)) => _ = self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed),
+                Ok(Err(_)) => _ = errors.fetch_add(1, Ordering::Relaxed),
                 Err(_) => {}
+            }
+            let count = errors.load(Ordering::Relaxed);
+            if count != told && Instant::now() >= tells_at {
+                (told, tells_at) = (count, Instant::now() + TELL_EVERY);
+                self.with(|companion, _| {
+                    let counters = companion.counters(link);
+                    let damaged = counters.bad_crc.wrapping_add(counters.expired);
+                    companion.say_count(true, LINE_TEXTS[link as usize], [count, damaged]);
+                });
             }
             self.seen(link as usize);
             Timer::after(GATHER).await;
@@ -221,17 +260,16 @@ impl Shell {
     pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
         let mut frame = [0; MAX_SENT];
         loop {
-            let length = {
-                let mut held = self.companion.lock().await;
-                held.as_mut().map_or(0, |companion| companion.poll_transmit(link, &mut frame))
-            };
+            let length = self.hold(|companion| companion.poll_transmit(link, &mut frame));
             if length == 0 {
                 // Late or not, it comes by.
                 let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
-                    self.note_setpoint();
+                    self.setpoints.note(now_ms());
                 }
+                // What waited for room to be said may go on.
+                self.works.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
                 }
@@ -243,14 +281,11 @@ impl Shell {
     /// Lets the companion's time pass.
     pub async fn keep_time(&'static self) -> ! {
         loop {
-            let due = {
-                let held = self.companion.lock().await;
-                held.as_ref().and_then(BoardCompanion::poll_timeout)
-            };
             let now = now();
+            let due = self.hold(|companion| companion.poll_timeout());
             let due = due.unwrap_or(now + companion::Duration::from_micros(ALIVE_EVERY.as_micros()));
             if due <= now {
-                self.with(|companion| companion.handle_timeout(now)).await;
+                self.with(BoardCompanion::handle_timeout);
             } else {
                 select(Timer::at(Instant::from_micros(due.micros())), self.steps.wait()).await;
             }
@@ -263,12 +298,9 @@ impl Shell {
     pub async fn work(&'static self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
         loop {
             if self.wants_plan.try_take().is_some() {
-                let detour = {
-                    let held = self.companion.lock().await;
-                    held.as_ref().and_then(|companion| planner.note_detour(companion))
-                };
+                let detour = self.hold(|companion| planner.note_detour(companion));
                 let answer: Result<_, PlanFailure> = planner.answer(detour.as_ref());
-                self.with(|companion| companion.handle_plan(now(), answer)).await;
+                self.with(|companion, now| companion.handle_plan(now, answer));
             }
             if !self.serve_flash(flash).await {
                 self.works.wait().await;
@@ -276,35 +308,44 @@ impl Shell {
         }
     }
 
-    /// Does one thing that the companion asks of its flash; false if it asks for none.
+    /// Does one thing that the companion asks of its flash; false if it asks for none, or is about to start anew: that must
+    /// not tear what is being written.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
+        if self.restart_ms.load(Ordering::Relaxed) != 0 {
+            return false;
+        }
         let mut bytes = [0; READ];
-        let request = {
-            let mut held = self.companion.lock().await;
-            match held.as_mut().and_then(BoardCompanion::poll_flash) {
-                None => return false,
-                Some(FlashRequest::Erase { at }) => Request::Erase(at),
-                Some(FlashRequest::Read { at, len }) => Request::Read(at, len),
-                Some(FlashRequest::Program { at, bytes: given }) => {
+        let request = self.hold(|companion| {
+            Some(match companion.poll_flash()? {
+                FlashRequest::Erase { at } => Request::Erase(at),
+                FlashRequest::Read { at, len } => Request::Read(at, len),
+                FlashRequest::Program { at, bytes: given } => {
                     bytes[..given.len()].copy_from_slice(given);
                     Request::Program(at, given.len())
                 }
-            }
+            })
+        });
+        let Some(request) = request else {
+            // It may have something to say of what it was asked.
+            self.sends.iter().for_each(|sends| sends.signal(()));
+            return false;
         };
+        self.writes.store(true, Ordering::Relaxed);
         let outcome = match request {
             Request::Erase(at) => flash.erase(at).await.map(|()| 0),
             Request::Program(at, len) => flash.program(at, &bytes[..len]).await.map(|()| 0),
             Request::Read(at, len) => flash.read(at, &mut bytes[..len]).map(|()| len),
         };
+        self.writes.store(false, Ordering::Relaxed);
         let outcome = outcome.map(|len| &bytes[..len]);
-        self.with(|companion| companion.handle_flash(now(), outcome)).await;
+        self.with(|companion, now| companion.handle_flash(now, outcome));
         true
     }
 
-    /// Whether a restart was asked for, and what was to be said before has had time to go out.
+    /// Whether a restart was asked for, what was to be said before has had time to go out, and the flash is at rest.
     pub fn wants_restart(&self) -> bool {
         let asked = self.restart_ms.load(Ordering::Relaxed);
-        asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS
+        asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS && !self.writes.load(Ordering::Relaxed)
     }
 
     /// Whether every task of the links and of time came by lately: else the watchdog is left to bite.
@@ -313,19 +354,52 @@ impl Shell {
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
     }
-
-    fn note_setpoint(&self) {
-        let now = now_ms();
-        let gap = now.wrapping_sub(self.setpoint_ms.swap(now, Ordering::Relaxed));
-        if gap < STREAM_ENDS_MS {
-            self.gap_ms.fetch_max(gap, Ordering::Relaxed);
-        }
-    }
 }
 
 impl Default for Shell {
     fn default() -> Self {
         Self::new()
+    }
+}
+
+/// How many setpoints went out in a flight and how far apart, by the board's own time. A stream lasts as long as the companion
+/// says so, not until a pause: else the longest pauses would not be seen.
+struct Setpoints {
+    count: AtomicU32,
+    /// The longest time between two, or between the last and the stream's end, milliseconds.
+    gap_ms: AtomicU32,
+    /// When the last went out, milliseconds; 0 while there is no stream.
+    last_ms: AtomicU32,
+}
+
+impl Setpoints {
+    const fn new() -> Self {
+        Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
+    }
+
+    /// One goes out.
+    fn note(&self, now_ms: u32) {
+        self.count.fetch_add(1, Ordering::Relaxed);
+        self.mark(now_ms, now_ms.max(1));
+    }
+
+    /// The companion streams none, for now.
+    fn end(&self, now_ms: u32) {
+        self.mark(now_ms, 0);
+    }
+
+    fn mark(&self, now_ms: u32, next_ms: u32) {
+        let last_ms = self.last_ms.swap(next_ms, Ordering::Relaxed);
+        if last_ms != 0 {
+            self.gap_ms.fetch_max(now_ms.wrapping_sub(last_ms), Ordering::Relaxed);
+        }
+    }
+
+    /// Number and longest gap of a flight that is over; none if it had none.
+    fn take(&self, now_ms: u32) -> Option<[u32; 2]> {
+        self.end(now_ms);
+        let told = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
+        (told[0] > 0).then_some(told)
     }
 }
 

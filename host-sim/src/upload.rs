@@ -234,16 +234,25 @@ impl Client {
             again.iter().try_for_each(|request| self.ask(request))?;
         }
         self.done(TERMINATE, &[]).context("not stored")?;
-        let sum = self.done(CRC32, file.name().as_bytes()).context("cannot compare")?;
-        if sum.data != crc32(bytes).to_le_bytes() {
+        if self.sum(file).context("cannot compare")? != crc32(bytes) {
             bail!("what arrived has another CRC-32");
         }
         Ok(())
     }
+
+    /// The CRC-32 that the companion makes of a file it keeps: [`crc32`] of the same bytes.
+    ///
+    /// # Errors
+    /// There is no such file, or no answer.
+    pub fn sum(&mut self, file: File) -> anyhow::Result<u32> {
+        let answer = self.done(CRC32, file.name().as_bytes())?;
+        let sum = answer.data.first_chunk().context("no sum in the answer")?;
+        Ok(u32::from_le_bytes(*sum))
+    }
 }
 
 /// FTP's CRC-32: that of zip, but begun at 0 and not inverted.
-fn crc32(bytes: &[u8]) -> u32 {
+pub fn crc32(bytes: &[u8]) -> u32 {
     const FTP: crc::Algorithm<u32> =
         crc::Algorithm { init: 0, xorout: 0, check: 0x2DFD_2D88, residue: 0, ..crc::CRC_32_ISO_HDLC };
     crc::Crc::<u32>::new(&FTP).checksum(bytes)

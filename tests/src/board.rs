@@ -1,12 +1,36 @@
 //! Boards in QEMU: the built firmware, and what it is run with.
 
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
 
+use companion::Link as Port;
+use companion::ftp::DATA;
+use companion::store::window::Taken;
+use companion::store::{Erasing, File, READ, Store, UploadState, WORD};
+use host_sim::flash::{DeskFlash, LAYOUT};
+use host_sim::link::{Link, LinkUrl};
 use planner_core::voxel::VoxelGrid;
+
+use crate::Guard;
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
+/// Where a byte for each of its words tells what happened to that last: nothing since it was erased, or it was programmed, or
+/// it is being programmed or erased.
+const MARKS: u32 = 0x6020_0000;
+const ERASED: u8 = 0;
+const WHOLE: u8 = 1;
+const TORN: u8 = 2;
+/// Where it is noted that the bank holds something.
+const MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
+/// A loaded machine starts nothing at once.
+const PATIENCE: Duration = Duration::from_secs(30);
+/// What QEMU's monitor says when it waits for an order.
+const PROMPT: &[u8] = b"(qemu) ";
 /// Where a map for measurements lies.
 const MAP: u32 = 0x6080_0000;
 
@@ -20,17 +44,172 @@ pub fn program(name: &str) -> Option<PathBuf> {
     Some(Path::new(&folder).join(name))
 }
 
-/// QEMU with a program on the board. One instruction takes 2^`shift` nanoseconds of the board's time.
-pub fn qemu(program: &Path, shift: u32) -> Command {
+/// QEMU with a program on the board.
+fn qemu(program: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
-        .args(["-machine", "mps2-an500", "-display", "none", "-monitor", "none"])
-        .args(["-icount", &format!("shift={shift}")])
-        .args(["-semihosting-config", "enable=on,target=native"])
+        .args(["-machine", "mps2-an500", "-display", "none"])
         .arg("-kernel")
         .arg(program)
         .stdin(Stdio::null());
     command
+}
+
+/// A board in QEMU that runs the firmware; it ends with us.
+pub struct Emulated {
+    monitor: TcpStream,
+    /// TCP ports of its UARTs: to the autopilot, to the radio.
+    ports: [u16; 2],
+    scratch: tempfile::TempDir,
+    _qemu: Guard,
+}
+
+impl Emulated {
+    /// Switches it on, with what `bank` says in its flash at every reset; else it is empty and keeps what comes. It runs as fast as this machine, or with `shift` so that an instruction
+    /// takes 2^`shift` nanoseconds of its time, which is never ahead of the clock.
+    ///
+    /// # Panics
+    /// QEMU does not start.
+    pub fn start(program: &Path, shift: Option<u32>, bank: Option<&[u8]>) -> Self {
+        let scratch = tempfile::tempdir().expect("a temporary directory");
+        let [autopilot, radio, monitor] = free_ports();
+        let ports = [autopilot, radio];
+        let listen = |port: u16| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
+        let mut qemu = qemu(program);
+        qemu.args(["-monitor", &listen(monitor), "-serial", &listen(autopilot), "-serial", &listen(radio)])
+            .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
+            .args(["-chardev", &format!("file,id=log,path={}", scratch.path().join("log").display())]);
+        if let Some(shift) = shift {
+            qemu.args(["-icount", &format!("shift={shift}")]);
+        }
+        if let Some(bank) = bank {
+            let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
+            let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
+            for (name, bytes, at) in
+                [("bank", bank, BANK2), ("marks", &marks, MARKS), ("made", &MADE.1.to_le_bytes(), MADE.0)]
+            {
+                let file = scratch.path().join(name);
+                std::fs::write(&file, bytes).expect("it can be written");
+                qemu.args(["-device", &loader(&file, at)]);
+            }
+        }
+        let qemu = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
+        let monitor = connect(monitor);
+        let mut board = Self { monitor, ports, scratch, _qemu: qemu };
+        board.answer();
+        board
+    }
+
+    /// Plugs a cable into one of its ports, once the one before is gone.
+    ///
+    /// # Panics
+    /// The port is not there.
+    pub fn plug(&self, port: Port) -> Box<dyn Link> {
+        let url = LinkUrl::Tcp(format!("127.0.0.1:{}", self.ports[port as usize]));
+        url.open().expect("the board's port is open")
+    }
+
+    /// Presses reset; the flash keeps what it holds, torn words too.
+    pub fn reset(&mut self) {
+        self.order("system_reset");
+    }
+
+    /// Halts the board where it is, or lets it run on.
+    pub fn halt(&mut self, halted: bool) {
+        self.order(if halted { "stop" } else { "cont" });
+    }
+
+    /// Words of its flash that are being programmed or erased, in its order. It should be halted.
+    ///
+    /// # Panics
+    /// QEMU gives no memory.
+    pub fn torn(&mut self) -> Vec<usize> {
+        let marks = self.memory(MARKS, LAYOUT.len() as usize / WORD);
+        (0..marks.len()).filter(|word| marks[*word] == TORN).collect()
+    }
+
+    /// Its memory from an address on.
+    fn memory(&mut self, address: u32, length: usize) -> Vec<u8> {
+        let file = self.scratch.path().join("memory");
+        self.order(&format!("pmemsave {address} {length} \"{}\"", file.display()));
+        let bytes = std::fs::read(file).expect("QEMU wrote it");
+        assert_eq!(bytes.len(), length);
+        bytes
+    }
+
+    /// Has QEMU's monitor do something.
+    fn order(&mut self, line: &str) {
+        writeln!(self.monitor, "{line}").expect("QEMU listens");
+        self.answer();
+    }
+
+    fn answer(&mut self) {
+        let mut heard = Vec::new();
+        let mut buffer = [0; 4096];
+        // The line is echoed before it is obeyed, and the prompt comes after.
+        while !heard.ends_with(PROMPT) {
+            let length = self.monitor.read(&mut buffer).expect("QEMU answers");
+            assert!(length > 0, "QEMU ended: {}", String::from_utf8_lossy(&heard));
+            heard.extend_from_slice(&buffer[..length]);
+        }
+    }
+}
+
+/// What a bank of flash holds after these files were uploaded to an empty one, its other slot erased.
+///
+/// # Panics
+/// A file is refused.
+pub fn bank(roadmap: &[u8], mission: &[u8]) -> Vec<u8> {
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let file = folder.path().join("bank");
+    let mut flash = DeskFlash::open(Some(&file)).expect("it can be made");
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    let mut settle = |store: &mut Store| {
+        let mut read = [0; READ];
+        while let Some(request) = store.poll(Erasing::Allowed) {
+            let outcome = flash.obey(request, &mut read);
+            store.handle(outcome);
+        }
+    };
+    settle(&mut store);
+    for (file, bytes) in [(File::Roadmap, roadmap), (File::Mission, mission)] {
+        store.open(file, Erasing::Allowed).expect("an idle store takes uploads");
+        settle(&mut store);
+        for (i, piece) in bytes.chunks(DATA).enumerate() {
+            assert_eq!(store.take((i * DATA) as u32, piece), Taken::Yes);
+            settle(&mut store);
+        }
+        store.close();
+        settle(&mut store);
+        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    }
+    std::fs::read(&file).expect("it was written")
+}
+
+/// QEMU's option that puts a file into memory at every reset.
+fn loader(file: &Path, at: u32) -> String {
+    format!("loader,file={},addr={at:#x},force-raw=on", file.display())
+}
+
+/// TCP ports that nobody has now.
+fn free_ports() -> [u16; 3] {
+    let held = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
+    held.each_ref().map(|listener| listener.local_addr().expect("it is bound").port())
+}
+
+/// Connects to what is about to listen.
+fn connect(port: u16) -> TcpStream {
+    let began = Clock::now();
+    loop {
+        match TcpStream::connect(("127.0.0.1", port)) {
+            Ok(stream) => {
+                stream.set_read_timeout(Some(PATIENCE)).expect("a timeout can be set");
+                return stream;
+            }
+            Err(error) => assert!(began.elapsed() < PATIENCE, "QEMU does not listen: {error}"),
+        }
+        sleep(Duration::from_millis(20));
+    }
 }
 
 /// A map as `measure` and `calls` find it.
@@ -52,12 +231,13 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let file = |name: &str, bytes: &[u8]| {
         let file = folder.path().join(name);
         std::fs::write(&file, bytes).expect("it can be written");
-        file.display().to_string()
+        file
     };
     let (roadmap, map) = (file("roadmap.bin", roadmap), file("map.bin", map));
-    let out = qemu(program, 0)
-        .args(["-device", &format!("loader,file={roadmap},addr={BANK2:#x},force-raw=on")])
-        .args(["-device", &format!("loader,file={map},addr={MAP:#x},force-raw=on")])
+    // An instruction takes a nanosecond of the board's time.
+    let out = qemu(program)
+        .args(["-monitor", "none", "-icount", "shift=0", "-semihosting-config", "enable=on,target=native"])
+        .args(["-device", &loader(&roadmap, BANK2), "-device", &loader(&map, MAP)])
         .output()
         .expect("qemu-system-arm runs");
     let text = String::from_utf8_lossy(&out.stdout);

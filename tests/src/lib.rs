@@ -3,6 +3,7 @@
 pub mod board;
 pub mod bounds;
 pub mod logs;
+pub mod vehicle;
 
 use std::io::{BufRead, BufReader};
 use std::net::UdpSocket;

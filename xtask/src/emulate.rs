@@ -87,7 +87,8 @@ fn fly(scenario: &Path, out: &Path) -> Result<Vec<u32>> {
     for line in BufReader::new(fly.stdout.take().context("its output is piped")?).lines() {
         let line = line?;
         println!("{line}");
-        let gap = line.split_once("Setpoints were at most ").and_then(|(_, rest)| rest.split_once(" ms"));
+        let gap = line.split_once("Setpoints: ").and_then(|(_, rest)| rest.split_once(", at most "));
+        let gap = gap.and_then(|(_, rest)| rest.split_once(" ms"));
         gaps.extend(gap.and_then(|(gap, _)| gap.parse::<u32>().ok()));
     }
     ensure!(fly.wait()?.success(), "the mission was not complete and clean");

@@ -8,10 +8,15 @@ use super::Guidance;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 /// A stop further ahead is no place to wait at yet, metres.
 const WAITS_WITHIN_M: f32 = 8.0;
+/// Who was heard to hear us within this time is linked.
+const LINKED: Duration = Duration::from_millis(800);
+/// A landing by the autopilot alone drifts in gusts, metres.
+const LANDING_DRIFT_M: f32 = 0.5;
+
 impl Guidance {
     /// Stops the reference within its braking distance; off the path, where the vehicle is.
     pub fn brake(&mut self, position: &Point) {
@@ -23,7 +28,9 @@ impl Guidance {
         }
     }
 
-    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to.
+    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. Who is
+    /// alone steps back from above one that lies below, to land beside it, but not beyond where others last heard it to be:
+    /// they look for it from there on.
     pub(super) fn retreat<const V: usize, const W: usize>(
         &mut self,
         state: State,
@@ -35,18 +42,27 @@ impl Guidance {
     ) -> Option<Reference> {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
+        if neighbours.linked_within(now, LINKED) {
+            self.linked_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED.secs_f32();
+        }
+        let alone = state == State::Alone;
         // On its way down it goes on, and on its way aside.
-        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning)
+        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning | State::Alone)
             && self.descended_m.is_none()
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + retreat::BESIDE_M;
-        let unsafe_at =
-            |m: f32| path.point_at(m).is_some_and(|p| neighbours.comes_down_on(now, &p, beside_m));
+        let unsafe_at = |m: f32| {
+            path.point_at(m).is_some_and(|p| match alone {
+                true => neighbours.any_below(&p, safety_m + LANDING_DRIFT_M),
+                false => neighbours.comes_down_on(now, &p, beside_m),
+            })
+        };
         let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
         let (to_m, nowhere) = if waits_there && unsafe_at(wait_m) {
             let to_m = retreat::elsewhere(wait_m, unsafe_at);
-            (to_m, to_m.is_none())
+            let linked_m = self.linked_m;
+            (to_m.filter(|to_m| !alone || *to_m >= linked_m), to_m.is_none() && !alone)
         } else {
             (None, false)
         };

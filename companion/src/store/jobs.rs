@@ -4,7 +4,7 @@ use super::area::{self, Area, Condition, Seal};
 use super::journal;
 use super::records::{Compaction, Record, Source, Step};
 use super::upload::{UploadError, UploadState};
-use super::{Answer, BLOCK, CRC_START, Fault, File, FlashRequest, READ, Store, WORD, crc_step};
+use super::{Answer, BLOCK, CRC_START, Erasing, Fault, File, FlashRequest, READ, Store, WORD, crc_step};
 
 /// What the store is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,16 +38,16 @@ pub enum Job {
 }
 
 impl Store {
-    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only if `may_erase`.
-    pub fn poll(&mut self, may_erase: bool) -> Option<FlashRequest<'_>> {
+    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only where that is allowed.
+    pub fn poll(&mut self, erasing: Erasing) -> Option<FlashRequest<'_>> {
         if self.asked {
             return None;
         }
         if self.job == Job::None {
-            self.job = self.choose(may_erase)?;
+            self.job = self.choose(erasing)?;
         }
         // An erasure goes on only while it may.
-        if let (Job::Erase { .. }, false) = (self.job, may_erase) {
+        if matches!(self.job, Job::Erase { .. }) && erasing != Erasing::Allowed {
             self.job = Job::None;
             return None;
         }
@@ -125,7 +125,8 @@ impl Store {
         self.buffer[..count].copy_from_slice(&rest[..count]);
     }
 
-    fn choose(&mut self, may_erase: bool) -> Option<Job> {
+    fn choose(&mut self, erasing: Erasing) -> Option<Job> {
+        let may_erase = erasing == Erasing::Allowed;
         match self.upload {
             Some((File::Roadmap, UploadState::Opening)) => {
                 let slot = self.target()?;
@@ -135,7 +136,14 @@ impl Store {
                         self.end(Err(UploadError::Flash));
                         None
                     }
-                    _ => may_erase.then(|| self.erase(Area::Slot(slot))),
+                    _ => match erasing {
+                        Erasing::Allowed => Some(self.erase(Area::Slot(slot))),
+                        Erasing::NotYet => None,
+                        Erasing::Forbidden => {
+                            self.end(Err(UploadError::Armed));
+                            None
+                        }
+                    },
                 };
             }
             Some((File::Roadmap, state)) => {
@@ -155,7 +163,7 @@ impl Store {
             }
             _ => {}
         }
-        if let Some(job) = self.choose_record(may_erase) {
+        if let Some(job) = self.choose_record(erasing) {
             return Some(job);
         }
         if let Job::Erase { .. } = self.paused {

@@ -6,7 +6,7 @@ use super::area::{Area, Condition, Seal};
 use super::jobs::Job;
 use super::journal::{self, Kind, record_len};
 use super::upload::{UploadError, UploadState};
-use super::{BLOCK, CRC_START, File, Store, WORD, crc_step, crc32};
+use super::{BLOCK, CRC_START, Erasing, File, Store, WORD, crc_step, crc32};
 
 /// Tries to write the journal before that is given up until the next start.
 const TRIES: u8 = 4;
@@ -53,7 +53,7 @@ pub struct Compaction {
 
 impl Store {
     /// The journal's next step.
-    pub(super) fn choose_record(&mut self, may_erase: bool) -> Option<Job> {
+    pub(super) fn choose_record(&mut self, erasing: Erasing) -> Option<Job> {
         if let Some(compaction) = self.journal.compacting.clone() {
             let Compaction { half, at, step, mission } = compaction;
             return Some(match (step, self.journal.mission.clone()) {
@@ -94,7 +94,7 @@ impl Store {
         };
         let fits = |active: usize| self.journal.end + record_len(len) <= Area::Half(active).end(&self.layout);
         if !self.journal.active.is_some_and(fits) {
-            return self.begin_compaction(may_erase, closing);
+            return self.begin_compaction(erasing, closing);
         }
         let at = self.journal.end;
         Some(Job::Record(match kind {
@@ -107,14 +107,19 @@ impl Store {
         }))
     }
 
-    fn begin_compaction(&mut self, may_erase: bool, closing: bool) -> Option<Job> {
+    fn begin_compaction(&mut self, erasing: Erasing, closing: bool) -> Option<Job> {
         let half = usize::from(self.journal.active == Some(0));
         match self.journal.halves[half] {
             Condition::Clean => Some(Job::MarkUsed(Area::Half(half))),
-            _ if may_erase && !self.erasure_failed => Some(self.erase(Area::Half(half))),
             _ => {
+                let refused = match erasing {
+                    _ if self.erasure_failed => UploadError::Flash,
+                    Erasing::Allowed => return Some(self.erase(Area::Half(half))),
+                    Erasing::NotYet => return None,
+                    Erasing::Forbidden => UploadError::Armed,
+                };
                 if closing {
-                    self.end(Err(if may_erase { UploadError::Flash } else { UploadError::Armed }));
+                    self.end(Err(refused));
                 }
                 None
             }

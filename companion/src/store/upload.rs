@@ -4,7 +4,7 @@ use planner_core::roadmap;
 
 use super::area::{Area, Condition, DATA_AT, u32_at};
 use super::window::{Taken, WINDOW};
-use super::{File, Store};
+use super::{Erasing, File, Store};
 use crate::mission_file::MissionView;
 
 /// Why an upload came to nothing. What was there before is still there.
@@ -45,14 +45,14 @@ impl Store {
     ///
     /// # Errors
     /// [`UploadError::Armed`] or [`UploadError::Waiting`].
-    pub fn open(&mut self, file: File, may_erase: bool) -> Result<(), UploadError> {
+    pub fn open(&mut self, file: File, erasing: Erasing) -> Result<(), UploadError> {
         if self.upload() == Some(UploadState::Closing) {
             return Err(UploadError::Waiting);
         }
         self.abandon();
         if file == File::Roadmap {
             let slot = self.target().ok_or(UploadError::Waiting)?;
-            if self.slots[slot] != Condition::Clean && !may_erase {
+            if self.slots[slot] != Condition::Clean && erasing == Erasing::Forbidden {
                 return Err(UploadError::Armed);
             }
             self.erasure_failed = false;

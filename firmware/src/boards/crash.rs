@@ -1,4 +1,5 @@
-//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start.
+//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start; so is that it ran
+//! and ended without a word.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::fmt::Write;
@@ -10,7 +11,11 @@ use heapless::String;
 /// Longest text of a STATUSTEXT.
 const TEXT: usize = 50;
 /// Says that a record was written.
-const MAGIC: u32 = 0x464c_4b21;
+const CRASHED: u32 = 0x464c_4b21;
+/// Says that the firmware ran, and did not end by itself.
+const RUNS: u32 = 0x464c_4b22;
+/// What is told of that.
+const UNANNOUNCED: &str = "Restarted: watchdog, reset key or brown-out";
 
 #[derive(Clone, Copy)]
 #[repr(C)]
@@ -23,42 +28,62 @@ struct Record {
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
 
-/// What the last start left, once.
+/// What the last start left, once; nothing after the power came.
 pub fn take() -> Option<String<TEXT>> {
     let record = &raw mut RECORD;
     // SAFETY: called once at the start, when nothing else runs; any bytes are a `Record`.
     let found = unsafe {
         let found = record.cast::<Record>().read_volatile();
-        record.cast::<Record>().write_volatile(Record { magic: 0, ..found });
+        record.cast::<Record>().write_volatile(Record { magic: RUNS, ..found });
         found
     };
-    let text = found.text.get(..found.len as usize).filter(|_| found.magic == MAGIC)?;
+    if found.magic == RUNS {
+        return String::try_from(UNANNOUNCED).ok();
+    }
+    let text = found.text.get(..found.len as usize).filter(|_| found.magic == CRASHED)?;
     String::try_from(core::str::from_utf8(text).ok()?).ok()
 }
 
-fn keep(text: &str) {
-    let mut record = Record { magic: MAGIC, len: 0, text: [0; TEXT] };
-    let bytes = text.as_bytes();
-    let len = bytes.len().min(TEXT);
-    record.text[..len].copy_from_slice(&bytes[..len]);
-    record.len = len as u32;
+/// Starts anew, as somebody asked for: there is nothing to tell.
+pub fn restart() -> ! {
+    cortex_m::interrupt::disable();
+    write(Record { magic: 0, len: 0, text: [0; TEXT] });
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+/// Keeps what happened, logs it and starts anew. Kept first, and logged once: what is wrong may be the log.
+fn end(text: &str) -> ! {
+    cortex_m::interrupt::disable();
+    // SAFETY: interrupts are off.
+    let ended = unsafe { (&raw const RECORD).cast::<Record>().read_volatile() }.magic == CRASHED;
+    if !ended {
+        let mut record = Record { magic: CRASHED, len: 0, text: [0; TEXT] };
+        let bytes = text.as_bytes();
+        let len = bytes.len().min(TEXT);
+        record.text[..len].copy_from_slice(&bytes[..len]);
+        record.len = len as u32;
+        write(record);
+        defmt::error!("{=str}", text);
+    }
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+/// To be called with interrupts off.
+fn write(record: Record) {
     let to = &raw mut RECORD;
-    // SAFETY: interrupts are off, and nobody comes back from here.
+    // SAFETY: nobody else runs, and who calls this starts anew.
     unsafe { to.cast::<Record>().write_volatile(record) };
 }
 
 /// Keeps where it was and starts anew.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
-    cortex_m::interrupt::disable();
     let mut text = String::<200>::new();
     if let Some(place) = info.location() {
         let file = place.file().rsplit('/').next().unwrap_or_default();
         // What does not fit is left out.
         let _ = write!(text, "Restarted: panic at {file}:{}", place.line());
     }
-    defmt::error!("{=str}", text.as_str());
-    keep(&text);
-    cortex_m::peripheral::SCB::sys_reset()
+    end(&text)
 }
 
 /// Keeps the program counter of a fault and starts anew.
@@ -66,7 +91,5 @@ pub fn faulted(pc: u32) -> ! {
     let mut text = String::<TEXT>::new();
     // It fits.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");
-    defmt::error!("{=str}", text.as_str());
-    keep(&text);
-    cortex_m::peripheral::SCB::sys_reset()
+    end(&text)
 }

@@ -2,6 +2,8 @@
 
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod crash;
+#[cfg(all(target_os = "none", feature = "board"))]
+pub mod lock;
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub mod nucleo_h743;
 #[cfg(all(target_os = "none", feature = "pico2"))]
@@ -17,6 +19,13 @@ pub use nucleo_h743 as chosen;
 pub use pico2 as chosen;
 #[cfg(all(target_os = "none", feature = "qemu"))]
 pub use qemu as chosen;
+
+#[cfg(all(target_os = "none", feature = "board"))]
+pub use lock::HoldsExecutors;
+
+/// On the desk there is no other executor to hold back.
+#[cfg(not(all(target_os = "none", feature = "board")))]
+pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 
 /// The watchdog resets the board so long after it was last fed, microseconds.
 #[cfg(all(target_os = "none", feature = "board"))]

@@ -24,9 +24,10 @@ const POSITION_SENSORS: u32 = 0x4000;
 
 /// Messages newer than many dialects: id, CRC seed and payload as PX4 1.17 was recorded to send them. What they say does not
 /// change; that they come, and that not everybody knows them, is what counts.
-const RECORDED: [(u32, u8, &[u8]); 4] = [
+const RECORDED: [(u32, u8, &[u8]); 5] = [
     (8, 117, &[0xA0, 0x6F, 0x6D, 0, 0, 0, 0, 0, 0x29, 0x60, 0, 0, 0, 0, 0, 0, 0xAB, 9]),
     (380, 232, &[0, 0, 0, 0, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255, 255]),
+    (410, 160, &[0x27, 0x37, 0x1D, 1, 0x5C, 0x18, 0, 0, 0x0D, 0, 0, 0, 0x88, 0, 0x0A, 0x0C, 2, 0x38]),
     (411, 106, &[13]),
     (441, 169, &[0, 0, 0, 0, 255, 255, 255, 255, 4, 0, 0, 0, 0, 255, 255, 255, 255]),
 ];

@@ -16,7 +16,7 @@ use super::messages::{self, scaled};
 use super::port::Port;
 
 /// Message id and interval in microseconds of each stream; 0 is off until asked for.
-pub const STREAMS: [(u32, u32); 31] = [
+pub const STREAMS: [(u32, u32); 32] = [
     (0, 1_000_000),   // HEARTBEAT
     (1, 200_000),     // SYS_STATUS
     (2, 1_000_000),   // SYSTEM_TIME
@@ -44,6 +44,7 @@ pub const STREAMS: [(u32, u32); 31] = [
     (245, 200_000),   // EXTENDED_SYS_STATE
     (331, 33_333),    // ODOMETRY
     (380, 2_000_000), // TIME_ESTIMATE_TO_TARGET
+    (410, 5_000_000), // EVENT: one of those seen, again and again
     (411, 3_000_000), // CURRENT_EVENT_SEQUENCE
     (436, 2_000_000), // CURRENT_MODE
     (441, 1_000_000), // GNSS_INTEGRITY
@@ -156,7 +157,7 @@ impl Snapshot {
                 let seq = port.pings;
                 port.send_raw(4, &ping(self.time_us, seq, 0, 0));
             }
-            8 | 380 | 411 | 441 => messages::send_recorded(id, port),
+            8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
             24 => self.send_gps(port),
             29 => port.send(&dialect::SCALED_PRESSURE_DATA {
                 time_boot_ms: self.boot_ms(),

@@ -100,15 +100,16 @@ impl Board {
     }
 }
 
+/// The state that a companion's HEARTBEAT tells.
+pub fn told_state(frame: &Frame) -> Option<State> {
+    let told = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
+    let named = TABLE.iter().flat_map(|row| row.from.iter().chain([&row.to]));
+    named.copied().find(|state| *state as u32 == told)
+}
+
 fn note(frame: &Frame, state: &mut State, progress_m: &mut f32, said: &mut impl FnMut(&str)) {
     match frame.message_id {
-        HEARTBEAT_DATA::ID => {
-            let told = frame.decode::<HEARTBEAT_DATA>().map(|heartbeat| heartbeat.custom_mode);
-            let named = TABLE.iter().flat_map(|row| row.from.iter().chain([&row.to]));
-            if let Some(found) = named.copied().find(|state| Some(*state as u32) == told) {
-                *state = found;
-            }
-        }
+        HEARTBEAT_DATA::ID => *state = told_state(frame).unwrap_or(*state),
         TUNNEL_DATA::ID => {
             if let Some(intent) = Intent::decode(frame.padded(), frame.system) {
                 *progress_m = intent.progress_m;

@@ -65,6 +65,10 @@ pub struct Parts {
     pub watchdog: Watchdog,
 }
 
+/// Priority of the executor of links and setpoints: below all devices.
+pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
+const LINKS_AT: Priority = Priority::P8;
+
 static LINKS: InterruptExecutor = InterruptExecutor::new();
 static PLANS: InterruptExecutor = InterruptExecutor::new();
 
@@ -85,7 +89,7 @@ unsafe fn UART8() {
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     let p = embassy_stm32::init(clocks());
-    interrupt::UART7.set_priority(Priority::P8);
+    interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {
         let mut config = usart::Config::default();

@@ -64,6 +64,10 @@ pub struct Parts {
     pub watchdog: Watchdog,
 }
 
+/// Priority of the executor of links and setpoints: below all devices.
+pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
+const LINKS_AT: Priority = Priority::P1;
+
 static LINKS: InterruptExecutor = InterruptExecutor::new();
 static PLANS: InterruptExecutor = InterruptExecutor::new();
 
@@ -84,7 +88,7 @@ unsafe fn SWI_IRQ_1() {
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     let p = embassy_rp::init(embassy_rp::config::Config::default());
-    interrupt::SWI_IRQ_0.set_priority(Priority::P1);
+    interrupt::SWI_IRQ_0.set_priority(LINKS_AT);
     interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
         let mut config = uart::Config::default();

@@ -12,6 +12,7 @@ pub mod uart;
 mod watchdog;
 
 pub use flash::{Flash, LAYOUT};
+pub use interrupts::LINKS as LINKS_PRIORITY;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;
 

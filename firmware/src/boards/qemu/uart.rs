@@ -64,7 +64,7 @@ impl Uart {
         self.register(CTRL).write(ENABLED);
         interrupts::enable(receives, interrupts::DEVICES);
         interrupts::enable(self.transmits, interrupts::DEVICES);
-        (Receiver(self), Transmitter(self))
+        (Receiver { uart: self, told: 0 }, Transmitter(self))
     }
 
     /// Takes the byte that has come and gives the next one to send.
@@ -89,19 +89,46 @@ impl Uart {
     }
 }
 
+/// Bytes were lost, by the device or behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct Lost;
+
+impl core::fmt::Display for Lost {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str("bytes were lost")
+    }
+}
+
+impl core::error::Error for Lost {}
+
+impl embedded_io_async::Error for Lost {
+    fn kind(&self) -> embedded_io_async::ErrorKind {
+        embedded_io_async::ErrorKind::Other
+    }
+}
+
 /// The end that bytes come out of.
-pub struct Receiver(&'static Uart);
+pub struct Receiver {
+    uart: &'static Uart,
+    /// Losses that were told.
+    told: u32,
+}
 
 /// The end that bytes go into.
 pub struct Transmitter(&'static Uart);
 
 impl embedded_io_async::ErrorType for Receiver {
-    type Error = core::convert::Infallible;
+    type Error = Lost;
 }
 
 impl embedded_io_async::Read for Receiver {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
-        Ok(self.0.received.read(buffer).await)
+        let lost = [&self.uart.counters.overruns, &self.uart.counters.dropped];
+        let lost = lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
+        if core::mem::replace(&mut self.told, lost) != lost {
+            return Err(Lost);
+        }
+        Ok(self.uart.received.read(buffer).await)
     }
 }
 

@@ -1,0 +1,271 @@
+//! One vehicle in real time: a board in QEMU beside a simulated autopilot, and somebody who gives orders by its radio.
+
+use std::thread::sleep;
+use std::time::{Duration, Instant as Clock};
+
+use companion::Link as Port;
+use companion::frame::{self, Frame, Framer, Header};
+use companion::{COMPONENT, Instant, State};
+use host_sim::autopilot::{Autopilot, Config};
+use host_sim::link::Link;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario;
+use host_sim::swarm::board::told_state;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, SET_POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
+};
+use planner_core::Point;
+use planner_core::frames::geodetic_to_enu;
+
+use crate::board::Emulated;
+
+const STEP: Duration = Duration::from_millis(4);
+/// Time that a machine which stood still does not make up for.
+const LATEST: Duration = Duration::from_millis(200);
+/// A machine may stand still for long; nothing that works takes half as long.
+const PATIENCE: Duration = Duration::from_secs(150);
+/// ArduCopter's estimator is ready sooner than the real one's.
+const READY_S: f32 = 2.0;
+
+/// What came from the board.
+#[derive(Debug, Default)]
+pub struct Heard {
+    /// STATUSTEXT, heard on the radio.
+    pub texts: Vec<String>,
+    /// Setpoints to the autopilot.
+    pub setpoints: Vec<SET_POSITION_TARGET_LOCAL_NED_DATA>,
+    /// Commands to the autopilot: number and first parameter.
+    pub commands: Vec<(u32, f32)>,
+    /// Its state as last told.
+    pub state: State,
+    /// Frames missing in the row of each line, by their numbers. A companion that starts anew counts from zero, which shows too.
+    pub missing: [u32; 2],
+    last: [Option<u8>; 2],
+}
+
+/// The vehicle.
+pub struct Vehicle {
+    /// Its companion.
+    pub board: Emulated,
+    /// Its autopilot and the vehicle itself.
+    pub autopilot: Autopilot,
+    /// What was heard from the board since this was last emptied.
+    pub heard: Heard,
+    /// What comes to the radio beside our orders, and what the board said there, for others to read.
+    pub radio: Vec<u8>,
+    lines: [Option<Box<dyn Link>>; 2],
+    framers: [Framer; 2],
+    ground_m: f32,
+    began: Clock,
+    next: Clock,
+    sequence: u8,
+}
+
+/// A scenario's mission, ready to be flown.
+///
+/// # Panics
+/// The scenario is no good.
+pub fn mission(text: &str) -> Mission {
+    let scenario = scenario::parse(text, "vehicle.toml").expect("the scenario is good");
+    Mission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
+}
+
+impl Vehicle {
+    /// The first vehicle of a mission, on its pad, its autopilot just switched on.
+    pub fn new(board: Emulated, mission: &Mission, seed: u64) -> Self {
+        let lines = [Port::Autopilot, Port::Swarm].map(|port| Some(board.plug(port)));
+        let mut config = config(mission);
+        config.seed = seed;
+        let mut autopilot = Autopilot::new(&config).expect("the scenario is good");
+        autopilot.land_on_stream_loss();
+        let now = Clock::now();
+        Self {
+            board,
+            autopilot,
+            heard: Heard::default(),
+            radio: Vec::new(),
+            lines,
+            framers: [Framer::new(), Framer::new()],
+            ground_m: config.start.z - config.vehicle.radius_m,
+            began: now,
+            next: now,
+            sequence: 0,
+        }
+    }
+
+    /// A line's cable is plugged in, or pulled out.
+    pub fn plug(&mut self, port: Port, plugged: bool) {
+        self.lines[port as usize] = plugged.then(|| self.board.plug(port));
+        self.framers[port as usize] = Framer::new();
+        self.heard.last[port as usize] = None;
+    }
+
+    /// Resets the board, now; what it sent before was heard before.
+    pub fn reset(&mut self) {
+        self.board.halt(true);
+        self.hear();
+        self.board.reset();
+        self.board.halt(false);
+        self.framers = [Framer::new(), Framer::new()];
+        self.heard = Heard::default();
+    }
+
+    /// Sends the companion a command.
+    pub fn order(&mut self, command: MavCmd, param1: f32) {
+        let data = COMMAND_LONG_DATA {
+            command,
+            param1,
+            target_system: 1,
+            target_component: COMPONENT,
+            ..COMMAND_LONG_DATA::DEFAULT
+        };
+        self.tell(&data);
+    }
+
+    /// Sends the companion a message by its radio.
+    pub fn tell(&mut self, data: &impl MessageData) {
+        let mut out = [0; frame::MAX_SENT];
+        let header = Header { system: 255, component: 190, sequence: self.sequence };
+        self.sequence = self.sequence.wrapping_add(1);
+        let length = frame::encode(header, data, &mut out);
+        self.send(Port::Swarm, &out[..length]);
+    }
+
+    /// Sends the board bytes, if the cable is in.
+    pub fn send(&mut self, port: Port, bytes: &[u8]) {
+        if let Some(line) = &mut self.lines[port as usize] {
+            line.send(bytes).expect("the line is open");
+        }
+    }
+
+    /// 4 ms, by the clock.
+    pub fn step(&mut self) {
+        self.hear();
+        self.autopilot.step(STEP.as_secs_f32(), self.ground_m);
+        let mut buffer = [0; 2048];
+        loop {
+            let length = self.autopilot.poll_transmit(&mut buffer);
+            if length == 0 {
+                break;
+            }
+            self.send(Port::Autopilot, &buffer[..length]);
+        }
+        self.next += STEP;
+        let now = Clock::now();
+        self.next = self.next.max(now.checked_sub(LATEST).unwrap_or(now));
+        sleep(self.next.saturating_duration_since(now));
+    }
+
+    /// Steps for some time, by the vehicle's.
+    pub fn run(&mut self, time: Duration) {
+        (0..time.as_micros() / STEP.as_micros()).for_each(|_| self.step());
+    }
+
+    /// Steps until something holds.
+    ///
+    /// # Panics
+    /// It does not in good time.
+    pub fn until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
+        let began = Clock::now();
+        while !holds(self) {
+            let place = self.autopilot.truth().position;
+            assert!(
+                began.elapsed() < PATIENCE,
+                "not {what}: {:?} at {place:?}, {:?}",
+                self.heard.state,
+                self.heard.texts
+            );
+            self.step();
+        }
+    }
+
+    /// Steps until the board says something that begins so.
+    ///
+    /// # Panics
+    /// It does not in good time.
+    pub fn until_said(&mut self, text: &str) {
+        self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
+    }
+
+    /// Starts the mission, once it is ready, and steps until it has left the pad's states.
+    pub fn start(&mut self) {
+        self.until("ready", |vehicle| vehicle.heard.state == State::Ready);
+        let mut last = Clock::now() - PATIENCE;
+        self.until("started", |vehicle| {
+            if vehicle.heard.state == State::Ready && last.elapsed() > Duration::from_secs(1) {
+                last = Clock::now();
+                vehicle.order(MavCmd::MAV_CMD_MISSION_START, 0.0);
+            }
+            !matches!(vehicle.heard.state, State::Ready | State::Scheduled)
+        });
+    }
+
+    /// Whether the vehicle is off the ground, in truth.
+    pub fn flies(&self) -> bool {
+        !self.autopilot.truth().touching
+    }
+
+    fn hear(&mut self) {
+        for (index, line) in self.lines.iter_mut().enumerate() {
+            let mut buffer = [0; 2048];
+            while let Some(line) = line {
+                let length = line.receive(&mut buffer).expect("the line is open");
+                if length == 0 {
+                    break;
+                }
+                let bytes = &buffer[..length];
+                if index == Port::Autopilot as usize {
+                    self.autopilot.handle_bytes(bytes);
+                } else {
+                    self.radio.extend_from_slice(bytes);
+                }
+                let now = Instant::from_micros(self.began.elapsed().as_micros() as u64);
+                let mut input = bytes;
+                while let Some(frame) = self.framers[index].next(now, &mut input) {
+                    self.heard.note(index, &frame);
+                }
+            }
+        }
+    }
+}
+
+impl Heard {
+    fn note(&mut self, line: usize, frame: &Frame) {
+        if let Some(last) = self.last[line].replace(frame.sequence) {
+            self.missing[line] += u32::from(frame.sequence.wrapping_sub(last).wrapping_sub(1));
+        }
+        let by_radio = line == Port::Swarm as usize;
+        match frame.message_id {
+            HEARTBEAT_DATA::ID if by_radio => self.state = told_state(frame).unwrap_or(self.state),
+            STATUSTEXT_DATA::ID if by_radio => {
+                let text = frame.decode::<STATUSTEXT_DATA>().map(|data| data.text);
+                self.texts.extend(text.iter().map(|text| text.to_str().unwrap_or_default().to_owned()));
+            }
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => self.setpoints.extend(frame.decode()),
+            COMMAND_LONG_DATA::ID => {
+                let p = frame.padded();
+                let command = u32::from(u16::from_le_bytes([p[28], p[29]]));
+                self.commands.push((command, f32::from_le_bytes([p[0], p[1], p[2], p[3]])));
+            }
+            _ => {}
+        }
+    }
+}
+
+/// The autopilot of a mission's first vehicle.
+fn config(mission: &Mission) -> Config {
+    let (vehicle, origin) = (&mission.scenario.vehicles[0], mission.scenario.map.origin);
+    let pad = mission.pad(0);
+    let start: Point = geodetic_to_enu(&origin, &pad);
+    Config {
+        system_id: vehicle.id,
+        personality: vehicle.personality,
+        world_origin: origin,
+        ekf_origin: pad,
+        start,
+        estimator_ready_s: READY_S,
+        ..Config::default()
+    }
+}
