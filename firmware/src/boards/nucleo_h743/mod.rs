@@ -67,6 +67,8 @@ unsafe fn UART8() {
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     let p = embassy_stm32::init(clocks());
+    // SAFETY: the instruction cache is this function's alone, which is called once. Code is never written.
+    unsafe { cortex_m::Peripherals::steal() }.SCB.enable_icache();
     interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {

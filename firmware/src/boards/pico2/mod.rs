@@ -6,8 +6,8 @@
 //! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 57 600 baud |
 //! | GP25 | the light |
 //!
-//! While the flash erases or programs nothing runs from it: no setpoint goes out. The companion asks for that only on the
-//! ground, disarmed.
+//! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a UART may be lost. Sectors are erased
+//! only on the ground, disarmed; a page, as of an upload or a parameter in flight, is programmed within a millisecond or so.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
 use companion::store::{Fault, Layout, ReadFlash};
