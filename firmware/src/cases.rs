@@ -13,6 +13,7 @@ use planner_core::prm::{Config, Sampling};
 use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
 use planner_core::schedule::{Gate, ScheduleConfig};
 use planner_core::search::{self, SearchWorkspace};
+use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -217,22 +218,25 @@ impl StepCase {
     }
 
     /// What is counted.
-    pub fn advise(&self) -> Advice {
+    pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
         let own = Own { rank: 0, position: *position, along_m: *along_m, path, detours: false };
-        deconflict::advise(&self.cfg, &own, &self.gates, &self.neighbours)
+        deconflict::advise(&DeconflictConfig { method, ..self.cfg }, &own, &self.gates, &self.neighbours)
     }
 }
 
-fn below(rng: &mut Pcg32, limit: usize) -> usize {
+/// A random number below `limit`.
+pub fn below(rng: &mut Pcg32, limit: usize) -> usize {
     rng.next_u32() as usize % limit
 }
 
-fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
+/// A random number between two.
+pub fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
     low + (rng.next_u32() >> 8) as f32 / (1u32 << 24) as f32 * (high - low)
 }
 
-fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
+/// A random point of a cube about zero.
+pub fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
     Point::from_fn(|_, _| uniform(rng, -reach_m, reach_m))
 }
 
@@ -245,6 +249,22 @@ pub const BUILT: Config = Config {
     seed: 1,
     sampling: Sampling::Uniform,
 };
+
+/// The map that lies in a board's memory: its head (three dimensions, three coordinates of the minimum corner, the resolution)
+/// and its words.
+///
+/// # Panics
+/// It is none.
+pub fn map<'a>(head: &[u8; 32], words: &'a [u64]) -> VoxelGrid<'a> {
+    let word =
+        |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
+    let shape = GridShape {
+        dims: [word(0), word(1), word(2)],
+        min: Point::new(f32::from_bits(word(3)), f32::from_bits(word(4)), f32::from_bits(word(5))),
+        resolution_m: f32::from_bits(word(6)),
+    };
+    VoxelGrid::new(shape, Outside::Blocked, words).expect("a map lies there")
+}
 
 /// CRC-32 over every bit of a roadmap's nodes and edges.
 pub fn roadmap_crc(nodes: &[Point], edges: &[Edge]) -> u32 {

@@ -5,6 +5,7 @@
 #![no_std]
 
 pub mod boards;
+pub mod calls;
 pub mod capacity;
 pub mod cases;
 pub mod planner;

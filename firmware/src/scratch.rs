@@ -84,12 +84,42 @@ impl Builder {
         terminals: &[Point],
         config: &Config,
     ) -> Result<(), PrmError> {
-        let Self { nodes, node_count, index, edges, edge_count } = self;
+        self.sample(grid, terminals, config)?;
+        self.index(config)?;
+        self.join(grid, config)
+    }
+
+    /// First step: nodes.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn sample(
+        &mut self,
+        grid: &VoxelGrid<'_>,
+        terminals: &[Point],
+        config: &Config,
+    ) -> Result<(), PrmError> {
+        self.edge_count = 0;
+        self.node_count = prm::sample_nodes(grid, None, terminals, config, &mut self.nodes)?;
+        Ok(())
+    }
+
+    /// Second step: nodes by place.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn index(&mut self, config: &Config) -> Result<(), PrmError> {
+        self.index.index(&self.nodes[..self.node_count], config)
+    }
+
+    /// Third step: edges.
+    ///
+    /// # Errors
+    /// As [`Self::build`].
+    pub fn join(&mut self, grid: &VoxelGrid<'_>, config: &Config) -> Result<(), PrmError> {
+        let Self { node_count, index, edges, edge_count, .. } = self;
         *edge_count = 0;
-        *node_count = prm::sample_nodes(grid, None, terminals, config, nodes)?;
-        let nodes = &nodes[..*node_count];
-        index.index(nodes, config)?;
-        prm::connect_range(grid, index, config, 0..nodes.len(), |edge| {
+        prm::connect_range(grid, index, config, 0..*node_count, |edge| {
             let to = edges.get_mut(*edge_count).ok_or(PrmError::RoadmapFull)?;
             *to = Edge { a: edge.a, b: edge.b, clearance_m: config.clearance_m };
             *edge_count += 1;

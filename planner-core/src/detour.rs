@@ -71,7 +71,15 @@ impl KeepOff {
     }
 
     fn touches(&self, a: &Point, b: &Point) -> bool {
-        segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
+        // Most are apart along one axis alone, which is cheaper to see than a distance.
+        let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
+        let beside = |axis: usize| {
+            let (low, high) = sorted(a[axis], b[axis]);
+            let (least, most) = sorted(self.from[axis], self.to[axis]);
+            high + self.radius_m < least || low - self.radius_m > most
+        };
+        !(0..3).any(beside)
+            && segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
     }
 }
 
@@ -93,8 +101,8 @@ pub fn is_blocked<const W: usize>(
     climbs
         || obstacle.touches(&last.position, &ground)
         || path.waypoints().windows(2).filter(|leg| leg[1].along_m > along_m).any(|leg| {
-            let from = path.point_at(fmaxf(along_m, leg[0].along_m)).unwrap_or(leg[0].position);
-            obstacle.touches(&from, &leg[1].position)
+            let begun = if along_m > leg[0].along_m { path.point_at(along_m) } else { None };
+            obstacle.touches(&begun.unwrap_or(leg[0].position), &leg[1].position)
         })
 }
 

@@ -109,8 +109,10 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
 pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
     /// Scratch of searches, also for [`crate::detour`].
     pub search: SearchWorkspace<N>,
-    sipp: SippWorkspace<N, P>,
-    assignment: AssignmentWorkspace<V>,
+    /// Scratch of [`schedule::sipp`].
+    pub sipp: SippWorkspace<N, P>,
+    /// Scratch of [`assignment`].
+    pub assignment: AssignmentWorkspace<V>,
     /// Starts × goals, packed from the front.
     costs: [[f32; V]; V],
     /// Scratch of the schedule, also for [`vehicle_plan`].

@@ -214,7 +214,7 @@ fn connect(port: u16) -> TcpStream {
     }
 }
 
-/// A map as `measure` finds it.
+/// A map as `measure` and `calls` find it.
 pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
     let shape = grid.shape();
     let dims = shape.dims.iter().flat_map(|d| d.to_le_bytes());
@@ -224,7 +224,7 @@ pub fn map_image(grid: &VoxelGrid<'_>) -> Vec<u8> {
     dims.chain(numbers).chain(count).chain(words.iter().flat_map(|word| word.to_le_bytes())).collect()
 }
 
-/// What `measure` says of a roadmap file and a map, line by line.
+/// What `measure` or `calls` says of a roadmap file and a map, line by line.
 ///
 /// # Panics
 /// It does not run to its end.

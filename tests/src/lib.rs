@@ -1,6 +1,7 @@
 //! Helpers shared by the cross-crate tests.
 
 pub mod board;
+pub mod bounds;
 pub mod logs;
 pub mod vehicle;
 

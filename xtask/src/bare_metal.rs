@@ -48,7 +48,7 @@ impl Board {
     /// The programs made for it.
     pub fn programs(self) -> &'static [&'static str] {
         match self {
-            Self::Qemu => &["flockmate", "measure"],
+            Self::Qemu => &["flockmate", "measure", "calls"],
             Self::NucleoH743 | Self::Pico2 => &["flockmate"],
         }
     }

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 
+use crate::bare_metal::{self, Board};
 use crate::install;
 use crate::shell::{cargo, command, root, run, target_dir};
 
@@ -16,7 +17,7 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps; or the deconfliction suite.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or the deconfliction suite.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// Seeds of each case of the deconfliction suite.
@@ -41,6 +42,10 @@ pub fn run_bench(args: &Args) -> Result<()> {
     }
     install::debian(install::COUNTER)?;
     bench.args(["bench", "--"]);
+    if args.only.as_deref().is_none_or(|only| "worst-case".contains(only)) {
+        install::debian(install::EMULATOR)?;
+        bench.env("FLOCKMATE_FIRMWARE", bare_metal::build(Board::Qemu)?);
+    }
     match peer() {
         Ok(peer) => {
             bench.arg("--peer").arg(peer);

@@ -11,12 +11,11 @@ use firmware::capacity::{ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase};
 use firmware::scratch::{Planner, Scratch};
 use heapless::Vec;
-use planner_core::Point;
+use planner_core::deconflict::Method;
 use planner_core::plan::{self, Goals, PlanRequest, SwarmPlan};
 use planner_core::prm::Config;
 use planner_core::roadmap::{HalfEdge, RoadmapView};
 use planner_core::search::{self, SearchWorkspace};
-use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 use semihosting::println;
@@ -103,7 +102,7 @@ fn steps() {
     let (mut worst, mut sum) = (0, 0);
     for number in 0..cases::STEPS {
         let case = StepCase::new(&mut rng, VEHICLES, number % 2 == 0);
-        let (_, count) = instructions(|| black_box(&case).advise());
+        let (_, count) = instructions(|| black_box(&case).advise(Method::Priority));
         worst = worst.max(count);
         sum += count;
     }
@@ -114,14 +113,7 @@ fn steps() {
 /// A roadmap built from the map.
 fn build(scratch: &mut Scratch, clearance_m: f32) {
     let (head, words) = memory::map();
-    let word =
-        |i: usize| u32::from_le_bytes([head[4 * i], head[4 * i + 1], head[4 * i + 2], head[4 * i + 3]]);
-    let shape = GridShape {
-        dims: [word(0), word(1), word(2)],
-        min: Point::new(f32::from_bits(word(3)), f32::from_bits(word(4)), f32::from_bits(word(5))),
-        resolution_m: f32::from_bits(word(6)),
-    };
-    let grid = VoxelGrid::new(shape, Outside::Blocked, words).expect("a map lies beyond bank 2");
+    let grid = cases::map(&head, words);
     let builder = scratch.builder();
     let config = Config { clearance_m, ..cases::BUILT };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };

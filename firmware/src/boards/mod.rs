@@ -6,6 +6,8 @@ pub mod crash;
 pub mod lock;
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub mod nucleo_h743;
+#[cfg(all(target_os = "none", feature = "board"))]
+pub mod parts;
 #[cfg(all(target_os = "none", feature = "pico2"))]
 pub mod pico2;
 #[cfg(all(target_os = "none", feature = "qemu"))]

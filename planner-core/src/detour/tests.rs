@@ -118,3 +118,18 @@ fn a_path_is_blocked_by_what_is_ahead_of_it_only() {
     let on_pad = Point::new(0.0, 0.0, 1.0);
     assert!(blocked(-4.0, on_pad) && !blocked(1.0, on_pad), "the climb, until it is over");
 }
+
+proptest::proptest! {
+    /// Looking along the axes first changes no answer.
+    #[test]
+    fn touching_is_being_nearer_than_the_radius(
+        c in proptest::collection::vec(-4.0f32..4.0, 12),
+        radius_m in 0.0f32..3.0,
+    ) {
+        let point = |i: usize| Point::new(c[3 * i], c[3 * i + 1], c[3 * i + 2]);
+        let off = KeepOff { from: point(0), to: point(1), radius_m, nature: Nature::Solid };
+        let (a, b) = (point(2), point(3));
+        let apart = segments_distance_sq((&a, &b), (&off.from, &off.to));
+        proptest::prop_assert_eq!(off.touches(&a, &b), apart < radius_m * radius_m);
+    }
+}

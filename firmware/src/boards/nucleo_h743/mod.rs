@@ -5,12 +5,10 @@
 //! | PD5 / PD6 | USART2 TX / RX, the autopilot's TELEM2, 921 600 baud |
 //! | PC6 / PC7 | USART6 TX / RX, the swarm's radio, 57 600 baud |
 //! | PB0 | LD1, green |
-#![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
+#![expect(unsafe_code, reason = "handlers of interrupts")]
 
-use companion::store::{Fault, Layout, ReadFlash};
 use defmt_rtt as _;
-use embassy_executor::{InterruptExecutor, SendSpawner};
-use embassy_stm32::flash::{self, Async, Flash as Device};
+use embassy_stm32::flash::{Flash as Device, InterruptHandler};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -20,6 +18,8 @@ use embassy_stm32::wdg::IndependentWatchdog;
 use embassy_stm32::{Peri, bind_interrupts, dma, peripherals, rcc};
 use static_cell::ConstStaticCell;
 
+use super::parts::{self, Parts};
+
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<peripherals::USART2>;
     USART6 => usart::InterruptHandler<peripherals::USART6>;
@@ -27,8 +27,12 @@ bind_interrupts!(struct Irqs {
     DMA1_STREAM1 => dma::InterruptHandler<peripherals::DMA1_CH1>;
     DMA1_STREAM2 => dma::InterruptHandler<peripherals::DMA1_CH2>;
     DMA1_STREAM3 => dma::InterruptHandler<peripherals::DMA1_CH3>;
-    FLASH => flash::InterruptHandler;
+    FLASH => InterruptHandler;
 });
+
+mod flash;
+
+pub use flash::{Flash, LAYOUT};
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 57_600;
@@ -37,53 +41,27 @@ const RING: usize = 2048;
 static AUTOPILOT_RING: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
 static RADIO_RING: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
 
-/// Where bank 2 begins, from the start of the flash.
-const BANK2: u32 = 1 << 20;
-/// The same as an address.
-const BANK2_ADDRESS: usize = 0x0810_0000;
-/// Bank 2.
-pub const LAYOUT: Layout = Layout::H743;
-
 /// Receives by DMA into a ring.
 pub type Receiver = RingBufferedUartRx<'static>;
 /// Transmits by DMA.
 pub type Transmitter = UartTx<'static, ByDma>;
 
-/// The board, ready.
-pub struct Parts {
-    /// Runs links and setpoints, by interrupt.
-    pub links: SendSpawner,
-    /// Runs what takes long, by an interrupt below that.
-    pub plans: SendSpawner,
-    /// To the autopilot.
-    pub autopilot: (Receiver, Transmitter),
-    /// To the swarm's radio.
-    pub swarm: (Receiver, Transmitter),
-    /// For files and parameters.
-    pub flash: Flash,
-    /// Asleep.
-    pub watchdog: Watchdog,
-}
-
 /// Priority of the executor of links and setpoints: below all devices.
 pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
 const LINKS_AT: Priority = Priority::P8;
 
-static LINKS: InterruptExecutor = InterruptExecutor::new();
-static PLANS: InterruptExecutor = InterruptExecutor::new();
-
 /// No device of ours has it: it runs the executor of links and setpoints.
 #[interrupt]
 unsafe fn UART7() {
-    // SAFETY: this is the handler; the interrupt is enabled by `start` alone, after which the executor is there.
-    unsafe { LINKS.on_interrupt() }
+    // SAFETY: this is the handler.
+    unsafe { parts::on_links() }
 }
 
 /// The same for plans and flash.
 #[interrupt]
 unsafe fn UART8() {
     // SAFETY: as above.
-    unsafe { PLANS.on_interrupt() }
+    unsafe { parts::on_plans() }
 }
 
 /// Starts the board. To be called once.
@@ -108,11 +86,11 @@ pub fn start() -> Parts {
             .split();
     let swarm = (receives.into_ring_buffered(RADIO_RING.take()), sends);
     Parts {
-        links: LINKS.start(interrupt::UART7),
-        plans: PLANS.start(interrupt::UART8),
+        links: parts::start_links(interrupt::UART7),
+        plans: parts::start_plans(interrupt::UART8),
         autopilot,
         swarm,
-        flash: Flash(Device::new(p.FLASH, Irqs)),
+        flash: Flash::new(Device::new(p.FLASH, Irqs)),
         watchdog: Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low)),
     }
 }
@@ -138,35 +116,6 @@ fn clocks() -> embassy_stm32::Config {
     config.rcc.apb4_pre = rcc::APBPrescaler::DIV2;
     config.rcc.voltage_scale = rcc::VoltageScale::Scale0;
     config
-}
-
-/// Bank 2 of the flash.
-pub struct Flash(Device<'static, Async>);
-
-impl Flash {
-    /// A roadmap as it lies in the bank; `None` where it would reach beyond.
-    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
-        let end = (at as usize).checked_add(len)?;
-        // SAFETY: inside the bank. The store never erases or programs the slot that a start uses, until the next start.
-        let view = || unsafe { core::slice::from_raw_parts((BANK2_ADDRESS + at as usize) as *const u8, len) };
-        (end <= LAYOUT.len() as usize).then(view)
-    }
-}
-
-impl ReadFlash for Flash {
-    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        self.0.blocking_read(BANK2 + at, out).map_err(|_| Fault)
-    }
-}
-
-impl crate::shell::Flash for Flash {
-    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
-        self.0.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
-    }
-
-    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
-        self.0.write(BANK2 + at, bytes).await.map_err(|_| Fault)
-    }
 }
 
 /// The independent watchdog, and the light that shows that it is fed.

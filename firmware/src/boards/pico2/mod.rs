@@ -12,7 +12,6 @@
 
 use companion::store::{Fault, Layout, ReadFlash};
 use defmt_rtt as _;
-use embassy_executor::{InterruptExecutor, SendSpawner};
 use embassy_rp::flash::{Blocking, Flash as Device};
 use embassy_rp::gpio::{Level, Output};
 use embassy_rp::interrupt;
@@ -20,6 +19,8 @@ use embassy_rp::interrupt::{InterruptExt, Priority};
 use embassy_rp::uart::{self, BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx};
 use embassy_rp::{Peri, bind_interrupts, peripherals, watchdog};
 use static_cell::ConstStaticCell;
+
+use super::parts::{self, Parts};
 
 bind_interrupts!(struct Irqs {
     UART0_IRQ => BufferedInterruptHandler<peripherals::UART0>;
@@ -48,41 +49,22 @@ pub type Receiver = BufferedUartRx;
 /// Transmits by interrupt from a ring.
 pub type Transmitter = BufferedUartTx;
 
-/// The board, ready.
-pub struct Parts {
-    /// Runs links and setpoints, by interrupt.
-    pub links: SendSpawner,
-    /// Runs what takes long, by an interrupt below that.
-    pub plans: SendSpawner,
-    /// To the autopilot.
-    pub autopilot: (Receiver, Transmitter),
-    /// To the swarm's radio.
-    pub swarm: (Receiver, Transmitter),
-    /// For files and parameters.
-    pub flash: Flash,
-    /// Asleep.
-    pub watchdog: Watchdog,
-}
-
 /// Priority of the executor of links and setpoints: below all devices.
 pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
 const LINKS_AT: Priority = Priority::P1;
 
-static LINKS: InterruptExecutor = InterruptExecutor::new();
-static PLANS: InterruptExecutor = InterruptExecutor::new();
-
 /// Runs the executor of links and setpoints.
 #[interrupt]
 unsafe fn SWI_IRQ_0() {
-    // SAFETY: this is the handler; the interrupt is enabled by `start` alone, after which the executor is there.
-    unsafe { LINKS.on_interrupt() }
+    // SAFETY: this is the handler.
+    unsafe { parts::on_links() }
 }
 
 /// Runs the executor of plans and flash.
 #[interrupt]
 unsafe fn SWI_IRQ_1() {
     // SAFETY: as above.
-    unsafe { PLANS.on_interrupt() }
+    unsafe { parts::on_plans() }
 }
 
 /// Starts the board. To be called once.
@@ -104,8 +86,8 @@ pub fn start() -> Parts {
     let autopilot = (receives, sends);
     let (sends, receives) = swarm.split();
     Parts {
-        links: LINKS.start(interrupt::SWI_IRQ_0),
-        plans: PLANS.start(interrupt::SWI_IRQ_1),
+        links: parts::start_links(interrupt::SWI_IRQ_0),
+        plans: parts::start_plans(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),
         flash: Flash(Device::new_blocking(p.FLASH)),

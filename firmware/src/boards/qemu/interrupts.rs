@@ -3,9 +3,10 @@
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
-use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_executor::SendSpawner;
 
 use super::{clock, uart};
+use crate::boards::parts;
 
 /// Priority of devices.
 pub const DEVICES: u8 = 0x40;
@@ -77,29 +78,26 @@ unsafe extern "C" fn timer1() {
     clock::on_timer1();
 }
 
-static LINKS_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
-static PLANS_EXECUTOR: InterruptExecutor = InterruptExecutor::new();
-
 unsafe extern "C" fn links() {
-    // SAFETY: this is the handler; the interrupt is enabled by `start_links` alone, after which the executor is there.
-    unsafe { LINKS_EXECUTOR.on_interrupt() }
+    // SAFETY: this is the handler.
+    unsafe { parts::on_links() }
 }
 
 unsafe extern "C" fn plans() {
-    // SAFETY: as above, with `start_plans`.
-    unsafe { PLANS_EXECUTOR.on_interrupt() }
+    // SAFETY: as above.
+    unsafe { parts::on_plans() }
 }
 
 /// Starts the executor of links and setpoints. To be called once.
 pub fn start_links() -> SendSpawner {
     set_priority(Irq::Links, LINKS);
-    LINKS_EXECUTOR.start(Irq::Links)
+    parts::start_links(Irq::Links)
 }
 
 /// Starts the executor of plans and flash. To be called once.
 pub fn start_plans() -> SendSpawner {
     set_priority(Irq::Plans, PLANS);
-    PLANS_EXECUTOR.start(Irq::Plans)
+    parts::start_plans(Irq::Plans)
 }
 
 fn set_priority(irq: Irq, priority: u8) {

@@ -5,6 +5,8 @@
 const MAP: usize = 0x6080_0000;
 /// Bytes before its words: three dimensions, three coordinates of the minimum corner, the resolution, the number of words.
 const MAP_HEAD: usize = 32;
+/// Where nothing lies.
+const SPARE: usize = 0x6040_0000;
 /// Bank 2 of the flash.
 const BANK2: usize = 0x6000_0000;
 /// Its length.
@@ -24,4 +26,10 @@ pub fn map() -> ([u8; MAP_HEAD], &'static [u64]) {
     // SAFETY: as above; the memory there is 8 MB long.
     let words = unsafe { core::slice::from_raw_parts((MAP + MAP_HEAD) as *const u64, words.min(1 << 19)) };
     (head, words)
+}
+
+/// Memory as long as bank 2 and a place for a flash that programs and erases in no time, for measurements.
+pub fn spare() -> &'static mut [u8] {
+    // SAFETY: memory of this board that nothing else uses; `calls` takes it once.
+    unsafe { core::slice::from_raw_parts_mut(SPARE as *mut u8, BANK2_LEN) }
 }

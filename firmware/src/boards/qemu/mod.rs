@@ -1,7 +1,6 @@
 //! QEMU's `mps2-an500`: a Cortex-M7 with FPU, linked against the memory of the STM32H743.
 
 use defmt_semihosting as _;
-use embassy_executor::SendSpawner;
 
 pub mod clock;
 pub mod flash;
@@ -16,21 +15,7 @@ pub use interrupts::LINKS as LINKS_PRIORITY;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;
 
-/// The board, ready.
-pub struct Parts {
-    /// Runs links and setpoints, by interrupt.
-    pub links: SendSpawner,
-    /// Runs what takes long, by an interrupt below that.
-    pub plans: SendSpawner,
-    /// To the autopilot.
-    pub autopilot: (Receiver, Transmitter),
-    /// To the swarm's radio.
-    pub swarm: (Receiver, Transmitter),
-    /// For files and parameters.
-    pub flash: Flash,
-    /// Asleep.
-    pub watchdog: Watchdog,
-}
+use super::parts::Parts;
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {

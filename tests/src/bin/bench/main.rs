@@ -7,6 +7,7 @@ mod assignment;
 mod roadmap;
 mod steps;
 mod swarm;
+mod worst_case;
 
 use std::path::PathBuf;
 
@@ -39,7 +40,7 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
@@ -71,6 +72,9 @@ fn main() -> Result<()> {
     }
     if "steps".contains(&args.only) {
         rows.extend(steps::rows()?);
+    }
+    if "worst-case".contains(&args.only) {
+        rows.extend(worst_case::rows()?);
     }
     println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
     for Row { name, ours, theirs, ratio, required, unit, n } in &rows {

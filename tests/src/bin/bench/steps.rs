@@ -11,7 +11,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
 use firmware::cases::{STEPS, StepCase};
-use planner_core::deconflict::Advice;
+use planner_core::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
@@ -71,7 +71,7 @@ fn counted(neighbours: usize) -> Result<Vec<u64>> {
 #[inline(never)]
 fn priority_step(case: &StepCase) -> Advice {
     // Not the last thing done, or the call would be a jump and callgrind would not see the return.
-    black_box(case.advise())
+    black_box(case.advise(Method::Priority))
 }
 
 /// Every case once.

@@ -1,0 +1,286 @@
+//! The calls of companion on the ground: files, parameters, commands, hostile bytes.
+
+use companion::commands;
+use companion::frame::{self, Framer, Header, MAX_SENT};
+use companion::intent::{self, Intent};
+use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
+use companion::parameters::{self, Parameters};
+use companion::store::{Fault, FlashRequest, READ, ReadFlash, Store};
+use companion::{Duration, Event, Instant, Link};
+use firmware::boards::chosen::{LAYOUT, memory};
+use firmware::calls::{Meter, flight};
+use firmware::capacity::VEHICLES;
+use firmware::cases;
+use firmware::shell::BoardCompanion;
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::plan::VehicleTask;
+use planner_core::roadmap::RoadmapView;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+const COMPANION: usize = size_of::<BoardCompanion>();
+/// Bytes that a shell hands over at once.
+const CHUNK: usize = 256;
+const FILE_TRANSFER: u32 = 110;
+const PARAM_REQUEST_LIST: u32 = 21;
+const PARAM_SET: u32 = 23;
+const COMMAND_LONG: u32 = 76;
+/// Opcodes of MAVLink FTP.
+const TERMINATE: u8 = 1;
+const OPEN_READ: u8 = 4;
+const CREATE: u8 = 6;
+const WRITE: u8 = 7;
+const CRC32: u8 = 14;
+const BURST_READ: u8 = 15;
+const ACK: u8 = 128;
+/// Data of an FTP packet.
+const DATA: usize = 239;
+const GROUND: (u8, u8) = (255, 190);
+
+/// All of them.
+#[inline(never)]
+pub fn run(meter: &mut impl Meter) {
+    bytes(meter);
+    missions(meter);
+    values(meter);
+    let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
+    let flash = Ram(memory::spare());
+    Ground { companion, flash, meter, now: Instant::ZERO + Duration::from_secs(11), sequence: 0, packet: 0 }
+        .run();
+}
+
+/// Bytes that are a frame's beginning again and again, each with a wrong end; and noise.
+fn bytes(meter: &mut impl Meter) {
+    let mut rng = Pcg32::seed_from_u64(1);
+    let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
+    let mut framer = Framer::new();
+    for round in 0..200_u64 {
+        let mut chunk = [0; CHUNK];
+        chunk.iter_mut().for_each(|byte| *byte = rng.next_u32() as u8);
+        if !round.is_multiple_of(4) {
+            for start in chunk.chunks_exact_mut(10) {
+                start.copy_from_slice(&[0xFD, 245 + round as u8 % 11, 0, 0, 0, 1, 1, 0, 0, 0]);
+            }
+        }
+        let now = Instant::ZERO + Duration::from_millis(round);
+        let mut input = &chunk[..];
+        meter.call("frame::Framer::next, 256 hostile bytes", size_of::<Framer>(), || {
+            while framer.next(now, &mut input).is_some() {}
+        });
+        meter.call("Companion::handle_bytes, 256 hostile bytes", COMPANION, || {
+            companion.handle_bytes(Link::Swarm, now, &chunk);
+        });
+    }
+    let points = (0..intent::POINTS).map(|_| cases::anywhere(&mut rng, 50.0)).collect();
+    let intent = Intent {
+        system_id: 2,
+        flags: intent::FLYING,
+        mission_crc: 1,
+        plan_crc: 2,
+        progress_m: 3.0,
+        speed_mps: 1.0,
+        heard: 7,
+        points,
+    };
+    let mut payload = [0; 133];
+    let len = meter.call("intent::Intent::encode", 0, || intent.encode(&mut payload));
+    let mut padded = [0; 255];
+    padded[..len].copy_from_slice(&payload[..len]);
+    meter.call("intent::Intent::decode", 0, || Intent::decode(&padded, 2)).expect("it is one");
+    let mut out = [0; MAX_SENT];
+    let full = [0xA5; 255];
+    let header = Header { system: 1, component: 191, sequence: 0 };
+    meter.call("frame::encode_raw, 255 bytes", 0, || frame::encode_raw(header, 0, 50, &full, &mut out));
+}
+
+/// A mission file for as many vehicles as there may be.
+fn missions(meter: &mut impl Meter) {
+    let header = MissionHeader {
+        roadmap_crc: 0,
+        mode: cases::MODE,
+        method: Method::Priority,
+        origin: flight::ORIGIN,
+        cruise_mps: 2.0,
+        schedule: cases::SCHEDULE,
+        safety_distance_m: 1.5,
+        geofence: None,
+    };
+    let vehicle = |id: u8| MissionVehicle {
+        task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: Some(0) },
+        start: Point::new(f32::from(id), 0.0, 1.0),
+        radius_m: 0.3,
+        speed_max_mps: 5.0,
+    };
+    let vehicles: Vec<_, VEHICLES> = (1..=VEHICLES as u8).map(vehicle).collect();
+    let goals = [MissionGoal { position: Point::new(1.0, 2.0, 3.0), descent_m: 1.0 }; VEHICLES];
+    let mut file = [0; mission_file::encoded_len(VEHICLES, VEHICLES)];
+    meter
+        .call("mission_file::write, 32", 0, || mission_file::write(&header, &vehicles, &goals, &mut file))
+        .expect("a good mission");
+    let view = meter
+        .call("mission_file::MissionView::parse, 32", size_of::<MissionView<'_>>(), || {
+            MissionView::parse(&file)
+        })
+        .expect("a good mission");
+    let config = meter
+        .call("mission_file::MissionView::config, 32", 0, || view.config::<VEHICLES>(VEHICLES as u8))
+        .expect("it is there");
+    let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
+    let _ =
+        meter.call("mission_file::MissionView::request, 32", 0, || view.request(&mut tasks, &mut descents_m));
+    let _ = meter.call("config::Config::check, 32", 0, || config.check());
+    let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
+    meter.call("mission_file::MissionView::fits", 0, || view.fits(&roadmap));
+}
+
+fn values(meter: &mut impl Meter) {
+    let mut values = Parameters::default();
+    let mut config = flight::config();
+    for (index, parameter) in parameters::TABLE.iter().enumerate() {
+        let _ = meter.call("parameters::Parameters::set", 0, || values.set(index, parameter.most));
+        meter.call("parameters::Parameters::index_of", 0, || Parameters::index_of(parameter.name.as_bytes()));
+    }
+    meter.call("parameters::Parameters::apply", 0, || values.apply(&mut config));
+    let bytes = meter.call("parameters::Parameters::to_bytes", 0, || values.to_bytes());
+    let (entries, _) = bytes.as_chunks();
+    entries
+        .iter()
+        .for_each(|entry| meter.call("parameters::Parameters::restore", 0, || values.restore(entry)));
+}
+
+/// A flash in memory that takes no time.
+struct Ram(&'static mut [u8]);
+
+impl ReadFlash for Ram {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+        let at = at as usize;
+        out.copy_from_slice(self.0.get(at..at + out.len()).ok_or(Fault)?);
+        Ok(())
+    }
+}
+
+/// A companion on the ground, its flash, and a ground station.
+struct Ground<'a, M> {
+    companion: BoardCompanion,
+    flash: Ram,
+    meter: &'a mut M,
+    now: Instant,
+    sequence: u8,
+    packet: u16,
+}
+
+impl<M: Meter> Ground<'_, M> {
+    /// Uploads a roadmap, reads it back, sets all parameters, starts anew.
+    fn run(mut self) {
+        self.mount();
+        let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
+        let file = &memory::bank2()[..roadmap.byte_len()];
+        self.ask(CREATE, 0, b"roadmap.bin");
+        for (i, piece) in file.chunks(DATA).enumerate() {
+            self.ask(WRITE, (i * DATA) as u32, piece);
+        }
+        self.ask(TERMINATE, 0, &[]);
+        self.ask(CRC32, 0, b"roadmap.bin");
+        self.ask(OPEN_READ, 0, b"roadmap.bin");
+        self.ask(BURST_READ, 0, &[]);
+        for parameter in parameters::TABLE {
+            let mut set = [0; 23];
+            set[..4].copy_from_slice(&parameter.most.to_le_bytes());
+            (set[4], set[5], set[22]) = (1, companion::COMPONENT, 9);
+            set[6..6 + parameter.name.len()].copy_from_slice(parameter.name.as_bytes());
+            self.hear(PARAM_SET, &set);
+        }
+        self.hear(PARAM_REQUEST_LIST, &[1, companion::COMPONENT]);
+        for command in [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND] {
+            let mut order = [0; 33];
+            order[28..30].copy_from_slice(&command.to_le_bytes());
+            (order[30], order[31]) = (1, companion::COMPONENT);
+            self.hear(COMMAND_LONG, &order);
+        }
+        let store = self.mount();
+        assert!(store, "what was uploaded is there");
+    }
+
+    /// Mounts the flash, as a start does; whether a roadmap lies in it.
+    fn mount(&mut self) -> bool {
+        let flash = &mut self.flash;
+        let store =
+            self.meter.call("store::Store::mount", size_of::<Store>(), || Store::mount(LAYOUT, flash));
+        let found = store.roadmap().is_some();
+        let companion = &mut self.companion;
+        self.meter.call("Companion::mount", COMPANION, || companion.mount(store));
+        self.pump();
+        found
+    }
+
+    /// An FTP request, until it is answered.
+    fn ask(&mut self, opcode: u8, offset: u32, data: &[u8]) {
+        self.packet = self.packet.wrapping_add(1);
+        let mut payload = [0; 254];
+        (payload[1], payload[2]) = (1, companion::COMPONENT);
+        payload[3..5].copy_from_slice(&self.packet.to_le_bytes());
+        (payload[6], payload[7]) = (opcode, data.len() as u8);
+        payload[11..15].copy_from_slice(&offset.to_le_bytes());
+        payload[15..15 + data.len()].copy_from_slice(data);
+        for _ in 0..10 {
+            if self.hear(FILE_TRANSFER, &payload) {
+                return;
+            }
+        }
+        panic!("FTP request {opcode} is not answered");
+    }
+
+    /// Gives it a frame; whether an FTP request was granted.
+    fn hear(&mut self, id: u32, payload: &[u8]) -> bool {
+        self.now = self.now + Duration::from_millis(20);
+        self.sequence = self.sequence.wrapping_add(1);
+        let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
+        let mut bytes = [0; MAX_SENT];
+        let extra = frame::extra_crc(id).expect("a message of the dialect");
+        let len = frame::encode_raw(header, id, extra, payload, &mut bytes);
+        let (now, companion) = (self.now, &mut self.companion);
+        self.meter.call("Companion::handle_bytes, a frame", COMPANION, || {
+            companion.handle_bytes(Link::Autopilot, now, &bytes[..len]);
+        });
+        self.pump()
+    }
+
+    /// Takes all that the companion has to say, and does what it asks of its flash; whether it granted an FTP request.
+    fn pump(&mut self) -> bool {
+        let Self { companion, flash, meter, now, .. } = self;
+        let now = *now;
+        let mut granted = false;
+        meter.call(flight::OTHER_STEP, COMPANION, || companion.handle_timeout(now));
+        loop {
+            let mut out = [0; MAX_SENT];
+            let mut len = 0;
+            for link in [Link::Autopilot, Link::Swarm] {
+                len = meter
+                    .call("Companion::poll_transmit", COMPANION, || companion.poll_transmit(link, &mut out));
+                granted |= len > 16 && out[7..10] == [110, 0, 0] && out[16] == ACK;
+            }
+            let event: Option<Event> =
+                meter.call("Companion::poll_event", COMPANION, || companion.poll_event());
+            let mut bytes = [0; READ];
+            let request = meter.call("Companion::poll_flash", COMPANION, || companion.poll_flash());
+            let idle = request.is_none() && event.is_none() && len == 0;
+            let outcome = match request {
+                None if idle => return granted,
+                None => continue,
+                Some(FlashRequest::Erase { at }) => {
+                    flash.0[at as usize..][..LAYOUT.sector_len as usize].fill(0xFF);
+                    Ok(0)
+                }
+                Some(FlashRequest::Program { at, bytes }) => {
+                    flash.0[at as usize..][..bytes.len()].copy_from_slice(bytes);
+                    Ok(0)
+                }
+                Some(FlashRequest::Read { at, len }) => flash.read(at, &mut bytes[..len]).map(|()| len),
+            };
+            let outcome = outcome.map(|len| &bytes[..len]);
+            meter.call("Companion::handle_flash", COMPANION, || companion.handle_flash(now, outcome));
+        }
+    }
+}

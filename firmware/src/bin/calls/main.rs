@@ -1,0 +1,79 @@
+//! What every public call of planner-core and companion costs a board, in instructions: run in QEMU with `-icount shift=0`, read
+//! by the bench. A roadmap lies in bank 2, a map beyond it. Every line is a name, bytes and instructions.
+#![no_std]
+#![no_main]
+
+mod companion_calls;
+mod planner_calls;
+
+use core::hint::black_box;
+
+use firmware::boards::chosen::clock;
+use firmware::boards::stack;
+use firmware::calls::{Meter, flight};
+use firmware::cases;
+use firmware::shell::BoardCompanion;
+use heapless::Vec;
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+use semihosting::println;
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    println!("panic {info}");
+    semihosting::process::exit(1)
+}
+
+/// Most rows.
+const ROWS: usize = 96;
+
+/// Counts instructions, those of asking the clock left out.
+struct Instructions {
+    rows: Vec<(&'static str, usize, u64), ROWS>,
+}
+
+impl Meter for Instructions {
+    fn call<T>(&mut self, name: &'static str, bytes: usize, work: impl FnOnce() -> T) -> T {
+        let idle = clock::instructions();
+        let before = clock::instructions();
+        let result = black_box(work());
+        let count = (clock::instructions() - before).saturating_sub(before - idle);
+        match self.rows.iter_mut().find(|row| row.0 == name) {
+            Some(row) => row.2 = row.2.max(count),
+            None => self.rows.push((name, bytes, count)).expect("there is room for all rows"),
+        }
+        result
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    clock::start();
+    let mut meter = Instructions { rows: Vec::new() };
+    planner_calls::run(&mut meter);
+    companion_calls::run(&mut meter);
+    fly(&mut meter);
+    for (name, bytes, count) in &meter.rows {
+        println!("call {count} {bytes} {name}");
+    }
+    println!("stack {} {}", stack::used(), stack::size());
+    semihosting::process::exit(0)
+}
+
+/// Control steps in flight.
+#[inline(never)]
+fn fly(meter: &mut Instructions) {
+    let mut steps = 0;
+    for seed in 0.. {
+        let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
+        let config = flight::config();
+        let mut companion = meter
+            .call("Companion::new", size_of::<BoardCompanion>(), || BoardCompanion::new(config))
+            .expect("the settings are good");
+        steps += flight::fly(seed, &plan, &mut companion, meter);
+        if steps >= cases::STEPS {
+            println!("steps {steps}");
+            return;
+        }
+    }
+}

@@ -1,0 +1,379 @@
+//! The calls of planner-core.
+
+use firmware::boards::chosen::memory;
+use firmware::calls::Meter;
+use firmware::capacity::{GATES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
+use firmware::cases::{self, StepCase, anywhere, below, uniform};
+use firmware::scratch::{Planner, Scratch};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::assignment::{self, AssignmentWorkspace};
+use planner_core::deconflict::{Advice, Method};
+use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
+use planner_core::frames::{self, Geodetic, Projection};
+use planner_core::path::{self, Path, TrackConfig, Tracker};
+use planner_core::plan::{self, Goals, PlanRequest, SwarmPlan};
+use planner_core::prm::{self, Config};
+use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
+use planner_core::schedule::sipp::{self, Route, SippWorkspace};
+use planner_core::schedule::{self, Flight, ScheduleWorkspace, VehiclePlan};
+use planner_core::search::{self, SearchWorkspace, WithLengths};
+use planner_core::segment;
+use planner_core::voxel::{Outside, VoxelGrid};
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+use static_cell::ConstStaticCell;
+
+type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
+type Search = SearchWorkspace<ROADMAP_NODES>;
+
+/// Random cases of a call that takes microseconds, and of one that takes milliseconds.
+const MANY: usize = 1000;
+const SOME: usize = 50;
+/// Longest edge, metres.
+const REACH_M: f32 = 8.0;
+/// Nodes of a small roadmap, for calls that only a desk makes.
+const SMALL: usize = 300;
+
+/// Memory beside the scratch.
+struct Beside {
+    plan: Plan,
+    small: prm::Workspace<SMALL, 1024>,
+    nodes: [Point; SMALL],
+    edges: [prm::Edge; 1024],
+    kept: Vec<roadmap::Edge, 1024>,
+    file: [u8; 12 << 10],
+    lengths: [f32; 2048],
+}
+
+static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
+    plan: Plan::new(),
+    small: prm::Workspace::new(),
+    nodes: [Point::new(0.0, 0.0, 0.0); SMALL],
+    edges: [prm::Edge { a: 0, b: 0 }; 1024],
+    kept: Vec::new(),
+    file: [0; 12 << 10],
+    lengths: [0.0; 2048],
+});
+
+/// All of them.
+#[inline(never)]
+pub fn run(meter: &mut impl Meter) {
+    let scratch = SCRATCH.take();
+    let beside = BESIDE.take();
+    let view = meter
+        .call("roadmap::RoadmapView::parse", size_of::<RoadmapView<'_>>(), || {
+            RoadmapView::parse(memory::bank2())
+        })
+        .expect("a roadmap lies in bank 2");
+    places(meter);
+    searches(meter, &view, scratch.planner());
+    assignments(meter, &mut scratch.planner().assignment);
+    plans(meter, &view, scratch.planner(), &mut beside.plan);
+    crowd(meter, &view, scratch.planner(), &mut beside.plan);
+    detours(meter, &view, &mut scratch.planner().search);
+    paths(meter);
+    let (head, words) = memory::map();
+    let grid = cases::map(&head, words);
+    let shape = *grid.shape();
+    // Its shape is good: it was one already.
+    let _ = meter.call("voxel::VoxelGrid::new", size_of::<VoxelGrid<'_>>(), || {
+        VoxelGrid::new(shape, Outside::Blocked, words)
+    });
+    segments(meter, &grid);
+    builds(meter, &grid, scratch);
+    let search = &mut scratch.planner().search;
+    desk(meter, &grid, search, beside);
+}
+
+fn geodetic(rng: &mut Pcg32) -> Geodetic {
+    Geodetic {
+        lat_deg: f64::from(uniform(rng, -70.0, 70.0)),
+        lon_deg: f64::from(uniform(rng, -179.0, 179.0)),
+        alt_m: f64::from(uniform(rng, 0.0, 4000.0)),
+    }
+}
+
+fn places(meter: &mut impl Meter) {
+    let mut rng = Pcg32::seed_from_u64(1);
+    for _ in 0..MANY {
+        let origin = geodetic(&mut rng);
+        let enu = anywhere(&mut rng, 5000.0);
+        let place = meter.call("frames::enu_to_geodetic", 0, || frames::enu_to_geodetic(&origin, &enu));
+        meter.call("frames::geodetic_to_enu", 0, || frames::geodetic_to_enu(&origin, &place));
+        meter.call("frames::haversine_m", 0, || frames::haversine_m(&origin, &place));
+        for projection in [Projection::Px4, Projection::ArduPilot] {
+            let ned = meter
+                .call("frames::geodetic_to_ned", 0, || frames::geodetic_to_ned(projection, &origin, &place));
+            meter.call("frames::ned_to_geodetic", 0, || frames::ned_to_geodetic(projection, &origin, &ned));
+        }
+    }
+}
+
+fn searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
+    let mut rng = Pcg32::seed_from_u64(2);
+    let nodes = view.node_count();
+    let bytes = size_of::<Search>();
+    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+    let search = &mut ws.search;
+    for _ in 0..SOME {
+        let (from, to) = (below(&mut rng, nodes) as u16, below(&mut rng, nodes) as u16);
+        let mut way: Vec<u16, WAYPOINTS> = Vec::new();
+        // No path, or one too long, is an answer too.
+        let _ =
+            meter.call("search::astar", bytes, || search::astar(view, from, to, passable, search, &mut way));
+        let _ = meter.call("search::SearchWorkspace::path_to", 0, || search.path_to(to, &mut way));
+        meter.call("roadmap::RoadmapView::edge_between", 0, || view.edge_between(from, to));
+    }
+    let mut draw =
+        || -> Vec<u16, VEHICLES> { (0..VEHICLES).map(|_| below(&mut rng, nodes) as u16).collect() };
+    let (starts, goals) = (draw(), draw());
+    let mut row = [0.0; VEHICLES];
+    let _ =
+        meter.call("search::dijkstra_all", bytes, || search::dijkstra_all(view, starts[0], passable, search));
+    let _ = meter.call("search::dijkstra_row, 32 targets", bytes, || {
+        search::dijkstra_row(view, starts[0], &goals, passable, search, &mut row)
+    });
+    let mut costs = [[0.0; VEHICLES]; VEHICLES];
+    let _ = meter.call("search::cost_matrix, 32 × 32", bytes, || {
+        search::cost_matrix(view, &starts, &goals, passable, search, costs.as_flattened_mut())
+    });
+}
+
+fn assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHICLES>) {
+    let mut rng = Pcg32::seed_from_u64(3);
+    let bytes = size_of::<AssignmentWorkspace<VEHICLES>>();
+    for case in 0..60 {
+        // Metres at random; few different ones; every third pair impossible; one worse than the other.
+        let mut cost = |i: usize| match case % 4 {
+            0 => uniform(&mut rng, 0.0, 100.0),
+            1 => below(&mut rng, 4) as f32,
+            2 if below(&mut rng, 3) == 0 => f32::INFINITY,
+            2 => uniform(&mut rng, 0.0, 100.0),
+            _ => ((i / VEHICLES + 1) * (i % VEHICLES + 1)) as f32,
+        };
+        let mut costs = [0.0; VEHICLES * VEHICLES];
+        costs.iter_mut().enumerate().for_each(|(i, to)| *to = cost(i));
+        let mut out = [None; VEHICLES];
+        let _ = meter.call("assignment::assign, 32 × 32", bytes, || {
+            assignment::assign(&costs, VEHICLES, VEHICLES, ws, &mut out)
+        });
+        let _ = meter.call("assignment::bottleneck, 32 × 32", bytes, || {
+            assignment::bottleneck(&costs, VEHICLES, VEHICLES, ws, &mut out)
+        });
+    }
+}
+
+/// The demo's ten vehicles.
+fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+    let bytes = size_of::<Planner>();
+    let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
+    let request = PlanRequest {
+        vehicles: &vehicles,
+        descents_m: &descents_m,
+        mode: cases::MODE,
+        schedule: cases::SCHEDULE,
+    };
+    let mut goals = Goals::new();
+    let good = "the demo has a plan";
+    meter.call("plan::costs, 10 × 10", bytes, || plan::costs(view, &request, ws)).expect(good);
+    meter.call("plan::assign, 10 × 10", bytes, || plan::assign(&request, ws, &mut goals)).expect(good);
+    meter.call("plan::schedule, 10", bytes, || plan::schedule(view, &request, &goals, ws, plan)).expect(good);
+    meter.call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan)).expect(good);
+    let bytes = size_of::<SippWorkspace<ROADMAP_NODES, PIECES>>();
+    for (index, flight) in plan.flights.iter().enumerate() {
+        let Some(goal) = flight.goal else { continue };
+        let route =
+            Route { from: index as u16, to: view.header().starts + goal, not_before_s: 0.0, parked: &[] };
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+        let others = plan.flights.iter().filter(|other| other.id != flight.id);
+        let mut own = flight.clone();
+        // That there is no way is an answer too.
+        let _ = meter.call("schedule::sipp::route, past 9", bytes, || {
+            sipp::route(&cases::SCHEDULE, view, &route, passable, others, &mut ws.sipp, &mut own)
+        });
+    }
+}
+
+/// As many vehicles as there may be, on shortest paths between random nodes.
+fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
+    let mut rng = Pcg32::seed_from_u64(4);
+    let cfg = &cases::SCHEDULE;
+    plan.flights.clear();
+    let mut way: Vec<u16, WAYPOINTS> = Vec::new();
+    while plan.flights.len() < VEHICLES {
+        let (from, to) =
+            (below(&mut rng, view.node_count()) as u16, below(&mut rng, view.node_count()) as u16);
+        let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
+        if search::astar(view, from, to, passable, &mut ws.search, &mut way).is_err() || way.len() < 2 {
+            continue;
+        }
+        let mut path = Path::new();
+        way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
+        meter.call("path::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
+        let id = 1 + plan.flights.len() as u8;
+        let flight = Flight { id, goal: Some(0), path, climb_m: 1.0, descent_m: 1.0, depart_s: 0.0 };
+        plan.flights.push(flight).expect("there is room");
+    }
+    let bytes = size_of::<ScheduleWorkspace>();
+    let mut own = VehiclePlan::<WAYPOINTS, GATES>::default();
+    for (index, flight) in plan.flights.iter().enumerate() {
+        let others = || plan.flights.iter().filter(|other| other.id != flight.id);
+        let _ = meter.call("schedule::earliest_departure, past 31", bytes, || {
+            schedule::earliest_departure(cfg, flight, 0.0, others(), &mut ws.schedule)
+        });
+        let _ = meter.call("schedule::gates, past 31", bytes, || {
+            schedule::gates(cfg, flight, others(), &mut ws.schedule, &mut own.gates)
+        });
+        let _ = meter.call("plan::vehicle_plan, past 31", bytes, || {
+            plan::vehicle_plan(plan, index, cfg, &mut ws.schedule, &mut own)
+        });
+    }
+}
+
+fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) {
+    let mut rng = Pcg32::seed_from_u64(5);
+    let bytes = size_of::<Search>();
+    let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
+    let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
+    let mut own = VehiclePlan::<WAYPOINTS, GATES>::default();
+    for case in 0..2 {
+        let mut draw = || view.node(below(&mut rng, view.node_count()) as u16);
+        let (here, other) = (draw(), draw());
+        let mut obstacles: Vec<KeepOff, { 4 * VEHICLES }> = (0..4 * VEHICLES)
+            .map(|i| {
+                let from = draw();
+                KeepOff { from, to: from - Point::new(0.0, 0.0, 20.0), radius_m: 1.0, nature: natures[i % 3] }
+            })
+            .collect();
+        let request = DetourRequest {
+            aside: case % 2 == 0,
+            here,
+            leg: [here, other],
+            leg_clearance_m: 1.0,
+            goal: 0,
+            descent_m: 0.5,
+            required_clearance_m: cases::CLEARANCE_M,
+        };
+        // That there is no way is an answer too.
+        let _ = meter.call("detour::plan, 128 things", bytes, || {
+            detour::plan(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
+        });
+        let _ = meter.call("detour::plan_vehicle, 128 things", bytes, || {
+            detour::plan_vehicle(view, &request, &mut obstacles, search, &mut nodes, &mut own)
+        });
+        meter.call("detour::KeepOff::holds", 0, || obstacles[0].holds(&here));
+    }
+}
+
+fn paths(meter: &mut impl Meter) {
+    let mut rng = Pcg32::seed_from_u64(6);
+    for case in 0..MANY {
+        let mut path: Path<WAYPOINTS> = Path::new();
+        for _ in 0..WAYPOINTS {
+            let next =
+                path.waypoints().last().map_or(Point::zeros(), |w| w.position + anywhere(&mut rng, 5.0));
+            meter.call("path::Path::push", 0, || path.push(next, 1.0)).expect("there is room");
+        }
+        let length_m = path.length_m();
+        let along_m = uniform(&mut rng, 0.0, length_m);
+        let near = anywhere(&mut rng, 30.0);
+        meter.call("path::Path::point_at", 0, || path.point_at(along_m));
+        meter.call("path::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
+        meter.call("path::Path::project", 0, || path.project(&near, along_m, length_m));
+        let mut tracker = Tracker { along_m, speed_mps: 1.0 };
+        let track = TrackConfig::default();
+        meter.call("path::advance", size_of::<Tracker>(), || {
+            path::advance(&track, &path, &mut tracker, &near, &Advice::FREE, 0.05)
+        });
+        let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
+        meter.call("detour::is_blocked", 0, || {
+            detour::is_blocked(&path, -1.0, 1.0, 1.0, &Point::new(500.0, 0.0, 0.0), &obstacle)
+        });
+        let step = StepCase::new(&mut rng, VEHICLES, case % 2 == 0);
+        meter.call("deconflict::advise, priority", 0, || step.advise(Method::Priority));
+        meter.call("deconflict::advise, algorithm2", 0, || step.advise(Method::Algorithm2));
+    }
+}
+
+fn segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
+    let mut rng = Pcg32::seed_from_u64(7);
+    let (min, max) = (grid.shape().min, grid.shape().max());
+    for _ in 0..MANY {
+        let a = Point::from_fn(|axis, _| uniform(&mut rng, min[axis], max[axis]));
+        let way = anywhere(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_else(Point::x);
+        let b = a + way * REACH_M;
+        meter.call("voxel::VoxelGrid::is_blocked_at", 0, || grid.is_blocked_at(&a));
+        meter.call("segment::segment_is_clear, 0 m", 0, || segment::segment_is_clear(grid, &a, &b, 0.0));
+        meter.call("segment::segment_is_clear, 0.8 m", 0, || {
+            segment::segment_is_clear(grid, &a, &b, cases::CLEARANCE_M)
+        });
+        if let (Some(from), Some(to)) = (segment::snap(grid.shape(), &a), segment::snap(grid.shape(), &b)) {
+            meter.call("segment::snapped_segment_touches", 0, || {
+                segment::snapped_segment_touches(grid, &from, &to)
+            });
+        }
+        meter.call("segment::segment_clearance, to 2 m", 0, || segment::segment_clearance(grid, &a, &b, 2.0));
+        meter.call("segment::point_clearance, to 2 m", 0, || segment::point_clearance(grid, &a, 2.0));
+        let nodes = [a, b];
+        meter.call("prm::edge_clearance, to 2 m", 0, || {
+            prm::edge_clearance(grid, &nodes, prm::Edge { a: 0, b: 1 }, 2.0)
+        });
+    }
+}
+
+/// P3D's building on board.
+fn builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut Scratch) {
+    let bytes = size_of::<prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>>();
+    let good = "the building has room";
+    let builder = scratch.builder();
+    meter.call("prm::sample_nodes, 2300", 0, || builder.sample(grid, &[], &cases::BUILT)).expect(good);
+    meter.call("prm::Workspace::index, 2300", bytes, || builder.index(&cases::BUILT)).expect(good);
+    meter.call("prm::connect_range, 2300", bytes, || builder.join(grid, &cases::BUILT)).expect(good);
+    let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::BUILT };
+    meter.call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample(grid, &[], &wide)).expect(good);
+    builder.index(&wide).expect(good);
+    meter.call("prm::connect_range, 2300, 0.8 m", bytes, || builder.join(grid, &wide)).expect(good);
+}
+
+/// Calls that a desk makes, on a small roadmap.
+fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, beside: &mut Beside) {
+    let Beside { small, nodes, edges, kept, file, lengths, .. } = beside;
+    let config = Config { nodes: SMALL, ..cases::BUILT };
+    let good = "the building has room";
+    prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
+    let count = meter
+        .call("prm::connect, 300", size_of::<prm::Workspace<SMALL, 1024>>(), || {
+            prm::connect(grid, nodes, &config, small, edges)
+        })
+        .expect(good);
+    let mut pairs = 0;
+    meter
+        .call("prm::connect_all_pairs, 300", 0, || {
+            prm::connect_all_pairs(grid, nodes, &config, |_| pairs += 1)
+        })
+        .expect(good);
+    assert_eq!(pairs, count, "the same edges");
+    kept.extend(edges[..count].iter().map(|e| roadmap::Edge { a: e.a, b: e.b, clearance_m: 0.0 }));
+    let header = RoadmapHeader {
+        origin: Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 },
+        edge_min_m: config.edge_min_m,
+        edge_max_m: config.edge_max_m,
+        tested_clearance_m: 0.0,
+        max_clearance_m: 2.0,
+        starts: 0,
+        goals: 0,
+    };
+    meter.call("roadmap::write, 300", 0, || roadmap::write(&header, nodes, kept, file)).expect(good);
+    let len = meter
+        .call("roadmap::write_with_landmarks, 300", size_of::<Search>(), || {
+            roadmap::write_with_landmarks(&header, nodes, kept, search, file)
+        })
+        .expect(good);
+    let view = RoadmapView::parse(&file[..len]).expect(good);
+    // As many numbers as half-edges.
+    let _ = meter.call("search::WithLengths::new, 300", 4 * view.half_edge_count(), || {
+        WithLengths::new(view, lengths)
+    });
+}

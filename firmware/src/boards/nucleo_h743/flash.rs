@@ -1,0 +1,129 @@
+//! Bank 2 of the STM32H743's flash: 8 sectors of 128 kB, words of 32 bytes with an error-correcting code each.
+//!
+//! A word whose programming was cut by a reset has a code that fits nothing. Reading one is answered by a bus error (RM0433, "Error
+//! code correction": double error detection), which would end in a hard fault. So all is read as memory is probed (ARMv7-M
+//! manual, `CCR.BFHFNMIGN`): with FAULTMASK set this code runs at priority −1, where that bit has a load's bus error ignored and
+//! noted in CFSR alone. For the time of one word, about a microsecond, no interrupt is taken but NMI. A load's error belongs to
+//! the load that made it, so what is found in CFSR between the barriers is this word's. The flag that the flash itself keeps is not
+//! asked: a load that the processor made ahead of time, and dropped, may have set it.
+//!
+//! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6 takes every erasure and program for
+//! failed: it clears them by FLASH_SR2, which on this chip is read-only for them. So they are cleared before.
+//!
+//! None of this has run on a chip.
+#![expect(unsafe_code, reason = "flash is memory, and its errors are faults")]
+
+use core::arch::asm;
+
+use companion::store::{Fault, Layout, ReadFlash, WORD};
+use cortex_m::asm::{dsb, isb};
+use cortex_m::peripheral::SCB;
+use embassy_stm32::flash::{Async, Flash as Device};
+use embassy_stm32::pac;
+
+/// Where bank 2 begins, from the start of the flash.
+const BANK2: u32 = 1 << 20;
+/// The same as an address.
+const BANK2_ADDRESS: usize = 0x0810_0000;
+/// `CCR.BFHFNMIGN`: at priority −1 and above, bus errors of loads are ignored.
+const BFHFNMIGN: u32 = 1 << 8;
+/// `CFSR`'s byte of bus faults; ones clear it.
+const BUS_FAULTS: u32 = 0xFF00;
+
+/// Bank 2.
+pub const LAYOUT: Layout = Layout::H743;
+
+/// Bank 2; there is one.
+pub struct Flash(Device<'static, Async>);
+
+impl Flash {
+    pub(super) fn new(device: Device<'static, Async>) -> Self {
+        Self(device)
+    }
+
+    /// A roadmap as it lies in the bank; `None` where it would reach beyond. The store gives only what it has read whole, by
+    /// [`ReadFlash::read`]: no word of it is torn.
+    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
+        let address = place(at, len)?;
+        // SAFETY: inside the bank. The store never erases or programs the slot that a start uses, until the next start.
+        Some(unsafe { core::slice::from_raw_parts(address as *const u8, len) })
+    }
+}
+
+/// The address of bytes of the bank; `None` where they would reach beyond.
+fn place(at: u32, len: usize) -> Option<usize> {
+    let end = (at as usize).checked_add(len)?;
+    (end <= LAYOUT.len() as usize).then_some(BANK2_ADDRESS + at as usize)
+}
+
+impl ReadFlash for Flash {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+        let mut address = place(at, out.len()).ok_or(Fault)?;
+        let mut rest = out;
+        while !rest.is_empty() {
+            let (piece, after) = rest.split_at_mut(rest.len().min(WORD - address % WORD));
+            // SAFETY: inside the bank, by `place`; and inside one word.
+            unsafe { probe(address as *const u8, piece) }?;
+            address += piece.len();
+            rest = after;
+        }
+        Ok(())
+    }
+}
+
+/// Reads bytes that may raise a bus error; then their values mean nothing.
+///
+/// # Safety
+/// They have to be memory, whole or torn.
+unsafe fn probe(from: *const u8, out: &mut [u8]) -> Result<(), Fault> {
+    // SAFETY: no other code of the firmware uses CCR and CFSR but the fault handler, which does not come back.
+    let scb = unsafe { &*SCB::PTR };
+    // SAFETY: FAULTMASK and BFHFNMIGN are set for the loads alone, and put back: they were not set before. Nothing in between may
+    // panic; `out` is not in the flash, so only the loads can fail.
+    unsafe {
+        asm!("cpsid f", options(nostack, preserves_flags));
+        scb.ccr.modify(|ccr| ccr | BFHFNMIGN);
+        scb.cfsr.write(BUS_FAULTS);
+        dsb();
+        isb();
+        for (i, byte) in out.iter_mut().enumerate() {
+            *byte = from.add(i).read_volatile();
+        }
+        dsb();
+        isb();
+        let torn = scb.cfsr.read() & BUS_FAULTS != 0;
+        scb.cfsr.write(BUS_FAULTS);
+        scb.ccr.modify(|ccr| ccr & !BFHFNMIGN);
+        dsb();
+        isb();
+        asm!("cpsie f", options(nostack, preserves_flags));
+        if torn { Err(Fault) } else { Ok(()) }
+    }
+}
+
+/// Clears what earlier loads and operations have left.
+fn clear_errors() {
+    pac::FLASH.bank(1).ccr().write(|w| {
+        w.set_clr_wrperr(true);
+        w.set_clr_pgserr(true);
+        w.set_clr_strberr(true);
+        w.set_clr_incerr(true);
+        w.set_clr_operr(true);
+        w.set_clr_rdperr(true);
+        w.set_clr_rdserr(true);
+        w.set_clr_sneccerr(true);
+        w.set_clr_dbeccerr(true);
+    });
+}
+
+impl crate::shell::Flash for Flash {
+    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+        clear_errors();
+        self.0.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
+    }
+
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+        clear_errors();
+        self.0.write(BANK2 + at, bytes).await.map_err(|_| Fault)
+    }
+}

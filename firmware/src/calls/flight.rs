@@ -1,0 +1,391 @@
+//! A companion in flight by script, 32 neighbours around it: whole control steps to be counted.
+//!
+//! The script is a PX4 that goes where its setpoint says, and neighbours that tell random places, intents and flags, or nothing.
+//! Half of the flights are hard: everybody is near, and off the plan, out of it, or silent for up to 90 s.
+
+use companion::frame::{self, Header, MAX_SENT};
+use companion::intent::{self, Intent};
+use companion::{Config, Duration, Event, Instant, Link, PlanFailure, RosterEntry};
+use heapless::Vec;
+use planner_core::frames::{self, Geodetic};
+use planner_core::path::Path;
+use planner_core::schedule::{Gate, VehiclePlan};
+use planner_core::{Point, frames::swap_enu_ned};
+use rand_core::SeedableRng;
+use rand_pcg::Pcg32;
+
+use super::Meter;
+use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::cases::{anywhere, below, uniform};
+use crate::shell::BoardCompanion;
+
+/// Mission and EKF origin of every flight.
+pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+/// What a control step is called in the table where all neighbours speak.
+pub const STEP: &str = "Companion::handle_timeout, 32 speak";
+/// The same where most have left the plan or fell silent.
+pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
+/// Any other, and what else is due.
+pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
+const SYSTEM: u8 = 1;
+const MISSION_CRC: u32 = 0xC0FFEE;
+const PLAN_CRC: u32 = 5;
+/// Control steps counted in each flight.
+const STEPS: usize = 100;
+/// Most steps of 0.9 s before them, in which silent neighbours grow old. A longer one would be a gap in the position.
+const AGEING: usize = 100;
+const STEP_TIME: Duration = Duration::from_millis(50);
+const AGEING_TIME: Duration = Duration::from_millis(900);
+/// Steps of 50 ms within which it is in the air.
+const TAKE_OFF: usize = 400;
+
+const HEARTBEAT: u32 = 0;
+const SYS_STATUS: u32 = 1;
+const LOCAL_POSITION_NED: u32 = 32;
+const GLOBAL_POSITION_INT: u32 = 33;
+const GPS_GLOBAL_ORIGIN: u32 = 49;
+const COMMAND_LONG: u32 = 76;
+const SET_POSITION_TARGET_LOCAL_NED: u32 = 84;
+const EXTENDED_SYS_STATE: u32 = 245;
+const TUNNEL: u32 = 385;
+const DO_SET_MODE: u16 = 176;
+const MISSION_START: u16 = 300;
+const ARM_DISARM: u16 = 400;
+const REQUEST_MESSAGE: u16 = 512;
+
+struct Other {
+    place: Point,
+    flags: u8,
+    progress_m: f32,
+    silent: bool,
+}
+
+/// One flight.
+pub struct Flight<'a, M> {
+    companion: &'a mut BoardCompanion,
+    meter: &'a mut M,
+    now: Instant,
+    place: Point,
+    target: Option<Point>,
+    mode: u32,
+    armed: bool,
+    sequences: [u8; 256],
+    others: Vec<Other, VEHICLES>,
+    plan: &'a VehiclePlan<WAYPOINTS, GATES>,
+}
+
+/// The settings of vehicle 1 of a swarm as large as this board's.
+pub fn config() -> Config<VEHICLES> {
+    let start = Point::new(0.0, 0.0, 10.0);
+    let mut config = Config::new(SYSTEM, start, ORIGIN);
+    config.mission_crc = MISSION_CRC;
+    for id in 2..=VEHICLES as u8 {
+        config.roster.push(RosterEntry { system_id: id, start }).expect("there is room");
+    }
+    config
+}
+
+/// A random plan as long as a board's may be.
+pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
+    let mut path = Path::new();
+    let mut at = Point::new(0.0, 0.0, 10.0);
+    for _ in 0..WAYPOINTS {
+        path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
+        at += anywhere(rng, 5.0);
+    }
+    let length_m = path.length_m();
+    let mut gates: Vec<_, GATES> = (0..GATES)
+        .map(|_| Gate {
+            at_m: uniform(rng, 0.0, length_m),
+            id: 2 + below(rng, VEHICLES) as u8,
+            until_m: uniform(rng, 0.0, 60.0),
+        })
+        .collect();
+    gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
+    VehiclePlan {
+        goal: Some(0),
+        path,
+        climb_m: 1.0,
+        descent_m: 1.0,
+        depart_s: 0.0,
+        gates,
+        plan_crc: PLAN_CRC,
+    }
+}
+
+/// One flight, its control steps counted by `meter`; how many there were.
+///
+/// # Panics
+/// The companion does not take off: the script is wrong.
+pub fn fly<M: Meter>(
+    seed: u64,
+    plan: &VehiclePlan<WAYPOINTS, GATES>,
+    companion: &mut BoardCompanion,
+    meter: &mut M,
+) -> usize {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let hard = seed.is_multiple_of(2);
+    let mut flight = Flight {
+        companion,
+        meter,
+        now: Instant::ZERO,
+        place: Point::new(0.0, 0.0, 9.0),
+        target: None,
+        mode: 0,
+        armed: false,
+        sequences: [0; 256],
+        others: Vec::new(),
+        plan,
+    };
+    // Far away, and past every gate.
+    let far = || Other { place: Point::new(300.0, 0.0, 0.0), flags: AIR, progress_m: 1e3, silent: false };
+    flight.others.extend((0..VEHICLES).map(|_| far()));
+    flight.take_off();
+    for (i, other) in flight.others.iter_mut().enumerate() {
+        let (flags, silent) = match seed % 4 {
+            // All on ways of their own: each is looked at along the whole path ahead.
+            1 => (AIR | intent::DETOURS, false),
+            3 => EASY[below(&mut rng, EASY.len())],
+            _ => HARD[below(&mut rng, HARD.len())],
+        };
+        // One always speaks, so that it is not alone.
+        (other.flags, other.silent) = (flags, silent && i > 0);
+        other.place = flight.place + anywhere(&mut rng, if hard { 6.0 } else { 20.0 });
+        other.progress_m = uniform(&mut rng, 0.0, 60.0);
+    }
+    flight.tell_all(&mut rng, |_| true);
+    if hard {
+        for _ in 0..below(&mut rng, AGEING) {
+            flight.tell(0, &mut rng);
+            flight.tick(OTHER_STEP, AGEING_TIME);
+        }
+    }
+    for step in 0..STEPS {
+        if !flight.flies() {
+            return step;
+        }
+        if step.is_multiple_of(8) {
+            let here = flight.place;
+            for other in flight.others.iter_mut().filter(|other| !other.silent) {
+                other.place = here + anywhere(&mut rng, if hard { 3.0 } else { 12.0 });
+            }
+            flight.tell_all(&mut rng, |other| !other.silent);
+        }
+        flight.tick(if hard { HARD_STEP } else { STEP }, STEP_TIME);
+    }
+    STEPS
+}
+
+const AIR: u8 = intent::FLYING | intent::ON_PLAN;
+/// Flags of a neighbour, and whether it falls silent.
+const EASY: [(u8, bool); 4] = [
+    (AIR, false),
+    (intent::GROUNDED | intent::ON_PLAN | intent::WAITING, false),
+    (AIR | intent::DETOURS, false),
+    (intent::GROUNDED | intent::LANDED | intent::ON_PLAN, false),
+];
+const HARD: [(u8, bool); 4] =
+    [(intent::FLYING, false), (intent::FLYING | intent::OUT, false), (AIR, true), (intent::FLYING, true)];
+
+impl<M: Meter> Flight<'_, M> {
+    fn flies(&self) -> bool {
+        use companion::State::*;
+        matches!(self.companion.state(), Follow | Blocked | Replanning)
+    }
+
+    fn take_off(&mut self) {
+        let mut rng = Pcg32::seed_from_u64(0);
+        self.tell_all(&mut rng, |_| true);
+        for step in 0..TAKE_OFF {
+            if step.is_multiple_of(4) {
+                self.tell(0, &mut rng);
+            }
+            if self.companion.state() == companion::State::Ready {
+                let mut order = [0; 33];
+                order[28..30].copy_from_slice(&MISSION_START.to_le_bytes());
+                (order[30], order[31]) = (SYSTEM, companion::COMPONENT);
+                self.hear(Link::Swarm, (255, 190), COMMAND_LONG, &order);
+            }
+            self.tick(OTHER_STEP, STEP_TIME);
+            if self.companion.state() == companion::State::Follow {
+                return;
+            }
+        }
+        panic!("it does not take off: {:?}", self.companion.state());
+    }
+
+    /// So much time passes: the companion's step, then the autopilot's.
+    fn tick(&mut self, name: &'static str, time: Duration) {
+        self.now = self.now + time;
+        let (now, companion) = (self.now, &mut *self.companion);
+        self.meter.call(name, size_of::<BoardCompanion>(), || companion.handle_timeout(now));
+        self.drain();
+        if let Some(target) = self.target.filter(|_| self.armed) {
+            let way = target - self.place;
+            self.place += way * (0.1 / way.norm().max(0.1));
+        }
+        if time > STEP_TIME || self.now.micros().is_multiple_of(1_000_000) {
+            let [a, b, c, d] = self.mode.to_le_bytes();
+            let armed = if self.armed { 129 } else { 1 };
+            self.hear(Link::Autopilot, (SYSTEM, 1), HEARTBEAT, &[a, b, c, d, 2, 12, armed, 4, 3]);
+            let landed = if self.place.z > 9.05 { 2 } else { 1 };
+            self.hear(Link::Autopilot, (SYSTEM, 1), EXTENDED_SYS_STATE, &[0, landed]);
+            let mut status = [0; 31];
+            status[30] = 90;
+            self.hear(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
+        }
+        let ned = swap_enu_ned(&self.place);
+        let mut position = [0; 28];
+        position[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+        put(&mut position[4..], &[ned.x, ned.y, ned.z]);
+        self.hear(Link::Autopilot, (SYSTEM, 1), LOCAL_POSITION_NED, &position);
+    }
+
+    /// Gives the companion a frame.
+    fn hear(&mut self, link: Link, from: (u8, u8), id: u32, payload: &[u8]) {
+        let sequence = &mut self.sequences[usize::from(from.0)];
+        *sequence = sequence.wrapping_add(1);
+        let header = Header { system: from.0, component: from.1, sequence: *sequence };
+        let mut bytes = [0; MAX_SENT];
+        let extra = frame::extra_crc(id).expect("a message of the dialect");
+        let len = frame::encode_raw(header, id, extra, payload, &mut bytes);
+        let (now, companion) = (self.now, &mut *self.companion);
+        let bytes = &bytes[..len];
+        self.meter.call("Companion::handle_bytes, a frame", size_of::<BoardCompanion>(), || {
+            companion.handle_bytes(link, now, bytes);
+        });
+        self.drain();
+    }
+
+    fn tell_all(&mut self, rng: &mut Pcg32, who: impl Fn(&Other) -> bool) {
+        for i in 0..self.others.len() {
+            if who(&self.others[i]) {
+                self.tell(i, rng);
+            }
+        }
+    }
+
+    /// A neighbour tells its intent and its position.
+    fn tell(&mut self, i: usize, rng: &mut Pcg32) {
+        let Other { place, flags, progress_m, .. } = self.others[i];
+        let system_id = 2 + i as u8;
+        let points = (0..intent::POINTS).map(|_| place + anywhere(rng, 3.0)).collect();
+        let intent = Intent {
+            system_id,
+            flags,
+            mission_crc: MISSION_CRC,
+            plan_crc: PLAN_CRC,
+            progress_m,
+            speed_mps: 1.0,
+            heard: u32::MAX,
+            points,
+        };
+        let mut payload = [0; 133];
+        let len = intent.encode(&mut payload);
+        self.hear(Link::Swarm, (system_id, companion::COMPONENT), TUNNEL, &payload[..len]);
+        let at = frames::enu_to_geodetic(&ORIGIN, &place);
+        let mut position = [0; 28];
+        position[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+        let whole = [(at.lat_deg * 1e7) as i32, (at.lon_deg * 1e7) as i32, (at.alt_m * 1e3) as i32];
+        for (to, number) in position[4..].chunks_exact_mut(4).zip(whole) {
+            to.copy_from_slice(&number.to_le_bytes());
+        }
+        for to in position[20..26].chunks_exact_mut(2) {
+            to.copy_from_slice(&(uniform(rng, -200.0, 200.0) as i16).to_le_bytes());
+        }
+        self.hear(Link::Swarm, (system_id, companion::COMPONENT), GLOBAL_POSITION_INT, &position);
+    }
+
+    /// Takes all that the companion has to say, and does as it asks.
+    fn drain(&mut self) {
+        for link in [Link::Autopilot, Link::Swarm] {
+            loop {
+                let mut out = [0; MAX_SENT];
+                let companion = &mut *self.companion;
+                let len = self.meter.call("Companion::poll_transmit", size_of::<BoardCompanion>(), || {
+                    companion.poll_transmit(link, &mut out)
+                });
+                if len == 0 {
+                    break;
+                }
+                if link == Link::Autopilot {
+                    self.obey(&out[..len]);
+                }
+            }
+        }
+        while let Some(event) = self.companion.poll_event() {
+            if event != Event::PlanRequested {
+                continue;
+            }
+            let (now, companion) = (self.now, &mut *self.companion);
+            let mut obstacles = 0_usize;
+            let around = self.meter.call("Companion::detour", size_of::<BoardCompanion>(), || {
+                companion.detour(|_| obstacles += 1)
+            });
+            let answer = if around.is_some() { Err(PlanFailure::Unreachable) } else { Ok(self.plan) };
+            self.meter.call("Companion::handle_plan", size_of::<BoardCompanion>(), || {
+                companion.handle_plan(now, answer);
+            });
+        }
+    }
+
+    /// Does what the autopilot is told by a frame.
+    fn obey(&mut self, frame: &[u8]) {
+        let mut p = [0; 255];
+        let payload = &frame[10..frame.len() - 2];
+        p[..payload.len()].copy_from_slice(payload);
+        let real = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+        match u32::from_le_bytes([frame[7], frame[8], frame[9], 0]) {
+            SET_POSITION_TARGET_LOCAL_NED => {
+                self.target = Some(swap_enu_ned(&Point::new(real(4), real(8), real(12))));
+            }
+            COMMAND_LONG => match u16::from_le_bytes([p[28], p[29]]) {
+                DO_SET_MODE => self.mode = (real(4) as u32) << 16 | (real(8) as u32) << 24,
+                ARM_DISARM => self.armed = real(0) == 1.0,
+                REQUEST_MESSAGE if real(0) == GPS_GLOBAL_ORIGIN as f32 => {
+                    let mut origin = [0; 20];
+                    let whole = [ORIGIN.lat_deg * 1e7, ORIGIN.lon_deg * 1e7, ORIGIN.alt_m * 1e3];
+                    for (to, number) in origin.chunks_exact_mut(4).zip(whole) {
+                        to.copy_from_slice(&(number as i32).to_le_bytes());
+                    }
+                    self.hear(Link::Autopilot, (SYSTEM, 1), GPS_GLOBAL_ORIGIN, &origin);
+                }
+                _ => {}
+            },
+            _ => {}
+        }
+    }
+}
+
+fn put(to: &mut [u8], numbers: &[f32]) {
+    for (to, number) in to.chunks_exact_mut(4).zip(numbers) {
+        to.copy_from_slice(&number.to_le_bytes());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    struct Counts(usize);
+
+    impl Meter for Counts {
+        fn call<T>(&mut self, name: &'static str, _bytes: usize, work: impl FnOnce() -> T) -> T {
+            self.0 += usize::from(name == STEP || name == HARD_STEP);
+            work()
+        }
+    }
+
+    #[test]
+    fn most_steps_of_a_flight_are_flown() {
+        let mut meter = Counts(0);
+        let mut flown = 0;
+        for seed in 0..10 {
+            let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
+            let mut companion = BoardCompanion::new(config()).expect("the settings are good");
+            flown += fly(seed, &plan, &mut companion, &mut meter);
+        }
+        assert_eq!(meter.0, flown);
+        assert!(flown > 8 * STEPS, "{flown}");
+    }
+}

@@ -1,0 +1,45 @@
+//! Every public call of planner-core and companion: its work bound, the most instructions seen on the emulated board, and the
+//! bytes it is lent. Printed as the table that ARCHITECTURE.md keeps.
+//!
+//! The program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in [`flockmate_tests::bounds`].
+
+use anyhow::{Context, Result};
+use flockmate_tests::board;
+use flockmate_tests::bounds::{self, BOUNDS};
+
+use crate::Row;
+
+/// What a step may cost by deconfliction alone and in all, thousands of instructions.
+const LIMITS: [(&str, &str, f64); 2] = [
+    ("board advise", "deconflict::advise, priority", 60.0),
+    ("board control step", "Companion::handle_timeout, 32 speak", 60.0),
+];
+
+/// Prints the table; rows for what has a limit.
+pub fn rows() -> Result<Vec<Row>> {
+    let Some(program) = board::program("calls") else { return Ok(Vec::new()) };
+    let calls = bounds::counted(&program)?;
+    println!("| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|");
+    for (name, bound) in BOUNDS {
+        let call = calls.get(*name).with_context(|| format!("{name} was not counted"))?;
+        println!("| `{name}` | {bound} | {} | {} |", bounds::rounded(call.instructions), call.bytes);
+    }
+    LIMITS
+        .iter()
+        .map(|&(name, call, limit)| {
+            let ours = calls.get(call).with_context(|| format!("{call} was not counted"))?.instructions
+                as f64
+                * 1e-3;
+            let row = Row {
+                name: name.into(),
+                ours,
+                theirs: limit,
+                ratio: limit / ours,
+                required: 1.0,
+                unit: "ki",
+                n: 32,
+            };
+            Ok(row)
+        })
+        .collect()
+}

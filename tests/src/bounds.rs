@@ -1,0 +1,157 @@
+//! What bounds the work of every public call of planner-core and companion, and what an emulated board counted.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use anyhow::{Context, Result};
+use host_sim::map::{Unknown, building};
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario;
+
+use crate::{board, workspace};
+
+/// What the board's program `calls` calls each call, and what bounds its work: n nodes, h half-edges, w = 64 waypoints, g = 128 gates,
+/// v = 32 vehicles, p = 2048 pieces of flights, d metres of segment, c cells of a map.
+pub const BOUNDS: &[(&str, &str)] = &[
+    ("frames::enu_to_geodetic", "constant: 5 rounds"),
+    ("frames::geodetic_to_enu", "constant"),
+    ("frames::haversine_m", "constant"),
+    ("frames::geodetic_to_ned", "constant"),
+    ("frames::ned_to_geodetic", "constant"),
+    ("voxel::VoxelGrid::new", "constant"),
+    ("voxel::VoxelGrid::is_blocked_at", "constant"),
+    ("segment::segment_is_clear, 0 m", "cells along d"),
+    ("segment::segment_is_clear, 0.8 m", "cells within the clearance of d"),
+    ("segment::snapped_segment_touches", "cells along d"),
+    ("segment::segment_clearance, to 2 m", "cells within what is returned of d, twice"),
+    ("segment::point_clearance, to 2 m", "the same, d = 0"),
+    ("prm::edge_clearance, to 2 m", "one `segment_clearance`"),
+    ("prm::sample_nodes, 2300", "10 000 draws a node"),
+    ("prm::sample_nodes, 2300, 0.8 m", "10 000 draws a node"),
+    ("prm::Workspace::index, 2300", "n + cubes"),
+    ("prm::connect_range, 2300", "pairs within Dmax × one segment check"),
+    ("prm::connect_range, 2300, 0.8 m", "the same"),
+    ("prm::connect, 300", "`index` and `connect_range`"),
+    ("prm::connect_all_pairs, 300", "n² / 2 × one segment check"),
+    ("roadmap::RoadmapView::parse", "n + h, and the CRC of the file"),
+    ("roadmap::RoadmapView::edge_between", "log of a node's degree"),
+    ("roadmap::write, 300", "n + h · log of the degree"),
+    ("roadmap::write_with_landmarks, 300", "the same and two searches"),
+    ("search::astar", "n · log n + h: each node settled once"),
+    ("search::dijkstra_all", "n · log n + h"),
+    ("search::dijkstra_row, 32 targets", "n · log n + h, and n a target"),
+    ("search::cost_matrix, 32 × 32", "v rows"),
+    ("search::SearchWorkspace::path_to", "w"),
+    ("search::WithLengths::new, 300", "h"),
+    ("assignment::assign, 32 × 32", "v³"),
+    ("assignment::bottleneck, 32 × 32", "v³"),
+    ("plan::costs, 10 × 10", "one cost matrix, or v rows"),
+    ("plan::assign, 10 × 10", "one assignment"),
+    ("plan::schedule, 10", "73 rounds of v vehicles, each 3 A* and `sipp::route` a few times"),
+    ("plan::plan_swarm, 10", "the three above"),
+    ("plan::vehicle_plan, past 31", "one `gates`"),
+    ("schedule::sipp::route, past 9", "n states, each with its half-edges × the pieces near"),
+    ("schedule::earliest_departure, past 31", "the pieces of a flight × p"),
+    ("schedule::gates, past 31", "the pieces of a flight × p"),
+    ("detour::plan, 128 things", "two A*, each half-edge × things"),
+    ("detour::plan_vehicle, 128 things", "the same"),
+    ("detour::is_blocked", "w"),
+    ("detour::KeepOff::holds", "constant"),
+    ("deconflict::advise, priority", "g, v a gate in reach, 16 places a neighbour without plan"),
+    ("deconflict::advise, algorithm2", "v"),
+    ("path::Path::push", "constant"),
+    ("path::Path::label", "w"),
+    ("path::Path::point_at", "log w"),
+    ("path::Path::points_from, 16", "w and the points"),
+    ("path::Path::project", "w"),
+    ("path::advance", "w"),
+    ("frame::Framer::next, 256 hostile bytes", "the bytes × a frame's length"),
+    ("frame::encode_raw, 255 bytes", "the bytes"),
+    ("intent::Intent::encode", "constant"),
+    ("intent::Intent::decode", "constant"),
+    ("mission_file::write, 32", "v, and the CRC of the file"),
+    ("mission_file::MissionView::parse, 32", "v, and the CRC of the file"),
+    ("mission_file::MissionView::config, 32", "v · log v"),
+    ("mission_file::MissionView::request, 32", "v"),
+    ("mission_file::MissionView::fits", "constant"),
+    ("config::Config::check, 32", "v"),
+    ("parameters::Parameters::index_of", "parameters"),
+    ("parameters::Parameters::set", "constant"),
+    ("parameters::Parameters::apply", "constant"),
+    ("parameters::Parameters::to_bytes", "parameters"),
+    ("parameters::Parameters::restore", "parameters"),
+    ("store::Store::mount", "the bank read once: CRC of the roadmap, heads of the journal"),
+    ("Companion::new", "v"),
+    ("Companion::mount", "constant: the store is moved in"),
+    ("Companion::handle_bytes, a frame", "its length, one row of the table · 4, 7 parameters"),
+    ("Companion::handle_bytes, 256 hostile bytes", "the bytes × a frame's length"),
+    ("Companion::handle_timeout, 32 speak", "advice, w, v, 4 rows of the table"),
+    (
+        "Companion::handle_timeout, most gone",
+        "the same; twice a second w × v × 16 places; below one that lands 49 × v × 16 places",
+    ),
+    ("Companion::handle_timeout, else", "the same"),
+    ("Companion::handle_plan", "w and g copied"),
+    ("Companion::detour", "v × 16 places"),
+    ("Companion::poll_transmit", "one frame"),
+    ("Companion::poll_event", "constant"),
+    ("Companion::poll_flash", "1 kB"),
+    ("Companion::handle_flash", "1 kB"),
+];
+
+/// What a call was seen to take.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// The most instructions.
+    pub instructions: u64,
+    /// Bytes of state or workspace.
+    pub bytes: u64,
+}
+
+/// Runs the board's program `calls` on the demo's roadmap and a map of the building; what it counted, by name.
+///
+/// # Errors
+/// The demo cannot be prepared, or the program says something else.
+pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
+    let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
+    let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
+    let map = building::building(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
+    let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
+    lines.iter().filter_map(|line| line.strip_prefix("call ")).map(seen).collect()
+}
+
+fn seen(line: &str) -> Result<(String, Seen)> {
+    let mut words = line.splitn(3, ' ');
+    let mut word = || words.next().context("a line of `calls` is cut");
+    let (instructions, bytes) = (word()?.parse()?, word()?.parse()?);
+    Ok((word()?.to_owned(), Seen { instructions, bytes }))
+}
+
+/// A count as the table prints it: two digits, rounded up.
+pub fn rounded(count: u64) -> String {
+    let mut unit = 1;
+    while count / unit > 99 {
+        unit *= 10;
+    }
+    let count = count.div_ceil(unit) * unit;
+    let short =
+        |one: u64, name| format!("{:.*} {name}", usize::from(count < 10 * one), count as f64 / one as f64);
+    match count {
+        0..1000 => count.to_string(),
+        1000..1_000_000 => short(1000, "k"),
+        _ => short(1_000_000, "M"),
+    }
+}
+
+/// What [`rounded`] printed, as a number again.
+pub fn parsed(text: &str) -> Option<f64> {
+    let (number, unit) = text.split_once(' ').unwrap_or((text, ""));
+    let unit = match unit {
+        "" => 1.0,
+        "k" => 1e3,
+        "M" => 1e6,
+        _ => return None,
+    };
+    Some(number.parse::<f64>().ok()? * unit)
+}

@@ -1,0 +1,81 @@
+//! The table of worst cases in ARCHITECTURE.md: every public call of planner-core and companion is in it, and an emulated board
+//! needs no more than it says.
+
+use std::fs;
+use std::path::Path;
+
+use flockmate_tests::bounds::{self, BOUNDS};
+use flockmate_tests::{board, workspace};
+
+/// Another compiler's code may need so much more.
+const SLACK: f64 = 1.25;
+/// Instructions of a control step among 32 neighbours that speak.
+const STEP: u64 = 60_000;
+/// Modules of companion that are its own, where no call is public, and doubles of its tests.
+const PRIVATE: [&str; 7] = ["guidance", "brakes", "retreat", "journal", "packet", "fake_px4", "fake_flash"];
+
+fn table() -> String {
+    let text = fs::read_to_string(workspace().join("ARCHITECTURE.md")).expect("it is there");
+    let from = text.find("## Worst cases").expect("the section");
+    let to = text[from + 1..].find("\n## ").map_or(text.len(), |len| from + 1 + len);
+    text[from..to].to_owned()
+}
+
+/// Names of the public functions in a folder's sources.
+fn public_calls(folder: &Path, names: &mut Vec<String>) {
+    for entry in fs::read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("readable")) {
+        let path = entry.path();
+        let module = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
+        if path.is_dir() {
+            public_calls(&path, names);
+        } else if !module.ends_with("tests") && !PRIVATE.contains(&module.as_str()) {
+            let source = fs::read_to_string(&path).expect("readable");
+            let source = source.split("#[cfg(test)]").next().unwrap_or_default();
+            let public = |line: &str| {
+                let line = line.trim_start().strip_prefix("pub ")?;
+                let name = line.strip_prefix("const ").unwrap_or(line).strip_prefix("fn ")?;
+                Some(name.split(['(', '<']).next()?.to_owned())
+            };
+            names.extend(source.lines().filter_map(public));
+        }
+    }
+}
+
+#[test]
+fn every_public_call_is_in_the_table() {
+    let table = table();
+    let mut names = Vec::new();
+    public_calls(&workspace().join("planner-core/src"), &mut names);
+    public_calls(&workspace().join("companion/src"), &mut names);
+    assert!(names.len() > 100, "{}", names.len());
+    let words: Vec<&str> = table.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+    names.retain(|name| !words.contains(&name.as_str()));
+    names.sort();
+    names.dedup();
+    assert!(names.is_empty(), "not in ARCHITECTURE.md, Worst cases: {names:?}");
+}
+
+#[test]
+fn the_board_needs_no_more_than_the_table_says() {
+    let Some(program) = board::program("calls") else { return };
+    let calls = bounds::counted(&program).expect("`calls` runs");
+    let table = table();
+    for (name, bound) in BOUNDS {
+        let start = format!("| `{name}` | {bound} | ");
+        let line =
+            table.lines().find_map(|line| line.strip_prefix(&start)).unwrap_or_else(|| panic!("{start}"));
+        let (count, bytes) = line.trim_end_matches(" |").split_once(" | ").expect("four columns");
+        let most = bounds::parsed(count).expect("a count");
+        let seen = calls[*name];
+        assert!(
+            seen.instructions as f64 <= most * SLACK + 100.0,
+            "{name}: {} of {most} instructions",
+            seen.instructions
+        );
+        assert_eq!(seen.bytes.to_string(), bytes, "{name}: bytes");
+    }
+    assert_eq!(calls.len(), BOUNDS.len(), "every call that is counted has its bound");
+    let step = calls["Companion::handle_timeout, 32 speak"].instructions;
+    println!("a control step among 32 neighbours: {step} instructions");
+    assert!(step <= STEP, "{step}");
+}
