@@ -63,6 +63,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'serial-stall'\nduration_s = 0.8", then: GoesOn, says: &[AT_GOAL] },
     Case { script: "kind = 'serial-stall'", then: Out, says: &["Position lost: stopping"] },
     Case { script: "kind = 'serial-stall'\nduration_s = 6", then: Out, says: &["Autopilot silent: stopping"] },
+    Case { script: "kind = 'serial-stall'\nduration_s = 600", then: Out, says: &["Autopilot silent: stopping"] },
     Case { script: "kind = 'serial-corrupt'", then: GoesOn, says: &[AT_GOAL] },
     Case { script: "kind = 'position-jump'", then: Out, says: &["Position is elsewhere: landing"] },
     Case { script: "kind = 'position-jump'\noffset_m = [0, 0, -5]", then: Out, says: &["Position is elsewhere: landing"] },
@@ -82,7 +83,7 @@ const CASES: &[Case] = &[
 ];
 
 /// States in which the mission of a vehicle struck may rest.
-const RESTS: &[&str] = &["Done", "Aborted", "Killed", "PilotControl", "Scheduled"];
+const RESTS: &[&str] = &["Done", "Aborted", "WaitAutopilot", "Killed", "PilotControl", "Scheduled"];
 
 impl Case {
     fn on_ground(&self) -> bool {
