@@ -17,6 +17,7 @@
 
 pub mod ardupilot;
 pub mod autopilot;
+pub mod budget;
 pub mod commands;
 pub mod config;
 mod detour;

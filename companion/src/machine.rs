@@ -9,7 +9,8 @@ use planner_core::Point;
 use planner_core::schedule::VehiclePlan;
 
 use crate::autopilot::Kind;
-use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, UNSUPPORTED, Wishes};
+use crate::budget::{self, Budget};
+use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED, Wishes};
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
@@ -73,6 +74,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) version_due: [bool; 2],
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
+    pub(crate) radio: Budget,
     pub(crate) store: Option<Store>,
     pub(crate) parameters: Parameters,
     pub(crate) ftp: Ftp,
@@ -118,6 +120,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             version_due: [false; 2],
             position_due: false,
             intent_due: false,
+            radio: Budget::default(),
             store: None,
             parameters: Parameters::default(),
             ftp: Ftp::default(),
@@ -332,6 +335,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn request(&mut self, link: Link, message: f32) -> u8 {
+        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+            return TEMPORARILY_REJECTED;
+        }
         if message == HEARTBEAT_DATA::ID as f32 {
             self.heartbeat_due[link as usize] = true;
         } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
@@ -340,6 +346,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.position_due = self.telemetry.position_at.is_some();
         } else {
             return DENIED;
+        }
+        if link == Link::Swarm {
+            self.radio.spend(budget::POSITION);
         }
         ACCEPTED
     }

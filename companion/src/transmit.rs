@@ -33,9 +33,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if core::mem::take(&mut self.heartbeat_due[at]) {
             return frame::encode(self.outboxes[at].header(system), &self.heartbeat(), out);
         }
-        if core::mem::take(&mut self.version_due[at]) {
-            return frame::encode(self.outboxes[at].header(system), &services::version(system), out);
-        }
         if link == Link::Swarm && core::mem::take(&mut self.position_due) {
             let data = self.global_position();
             return frame::encode(self.outboxes[at].header(system), &data, out);
@@ -45,6 +42,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let len = self.intent().encode(&mut payload);
             let header = self.outboxes[at].header(system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+            return 0;
+        }
+        let length = self.answer(link, out);
+        if link == Link::Swarm {
+            self.radio.spend(length);
+        }
+        length
+    }
+
+    /// What was asked for, and what waits to be told.
+    fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
+        let (at, system) = (link as usize, self.config.system_id);
+        if core::mem::take(&mut self.version_due[at]) {
+            return frame::encode(self.outboxes[at].header(system), &services::version(system), out);
         }
         let length = self.outboxes[at].transmit(system, out);
         if length > 0 {
