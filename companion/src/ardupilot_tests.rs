@@ -132,3 +132,18 @@ fn another_autopilots_heartbeat_changes_nothing() {
     bench.run(3.5);
     assert_eq!(bench.state(), State::WaitAutopilot, "its own is silent");
 }
+
+#[test]
+fn what_was_flown_while_the_estimator_was_not_ready_is_no_jump() {
+    let mut bench = following();
+    bench.ekf_flags = 0xA7;
+    bench.stuck = true;
+    // Two and a half metres before the next position counts.
+    for _ in 0..10 {
+        bench.enu.x += 0.25;
+        bench.run(0.05);
+    }
+    bench.ekf_flags = 0x33F;
+    bench.run(0.5);
+    assert!(!bench.companion.telemetry.is_settling(bench.now), "{:?}", bench.texts);
+}

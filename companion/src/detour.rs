@@ -82,6 +82,8 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found in a row.
     pub(crate) failed: u8,
+    /// When no way aside was found.
+    pub(crate) no_way_aside_at: Option<Instant>,
     /// Where and when it was before its position jumped.
     pub(crate) lost_at: Option<(Point, Instant)>,
     pub(crate) quiet_since: Option<Instant>,
@@ -298,9 +300,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {
         self.plan_failure = Some(failure);
         // Where no way aside is found there may yet be one around.
-        if !self.around.aside {
+        if self.around.aside {
+            self.around.no_way_aside_at = Some(self.now);
+        } else {
             self.around.failed = self.around.failed.saturating_add(1);
         }
+    }
+
+    /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
+    pub(crate) fn underneath(&self) -> Duration {
+        let retries = |at: Instant| self.now - at >= Duration::from_secs(RETRY_S);
+        let trapped = self.guidance.trapped_since.filter(|_| self.around.no_way_aside_at.is_none_or(retries));
+        trapped.map_or(Duration::default(), |at| self.now - at)
     }
 }
 

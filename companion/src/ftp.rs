@@ -17,7 +17,7 @@ use heapless::Deque;
 #[cfg(test)]
 pub(crate) use self::packet::TEXTS;
 use self::packet::{
-    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, print, told,
+    ACK, EFBIG, EIO, HEAD, NAK, No, Print, REMOVED, Request, Text, chunk, decimal, is_open, op, print, told,
 };
 use crate::frame::Frame;
 use crate::store::window::Taken;
@@ -77,7 +77,7 @@ struct Stream {
 
 #[derive(Clone, Copy, Debug)]
 struct Done {
-    request: (u8, u8, u16, u8),
+    request: Print,
     result: Result<(), No>,
     at: Instant,
 }

@@ -38,7 +38,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
-            stalled: if follow { now - self.guidance.progress_at() } else { Duration::default() },
+            stalled: if follow || self.state == State::Blocked {
+                now - self.guidance.progress_at()
+            } else {
+                Duration::default()
+            },
             neighbour_age: self.neighbours.silence(now, self.entered_at),
             neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
             plan_ready: self.plan.is_some(),
@@ -77,7 +81,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
             detours_failed: self.around.failed,
-            underneath: self.guidance.trapped_since.map_or(Duration::default(), |at| now - at),
+            underneath: self.underneath(),
             standing,
         }
     }

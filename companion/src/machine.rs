@@ -18,7 +18,7 @@ use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
 use crate::guidance::{Guidance, Scene, setpoints_flow};
 use crate::intent::Intent;
-use crate::mission::{self, Action, Row, State};
+use crate::mission::{self, Action, Guard, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
@@ -54,6 +54,8 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) obstacles: Obstacles,
     pub(crate) state: State,
     pub(crate) entered_at: Instant,
+    /// When MISSION_START was taken: the schedule counts from it.
+    started_at: Instant,
     pub(crate) wishes: Wishes,
     repeats: Repeats,
     pub(crate) guidance: Guidance,
@@ -99,6 +101,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             obstacles: Obstacles::default(),
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
+            started_at: Instant::ZERO,
             wishes: Wishes::default(),
             repeats: Repeats::default(),
             guidance: Guidance::new(&config),
@@ -241,7 +244,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
     pub(crate) fn departure_due(&self) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
-        (self.now - self.entered_at).secs_f32() >= depart_s
+        (self.now - self.started_at).secs_f32() >= depart_s
     }
 
     /// Finite, from `place`, and a path wherever there is a goal.
@@ -385,6 +388,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (from, now) = (self.state, self.now);
         self.state = row.to;
         self.entered_at = now;
+        if row.guard == Guard::StartCommanded {
+            self.started_at = now;
+        }
         self.wishes = Wishes { start: self.wishes.start, ..Wishes::default() };
         let ended = matches!(row.to, State::Aborted | State::Done);
         if ended || row.action == Action::ForgetStart {

@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::*;
 use crate::fake_px4::*;
-use crate::intent::{FLYING, GROUNDED, ON_PLAN, OUT};
+use crate::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
 use crate::{RosterEntry, px4};
 
 /// Vehicle 77 on its pad, or lying below the path, with these flags beside "grounded".
@@ -134,6 +134,21 @@ fn every_row_has_its_scene() {
     let mut fenced = config();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));
     scene(Bench::following(fenced), &|_| {}, Done, 60.0);
+    // The same while somebody lies below: it stops, and lands when there is room.
+    let mut fenced = two_vehicles();
+    fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));
+    scene(
+        Bench::accompanied(fenced),
+        &|b| {
+            b.neighbour = Some((Point::new(13.0, 12.0, 0.0), GROUNDED | LANDED | ON_PLAN, 99.0, 5));
+            b.until(Paused, 20.0);
+            b.run(5.0);
+            assert!(b.state() == Paused && b.enu.x < 14.5, "{:?} at {:?}", b.state(), b.enu);
+            b.neighbour = on_pad(ON_PLAN);
+        },
+        Done,
+        60.0,
+    );
     scene(flying(), &|b| back(b), Done, 60.0);
     scene(to(Climb), &|b| back(b), Done, 60.0);
     // The mission in order, and where it halts.

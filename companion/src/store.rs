@@ -48,7 +48,7 @@ pub(crate) fn crc_step(state: u32, bytes: &[u8]) -> u32 {
     !digest.finalize()
 }
 
-fn crc32(bytes: &[u8]) -> u32 {
+pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     CRC.checksum(bytes)
 }
 
@@ -217,6 +217,16 @@ impl Store {
         let slot = self.in_use?;
         let at = Area::Slot(slot).data_at(&self.layout);
         Some(at..at + self.slots[slot].seal()?.len)
+    }
+
+    /// The roadmap of this start cannot be used after all, whole as it is: [`Self::roadmap`] is the one before it, if that is still
+    /// there; whether it is. To be called before anything else is done with the flash.
+    pub fn refuse_roadmap(&mut self) -> bool {
+        if let Some(slot) = self.in_use {
+            self.slots[slot] = Condition::Dirty;
+            self.in_use = self.newest();
+        }
+        self.in_use.is_some()
     }
 
     /// Where the mission file lies, in the storage bank; to be copied from there, since the journal moves.

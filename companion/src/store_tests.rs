@@ -323,3 +323,61 @@ fn an_upload_waits_until_it_is_known_whether_the_vehicle_is_armed() {
         assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))), "{file:?}");
     }
 }
+
+#[test]
+fn a_record_whose_head_did_not_come_out_is_written_again() {
+    let mut flash = Flash::new(78);
+    let mut store = started(&mut flash);
+    let flown = mission(3);
+    store.open(File::Mission, Erasing::Allowed).unwrap();
+    flown.chunks(200).enumerate().for_each(|(i, part)| _ = store.take(i as u32 * 200, part));
+    store.close();
+    let mut read = [0; READ];
+    let mut heads = 0;
+    while let Some(request) = store.poll(Erasing::Allowed) {
+        let head = match request {
+            FlashRequest::Program { at, bytes } if bytes[..4] == flown_head(&flown)[..4] => Some(at as usize),
+            _ => None,
+        };
+        let outcome = obey(&mut flash, request, Erasing::Allowed, &mut read).unwrap();
+        if let Some(at) = head {
+            heads += 1;
+            if heads == 1 {
+                flash.bytes[at + 20] ^= 1;
+            }
+        }
+        store.handle(outcome.map(|len| &read[..len]));
+    }
+    assert!(heads > 1, "{heads}");
+    assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    let store = started(&mut flash);
+    assert_eq!(held(&flash, store.mission()), Some(flown.as_slice()));
+}
+
+fn flown_head(flown: &[u8]) -> [u8; WORD] {
+    journal::head(journal::Kind::Mission, flown.len() as u32, 0)
+}
+
+#[test]
+fn a_roadmap_that_cannot_be_used_is_refused_or_given_up_for_the_one_before() {
+    let mut flash = Flash::new(79);
+    let mut store = started(&mut flash);
+    let old = roadmap(60);
+    upload(&mut store, &mut flash, File::Roadmap, &old, 239).unwrap().unwrap();
+    store = started(&mut flash);
+    // Another version of the format, its CRC right.
+    let mut other = roadmap(80);
+    other[8] += 1;
+    let covered = other.len() - 4;
+    let crc = crc32(&other[..covered]);
+    other[covered..].copy_from_slice(&crc.to_le_bytes());
+    let refused = upload(&mut store, &mut flash, File::Roadmap, &other, 239).unwrap();
+    assert_eq!(refused, Err(UploadError::Damaged));
+    let new = roadmap(90);
+    upload(&mut store, &mut flash, File::Roadmap, &new, 239).unwrap().unwrap();
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    assert_eq!(held(&flash, store.roadmap()), Some(new.as_slice()));
+    assert!(store.refuse_roadmap());
+    assert_eq!(held(&flash, store.roadmap()), Some(old.as_slice()));
+    assert!(!store.refuse_roadmap() && store.roadmap().is_none());
+}

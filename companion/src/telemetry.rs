@@ -96,6 +96,8 @@ pub struct Telemetry {
     /// Velocity, ENU m/s.
     pub velocity: Point,
     boot_ms: u32,
+    /// By the autopilot's clock, of the last position used, milliseconds.
+    read_boot_ms: u32,
     /// When a position was last read, used or not.
     read_at: Option<Instant>,
     settled_at: Instant,
@@ -226,9 +228,7 @@ impl Telemetry {
         if fields.iter().any(|f| !f.is_finite()) || stale {
             return Change::None;
         }
-        // By the autopilot's clock: what waited on the way comes all at once.
-        let passed_s =
-            d.time_boot_ms.wrapping_sub(core::mem::replace(&mut self.boot_ms, d.time_boot_ms)) as f32 * 1e-3;
+        self.boot_ms = d.time_boot_ms;
         let Some(kind) = self.kind.filter(|kind| *kind == Kind::Px4 || self.estimator_ready) else {
             return Change::None;
         };
@@ -239,6 +239,8 @@ impl Telemetry {
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
         if let Some(at) = self.read_at {
+            // By the autopilot's clock, since the last one that was used: what waited on the way comes all at once.
+            let passed_s = d.time_boot_ms.wrapping_sub(self.read_boot_ms) as f32 * 1e-3;
             let dt_s = passed_s.min(GAP_MOST_S);
             if now - at > SETTLE {
                 self.counts_from = now + SETTLE;
@@ -248,7 +250,7 @@ impl Telemetry {
                 return self.lose_position(now);
             }
         }
-        self.read_at = Some(now);
+        (self.read_at, self.read_boot_ms) = (Some(now), d.time_boot_ms);
         self.position = position;
         // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
         self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));

@@ -61,11 +61,14 @@ fn main() -> ! {
 #[task]
 async fn work(parts: Parts, crashed: Option<String<50>>) {
     let Parts { links, mut autopilot, swarm, mut flash, watchdog, .. } = parts;
-    let store = Store::mount(LAYOUT, &mut flash);
-    let roadmap = store
-        .roadmap()
-        .and_then(|r| flash.view(r.start, (r.end - r.start) as usize))
-        .and_then(|bytes| RoadmapView::parse(bytes).ok());
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    let roadmap = loop {
+        let lies = store.roadmap().and_then(|r| flash.view(r.start, (r.end - r.start) as usize));
+        match lies.and_then(|bytes| RoadmapView::parse(bytes).ok()) {
+            None if store.refuse_roadmap() => {}
+            found => break found,
+        }
+    };
     let bytes = MISSION_BYTES.take();
     // The mission is copied: the journal it lies in moves.
     let mission = store.mission().and_then(|r| {

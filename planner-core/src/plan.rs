@@ -5,8 +5,8 @@
 //! assignment of least total length over all pairs (unlabelled); what the paper leaves out is the order at shared stretches,
 //! which [`crate::schedule`] settles.
 //!
-//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A* and one pass
-//! over all scheduled pieces per vehicle.
+//! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A*, up to a dozen searches
+//! of the schedule (one for each departure looked at) and one pass over all scheduled pieces per vehicle.
 
 mod order;
 

@@ -187,26 +187,8 @@ impl<'a> RoadmapView<'a> {
     /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole flash slot can be given.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
         let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(RoadmapError::Truncated)?;
-        if head[..8] != MAGIC {
-            return Err(RoadmapError::Magic);
-        }
-        let version = u16_at(head, 8);
-        if version != VERSION {
-            return Err(RoadmapError::Version(version));
-        }
-        let total = u32_at(head, 12) as usize;
+        let total = declared_len(head)?;
         let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
-        let landmarks = u32_at(head, 68) as usize;
-        let sound = half_edge_count % 2 == 0 && (landmarks == 0 || landmarks == LANDMARKS);
-        if usize::from(u16_at(head, 10)) != HEADER_LEN || !sound {
-            return Err(RoadmapError::Length);
-        }
-        if node_count > MAX_NODES {
-            return Err(RoadmapError::TooManyNodes);
-        }
-        if encoded_len(node_count, half_edge_count / 2, landmarks) != Some(total) {
-            return Err(RoadmapError::Length);
-        }
         let body = bytes.get(..total).ok_or(RoadmapError::Truncated)?;
         let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(RoadmapError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
@@ -417,6 +399,34 @@ impl<'a> RoadmapView<'a> {
             _ => (0, &[]),
         }
     }
+}
+
+/// The length that a file's header tells, of a file that this version can read.
+///
+/// # Errors
+/// It is no roadmap, of another version, or its counts are not those of such a length.
+pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
+    if head[..8] != MAGIC {
+        return Err(RoadmapError::Magic);
+    }
+    let version = u16_at(head, 8);
+    if version != VERSION {
+        return Err(RoadmapError::Version(version));
+    }
+    let total = u32_at(head, 12) as usize;
+    let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
+    let landmarks = u32_at(head, 68) as usize;
+    let sound = half_edge_count % 2 == 0 && (landmarks == 0 || landmarks == LANDMARKS);
+    if usize::from(u16_at(head, 10)) != HEADER_LEN || !sound {
+        return Err(RoadmapError::Length);
+    }
+    if node_count > MAX_NODES {
+        return Err(RoadmapError::TooManyNodes);
+    }
+    if encoded_len(node_count, half_edge_count / 2, landmarks) != Some(total) {
+        return Err(RoadmapError::Length);
+    }
+    Ok(total)
 }
 
 fn u16_at(head: &[u8; HEADER_LEN], at: usize) -> u16 {

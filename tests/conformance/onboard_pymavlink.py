@@ -140,7 +140,7 @@ def main():
     check("a damaged one is not kept", get("mission.bin") == bytes_of(mission))
     check("what is not there is not found", get("nothing.bin") == mavftp.FtpError.FileNotFound)
     check("it restarts on command", ground.command(REBOOT, 1) == 0)
-    check("and is back", ground.ask("HEARTBEAT", lambda: None))
+    check("and is back", ground.until("STATUSTEXT", lambda m: m.text.startswith("Autopilot found")), ground.heard)
     check("with the parameter kept", abs(ground.read(ACCEL).param_value - 2.25) < 1e-6)
     check("and the files", names() == {"roadmap.bin": os.path.getsize(roadmap), "mission.bin": os.path.getsize(mission)})
     check("a file is removed", done(ftp.cmd_rm(["mission.bin"])))

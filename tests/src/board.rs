@@ -49,6 +49,8 @@ fn qemu(program: &Path) -> Command {
     let mut command = Command::new("qemu-system-arm");
     command
         .args(["-machine", "mps2-an500", "-display", "none"])
+        // It would bite where this machine stands still. What hangs by itself does so for good without it, and fails the test.
+        .args(["-action", "watchdog=none"])
         .arg("-kernel")
         .arg(program)
         .stdin(Stdio::null());

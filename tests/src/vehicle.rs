@@ -18,14 +18,15 @@ use mavlink::dialects::ardupilotmega::{
 };
 use planner_core::Point;
 use planner_core::frames::geodetic_to_enu;
+use planner_core::path::Path;
 
 use crate::board::Emulated;
 
 const STEP: Duration = Duration::from_millis(4);
 /// Time that a machine which stood still does not make up for.
 const LATEST: Duration = Duration::from_millis(200);
-/// A machine may stand still for long; nothing that works takes half as long.
-const PATIENCE: Duration = Duration::from_secs(150);
+/// A machine may stand still for long; a megabyte of garbage takes less than half as long.
+const PATIENCE: Duration = Duration::from_secs(400);
 /// ArduCopter's estimator is ready sooner than the real one's.
 const READY_S: f32 = 2.0;
 
@@ -53,8 +54,10 @@ pub struct Vehicle {
     pub autopilot: Autopilot,
     /// What was heard from the board since this was last emptied.
     pub heard: Heard,
-    /// What comes to the radio beside our orders, and what the board said there, for others to read.
+    /// What was heard from the board's radio, as it came, for others to read.
     pub radio: Vec<u8>,
+    /// The longest that this machine kept us from a step.
+    pub stood_still: Duration,
     lines: [Option<Box<dyn Link>>; 2],
     framers: [Framer; 2],
     ground_m: f32,
@@ -72,6 +75,16 @@ pub fn mission(text: &str) -> Mission {
     Mission::prepare(scenario, &Progress::on_terminal()).expect("it can be prepared")
 }
 
+/// The middle of the widest leg in the second half of a path.
+///
+/// # Panics
+/// The path has no legs.
+pub fn ahead<const W: usize>(path: &Path<W>) -> Point {
+    let late = path.waypoints().windows(2).filter(|leg| leg[0].along_m > 0.5 * path.length_m());
+    let widest = late.max_by(|a, b| a[1].clearance_m.total_cmp(&b[1].clearance_m)).expect("a path has legs");
+    (widest[0].position + widest[1].position) * 0.5
+}
+
 impl Vehicle {
     /// The first vehicle of a mission, on its pad, its autopilot just switched on.
     pub fn new(board: Emulated, mission: &Mission, seed: u64) -> Self {
@@ -86,6 +99,7 @@ impl Vehicle {
             autopilot,
             heard: Heard::default(),
             radio: Vec::new(),
+            stood_still: Duration::ZERO,
             lines,
             framers: [Framer::new(), Framer::new()],
             ground_m: config.start.z - config.vehicle.radius_m,
@@ -154,6 +168,7 @@ impl Vehicle {
         }
         self.next += STEP;
         let now = Clock::now();
+        self.stood_still = self.stood_still.max(now.saturating_duration_since(self.next));
         self.next = self.next.max(now.checked_sub(LATEST).unwrap_or(now));
         sleep(self.next.saturating_duration_since(now));
     }

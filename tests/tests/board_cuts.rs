@@ -4,7 +4,7 @@
 //! The board is the firmware as it is flashed, in QEMU; its emulated flash keeps over a reset what was in it, torn words too. Each
 //! cut is a reset: while a slot is erased, after a random byte of the upload, or a random moment after the last one, while it is
 //! checked and sealed. Every second cut is moved on, by instants, to one that leaves a torn word: of the data, or the seal. What
-//! the board holds then is asked of it by FTP. A watchdog that bites, because this machine stood still, is one more cut.
+//! the board holds then is asked of it by FTP.
 //!
 //! `FLOCKMATE_FIRMWARE=… FLOCKMATE_CUTS=200 cargo test --workspace --test board_cuts -- --nocapture` makes two hundred.
 

@@ -1,18 +1,27 @@
 //! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both lines. The board is the firmware
 //! as it is flashed, the autopilot beside it the simulated one, in real time.
 //!
-//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture` resets fifty times.
+//! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture` resets fifty times, and
+//! `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.
 
+use std::io::Result;
+use std::net::SocketAddr;
 use std::path::Path;
-use std::thread::scope;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, scope};
 use std::time::{Duration, Instant as Clock};
 
+use companion::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board::{self, Emulated};
-use flockmate_tests::vehicle::{Vehicle, mission};
+use flockmate_tests::vehicle::{Vehicle, ahead, mission};
 use host_sim::autopilot::ardupilot;
+use host_sim::link::Link;
 use host_sim::mission::Mission;
+use host_sim::upload::Client;
+use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
+use planner_core::frames::enu_to_geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -24,11 +33,13 @@ file = "builtin:building"
 nodes = 400
 edge_max_m = 12.0
 [mission]
-goals = [[28.0, 3.0, 1.8]]
+goals = [[28.0, 3.0, 3.5]]
 [[vehicles]]
 id = 1
-start = [10.0, 3.0, 1.5]
+start = [10.0, 3.0, 3.5]
 "#;
+/// Its start's height, metres.
+const CLIMBS_TO_M: f32 = 3.5;
 /// The same flown by ArduCopter.
 const ARDUPILOT: &str = "personality = \"ardupilot\"\n";
 /// Resets of a run that does not say how many.
@@ -36,13 +47,26 @@ const RESETS: usize = 4;
 /// Boards at once.
 const BOARDS: usize = 4;
 /// From the start command to the landing, milliseconds.
-const FLIGHT_MS: u32 = 20_000;
+const FLIGHT_MS: u32 = 22_000;
 /// Commands to an autopilot that would have it fly: NAV_TAKEOFF, DO_SET_MODE, COMPONENT_ARM_DISARM.
 const FLIES: [u32; 3] = [22, 176, 400];
 /// A vehicle that flies at 2 m/s stops within that way, metres.
 const STOPS_M: f32 = 4.0;
 /// Streams and the first heartbeats take a companion less.
-const FINDS: Duration = Duration::from_secs(3);
+const FINDS: Duration = Duration::from_millis(4500);
+
+/// The demo, whose first vehicle flies alone.
+const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
+/// Where the tables of its vehicles begin.
+const VEHICLE: &str = "[[vehicles]]";
+/// Garbage on each line of a run that does not say how much, bytes.
+const GARBAGE: usize = 200_000;
+/// So much of it in each step of 4 ms: 10 kB/s, beside the autopilot's 4 kB/s; the emulated UART takes 18 kB/s.
+const HANDFUL: usize = 40;
+/// An instruction takes 2⁴ ns of the board's time, as in `cargo xtask emulate`.
+const SHIFT: u32 = 4;
+/// Setpoints may be no further apart by the board's own time, milliseconds.
+const GAP_MS: u32 = 150;
 
 /// Resets the companion at a random moment of a flight, and sees the flight to its end; what came of it.
 fn reset_in_flight(vehicle: &mut Vehicle, brakes: bool, rng: &mut Pcg32) -> Option<String> {
@@ -52,6 +76,8 @@ fn reset_in_flight(vehicle: &mut Vehicle, brakes: bool, rng: &mut Pcg32) -> Opti
         return None;
     }
     let (state, place) = (vehicle.heard.state, vehicle.autopilot.truth().position);
+    // A take-off by command is flown to its end.
+    let top_m = place.z.max(CLIMBS_TO_M);
     vehicle.reset();
     // From here on nobody but the autopilot flies it.
     let began = vehicle.autopilot.time_us();
@@ -61,12 +87,12 @@ fn reset_in_flight(vehicle: &mut Vehicle, brakes: bool, rng: &mut Pcg32) -> Opti
     vehicle.until("landed by itself, or hovering", |vehicle| {
         let truth = vehicle.autopilot.truth();
         let (away, armed, flies): (Point, _, _) = (truth.position - place, truth.armed, vehicle.flies());
-        (farthest_m, highest_m) = (farthest_m.max(away.xy().norm()), highest_m.max(away.z));
+        (farthest_m, highest_m) = (farthest_m.max(away.xy().norm()), highest_m.max(truth.position.z - top_m));
         let passed = Duration::from_micros(vehicle.autopilot.time_us() - began);
         if flies {
             in_air = passed;
         }
-        !armed || brakes && passed > 3 * FINDS && flies
+        !armed || brakes && passed > 2 * FINDS && flies
     });
     if vehicle.autopilot.truth().armed {
         // ArduCopter brakes and hovers until its pilot lands it.
@@ -81,7 +107,7 @@ fn reset_in_flight(vehicle: &mut Vehicle, brakes: bool, rng: &mut Pcg32) -> Opti
     assert!(!heard.commands.iter().any(|(number, _)| FLIES.contains(number)), "it flies on, {context}");
     assert!(farthest_m < STOPS_M && highest_m < 1.0, "{farthest_m} m away, {highest_m} m up, {context}");
     let said = |text: &str| heard.texts.iter().any(|said| said == text);
-    assert!(said("Restarted: reset or watchdog"), "{context}");
+    assert!(said("Restarted: watchdog, reset key or brown-out"), "{context}");
     if in_air > FINDS {
         assert!(said("Found in flight: no mission"), "{context}");
         assert!(said("Landed after failsafe: mission over"), "{context}");
@@ -96,7 +122,7 @@ fn reset_again_and_again(program: &Path, missions: [&Mission; 2], resets: usize,
     let mut lines = Vec::new();
     let mut flights = 0;
     while lines.len() < resets {
-        let brakes = (flights + seed) % 2 == 0;
+        let brakes = (flights + seed).is_multiple_of(2);
         let mission = missions[usize::from(brakes)];
         let bank = board::bank(&mission.roadmap_file, &mission.mission_file);
         let board = Emulated::start(program, None, Some(&bank));
@@ -161,4 +187,105 @@ fn cables_are_pulled_and_put_back_without_a_restart() {
     println!("{:?}", heard.texts);
     assert!(!heard.texts.iter().any(|text| text.starts_with("Restarted")), "{heard:?}");
     assert_eq!(heard.missing, [0, 0], "{heard:?}");
+}
+
+/// A client's end of a radio that the vehicle's thread serves.
+struct Radio {
+    heard: Receiver<Vec<u8>>,
+    sent: Sender<Vec<u8>>,
+}
+
+impl Link for Radio {
+    fn receive(&mut self, buffer: &mut [u8]) -> Result<usize> {
+        let bytes = self.heard.try_recv().unwrap_or_default();
+        buffer[..bytes.len()].copy_from_slice(&bytes);
+        Ok(bytes.len())
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<()> {
+        // Nobody is there any more when the vehicle has landed.
+        let _ = self.sent.send(bytes.to_vec());
+        Ok(())
+    }
+
+    fn local_address(&self) -> Option<SocketAddr> {
+        None
+    }
+}
+
+#[test]
+fn setpoints_flow_through_planning_uploading_and_garbage() {
+    let Some(program) = board::program("flockmate") else { return };
+    let length = std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
+    let demo = DEMO.match_indices(VEHICLE).nth(1).map_or(DEMO, |(second, _)| &DEMO[..second]);
+    let mut demo = mission(demo);
+    let plan = demo.plan().expect("the demo has a plan");
+    let place = enu_to_geodetic(&demo.scenario.map.origin, &ahead(&plan.flights[0].path));
+    let bank = board::bank(&demo.roadmap_file, &demo.mission_file);
+    let mut vehicle = Vehicle::new(Emulated::start(&program, Some(SHIFT), Some(&bank)), &demo, 1);
+    vehicle.start();
+    vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow);
+
+    // An upload by the radio, another roadmap than the one that is flown on.
+    let ((to_client, heard), (sent, from_client)) = (channel(), channel());
+    let other = mission(LOBBY).roadmap_file;
+    let upload = thread::spawn(move || {
+        let mut client = Client::new(Box::new(Radio { heard, sent }), Some(1));
+        client.find().and_then(|_| client.upload(File::Roadmap, &other, |_| ()))
+    });
+    // Something lies on the path: it has to be planned around, in the air.
+    let exclude = COMMAND_INT_DATA {
+        command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+        target_system: 1,
+        frame: MavFrame::MAV_FRAME_GLOBAL,
+        param1: 0.4,
+        x: (place.lat_deg * 1e7).round() as i32,
+        y: (place.lon_deg * 1e7).round() as i32,
+        z: place.alt_m as f32,
+        ..COMMAND_INT_DATA::DEFAULT
+    };
+    vehicle.tell(&exclude);
+    let mut rng = Pcg32::seed_from_u64(1);
+    let (mut left, mut steps) = (length, 0);
+    vehicle.until("done with garbage and upload", |vehicle| {
+        steps += 1;
+        for port in [Port::Autopilot, Port::Swarm] {
+            let mut garbage = [0; HANDFUL];
+            rng.fill_bytes(&mut garbage);
+            vehicle.send(port, &garbage[..left.min(HANDFUL)]);
+        }
+        left = left.saturating_sub(HANDFUL);
+        let heard = core::mem::take(&mut vehicle.radio);
+        heard.chunks(1024).for_each(|bytes| to_client.send(bytes.to_vec()).unwrap_or_default());
+        from_client.try_iter().for_each(|bytes| vehicle.send(Port::Swarm, &bytes));
+        let around = vehicle.heard.texts.iter().any(|text| text == "Flying around");
+        if around && left > 0 && vehicle.heard.state == State::Follow && steps % 250 == 0 {
+            // It hovers, rather than to land before all has come.
+            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
+        } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
+            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
+        }
+        left == 0 && upload.is_finished() && vehicle.heard.state == State::Done
+    });
+    vehicle.until_said("Setpoints: ");
+    upload.join().expect("a client").expect("the upload arrives");
+
+    let heard = &vehicle.heard;
+    println!("{:?}", heard.texts);
+    let told =
+        heard.texts.iter().find_map(|text| text.strip_prefix("Setpoints: ")?.strip_suffix(" ms apart"));
+    let (count, gap) = told.and_then(|told| told.split_once(", at most ")).expect("two numbers");
+    let (count, gap_ms): (usize, u32) = (count.parse().expect("a number"), gap.parse().expect("a number"));
+    let times: Vec<u32> = heard.setpoints.iter().map(|setpoint| setpoint.time_boot_ms).collect();
+    let longest_ms = times.windows(2).map(|pair| pair[1] - pair[0]).max().expect("many");
+    let still_ms = vehicle.stood_still.as_millis() as u32;
+    println!(
+        "{length} bytes of garbage on each line: {count} setpoints told, {} heard, at most {gap_ms} ms apart as told, {longest_ms} \
+         by their own times; this machine stood still for up to {still_ms} ms",
+        times.len()
+    );
+    assert!(heard.texts.iter().any(|text| text == "Flying around"));
+    assert_eq!(count, times.len(), "setpoints were lost");
+    assert_eq!(heard.missing, [0, 0], "frames were lost");
+    assert!(gap_ms.max(longest_ms) <= GAP_MS + still_ms, "setpoints were {gap_ms} ms apart");
 }

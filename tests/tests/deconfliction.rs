@@ -23,6 +23,11 @@ fn hard_meetings_end_without_a_touch_or_a_standstill() {
         // Where one may lie anywhere on a stretch, another's goal may be out of reach.
         let lost = row["name"].as_str().is_some_and(|name| name.starts_with("radio"));
         assert!(lost || row["complete"] == SEEDS, "{row}");
+        // Most get there all the same: one of eight in every flight may land short.
+        assert!(
+            row["held_up"].as_u64().is_some_and(|held_up| held_up <= if lost { SEEDS } else { 0 }),
+            "{row}"
+        );
         for count in ["violations", "wall_contacts", "deadlocks"] {
             assert_eq!(row[count], 0, "{row}");
         }

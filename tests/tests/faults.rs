@@ -10,6 +10,7 @@
 //! sweeps twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose lines hold that,
 //! `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
+use flockmate_tests::vehicle::ahead;
 use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
 use host_sim::report::Event;
@@ -62,6 +63,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'serial-stall'\nduration_s = 0.8", then: GoesOn, says: &[AT_GOAL] },
     Case { script: "kind = 'serial-stall'", then: Out, says: &["Position lost: stopping"] },
     Case { script: "kind = 'serial-stall'\nduration_s = 6", then: Out, says: &["Autopilot silent: stopping"] },
+    Case { script: "kind = 'serial-stall'\nduration_s = 600", then: Out, says: &["Autopilot silent: stopping"] },
     Case { script: "kind = 'serial-corrupt'", then: GoesOn, says: &[AT_GOAL] },
     Case { script: "kind = 'position-jump'", then: Out, says: &["Position is elsewhere: landing"] },
     Case { script: "kind = 'position-jump'\noffset_m = [0, 0, -5]", then: Out, says: &["Position is elsewhere: landing"] },
@@ -81,7 +83,7 @@ const CASES: &[Case] = &[
 ];
 
 /// States in which the mission of a vehicle struck may rest.
-const RESTS: &[&str] = &["Done", "Aborted", "Killed", "PilotControl", "Scheduled"];
+const RESTS: &[&str] = &["Done", "Aborted", "WaitAutopilot", "Killed", "PilotControl", "Scheduled"];
 
 impl Case {
     fn on_ground(&self) -> bool {
@@ -89,7 +91,7 @@ impl Case {
     }
 
     fn faults(&self, at_s: f32, vehicle: u8, plan: &SwarmPlan) -> Vec<Fault> {
-        let [x, y, z] = ahead(plan, vehicle).into();
+        let [x, y, z] = ahead(&plan.flights[usize::from(vehicle) - 1].path).into();
         let script = self
             .script
             .replace("LATER", &(at_s + 8.0).to_string())
@@ -100,14 +102,6 @@ impl Case {
         scenario.check_supported().expect("every kind can be played");
         scenario.faults
     }
-}
-
-/// The middle of the widest leg in the second half of a vehicle's path.
-fn ahead(plan: &SwarmPlan, vehicle: u8) -> Point {
-    let path = &plan.flights[usize::from(vehicle) - 1].path;
-    let late = path.waypoints().windows(2).filter(|leg| leg[0].along_m > 0.5 * path.length_m());
-    let widest = late.max_by(|a, b| a[1].clearance_m.total_cmp(&b[1].clearance_m)).expect("a path has legs");
-    (widest[0].position + widest[1].position) * 0.5
 }
 
 /// The demo's mission by a seed, and its plan.

@@ -31,6 +31,15 @@ impl Board {
         }
     }
 
+    /// Bytes of flash for the program, and of memory for statics and the worst stack.
+    pub fn memory(self) -> (usize, usize) {
+        match self {
+            // AXI SRAM and DTCM.
+            Self::Qemu | Self::NucleoH743 => (512 << 10, 576 << 10),
+            Self::Pico2 => (1 << 20, 512 << 10),
+        }
+    }
+
     fn target(self) -> &'static str {
         match self {
             Self::Qemu | Self::NucleoH743 => "thumbv7em-none-eabihf",

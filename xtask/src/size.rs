@@ -11,10 +11,6 @@ use anyhow::{Context, Result, ensure};
 use crate::bare_metal::{self, Board};
 use crate::emulate;
 
-/// Most bytes of statics and stack, and of code, on the default board.
-const RAM: usize = 576 << 10;
-const FLASH: usize = 512 << 10;
-
 /// What to size.
 #[derive(clap::Args)]
 pub struct Args {
@@ -49,21 +45,22 @@ pub fn run(args: &Args) -> Result<()> {
 pub fn rows(board: Board, stack: usize) -> Result<Vec<(&'static str, usize, usize)>> {
     let program = bare_metal::build(board)?.join("flockmate");
     let Parts { code, constants, initialised, zeroed } = parts(&program)?;
+    let (most_flash, most_ram) = board.memory();
     let (flash, statics) = (code + constants + initialised, initialised + zeroed);
     let rows = vec![
-        ("code_bytes", code, FLASH),
-        ("constants_bytes", constants, FLASH),
-        ("flash_bytes", flash, FLASH),
-        ("statics_bytes", statics, RAM),
-        ("stack_bytes", stack, RAM),
-        ("ram_bytes", statics + stack, RAM),
+        ("code_bytes", code, most_flash),
+        ("constants_bytes", constants, most_flash),
+        ("flash_bytes", flash, most_flash),
+        ("statics_bytes", statics, most_ram),
+        ("stack_bytes", stack, most_ram),
+        ("ram_bytes", statics + stack, most_ram),
     ];
     println!("{}", board.name());
     for (name, ours, most) in &rows {
         println!("  {name:16} {ours:>8} of {most}");
     }
-    ensure!(flash <= FLASH, "{}: more than {FLASH} bytes of flash", board.name());
-    ensure!(statics + stack <= RAM, "{}: more than {RAM} bytes of memory", board.name());
+    ensure!(flash <= most_flash, "{}: more than {most_flash} bytes of flash", board.name());
+    ensure!(statics + stack <= most_ram, "{}: more than {most_ram} bytes of memory", board.name());
     Ok(rows)
 }
 

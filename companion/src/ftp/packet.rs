@@ -3,7 +3,7 @@
 
 use super::DATA;
 use crate::frame::Frame;
-use crate::store::{File, UploadError};
+use crate::store::{File, UploadError, crc32};
 
 /// Bytes before the data.
 pub const HEAD: usize = 12;
@@ -119,7 +119,7 @@ impl Request {
     }
 
     pub fn is(&self, other: &Self) -> bool {
-        (self.client, self.sequence, self.opcode) == (other.client, other.sequence, other.opcode)
+        print(self) == print(other)
     }
 
     /// The data that counts, or all of it where the size is too large.
@@ -146,8 +146,13 @@ pub fn is_open(request: &Request) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 
-pub fn print(request: &Request) -> (u8, u8, u16, u8) {
-    (request.client.0, request.client.1, request.sequence, request.opcode)
+/// What a repeated request is known by. Two programs of one client's id may begin at the same sequence number: the data tells
+/// them apart.
+pub type Print = ((u8, u8), u16, u8, u32, u32);
+
+pub fn print(request: &Request) -> Print {
+    let Request { client, sequence, opcode, offset, .. } = *request;
+    (client, sequence, opcode, offset, crc32(request.bytes()))
 }
 
 /// Bytes asked for with each packet of a read.

@@ -90,7 +90,7 @@ impl Store {
             }
             Job::Record(record) => {
                 let data_at = record.at + WORD as u32 + record.done;
-                let left = (record.len - record.done) as usize;
+                let left = (record.whole() - record.done) as usize;
                 match (record.step, record.source) {
                     (Step::Head, _) => {
                         self.word = journal::head(record.kind, record.len, record.crc);
@@ -103,7 +103,9 @@ impl Store {
                         let count = left.next_multiple_of(WORD).min(BLOCK);
                         FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
                     }
-                    (Step::Verify, _) => FlashRequest::Read { at: data_at, len: left.min(READ) },
+                    (Step::Verify, _) => {
+                        FlashRequest::Read { at: record.at + record.done, len: left.min(READ) }
+                    }
                 }
             }
         })

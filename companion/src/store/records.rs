@@ -25,6 +25,13 @@ pub struct Record {
     pub sum: u32,
 }
 
+impl Record {
+    /// Bytes of its step: what is read back begins with the head.
+    pub fn whole(&self) -> u32 {
+        if self.step == Step::Verify { WORD as u32 + self.len } else { self.len }
+    }
+}
+
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// In the buffer, whole.
@@ -161,18 +168,22 @@ impl Store {
                 record.step = if matches!(record.source, Source::Buffer) { Step::Data } else { Step::Load };
             }
             (Step::Verify, _) => {
-                record.sum = crc_step(record.sum, bytes);
-                record.done += bytes.len() as u32;
-                if bytes.is_empty() {
+                let head = if record.done == 0 { WORD } else { 0 };
+                let Some((head, data)) = bytes.split_at_checked(head).filter(|_| !bytes.is_empty()) else {
+                    return self.fail_record();
+                };
+                if !head.is_empty() && head != journal::head(record.kind, record.len, record.crc) {
                     return self.fail_record();
                 }
+                record.sum = crc_step(record.sum, data);
+                record.done += bytes.len() as u32;
             }
         }
-        if record.done < record.len {
+        if record.done < record.whole() {
             self.job = Job::Record(record);
-        } else if record.step != Step::Verify && record.len > 0 {
+        } else if record.step != Step::Verify {
             self.job = Job::Record(Record { step: Step::Verify, done: 0, ..record });
-        } else if record.len > 0 && !record.sum != record.crc {
+        } else if !record.sum != record.crc {
             self.fail_record();
         } else {
             self.finish_record(&record);

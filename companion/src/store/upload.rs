@@ -2,7 +2,7 @@
 
 use planner_core::roadmap;
 
-use super::area::{Area, Condition, DATA_AT, u32_at};
+use super::area::{Area, Condition, DATA_AT};
 use super::window::{Taken, WINDOW};
 use super::{Erasing, File, Store};
 use crate::mission_file::MissionView;
@@ -132,8 +132,8 @@ impl Store {
         self.slots.iter().position(|slot| *slot == Condition::Open).map(Area::Slot)
     }
 
-    /// Whether the first bytes are those of a roadmap file of this length.
-    pub(super) fn is_roadmap(head: &[u8], len: u32) -> bool {
-        head.len() >= 16 && head[..8] == roadmap::MAGIC && u32_at(head, 12) == len
+    /// Whether the first bytes are those of a roadmap file of this length that can be read.
+    pub(super) fn is_roadmap(bytes: &[u8], len: u32) -> bool {
+        bytes.first_chunk().is_some_and(|head| roadmap::declared_len(head) == Ok(len as usize))
     }
 }

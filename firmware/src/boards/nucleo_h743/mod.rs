@@ -3,7 +3,7 @@
 //! | pin | is |
 //! |---|---|
 //! | PD5 / PD6 | USART2 TX / RX, the autopilot's TELEM2, 921 600 baud |
-//! | PC6 / PC7 | USART6 TX / RX, the swarm's radio, 57 600 baud |
+//! | PC6 / PC7 | USART6 TX / RX, the swarm's radio, 460 800 baud |
 //! | PB0 | LD1, green |
 #![expect(unsafe_code, reason = "handlers of interrupts")]
 
@@ -35,7 +35,7 @@ mod flash;
 pub use flash::{Flash, LAYOUT};
 
 const AUTOPILOT_BAUD: u32 = 921_600;
-const RADIO_BAUD: u32 = 57_600;
+const RADIO_BAUD: u32 = 460_800;
 /// The DMA turns in it: 22 ms of the autopilot's bytes. Statics lie in AXI SRAM, where the DMA reaches them.
 const RING: usize = 2048;
 static AUTOPILOT_RING: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
@@ -67,6 +67,8 @@ unsafe fn UART8() {
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     let p = embassy_stm32::init(clocks());
+    // SAFETY: the instruction cache is this function's alone, which is called once. Code is never written.
+    unsafe { cortex_m::Peripherals::steal() }.SCB.enable_icache();
     interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {

@@ -3,11 +3,11 @@
 //! | pin | is |
 //! |---|---|
 //! | GP0 / GP1 | UART0 TX / RX, the autopilot's TELEM2, 921 600 baud |
-//! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 57 600 baud |
+//! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 460 800 baud |
 //! | GP25 | the light |
 //!
-//! While the flash erases or programs nothing runs from it: no setpoint goes out. The companion asks for that only on the
-//! ground, disarmed.
+//! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a UART may be lost. Sectors are erased
+//! only on the ground, disarmed; a page, as of an upload or a parameter in flight, is programmed within a millisecond or so.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
 use companion::store::{Fault, Layout, ReadFlash};
@@ -28,7 +28,7 @@ bind_interrupts!(struct Irqs {
 });
 
 const AUTOPILOT_BAUD: u32 = 921_600;
-const RADIO_BAUD: u32 = 57_600;
+const RADIO_BAUD: u32 = 460_800;
 /// 22 ms of the autopilot's bytes.
 const RING: usize = 2048;
 type Rings = [[u8; RING]; 2];

@@ -1,4 +1,7 @@
 //! CMSDK watchdog: resets the board unless it is fed.
+#![expect(unsafe_code, reason = "the handler of the interrupt that nothing masks")]
+
+use cortex_m_rt::exception;
 
 use super::registers::Register;
 
@@ -12,6 +15,10 @@ const UNLOCK: u32 = 0x1ACC_E551;
 const COUNTS: u32 = super::super::BITES_AFTER_US / 2 * 25;
 /// Interrupt at the first end, reset at the second.
 const ENABLED: u32 = 0b11;
+
+/// Half of the time is over, which this device says by the interrupt that nothing masks: the other half is left.
+#[exception]
+unsafe fn NonMaskableInt() {}
 
 /// The watchdog.
 pub struct Watchdog(pub(super) ());
