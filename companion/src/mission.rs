@@ -136,8 +136,6 @@ pub enum Guard {
     BatteryLow,
     /// Outside the configured volume, and no neighbour below.
     OutsideGeofence,
-    /// Outside the configured volume.
-    Outside,
     /// Of the neighbours that fly, none was heard for the limit.
     NeighboursSilent,
     /// A neighbour was heard within the last second.
@@ -352,7 +350,6 @@ impl Guard {
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside && i.room_below,
-            Self::Outside => i.outside,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground,

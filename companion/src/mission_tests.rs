@@ -126,7 +126,6 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
         G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
-        G::Outside => i.outside = true,
         G::NeighboursSilent => i.neighbour_age = long,
         G::NeighbourHeard => i.neighbour_heard = true,
         G::OnGround => i.on_ground = true,

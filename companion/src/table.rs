@@ -77,7 +77,6 @@ pub static TABLE: &[Row] = &[
     warn(&[TakeOff, Climb],   G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
     warn(&[TakeOff, Climb],   G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
-    warn(&[Climb, Follow, Alone, Blocked, Replanning], G::Outside, NOW, Paused, A::BrakeOnPath, "Outside the geofence: stopping"),
     info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
     info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
     info(ON_PATH,             G::ReturnCommanded,  NOW,    Follow,          A::TurnBack,    "Flying back to the start"),
