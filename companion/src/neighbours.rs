@@ -40,6 +40,8 @@ const SILENT: Duration = Duration::from_secs(3);
 const BELOW_M: f32 = 15.0;
 /// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
 const LANDS_MPS: f32 = 2.0;
+/// A place older than this tells little of how low a vehicle is that lands, seconds.
+const OLD_S: f32 = 1.0;
 /// A vehicle this little below may yet be above in a moment, metres.
 const LEVEL_M: f32 = 1.0;
 /// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
@@ -110,19 +112,20 @@ impl Contact {
     fn columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
-        let mut column = |from: Point, below_m: f32| {
-            tell(KeepOff {
-                from: from + up(LEVEL_M),
-                to: from - up(below_m),
-                radius_m: apart_m,
-                nature: Nature::Landing,
-            });
+        let mut column = |from: Point, below_m: f32, nature: Nature| {
+            tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
         };
         if !self.heard_within(now, SILENT) {
-            self.stretch(|place| column(place, COLUMN_M));
+            return self.stretch(|place| column(place, COLUMN_M, Nature::Landing));
+        }
+        let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
+        let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
+        if age_s < OLD_S {
+            column(here, (BELOW_M + fallen_m).min(COLUMN_M), Nature::Landing);
         } else {
-            let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
-            column(here, (BELOW_M + LANDS_MPS * age_s).min(COLUMN_M));
+            // It may be anywhere down to there by now, and comes down from there.
+            column(here, fallen_m, Nature::Solid);
+            column(here - up(fallen_m), BELOW_M, Nature::Landing);
         }
     }
 

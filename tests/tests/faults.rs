@@ -6,7 +6,7 @@
 //! it is shown that there was no time to leave ([`is_unavoidable`]).
 //!
 //! What is counted and not asserted: vehicles nearer than the safety distance to the one struck, where that comes down without
-//! looking; touching it is asserted. `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture`
+//! looking, or to one that it hit; touching it is asserted. `FLOCKMATE_FAULT_SEEDS=20 cargo test --release --workspace --test faults -- --nocapture`
 //! sweeps twenty seeds and prints a line for each kind. `FLOCKMATE_FAULT_ONLY=kill` plays the kinds whose lines hold that,
 //! `FLOCKMATE_FAULT_SEED=17` one seed, and prints its logs.
 
@@ -134,12 +134,21 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     let said = |text: &str| flight.log.iter().any(|e| is_struck(e) && e.text.contains(text));
     // A vehicle that is out comes down where it is, whatever is there.
     let own_contacts_count = case.then == GoesOn;
-    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet up, the autopilot disarms.
-    let goes_on = case.then == GoesOn && !said("start cancelled") && !said("Disarmed in flight");
+    // Before take-off a mode that the pilot changes cancels the start for good; armed and not yet up, the autopilot disarms; and a
+    // pilot who takes over at the end of a landing has landed.
+    let goes_on = case.then == GoesOn
+        && !["start cancelled", "Disarmed in flight", "landing stopped"].iter().any(|text| said(text));
     let (mut too_near, mut hit) = (0, 0);
+    // Who could not help being hit is struck from then on; that it flies on at all is the simulation's.
+    let is_hit = |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
+    let hit_at: Vec<(u8, f32)> =
+        flight.log.iter().filter(is_hit).filter_map(|e| Some((e.vehicle?, e.t_s))).collect();
     for e in &flight.log {
-        let by_or_at_struck =
-            is_struck(e) || struck.iter().any(|id| e.text.ends_with(&format!("vehicle no. {id}")));
+        let now_struck = hit_at.iter().filter(|(_, t_s)| *t_s <= e.t_s).map(|(id, _)| id);
+        let by_or_at_struck = struck
+            .iter()
+            .chain(now_struck)
+            .any(|id| e.vehicle == Some(*id) || e.text.ends_with(&format!("vehicle no. {id}")));
         let own_wall = e.text.contains("touches an obstacle") && is_struck(e);
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
         let is_wrong = if e.text.contains("nearer than") {
