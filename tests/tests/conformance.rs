@@ -1,9 +1,10 @@
-//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK.
+//! Ground tools that others wrote must be able to fly `host-sim autopilot`: pymavlink and MAVSDK; and with MAVProxy use a companion's services.
 //!
 //! The scripts in `tests/conformance` run with the Python of the virtual environment that `cargo xtask test` makes
 //! (`FLOCKMATE_PYTHON`); without it each test says so and passes. Flights are in real time: half a minute each.
 
 use std::io::{BufRead, BufReader};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
@@ -136,6 +137,16 @@ fn pymavlink_uses_the_companions_files_and_parameters_through_the_autopilot() {
 fn mavsdk_uses_the_companions_files_and_parameters_through_the_autopilot() {
     let address = format!("127.0.0.1:{}", free_udp_port());
     onboard("onboard_mavsdk.py", &format!("udp:{address}"), |_| format!("udpin://{address}"));
+}
+
+#[test]
+fn mavproxy_uses_the_companions_files_and_parameters_through_the_autopilot() {
+    let Some(python) = python() else { return };
+    if !Path::new(&python).with_file_name("mavproxy.py").exists() {
+        println!("skipped: no MAVProxy beside {python}");
+        return;
+    }
+    onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", |at| format!("udpout:{at}"));
 }
 
 #[test]

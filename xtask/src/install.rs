@@ -33,7 +33,7 @@ pub const PEER: &[Package] = &[
 ];
 /// What counts instructions.
 pub const COUNTER: &[Package] = &[Package { name: "valgrind", file: "/usr/bin/valgrind" }];
-const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink"];
+const PYTHON_CLIENTS: &[&str] = &["mavsdk<4", "pymavlink", "MAVProxy"];
 
 /// Installs what is missing of `packages`, as root on Debian; else says in one line what to install.
 pub fn debian(packages: &[Package]) -> Result<()> {
@@ -58,19 +58,20 @@ fn is_root() -> bool {
     id.is_ok_and(|out| out.stdout.trim_ascii() == b"0")
 }
 
-/// The Python of a venv with MAVSDK and pymavlink, made in the target directory at the first call.
+/// The Python of a venv with MAVSDK, pymavlink and MAVProxy, made in the target directory at the first call.
 pub fn python_clients() -> Result<PathBuf> {
     let venv = target_dir().join("venv");
     let python = venv.join("bin/python");
     let ready = venv.join("flockmate-ready");
-    if !ready.exists() {
-        println!("making a venv for {}", PYTHON_CLIENTS.join(", "));
+    let clients = PYTHON_CLIENTS.join(", ");
+    if std::fs::read_to_string(&ready).ok().as_ref() != Some(&clients) {
+        println!("making a venv for {clients}");
         if run(command("python3").args(["-m", "venv"]).arg(&venv)).is_err() {
             debian(&[Package { name: "python3-venv", file: "/usr/share/doc/python3-venv" }])?;
             run(command("python3").args(["-m", "venv", "--clear"]).arg(&venv))?;
         }
         run(command(&python).args(["-m", "pip", "install", "--quiet"]).args(PYTHON_CLIENTS))?;
-        std::fs::write(ready, "")?;
+        std::fs::write(ready, clients)?;
     }
     Ok(python)
 }
