@@ -18,7 +18,7 @@ use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use heapless::Vec;
 
-use crate::boards::HoldsExecutors;
+use crate::boards::{HoldsExecutors, overslept_us};
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::planner::Planner;
 
@@ -154,6 +154,11 @@ fn now_ms() -> u32 {
     Instant::now().as_millis() as u32
 }
 
+/// The same without what an emulated board's host overslept, which is none of the firmware's doing.
+fn awake_ms() -> u32 {
+    (Instant::now().as_micros().saturating_sub(overslept_us().into()) / 1000) as u32
+}
+
 impl Shell {
     /// Without a companion.
     pub const fn new() -> Self {
@@ -192,7 +197,7 @@ impl Shell {
                     Event::PlanRequested => self.wants_plan.signal(()),
                     Event::RestartRequested => self.ask_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
-                        if let Some(told) = self.setpoints.take(now_ms()) {
+                        if let Some(told) = self.setpoints.take(awake_ms()) {
                             companion.say_count(false, "Setpoints: #, at most # ms apart", told);
                         }
                     }
@@ -200,7 +205,7 @@ impl Shell {
                 }
             }
             if !companion.streams() {
-                self.setpoints.end(now_ms());
+                self.setpoints.end(awake_ms());
             }
             result
         });
@@ -266,7 +271,7 @@ impl Shell {
                 let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
-                    self.setpoints.note(now_ms());
+                    self.setpoints.note(awake_ms());
                 }
                 // What waited for room to be said may go on.
                 self.works.signal(());

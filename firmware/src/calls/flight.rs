@@ -31,7 +31,7 @@ const SYSTEM: u8 = 1;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Control steps counted in each flight.
-const STEPS: usize = 100;
+const STEPS: usize = 200;
 /// Most steps of 0.9 s before them, in which silent neighbours grow old. A longer one would be a gap in the position.
 const AGEING: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
