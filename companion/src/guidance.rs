@@ -139,6 +139,12 @@ impl Guidance {
         }
     }
 
+    /// Takes other speeds.
+    pub fn tune<const V: usize>(&mut self, config: &Config<V>) {
+        let Self { track, deconflict, climb_mps, .. } = Self::new(config);
+        (self.track, self.deconflict, self.climb_mps) = (track, deconflict, climb_mps);
+    }
+
     /// Forgets a former flight.
     pub fn reset(&mut self) {
         self.tracker = Tracker::default();

@@ -22,7 +22,7 @@ use crate::mission::{self, Action, Guard, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
-use crate::store::Store;
+use crate::store::{Erasing, Store};
 use crate::telemetry::{Change, Telemetry};
 use crate::time::{Duration, Instant};
 
@@ -42,6 +42,10 @@ const EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
+    /// Cruise and climb of the mission, which parameters may limit.
+    pub(crate) nominal_mps: [f32; 2],
+    /// A parameter was set that is not in use yet.
+    pub(crate) untuned: bool,
     pub(crate) rank: u16,
     pub(crate) start: Point,
     framers: [Framer; 2],
@@ -89,6 +93,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
         let start = own.start;
         Ok(Self {
+            nominal_mps: [config.cruise_mps, config.climb_mps],
+            untuned: false,
             rank,
             start,
             framers: [Framer::new(), Framer::new()],
@@ -356,6 +362,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// One step of the control loop: reference, table, and what is asked for again.
     fn step(&mut self) {
         let now = self.now;
+        if self.untuned && self.erasing() == Erasing::Allowed {
+            self.tune();
+        }
         let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
         self.stepped_at = now;
         let scene = Scene {

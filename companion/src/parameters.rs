@@ -1,7 +1,8 @@
 //! The tunables of one vehicle, as MAVLink parameters: names, ranges, defaults, and how they are kept in flash.
 //!
 //! All travel as REAL32, since ground tools decode parameters by the autopilot's firmware. What the whole swarm must agree on is
-//! in the mission file instead. A changed value counts from the next start of the companion.
+//! in the mission file instead. A changed value counts as soon as the vehicle stands
+//! disarmed and idle, but for the system id: that counts from the next start.
 
 use crate::config::Config;
 

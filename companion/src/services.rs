@@ -24,9 +24,20 @@ const REAL32: u8 = 9;
 const ALONE_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Gives it a flash to keep its files and parameters in; without one there are no files, and parameters are forgotten.
+    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
+    /// forgotten.
     pub fn mount(&mut self, store: Store) {
         self.store = Some(store);
+        self.tune();
+    }
+
+    /// Puts the parameters to use.
+    pub(crate) fn tune(&mut self) {
+        self.untuned = false;
+        [self.config.cruise_mps, self.config.climb_mps] = self.nominal_mps;
+        let parameters = *self.parameters();
+        parameters.apply(&mut self.config);
+        self.guidance.tune(&self.config);
     }
 
     /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
@@ -50,7 +61,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
-    fn erasing(&self) -> Erasing {
+    pub(crate) fn erasing(&self) -> Erasing {
         let idle = matches!(
             self.state,
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
@@ -146,6 +157,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 })
             }
         };
+        self.untuned |= result.is_ok();
         // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
         if let Some(index) = found {
             self.tell_parameter(link, index);

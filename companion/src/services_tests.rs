@@ -187,3 +187,40 @@ fn time_and_version_are_told_on_either_link() {
         assert!(version.flight_sw_version > 0);
     }
 }
+
+#[test]
+fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
+    let set = |value, name: &str| PARAM_SET_DATA {
+        param_value: value,
+        target_system: SYSTEM,
+        target_component: crate::COMPONENT,
+        param_id: name.into(),
+        param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+    };
+    let speeds = |ground: &Ground| {
+        let config = &ground.bench.companion.config;
+        (config.cruise_mps, config.climb_mps, config.accel_mps2)
+    };
+    let mut ground = Ground::new();
+    ground.bench.until(State::Ready, 6.0);
+    let mission = speeds(&ground);
+    ground.ask(Link::Autopilot, &set(0.5, "FLK_SPEED_MAX"));
+    ground.ask(Link::Autopilot, &set(0.8, "FLK_ACCEL"));
+    ground.bench.run(0.5);
+    assert_eq!(speeds(&ground), (0.5, mission.1, 0.8));
+    ground.bench.start();
+    ground.bench.until(State::Follow, 20.0);
+    ground.ask(Link::Autopilot, &set(1.0, "FLK_SPEED_MAX"));
+    let begun = ground.bench.setpoints.len();
+    ground.bench.run(4.0);
+    let pairs = ground.bench.setpoints[begun..].windows(2);
+    let fastest = pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).secs_f32()).fold(0.0, f32::max);
+    assert!((0.4..0.55).contains(&fastest), "not while it flies: {fastest}");
+    assert_eq!(speeds(&ground).0, 0.5);
+    ground.bench.until(State::Done, 90.0);
+    ground.bench.run(0.5);
+    assert_eq!(speeds(&ground).0, 1.0);
+    ground.ask(Link::Autopilot, &set(20.0, "FLK_SPEED_MAX"));
+    ground.bench.run(0.5);
+    assert_eq!(speeds(&ground).0, mission.0, "the mission's own, not more");
+}

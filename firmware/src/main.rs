@@ -88,11 +88,10 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
         roadmap.is_some(),
         mission.is_some()
     );
-    let mut config = mission
+    let config = mission
         .as_ref()
         .and_then(|mission| mission.config(system_id).ok())
         .unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
-    store.parameters().apply(&mut config);
     let mut companion = BoardCompanion::new(config).expect("every setting was checked");
     companion.mount(store);
     if let Some(text) = crashed {

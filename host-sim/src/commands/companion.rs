@@ -140,9 +140,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 /// A companion with its flash and the parameters kept there.
 fn start(config: &Config<VEHICLES>, flash: &mut DeskFlash) -> anyhow::Result<Box<DeskCompanion>> {
     let store = Store::mount(flash::LAYOUT, flash);
-    let mut config = config.clone();
-    store.parameters().apply(&mut config);
-    let mut companion = new_companion(config)?;
+    let mut companion = new_companion(config.clone())?;
     companion.mount(store);
     Ok(companion)
 }
