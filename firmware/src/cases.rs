@@ -8,7 +8,7 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
 use planner_core::path::Path;
-use planner_core::plan::{Mode, Objective, VehicleTask};
+use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::prm::{Config, Sampling};
 use planner_core::roadmap::{Edge, HalfEdge, RoadmapView};
 use planner_core::schedule::{Gate, ScheduleConfig};
@@ -52,6 +52,11 @@ pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
 /// Height of every goal above its ground, metres.
 pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
     (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
+}
+
+/// What is asked for that swarm.
+pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
+    PlanRequest { vehicles, descents_m, mode: MODE, schedule: SCHEDULE }
 }
 
 /// Scratch of [`plan_case`].

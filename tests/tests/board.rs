@@ -11,7 +11,7 @@ use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
-use planner_core::plan::{self, PlanRequest, PlanWorkspace, SwarmPlan};
+use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
 use planner_core::prm::{self, Config};
 
 /// Most instructions, by the name of what is counted.
@@ -60,12 +60,7 @@ fn the_board_computes_what_the_desk_computes() {
 fn swarm_crc(mission: &Mission) -> u32 {
     let view = mission.view();
     let (vehicles, descents_m) = (cases::tasks(&view), cases::descents(&view));
-    let request = PlanRequest {
-        vehicles: &vehicles,
-        descents_m: &descents_m,
-        mode: cases::MODE,
-        schedule: cases::SCHEDULE,
-    };
+    let request = cases::request(&vehicles, &descents_m);
     let mut ws = host_sim::capacity::on_heap(PlanWorkspace::<4096, 32, 2048>::new);
     let mut plan = Box::new(SwarmPlan::<32, 64>::new());
     plan::plan_swarm(&view, &request, &mut ws, &mut plan).expect("a plan");

@@ -14,8 +14,8 @@ use crate::time::{Duration, Instant};
 const WAITS_WITHIN_M: f32 = 8.0;
 /// Who was heard to hear us within this time is linked.
 const LINKED: Duration = Duration::from_millis(800);
-/// A landing by the autopilot alone drifts in gusts, metres.
-const LANDING_DRIFT_M: f32 = 0.5;
+/// What gusts carry a vehicle off that its autopilot lands from a standstill, and some room, metres.
+const ALONE_BESIDE_M: f32 = 0.5;
 
 impl Guidance {
     /// Stops the reference within its braking distance; off the path, where the vehicle is.
@@ -53,9 +53,12 @@ impl Guidance {
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + retreat::BESIDE_M;
         let unsafe_at = |m: f32| {
-            path.point_at(m).is_some_and(|p| match alone {
-                true => neighbours.any_below(&p, safety_m + LANDING_DRIFT_M),
-                false => neighbours.comes_down_on(now, &p, beside_m),
+            path.point_at(m).is_some_and(|p| {
+                if alone {
+                    neighbours.any_below(&p, safety_m + ALONE_BESIDE_M)
+                } else {
+                    neighbours.comes_down_on(now, &p, beside_m)
+                }
             })
         };
         let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;

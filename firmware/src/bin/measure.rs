@@ -12,7 +12,7 @@ use firmware::cases::{self, StepCase};
 use firmware::scratch::{Planner, Scratch};
 use heapless::Vec;
 use planner_core::deconflict::Method;
-use planner_core::plan::{self, Goals, PlanRequest, SwarmPlan};
+use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::prm::Config;
 use planner_core::roadmap::{HalfEdge, RoadmapView};
 use planner_core::search::{self, SearchWorkspace};
@@ -71,12 +71,7 @@ fn counted<T>(name: &str, work: impl FnOnce() -> T) -> T {
 fn plan_swarm(view: &RoadmapView<'_>, ws: &mut Planner) {
     let plan = PLAN.take();
     let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = PlanRequest {
-        vehicles: &vehicles,
-        descents_m: &descents_m,
-        mode: cases::MODE,
-        schedule: cases::SCHEDULE,
-    };
+    let request = cases::request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     counted("costs", || plan::costs(view, &request, ws)).expect("a cost matrix");
     counted("assign", || plan::assign(&request, ws, &mut goals)).expect("an assignment");

@@ -12,7 +12,7 @@ use planner_core::deconflict::{Advice, Method};
 use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::path::{self, Path, TrackConfig, Tracker};
-use planner_core::plan::{self, Goals, PlanRequest, SwarmPlan};
+use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::prm::{self, Config};
 use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
@@ -169,12 +169,7 @@ fn assignments(meter: &mut impl Meter, ws: &mut AssignmentWorkspace<VEHICLES>) {
 fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
     let bytes = size_of::<Planner>();
     let (vehicles, descents_m) = (cases::tasks(view), cases::descents(view));
-    let request = PlanRequest {
-        vehicles: &vehicles,
-        descents_m: &descents_m,
-        mode: cases::MODE,
-        schedule: cases::SCHEDULE,
-    };
+    let request = cases::request(&vehicles, &descents_m);
     let mut goals = Goals::new();
     let good = "the demo has a plan";
     meter.call("plan::costs, 10 × 10", bytes, || plan::costs(view, &request, ws)).expect(good);
