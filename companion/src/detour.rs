@@ -10,7 +10,10 @@
 //! blocked and no longer that it waits, for [`CLAIM`], longer than a word takes to be heard. It begins only if all others
 //! wait then; who hears a lower system id claim waits again.
 //!
-//! ENU metres. Cost: every half second, each leg ahead against each vehicle that is out.
+//! Who is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
+//! step, so a look among many takes several steps.
+//!
+//! ENU metres.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -24,10 +27,13 @@ use crate::events::Event;
 use crate::machine::{Companion, STANDING_MPS};
 use crate::mission::State;
 use crate::retreat;
+use crate::sweep::Sweep;
 use crate::time::{Duration, Instant};
 
-/// Time between two looks along the path.
+/// Time from one look along the path to the next.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
+/// Stretches of the path that are looked at in one step, each against one thing; a step looks at the whole path at least once.
+const STRETCHES: usize = 72;
 /// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
 const QUIET_S: u64 = 3;
 /// A turn is claimed for this long before it is taken.
@@ -89,7 +95,10 @@ pub(crate) struct Around {
     pub(crate) quiet_since: Option<Instant>,
     /// Since when it claims its turn.
     pub(crate) claimed_since: Option<Instant>,
+    /// When the last look began, and whether it goes on.
     pub(crate) looked_at: Instant,
+    pub(crate) looking: bool,
+    pub(crate) sweep: Sweep,
 }
 
 /// What the others are told of where it is.
@@ -151,25 +160,34 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Looks for what is in the way, and whether the others stand.
     pub(crate) fn look_around(&mut self) {
         let now = self.now;
-        if now - self.around.looked_at < LOOK_EVERY {
-            return;
+        if !self.around.looking {
+            if now - self.around.looked_at < LOOK_EVERY {
+                return;
+            }
+            self.around.looked_at = now;
         }
-        self.around.looked_at = now;
         self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.plan.is_some();
         let on_ground = matches!(self.state, State::Scheduled | State::PadReplanning);
         let stopped = matches!(self.state, State::Blocked | State::Replanning);
         if !on_ground && !stopped && self.state != State::Follow {
             self.around.blocked = false;
             (self.around.quiet_since, self.around.claimed_since) = (None, None);
+            self.around.sweep.restart();
+            self.around.looking = false;
             return;
+        }
+        let in_the_way = self.is_in_the_way(on_ground);
+        self.around.looking = in_the_way.is_none();
+        let Some(in_the_way) = in_the_way else { return };
+        if !in_the_way {
+            self.neighbours.found_clear(self.around.looked_at);
         }
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
         let astray = self.around.left && (!self.around.flying || aside);
         let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
-        self.around.blocked =
-            !self.guidance.returning && (stuck || astray || dead_end || self.is_in_the_way(on_ground));
+        self.around.blocked = !self.guidance.returning && (stuck || astray || dead_end || in_the_way);
         if !self.neighbours.all_stand(now) {
             // Somebody moved: what stood in the way may have gone.
             (self.around.quiet_since, self.around.failed) = (None, 0);
@@ -180,18 +198,25 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.around.claimed_since = self.around.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
-    fn is_in_the_way(&self, on_ground: bool) -> bool {
-        let Some(plan) = &self.plan else { return false };
+    /// Whether anything is; `None` while the look goes on.
+    fn is_in_the_way(&mut self, on_ground: bool) -> Option<bool> {
+        let Some(plan) = &self.plan else { return Some(false) };
         let here = if on_ground { self.pad() } else { self.telemetry.position };
         let along_m = self.guidance.along_m();
-        let ahead = |obstacle: &KeepOff| {
-            detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, obstacle)
-        };
-        let mut blocked = self.obstacles.known[self.obstacles.avoided..].iter().any(ahead);
-        self.neighbours.obstacles(self.now, self.config.safety_distance_m + STRAY_M, |obstacle| {
-            blocked |= ahead(&obstacle);
-        });
-        blocked
+        let stretches = detour::stretches_ahead(&plan.path, along_m);
+        let apart_m = self.config.safety_distance_m + STRAY_M;
+        let (now, neighbours) = (self.now, &self.neighbours);
+        let new = &self.obstacles.known[self.obstacles.avoided..];
+        self.around.sweep.go_on(
+            new.len() + neighbours.len(),
+            &mut (stretches.max(STRETCHES) as u16),
+            stretches as u16,
+            |source, tell| match new.get(source) {
+                Some(obstacle) => tell(*obstacle),
+                None => neighbours.obstacle(source - new.len(), now, apart_m, tell),
+            },
+            |obstacle| detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, obstacle),
+        )
     }
 
     /// Takes an obstacle that is not on the map: its centre, and its radius.

@@ -11,6 +11,7 @@ use planner_core::schedule::VehiclePlan;
 use crate::config::Config;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
+use crate::retreat::Search;
 use crate::telemetry::Telemetry;
 use crate::time::Instant;
 
@@ -80,6 +81,7 @@ pub struct Guidance {
     pub returning: bool,
     /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
     linked_m: f32,
+    shelter: Search,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
@@ -131,6 +133,7 @@ impl Guidance {
             progress_at: Instant::ZERO,
             returning: false,
             linked_m: f32::INFINITY,
+            shelter: Search::default(),
             retreating: false,
             trapped_since: None,
             aside: false,

@@ -42,6 +42,7 @@ mod requests;
 mod retreat;
 mod services;
 pub mod store;
+mod sweep;
 pub mod table;
 pub mod telemetry;
 pub mod time;

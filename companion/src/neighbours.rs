@@ -48,6 +48,8 @@ const LEVEL_M: f32 = 1.0;
 const VAGUE_M: f32 = 0.5;
 /// What two vehicles in the air may stray together, one of which hovers, metres.
 const SWAY_M: f32 = 0.1;
+/// Nobody flies higher over another than this, metres.
+const SKY_M: f32 = 1000.0;
 
 #[derive(Clone, Debug)]
 struct Contact {
@@ -58,6 +60,8 @@ struct Contact {
     position_at: Option<Instant>,
     boot_ms: u32,
     flags: u8,
+    /// Since when it tells that it is out.
+    out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
     points: Vec<Point, POINTS>,
     /// Where it rested when a way around was planned.
@@ -85,6 +89,11 @@ impl Contact {
 
     fn is_out(&self, now: Instant) -> bool {
         self.tells(OUT) || self.is_dead(now)
+    }
+
+    /// Whether it is out, and was when it was last looked at what is in the way.
+    fn is_out_since(&self, at: Instant) -> bool {
+        self.out_at.is_some_and(|since| since <= at) || self.is_dead(at)
     }
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
@@ -182,12 +191,15 @@ pub struct Neighbours<const V: usize> {
     /// The first contacts are the roster, sorted by id; the rest are strangers.
     roster: usize,
     dropped: u32,
+    /// When it was last found that nobody who was out is in the way.
+    clear_at: Instant,
 }
 
 impl<const V: usize> Neighbours<V> {
     /// The vehicles of a roster sorted by id, without the own one; nobody heard yet.
     pub fn new(roster: &[RosterEntry], own_id: u8) -> Self {
-        let mut table = Self { contacts: Vec::new(), heard: Vec::new(), roster: 0, dropped: 0 };
+        let mut table =
+            Self { contacts: Vec::new(), heard: Vec::new(), roster: 0, dropped: 0, clear_at: Instant::ZERO };
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id != own_id {
                 // A roster of at most V entries fits.
@@ -223,6 +235,7 @@ impl<const V: usize> Neighbours<V> {
             position_at: None,
             boot_ms: 0,
             flags: 0,
+            out_at: None,
             hears_us_at: None,
             points: Vec::new(),
             avoided: None,
@@ -296,6 +309,7 @@ impl<const V: usize> Neighbours<V> {
             same_mission && intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         contact.heard_at = Some(now);
         contact.flags = intent.flags;
+        contact.out_at = contact.out_at.or(Some(now)).filter(|_| contact.tells(OUT));
         // Ranks beyond the bitmap are not told.
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
@@ -305,7 +319,8 @@ impl<const V: usize> Neighbours<V> {
         contact.state.progress_m = shared.then_some(intent.progress_m);
     }
 
-    /// Every neighbour whose position was ever heard, with its age at `now`.
+    /// Every neighbour whose position was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
+    /// whether it is in the way ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         for contact in &self.contacts {
@@ -314,7 +329,7 @@ impl<const V: usize> Neighbours<V> {
                     age_s: (now - at).secs_f32(),
                     rank: contact.rank,
                     grounded: contact.state.grounded || contact.is_dead(now),
-                    out: contact.is_out(now),
+                    out: contact.is_out_since(self.clear_at),
                     detours: contact.tells(DETOURS),
                     ..contact.state
                 };
@@ -358,12 +373,29 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// What lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it is far
-    /// enough.
-    pub fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    /// How many contacts there are.
+    pub fn len(&self) -> usize {
+        self.contacts.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
+    /// is far enough.
+    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
-        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.is_out(now) && !avoided(c));
-        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+        let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
+        if let Some(contact) = self.contacts.get(i).filter(unknown) {
+            contact.obstacles(now, apart_m, tell);
+        }
+    }
+
+    /// Everybody who was out at `at` was looked at, and nobody is in the way.
+    pub fn found_clear(&mut self, at: Instant) {
+        self.clear_at = at;
     }
 
     /// Where all neighbours are while they stand, those out of the plan among them.
@@ -374,15 +406,24 @@ impl<const V: usize> Neighbours<V> {
 
     /// Where vehicles that land without looking may come nearer than `apart_m`.
     pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let placed = self.contacts.iter().filter(|c| c.position_at.is_some() && c.comes_down(now));
-        placed.for_each(|c| c.columns(now, apart_m, &mut tell));
+        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
     }
 
-    /// Whether one of these columns holds `place`.
-    pub fn comes_down_on(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
-        let mut on_it = false;
-        self.landing_columns(now, apart_m, |column| on_it |= column.holds(place));
-        on_it
+    /// The same of contact `i`.
+    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
+        let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
+        if let Some(contact) = self.contacts.get(i).filter(landing) {
+            contact.columns(now, apart_m, tell);
+        }
+    }
+
+    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical.
+    pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
+            let from = contact.state.position;
+            let to = from + Point::new(0.0, 0.0, SKY_M);
+            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Solid });
+        }
     }
 
     /// Whether a neighbour of the roster was heard within `span`, and one told that it hears us.

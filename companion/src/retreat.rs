@@ -5,11 +5,14 @@
 //! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
 //! who follows behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
 //!
-//! ENU metres. Cost: [`STEPS`] places against each neighbour, only while one comes down near the place to wait.
+//! ENU metres. Cost: [`BUDGET`] a step, so a search among many columns takes several steps.
 
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
+use planner_core::detour::KeepOff;
 use planner_core::path::{Path, Reference, Tracker};
+
+use crate::sweep::Sweep;
 
 /// What the one that comes down may drift, and the one below sways, metres.
 pub const BESIDE_M: f32 = 0.6;
@@ -18,16 +21,67 @@ const FOLLOWER_M: f32 = 0.6;
 /// Spacing and number of the places looked at.
 const STEP_M: f32 = 0.25;
 const STEPS: u16 = 48;
+/// What a search may cost in one step: neighbours, columns, and [`PLACE_COST`] for each place.
+const BUDGET: u16 = 128;
+const PLACE_COST: u16 = 4;
 /// Fastest on a straight leg, and through its ends, m/s: a right angle is strayed from by 0.47 m then.
 const FAST_MPS: f32 = 1.5;
 const CORNER_MPS: f32 = 0.6;
 /// Acceleration, m/s².
 const ACCEL_MPS2: f32 = 1.0;
 
-/// The nearest place before `wait_m`, metres along the path, that is not `unsafe_at`; `None` if there is none within reach.
-pub fn elsewhere(wait_m: f32, unsafe_at: impl Fn(f32) -> bool) -> Option<f32> {
-    let places = (1..=STEPS).map(|i| wait_m - f32::from(i) * STEP_M);
-    places.take_while(|m| *m >= 0.0).find(|m| !unsafe_at(*m))
+/// Where to wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Shelter {
+    /// Where it would anyway.
+    #[default]
+    Here,
+    /// Metres along the path.
+    Back(f32),
+    /// No place within reach is better.
+    Nowhere,
+}
+
+/// Looks for the nearest place to wait that no column holds.
+#[derive(Clone, Debug, Default)]
+pub struct Search {
+    sweep: Sweep,
+    /// Places behind the one to wait at that are held.
+    held: u16,
+    /// What the last search found.
+    pub found: Shelter,
+}
+
+impl Search {
+    /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of so many.
+    pub fn go_on<const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        wait_m: f32,
+        neighbours: usize,
+        tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
+    ) {
+        let mut budget = BUDGET;
+        let found = loop {
+            let along_m = wait_m - f32::from(self.held) * STEP_M;
+            let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
+            let Some(place) = place.filter(|_| self.held <= STEPS) else { break Shelter::Nowhere };
+            budget = budget.saturating_sub(PLACE_COST);
+            match self.sweep.go_on(neighbours, &mut budget, 1, &tell, |column| column.holds(&place)) {
+                None => return,
+                Some(true) => self.held += 1,
+                Some(false) if self.held == 0 => break Shelter::Here,
+                Some(false) => break Shelter::Back(along_m),
+            }
+        };
+        (self.found, self.held) = (found, 0);
+    }
+
+    /// Nobody asks.
+    pub fn reset(&mut self) {
+        self.sweep.restart();
+        (self.found, self.held) = (Shelter::Here, 0);
+    }
 }
 
 /// One step of `dt_s` back towards `to_m`; `None` if somebody is behind.
@@ -63,6 +117,10 @@ pub fn step<const W: usize>(
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use planner_core::detour::Nature;
+
     use super::*;
 
     fn path() -> Path<4> {
@@ -87,16 +145,47 @@ mod tests {
         }
     }
 
+    /// The column of one that comes down from 8 m.
+    fn column(x: f32, y: f32, radius_m: f32) -> KeepOff {
+        let (from, to) = (Point::new(x, y, 8.0), Point::new(x, y, 0.0));
+        KeepOff { from, to, radius_m, nature: Nature::Landing }
+    }
+
+    /// What a search for a place to wait at 9 m finds, and the steps it takes.
+    fn search(columns: &[KeepOff]) -> (Shelter, usize) {
+        let path = path();
+        let mut search = Search { found: Shelter::Back(99.0), ..Search::default() };
+        for steps in 1.. {
+            // A neighbour tells up to 16.
+            let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
+            search.go_on(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
+            if search.found != Shelter::Back(99.0) {
+                return (search.found, steps);
+            }
+            assert!(steps < 100);
+        }
+        unreachable!();
+    }
+
     #[test]
     fn a_place_below_one_that_comes_down_is_exchanged_for_one_before_it() {
-        let path = path();
-        let unsafe_at = |along_m: f32| {
-            let place = path.point_at(along_m).unwrap();
-            (place.xy() - Point::new(6.0, 3.0, 8.0).xy()).norm() < 2.1
+        let (Shelter::Back(to_m), 1) = search(&[column(6.0, 3.0, 2.1)]) else {
+            panic!("one is looked at in a step")
         };
-        let to_m = elsewhere(9.0, unsafe_at).unwrap();
         assert!((5.0..7.0).contains(&to_m), "{to_m}");
-        assert_eq!(elsewhere(9.0, |_| true), None, "nowhere is better");
+        assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (Shelter::Here, 1));
+        assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (Shelter::Nowhere, 2), "nowhere is better");
+    }
+
+    #[test]
+    fn a_search_among_all_columns_there_can_be_ends_within_a_second() {
+        let mut columns = std::vec![column(60.0, 0.0, 2.1); 31 * 16];
+        let (found, steps) = search(&columns);
+        assert!(found == Shelter::Here && (4..6).contains(&steps), "{steps}");
+        let last = columns.len() - 1;
+        columns[last] = column(6.0, 3.0, 2.1);
+        let (found, steps) = search(&columns);
+        assert!(matches!(found, Shelter::Back(_)) && steps < 20, "{found:?} after {steps}");
     }
 
     #[test]

@@ -98,12 +98,23 @@ pub fn is_blocked<const W: usize>(
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
     let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
+    let next = legs_begun(path, along_m);
     climbs
         || obstacle.touches(&last.position, &ground)
-        || path.waypoints().windows(2).filter(|leg| leg[1].along_m > along_m).any(|leg| {
+        || path.waypoints()[next.saturating_sub(1)..].windows(2).any(|leg| {
             let begun = if along_m > leg[0].along_m { path.point_at(along_m) } else { None };
             obstacle.touches(&begun.unwrap_or(leg[0].position), &leg[1].position)
         })
+}
+
+/// How many stretches [`is_blocked`] looks at: the legs ahead, the climb, the descent.
+pub fn stretches_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
+    path.waypoints().len() - legs_begun(path, along_m) + 2
+}
+
+/// The waypoints that are not ahead of an arc length.
+fn legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
+    path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
 
 /// What to plan.

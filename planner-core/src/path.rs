@@ -259,11 +259,14 @@ pub fn advance<const W: usize>(
     let mut speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
     let brake = |distance: f32, end: f32| sqrtf(end * end + 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0));
     speed = fminf(speed, brake(advice.stop_within_m, 0.0));
-    for (i, waypoint) in points.iter().enumerate() {
+    let next = points.partition_point(|w| w.along_m <= tracker.along_m);
+    for (i, waypoint) in points.iter().enumerate().skip(next) {
         let distance = waypoint.along_m - tracker.along_m;
-        if distance > 0.0 {
-            speed = fminf(speed, brake(distance, corner_speed(cfg, path, i)));
+        if 2.0 * cfg.accel_mps2 * distance >= speed * speed {
+            // From here on there is room to stop before any corner.
+            break;
         }
+        speed = fminf(speed, brake(distance, corner_speed(cfg, path, i)));
     }
     let step = cfg.accel_mps2 * dt_s;
     let speed_before = tracker.speed_mps;

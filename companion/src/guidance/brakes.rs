@@ -7,7 +7,7 @@ use planner_core::path::{Path, Reference};
 use super::Guidance;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
-use crate::retreat;
+use crate::retreat::{self, Shelter};
 use crate::time::{Duration, Instant};
 
 /// A stop further ahead is no place to wait at yet, metres.
@@ -52,23 +52,25 @@ impl Guidance {
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + retreat::BESIDE_M;
-        let unsafe_at = |m: f32| {
-            path.point_at(m).is_some_and(|p| {
-                if alone {
-                    neighbours.any_below(&p, safety_m + ALONE_BESIDE_M)
-                } else {
-                    neighbours.comes_down_on(now, &p, beside_m)
-                }
-            })
-        };
         let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
-        let (to_m, nowhere) = if waits_there && unsafe_at(wait_m) {
-            let to_m = retreat::elsewhere(wait_m, unsafe_at);
-            let linked_m = self.linked_m;
-            (to_m.filter(|to_m| !alone || *to_m >= linked_m), to_m.is_none() && !alone)
+        if waits_there {
+            self.shelter.go_on(path, wait_m, neighbours.len(), |i, tell| {
+                if alone {
+                    neighbours.above(i, safety_m + ALONE_BESIDE_M, tell);
+                } else {
+                    neighbours.landing_column(i, now, beside_m, tell);
+                }
+            });
         } else {
-            (None, false)
+            self.shelter.reset();
+        }
+        let (to_m, nowhere) = match self.shelter.found {
+            Shelter::Here => (None, false),
+            Shelter::Back(to_m) => (Some(to_m.min(wait_m)), false),
+            Shelter::Nowhere => (None, !alone),
         };
+        let linked_m = self.linked_m;
+        let to_m = to_m.filter(|to_m| !alone || *to_m >= linked_m);
         self.retreating = to_m.is_some();
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);

@@ -1,0 +1,123 @@
+//! Is any of many things in the way? Asked a few at a time, since a control step is not to take longer with more neighbours.
+//!
+//! The things are stretches to keep off ([`KeepOff`]), told by sources: a neighbour tells up to 16 of them. A step asks about as
+//! many as its budget pays for, the next goes on from there. One thing that is in the way answers at once, and its source is
+//! asked first the next time: what blocks the way mostly goes on doing so. That nothing is, is known after all were asked.
+
+use planner_core::detour::KeepOff;
+
+/// How far the question has come.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sweep {
+    source: usize,
+    /// Sources that were asked.
+    asked: usize,
+    /// Things of this source that were asked about.
+    place: usize,
+}
+
+impl Sweep {
+    /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source one. `Some(true)` once one of
+    /// them `is_in_the_way`, `Some(false)` when none of all `sources` is, then anew; `None` when the budget is spent, which has to
+    /// begin with at least `each`.
+    pub fn go_on(
+        &mut self,
+        sources: usize,
+        budget: &mut u16,
+        each: u16,
+        tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
+        is_in_the_way: impl Fn(&KeepOff) -> bool,
+    ) -> Option<bool> {
+        while self.asked < sources {
+            let (mut told, mut place, mut found) = (0, self.place, false);
+            self.source %= sources;
+            tell(self.source, &mut |keep_off| {
+                if told == place && !found && *budget >= each {
+                    *budget -= each;
+                    place += 1;
+                    found = is_in_the_way(&keep_off);
+                }
+                told += 1;
+            });
+            if found {
+                *self = Self { source: self.source, ..Self::default() };
+                return Some(true);
+            }
+            if place < told {
+                self.place = place;
+                return None;
+            }
+            *budget = budget.saturating_sub(1);
+            (self.source, self.asked, self.place) = (self.source + 1, self.asked + 1, 0);
+        }
+        self.asked = 0;
+        Some(false)
+    }
+
+    /// Asks anew, in the same order.
+    pub fn restart(&mut self) {
+        (self.asked, self.place) = (0, 0);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use planner_core::Point;
+    use planner_core::detour::Nature;
+
+    use super::*;
+
+    /// Seven sources of so many things; the first number of a thing is its source's, the second its own.
+    const THINGS: [usize; 7] = [0, 3, 16, 0, 1, 0, 2];
+
+    fn tell(source: usize, tell: &mut dyn FnMut(KeepOff)) {
+        for i in 0..THINGS[source] {
+            let at = Point::new(source as f32, i as f32, 0.0);
+            tell(KeepOff { from: at, to: at, radius_m: 1.0, nature: Nature::Solid });
+        }
+    }
+
+    /// Answer to where the thing is that is in the way, and the steps it took.
+    fn ask(sweep: &mut Sweep, each: u16, at: Option<(f32, f32)>) -> (bool, usize) {
+        for steps in 1.. {
+            let mut budget = 5;
+            let is = |k: &KeepOff| at.is_some_and(|(source, i)| k.from.x == source && k.from.y == i);
+            if let Some(found) = sweep.go_on(THINGS.len(), &mut budget, each, tell, is) {
+                return (found, steps);
+            }
+            assert!(steps < 100);
+        }
+        unreachable!();
+    }
+
+    #[test]
+    fn everything_is_asked_about_however_small_the_budget() {
+        for each in [1, 2, 5] {
+            for (source, &things) in THINGS.iter().enumerate() {
+                for i in 0..things {
+                    let mut sweep = Sweep::default();
+                    let at = Some((source as f32, i as f32));
+                    assert!(ask(&mut sweep, each, at).0, "{each} {source} {i}");
+                    assert_eq!(ask(&mut sweep, each, None).0, false);
+                }
+            }
+        }
+        assert_eq!(Sweep::default().go_on(0, &mut 5, 1, tell, |_| true), Some(false), "nobody is there");
+    }
+
+    #[test]
+    fn what_was_in_the_way_is_asked_about_first() {
+        let mut sweep = Sweep::default();
+        let at = Some((4.0, 0.0));
+        assert!(ask(&mut sweep, 5, at).1 > 10);
+        assert_eq!(ask(&mut sweep, 5, at), (true, 1));
+        assert_eq!(ask(&mut sweep, 5, None), (false, 22), "as many as there are things");
+    }
+
+    #[test]
+    fn sources_may_become_fewer_on_the_way() {
+        let mut sweep = Sweep::default();
+        assert_eq!(sweep.go_on(7, &mut 12, 1, tell, |_| false), None);
+        assert_eq!(sweep.go_on(2, &mut 12, 1, tell, |_| false), Some(false));
+    }
+}
