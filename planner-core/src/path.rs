@@ -50,19 +50,19 @@ impl<const W: usize> Path<W> {
         Self { waypoints: Vec::new() }
     }
 
-    /// Appends a waypoint; a zero-length leg is dropped, keeping the smaller clearance of the two.
+    /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of the two.
     pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
         if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
             return Err(PathError::NotFinite);
         }
         let along_m = match self.waypoints.last_mut() {
             Some(last) => {
-                let leg = (position - last.position).norm();
-                if leg == 0.0 {
+                let along_m = last.along_m + (position - last.position).norm();
+                if along_m == last.along_m {
                     last.clearance_m = fminf(last.clearance_m, clearance_m);
                     return Ok(());
                 }
-                last.along_m + leg
+                along_m
             }
             None => 0.0,
         };
@@ -223,18 +223,19 @@ fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
-/// Greatest speed through waypoint `i`.
-fn corner_speed<const W: usize>(cfg: &TrackConfig, path: &Path<W>, i: usize) -> f32 {
+/// Square of the greatest speed through waypoint `i`. Squares, and the legs' lengths from their arc lengths: a board takes its
+/// square roots by software.
+fn corner_speed_sq<const W: usize>(cfg: &TrackConfig, path: &Path<W>, i: usize) -> f32 {
     let points = path.waypoints();
     let (Some(before), Some(after)) = (i.checked_sub(1).and_then(|b| points.get(b)), points.get(i + 1))
     else {
         return 0.0;
     };
-    let incoming = (points[i].position - before.position).normalize();
-    let outgoing = (after.position - points[i].position).normalize();
-    let change = (outgoing - incoming).norm();
-    let e = deviation(cfg, fminf(points[i].clearance_m, after.clearance_m));
-    fminf(cfg.cruise_mps, e / (cfg.response_s * fmaxf(change, 1e-3)))
+    let direction =
+        |from: &Waypoint, to: &Waypoint| (to.position - from.position) / (to.along_m - from.along_m);
+    let change_sq = (direction(&points[i], after) - direction(before, &points[i])).norm_squared();
+    let sweep = deviation(cfg, fminf(points[i].clearance_m, after.clearance_m)) / cfg.response_s;
+    fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
 }
 
 /// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
@@ -256,18 +257,20 @@ pub fn advance<const W: usize>(
     let allowed = leg.map_or(cfg.deviation_max_m, |w| deviation(cfg, w.clearance_m));
     let lead_max = fminf(cfg.lead_max_m, fmaxf(4.0 * allowed, LEAD_LEAST_M));
     let waiting = fminf(fmaxf((lead_max - lead) / (0.5 * lead_max), 0.0), 1.0);
-    let mut speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
-    let brake = |distance: f32, end: f32| sqrtf(end * end + 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0));
-    speed = fminf(speed, brake(advice.stop_within_m, 0.0));
+    let speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
+    // Squares of what can be braked from.
+    let room = |distance: f32| 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0);
+    let mut speed_sq = fminf(speed * speed, room(advice.stop_within_m));
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
     for (i, waypoint) in points.iter().enumerate().skip(next) {
-        let distance = waypoint.along_m - tracker.along_m;
-        if 2.0 * cfg.accel_mps2 * distance >= speed * speed {
+        let room = room(waypoint.along_m - tracker.along_m);
+        if room >= speed_sq {
             // From here on there is room to stop before any corner.
             break;
         }
-        speed = fminf(speed, brake(distance, corner_speed(cfg, path, i)));
+        speed_sq = fminf(speed_sq, corner_speed_sq(cfg, path, i) + room);
     }
+    let speed = sqrtf(speed_sq);
     let step = cfg.accel_mps2 * dt_s;
     let speed_before = tracker.speed_mps;
     // Speeding up is limited; a bound from ahead is met at once, it already holds the braking distance.

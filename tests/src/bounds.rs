@@ -89,7 +89,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_timeout, 32 speak", "advice, w, v, 4 rows of the table"),
     (
         "Companion::handle_timeout, most gone",
-        "the same; twice a second w × v × 16 places; below one that lands 49 × v × 16 places",
+        "the same; 72 legs or w against what is out, 96 columns of what comes down",
     ),
     ("Companion::handle_timeout, else", "the same"),
     ("Companion::handle_plan", "w and g copied"),

@@ -28,6 +28,8 @@ pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
 /// Any other, and what else is due.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
+/// Faster than indoors: many corners are within its braking distance of 8 m.
+pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Control steps counted in each flight.
@@ -79,20 +81,30 @@ pub fn config() -> Config<VEHICLES> {
     let start = Point::new(0.0, 0.0, 10.0);
     let mut config = Config::new(SYSTEM, start, ORIGIN);
     config.mission_crc = MISSION_CRC;
+    config.cruise_mps = CRUISE_MPS;
     for id in 2..=VEHICLES as u8 {
         config.roster.push(RosterEntry { system_id: id, start }).expect("there is room");
     }
     config
 }
 
-/// A random plan as long as a board's may be.
-pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
+/// A random path as long as a board's may be: of short legs or long ones, nearly straight on or to and fro.
+pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
+    let leg_m = [0.2, 1.0, 5.0][below(rng, 3)];
+    let onward = anywhere(rng, leg_m);
+    let straight = below(rng, 2) == 0;
     let mut path = Path::new();
     let mut at = Point::new(0.0, 0.0, 10.0);
     for _ in 0..WAYPOINTS {
         path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
-        at += anywhere(rng, 5.0);
+        at += if straight { onward + anywhere(rng, 0.01 * leg_m) } else { anywhere(rng, leg_m) };
     }
+    path
+}
+
+/// A random plan as long as a board's may be.
+pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
+    let path = random_path(rng);
     let length_m = path.length_m();
     let mut gates: Vec<_, GATES> = (0..GATES)
         .map(|_| Gate {
@@ -113,6 +125,11 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     }
 }
 
+/// Whether most of a flight's neighbours leave the plan or fall silent.
+pub fn is_hard(seed: u64) -> bool {
+    seed.is_multiple_of(2)
+}
+
 /// One flight, its control steps counted by `meter`; how many there were.
 ///
 /// # Panics
@@ -124,7 +141,7 @@ pub fn fly<M: Meter>(
     meter: &mut M,
 ) -> usize {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let hard = seed.is_multiple_of(2);
+    let hard = is_hard(seed);
     let mut flight = Flight {
         companion,
         meter,
@@ -222,7 +239,8 @@ impl<M: Meter> Flight<'_, M> {
         self.drain();
         if let Some(target) = self.target.filter(|_| self.armed) {
             let way = target - self.place;
-            self.place += way * (0.1 / way.norm().max(0.1));
+            let reach_m = CRUISE_MPS * 0.05;
+            self.place += way * (reach_m / way.norm().max(reach_m));
         }
         if time > STEP_TIME || self.now.micros().is_multiple_of(1_000_000) {
             let [a, b, c, d] = self.mode.to_le_bytes();

@@ -1,7 +1,7 @@
 //! The calls of planner-core.
 
 use firmware::boards::chosen::memory;
-use firmware::calls::Meter;
+use firmware::calls::{Meter, flight};
 use firmware::capacity::{GATES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase, anywhere, below, uniform};
 use firmware::scratch::{Planner, Scratch};
@@ -266,10 +266,9 @@ fn paths(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(6);
     for case in 0..MANY {
         let mut path: Path<WAYPOINTS> = Path::new();
-        for _ in 0..WAYPOINTS {
-            let next =
-                path.waypoints().last().map_or(Point::zeros(), |w| w.position + anywhere(&mut rng, 5.0));
-            meter.call("path::Path::push", 0, || path.push(next, 1.0)).expect("there is room");
+        for waypoint in flight::random_path(&mut rng).waypoints() {
+            let (next, clearance_m) = (waypoint.position, waypoint.clearance_m);
+            meter.call("path::Path::push", 0, || path.push(next, clearance_m)).expect("there is room");
         }
         let length_m = path.length_m();
         let along_m = uniform(&mut rng, 0.0, length_m);
@@ -277,10 +276,11 @@ fn paths(meter: &mut impl Meter) {
         meter.call("path::Path::point_at", 0, || path.point_at(along_m));
         meter.call("path::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
         meter.call("path::Path::project", 0, || path.project(&near, along_m, length_m));
-        let mut tracker = Tracker { along_m, speed_mps: 1.0 };
-        let track = TrackConfig::default();
+        let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
+        let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps };
+        let here = path.point_at(along_m).expect("it is on the path");
         meter.call("path::advance", size_of::<Tracker>(), || {
-            path::advance(&track, &path, &mut tracker, &near, &Advice::FREE, 0.05)
+            path::advance(&track, &path, &mut tracker, &here, &Advice::FREE, 0.05)
         });
         let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
         meter.call("detour::is_blocked", 0, || {

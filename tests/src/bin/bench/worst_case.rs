@@ -10,9 +10,11 @@ use flockmate_tests::bounds::{self, BOUNDS};
 use crate::Row;
 
 /// What a step may cost by deconfliction alone and in all, thousands of instructions.
-const LIMITS: [(&str, &str, f64); 2] = [
+const LIMITS: [(&str, &str, f64); 4] = [
     ("board advise", "deconflict::advise, priority", 60.0),
-    ("board control step", "Companion::handle_timeout, 32 speak", 60.0),
+    ("board control step, all speak", "Companion::handle_timeout, 32 speak", 60.0),
+    ("board control step, most gone", "Companion::handle_timeout, most gone", 60.0),
+    ("board control step, else", "Companion::handle_timeout, else", 60.0),
 ];
 
 /// Prints the table; rows for what has a limit.
