@@ -33,7 +33,7 @@ use crate::time::{Duration, Instant};
 /// Time from one look along the path to the next.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// Stretches of the path that are looked at in one step, each against one thing; a step looks at the whole path at least once.
-const STRETCHES: usize = 72;
+const STRETCHES: usize = 128;
 /// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
 const QUIET_S: u64 = 3;
 /// A turn is claimed for this long before it is taken.
