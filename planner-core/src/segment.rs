@@ -26,6 +26,7 @@ mod distance;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use distance::is_farther_than;
 pub use distance::{point_clearance, segment_clearance};
 
 use crate::Point;
@@ -34,6 +35,9 @@ use crate::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
 /// Bits after the point of a snapped coordinate, in cells.
 pub const FRACTION_BITS: u32 = 14;
 const ONE: i32 = 1 << FRACTION_BITS;
+
+/// A clearance as wide as this, in cells, is not kept by what is touched, whatever the rounding.
+pub(crate) const WIDE_CELLS: f32 = 0.25;
 
 /// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
 pub type Snapped = [i32; 3];
@@ -74,7 +78,10 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
     if !(clearance_m > 0.0 && clearance_m.is_finite()) {
         return false;
     }
-    !snapped_segment_touches(grid, &from, &to) && distance::is_farther_than(grid, a, b, clearance_m)
+    if clearance_m < WIDE_CELLS * grid.shape().resolution_m && snapped_segment_touches(grid, &from, &to) {
+        return false;
+    }
+    distance::is_farther_than(grid, a, b, 0.0, clearance_m)
 }
 
 /// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact.

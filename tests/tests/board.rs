@@ -15,7 +15,8 @@ use planner_core::plan::{self, PlanWorkspace, SwarmPlan};
 use planner_core::prm::{self, Config};
 
 /// Most instructions, by the name of what is counted.
-const LIMITS: [(&str, u64); 3] = [("replan", 40_000_000), ("build", 100_000_000), ("step", 60_000)];
+const LIMITS: [(&str, u64); 4] =
+    [("replan", 40_000_000), ("build", 100_000_000), ("build-with-clearance", 100_000_000), ("step", 60_000)];
 
 #[test]
 fn the_board_computes_what_the_desk_computes() {

@@ -7,7 +7,9 @@
 
 use super::{Config, Workspace};
 use crate::Point;
-use crate::segment::{Snapped, lane_mask, segment_is_clear, snap, snapped_rest_touches};
+use crate::segment::{
+    Snapped, WIDE_CELLS, is_farther_than, lane_mask, segment_is_clear, snap, snapped_rest_touches,
+};
 use crate::voxel::VoxelGrid;
 
 /// Cells. Places below are computed to within 2⁻¹¹ cell as long as the grid has at most [`MAX_CELLS`] cells a side:
@@ -53,6 +55,8 @@ struct View {
     /// The faces, [`DEPTH`] farther out.
     face_low: [f32; 3],
     face_high: [f32; 3],
+    /// What a ray keeps from the faces where it is known to be clear.
+    inset: f32,
 }
 
 impl<'g, 'a> Sight<'g, 'a> {
@@ -109,6 +113,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             clear_high: high.map(|x| x - inset),
             face_low: low.map(|x| x - DEPTH),
             face_high: high.map(|x| x + DEPTH),
+            inset,
         };
         if (0..3).any(|axis| view.clear_low[axis] >= 0.0 || view.clear_high[axis] <= 0.0) {
             view.clear_high = [f32::NEG_INFINITY; 3];
@@ -144,13 +149,14 @@ impl<'g, 'a> Sight<'g, 'a> {
     #[inline]
     fn check(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
+        let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else { return false };
+        if self.clearance_cells >= WIDE_CELLS {
+            return is_farther_than(self.grid, &Point::from(self.here), &there, known, self.clearance_m);
+        }
         if self.clearance_m > 0.0 {
             return segment_is_clear(self.grid, &Point::from(self.here), &there, self.clearance_m);
         }
-        match (&self.snapped, snap(self.grid.shape(), &there)) {
-            (Some(a), Some(b)) => !snapped_rest_touches(self.grid, a, &b, known),
-            _ => false,
-        }
+        !snapped_rest_touches(self.grid, a, &b, known)
     }
 
     /// Whether the segment from here is clear, where that can be told for certain.
@@ -172,21 +178,28 @@ impl<'g, 'a> Sight<'g, 'a> {
             face / d[axis]
         });
         let t = leave[0].min(leave[1]).min(leave[2]);
+        let at = |t: f32| [0, 1, 2].map(|axis| self.at[axis] + d[axis] * t);
+        if t < 0.999 && self.is_obstacle(at(t)) {
+            return Judgement::Blocked;
+        }
+        // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead, and as far
+        // away as the clearance.
+        let inside = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + view.inset) / d[axis].abs());
+        let known = inside[0].min(inside[1]).min(inside[2]).clamp(0.0, 1.0);
+        Judgement::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
+    }
+
+    /// Whether a place, in cells, is certain to lie inside an obstacle.
+    #[inline(always)]
+    fn is_obstacle(&self, place: [f32; 3]) -> bool {
         let mut cell = [0; 3];
-        let mut certain = t < 0.999;
+        let mut certain = true;
         for axis in 0..3 {
-            let q = self.at[axis] + d[axis] * t;
-            cell[axis] = q as i32;
-            let part = q - cell[axis] as f32;
+            cell[axis] = place[axis] as i32;
+            let part = place[axis] - cell[axis] as f32;
             certain &= part > GUARD && part < 1.0 - GUARD && cell[axis] < self.grid.shape().dims[axis] as i32;
         }
-        if certain && self.grid.is_occupied(cell.map(|c| c as u32)) {
-            Judgement::Blocked
-        } else {
-            // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead.
-            let inside = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + GUARD) / d[axis].abs());
-            Judgement::Leaves(inside[0].min(inside[1]).min(inside[2]).clamp(0.0, 1.0))
-        }
+        certain && self.grid.is_occupied(cell.map(|c| c as u32))
     }
 }
 

@@ -88,10 +88,12 @@ impl Segment {
     }
 
     /// Calls `visit` with each word that may hold an obstacle within `reach` cells, its other cells cleared as far as
-    /// bounding boxes of the swept volume tell, and the minimum corner of its brick. `visit` may lower the reach.
+    /// bounding boxes of the swept volume tell, and the minimum corner of its brick. `visit` may lower the reach. Of the
+    /// share `known` of the segment nothing is in reach.
     fn walk(
         &self,
         grid: &VoxelGrid<'_>,
+        known: f32,
         mut reach: f32,
         mut visit: impl FnMut(u64, &Point) -> ControlFlow<(), f32>,
     ) -> ControlFlow<()> {
@@ -100,35 +102,38 @@ impl Segment {
         let [axis_v, axis_w] = [[1, 2], [0, 2], [0, 1]][axis_u];
         let [bx, by, _] = shape.bricks().map(|n| n as usize);
         let strides = [1, bx, bx * by];
-        let (mut from, mut to) = (0.0, 1.0);
-        let Some((first, last)) =
-            cells(self.a[axis_u], self.a[axis_u] + self.d[axis_u], reach, shape.dims[axis_u])
-        else {
+        // Along the longest axis no other coordinate changes faster.
+        let slope = if self.d[axis_u] == 0.0 { Point::zeros() } else { self.d / self.d[axis_u] };
+        let (begin, end) = (self.a[axis_u] + self.d[axis_u] * known, self.a[axis_u] + self.d[axis_u]);
+        let (least, most) = if begin < end { (begin, end) } else { (end, begin) };
+        // A thousandth of a cell and the rounding of large coordinates more than the reach, so that no cell is lost.
+        let largest = self.a.amax() + self.d.amax();
+        let slack = 1e-3 + largest * (8.0 * f32::EPSILON);
+        let Some((first, last)) = cells(least, most, reach + slack, shape.dims[axis_u]) else {
             return ControlFlow::Continue(());
         };
         for brick_u in first >> 2..=last >> 2 {
             let low = (brick_u * 4) as f32;
-            if self.d[axis_u] != 0.0 {
-                // The part of the segment within reach of this layer of bricks.
-                let t0 = (low - reach - self.a[axis_u]) / self.d[axis_u];
-                let t1 = (low + 4.0 + reach - self.a[axis_u]) / self.d[axis_u];
-                (from, to) = (t0.min(t1).clamp(0.0, 1.0), t0.max(t1).clamp(0.0, 1.0));
-            }
+            // The part of the segment within reach of this layer of bricks.
+            let from = (low - reach).clamp(least, most) - self.a[axis_u];
+            let to = (low + 4.0 + reach).clamp(least, most) - self.a[axis_u];
             let span = |axis: usize| {
-                let at = |t: f32| self.a[axis] + self.d[axis] * t;
-                cells(at(from), at(to), reach, shape.dims[axis])
+                let at = |along: f32| self.a[axis] + slope[axis] * along;
+                cells(at(from), at(to), reach + slack, shape.dims[axis])
             };
             let (Some(v), Some(w)) = (span(axis_v), span(axis_w)) else {
                 continue;
             };
-            let lanes_u = lanes(first, last, brick_u);
+            let mask_u = lane_mask(axis_u, lanes(first, last, brick_u));
             for brick_w in w.0 >> 2..=w.1 >> 2 {
-                let mask_w = lane_mask(axis_w, lanes(w.0, w.1, brick_w)) & lane_mask(axis_u, lanes_u);
+                let mask_w = lane_mask(axis_w, lanes(w.0, w.1, brick_w)) & mask_u;
+                let row = brick_u as usize * strides[axis_u] + brick_w as usize * strides[axis_w];
                 for brick_v in v.0 >> 2..=v.1 >> 2 {
-                    let at = brick_u as usize * strides[axis_u]
-                        + brick_v as usize * strides[axis_v]
-                        + brick_w as usize * strides[axis_w];
-                    let word = grid.words()[at] & mask_w & lane_mask(axis_v, lanes(v.0, v.1, brick_v));
+                    let word = grid.words()[row + brick_v as usize * strides[axis_v]] & mask_w;
+                    if word == 0 {
+                        continue;
+                    }
+                    let word = word & lane_mask(axis_v, lanes(v.0, v.1, brick_v));
                     if word == 0 {
                         continue;
                     }
@@ -149,15 +154,12 @@ impl Segment {
 }
 
 /// First and last cell of an axis within `reach` of the stretch between two coordinates, or `None` beyond the grid.
-/// A thousandth of a cell and the rounding of large coordinates more, so that none is lost.
 fn cells(from: f32, to: f32, reach: f32, dim: u32) -> Option<(i32, i32)> {
-    let margin = reach + 1e-3 + (from.abs() + to.abs()) * (4.0 * f32::EPSILON);
-    let low = libm::floorf(from.min(to) - margin);
-    let high = libm::floorf(from.max(to) + margin);
-    if high < 0.0 || low >= dim as f32 {
-        return None;
-    }
-    Some((low.max(0.0) as i32, (high as i32).min(dim as i32 - 1)))
+    let (low, high) = if from < to { (from - reach, to + reach) } else { (to - reach, from + reach) };
+    // A cast rounds towards zero: down, but for negative numbers, which are not in the grid.
+    let first = (low as i32).max(0);
+    let last = (high as i32).min(dim as i32 - 1);
+    (high >= 0.0 && first <= last).then_some((first, last))
 }
 
 /// Lanes of brick `brick` among the cells `first..=last`, which it must meet.
@@ -180,8 +182,16 @@ fn corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
 }
 
 /// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive and finite. The
-/// caller has checked that the ends are finite and near the grid, and that nothing is touched.
-pub(super) fn is_farther_than(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m: f32) -> bool {
+/// caller has checked that the ends are finite and near the grid, and where it is less than [`super::WIDE_CELLS`] that nothing is
+/// touched. Of the share `known` of the
+/// segment from `a` it is known already, by far more than rounding.
+pub(crate) fn is_farther_than(
+    grid: &VoxelGrid<'_>,
+    a: &Point,
+    b: &Point,
+    known: f32,
+    clearance_m: f32,
+) -> bool {
     let segment = Segment::new(grid, a, b);
     let reach = clearance_m / grid.shape().resolution_m;
     if grid.outside() == Outside::Blocked && segment.to_outside(grid.shape().dims) <= reach {
@@ -192,7 +202,7 @@ pub(super) fn is_farther_than(grid: &VoxelGrid<'_>, a: &Point, b: &Point, cleara
     let (never, always) = (reach + CELL_RADIUS, reach + 0.5);
     let (never, always) = (never * never * (1.0 + 1e-5), always * always * (1.0 - 1e-5));
     segment
-        .walk(grid, reach, |word, brick| {
+        .walk(grid, known, reach, |word, brick| {
             for low in corners(word, brick) {
                 let to_center = segment.square_to_point(&low.add_scalar(0.5));
                 if to_center <= always || to_center <= never && segment.square_to_cell(&low) <= square {
@@ -231,7 +241,7 @@ pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32)
         let around = |reach: f32| (reach + CELL_RADIUS) * (reach + CELL_RADIUS) * (1.0 + 1e-5);
         let (mut nearest, mut bound) = (tried * tried, around(tried));
         let mut found = false;
-        let _ = segment.walk(grid, tried, |word, brick| {
+        let _ = segment.walk(grid, 0.0, tried, |word, brick| {
             for low in corners(word, brick) {
                 if segment.square_to_point(&low.add_scalar(0.5)) <= bound {
                     let square = segment.square_to_cell(&low);
