@@ -8,7 +8,7 @@
 //! 1. nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
 //! 2. around a node the largest empty box in a fixed order of growth is taken ([`free_box`]): a neighbour inside it is clear,
 //!    and a ray that leaves it mostly does so into a wall. Both answers are taken only where f32 cannot be wrong;
-//! 3. what is left goes to the exact check.
+//! 3. of what is left the part outside the box goes to the exact check.
 //!
 //! Cost: O(nodes · neighbours); 2300 nodes make some 80 000 pairs in range. Memory: 14 bytes a node, 2 a cube.
 //! Metres, mission frame, f32.
