@@ -33,7 +33,9 @@ use crate::time::{Duration, Instant};
 /// Time from one look along the path to the next.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
 /// Stretches of the path that are looked at in one step, each against one thing; a step looks at the whole path at least once.
-const STRETCHES: usize = 128;
+const STRETCHES: usize = 160;
+/// A thing to look at costs as much as so many stretches beside those.
+const THING_COST: usize = 12;
 /// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
 const QUIET_S: u64 = 3;
 /// A turn is claimed for this long before it is taken.
@@ -95,10 +97,12 @@ pub(crate) struct Around {
     pub(crate) quiet_since: Option<Instant>,
     /// Since when it claims its turn.
     pub(crate) claimed_since: Option<Instant>,
-    /// When the last look began, and whether it goes on.
+    /// When a look was last due, and when the one that goes on began.
     pub(crate) looked_at: Instant,
-    pub(crate) looking: bool,
+    pub(crate) look_began: Option<Instant>,
+    /// How far that is, and what the last one found.
     pub(crate) sweep: Sweep,
+    pub(crate) in_the_way: bool,
 }
 
 /// What the others are told of where it is.
@@ -160,34 +164,48 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Looks for what is in the way, and whether the others stand.
     pub(crate) fn look_around(&mut self) {
         let now = self.now;
-        if !self.around.looking {
-            if now - self.around.looked_at < LOOK_EVERY {
-                return;
-            }
-            self.around.looked_at = now;
-        }
         self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.plan.is_some();
         let on_ground = matches!(self.state, State::Scheduled | State::PadReplanning);
         let stopped = matches!(self.state, State::Blocked | State::Replanning);
         if !on_ground && !stopped && self.state != State::Follow {
-            self.around.blocked = false;
+            (self.around.blocked, self.around.in_the_way) = (false, false);
             (self.around.quiet_since, self.around.claimed_since) = (None, None);
             self.around.sweep.restart();
-            self.around.looking = false;
+            self.around.look_began = None;
             return;
         }
-        let in_the_way = self.is_in_the_way(on_ground);
-        self.around.looking = in_the_way.is_none();
-        let Some(in_the_way) = in_the_way else { return };
-        if !in_the_way {
-            self.neighbours.found_clear(self.around.looked_at);
+        let due = now - self.around.looked_at >= LOOK_EVERY;
+        if due {
+            self.around.looked_at = now;
+            self.around.look_began.get_or_insert(now);
         }
+        if self.go_on_looking(on_ground) || due {
+            self.weigh();
+        }
+    }
+
+    /// Returns whether a look has ended.
+    fn go_on_looking(&mut self, on_ground: bool) -> bool {
+        let Some(began) = self.around.look_began else { return false };
+        let Some(in_the_way) = self.is_in_the_way(on_ground) else { return false };
+        self.around.look_began = None;
+        self.around.in_the_way = in_the_way;
+        if !in_the_way {
+            self.neighbours.found_clear(began);
+        }
+        true
+    }
+
+    /// What follows from what is known: whether it is blocked, for how long all have stood, and whether it claims its turn.
+    fn weigh(&mut self) {
+        let now = self.now;
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
         let astray = self.around.left && (!self.around.flying || aside);
         let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
-        self.around.blocked = !self.guidance.returning && (stuck || astray || dead_end || in_the_way);
+        self.around.blocked =
+            !self.guidance.returning && (stuck || astray || dead_end || self.around.in_the_way);
         if !self.neighbours.all_stand(now) {
             // Somebody moved: what stood in the way may have gone.
             (self.around.quiet_since, self.around.failed) = (None, 0);
@@ -203,14 +221,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(plan) = &self.plan else { return Some(false) };
         let here = if on_ground { self.pad() } else { self.telemetry.position };
         let along_m = self.guidance.along_m();
-        let stretches = detour::stretches_ahead(&plan.path, along_m);
+        let cost = detour::stretches_ahead(&plan.path, along_m) + THING_COST;
         let apart_m = self.config.safety_distance_m + STRAY_M;
         let (now, neighbours) = (self.now, &self.neighbours);
         let new = &self.obstacles.known[self.obstacles.avoided..];
         self.around.sweep.go_on(
             new.len() + neighbours.len(),
-            &mut (stretches.max(STRETCHES) as u16),
-            stretches as u16,
+            &mut (cost.max(STRETCHES) as u16),
+            cost as u16,
             |source, tell| match new.get(source) {
                 Some(obstacle) => tell(*obstacle),
                 None => neighbours.obstacle(source - new.len(), now, apart_m, tell),

@@ -5,6 +5,8 @@ use super::*;
 use crate::commands::EXCLUDE;
 use crate::fake_px4::*;
 use crate::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
+use mavlink::dialects::ardupilotmega::MavCmd;
+use planner_core::schedule::Gate;
 
 fn sphere(at: Point, radius_m: f32) -> Command {
     let place = frames::enu_to_geodetic(&ORIGIN, &at);
@@ -145,4 +147,66 @@ fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
     };
     assert!((depth_m(true) - 15.0).abs() < 1.0, "{}", depth_m(true));
     assert!((depth_m(false) - 35.0).abs() < 2.0, "{}", depth_m(false));
+}
+
+#[test]
+fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
+    for tenth in 0..8 {
+        let mut bench = Bench::new(two_vehicles());
+        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+        bench.until(State::Ready, 8.0);
+        bench.run(0.1 * tenth as f32);
+        bench.start();
+        bench.run(0.7);
+        assert_eq!(bench.state(), State::Scheduled, "{tenth}");
+        assert!(bench.companion.around.blocked, "{tenth}");
+    }
+}
+
+#[test]
+fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
+    for tenth in 0..8 {
+        let mut bench = Bench::new(two_vehicles());
+        let mut plan = plan();
+        plan.gates.push(Gate { at_m: -1.5, id: 77, until_m: 5.0 }).unwrap();
+        bench.answer_plan = Some(Ok(plan.clone()));
+        bench.neighbour = Some((Point::new(30.0, 40.0, 0.0), GROUNDED | OUT, 0.0, 5));
+        bench.until(State::Ready, 8.0);
+        bench.start();
+        bench.until(State::Streaming, 5.0);
+        bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+        bench.run(0.3);
+        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+        bench.answer_plan = Some(Ok(plan));
+        bench.run(1.0);
+        bench.start();
+        bench.until(State::Ready, 8.0);
+        bench.run(0.3 + 0.1 * tenth as f32);
+        bench.start();
+        bench.run(0.7);
+        assert_eq!(bench.state(), State::Scheduled, "{tenth}");
+    }
+}
+
+#[test]
+fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
+    let mut bench = Bench::following(config());
+    // The first ones are far beside the path; each costs a share of a step.
+    for i in 0..OBSTACLES - 1 {
+        bench.companion.exclude(&sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
+    }
+    bench.run(1.0);
+    let mut steps = 0;
+    while bench.companion.around.look_began.is_none() {
+        bench.run(0.05);
+    }
+    while bench.companion.around.look_began.is_some() {
+        bench.run(0.05);
+        steps += 1;
+    }
+    assert!((1..4).contains(&steps), "{steps}");
+    assert_eq!(bench.state(), State::Follow);
+    bench.companion.exclude(&sphere(Point::new(15.9, 12.0, 1.5), 0.5));
+    bench.run(1.0);
+    assert_eq!(bench.state(), State::Blocked);
 }

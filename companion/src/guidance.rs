@@ -171,6 +171,7 @@ impl Guidance {
 
     pub fn run(&mut self, now: Instant) {
         self.on_path = true;
+        self.shelter.reset();
         self.brake_at_m = f32::INFINITY;
         self.linked_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;

@@ -65,6 +65,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             gates_open: self.guidance.advice.stop_within_m > 0.05
                 && self.departure_due()
                 && !self.around.blocked
+                && self.neighbours.is_clear_since(self.entered_at)
                 && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),

@@ -431,6 +431,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.plan_failure = None;
                 self.around = Around { left: self.around.left, ..Around::default() };
                 self.obstacles.avoided = 0;
+                self.neighbours.forget_plan();
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }

@@ -60,7 +60,7 @@ struct Contact {
     position_at: Option<Instant>,
     boot_ms: u32,
     flags: u8,
-    /// Since when it tells that it is out.
+    /// Since when it tells that it is out, and it is known where.
     out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
     points: Vec<Point, POINTS>,
@@ -309,7 +309,8 @@ impl<const V: usize> Neighbours<V> {
             same_mission && intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
         contact.heard_at = Some(now);
         contact.flags = intent.flags;
-        contact.out_at = contact.out_at.or(Some(now)).filter(|_| contact.tells(OUT));
+        let out = contact.tells(OUT) && contact.position_at.is_some();
+        contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not told.
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
@@ -328,7 +329,7 @@ impl<const V: usize> Neighbours<V> {
                 let state = Neighbour {
                     age_s: (now - at).secs_f32(),
                     rank: contact.rank,
-                    grounded: contact.state.grounded || contact.is_dead(now),
+                    grounded: contact.state.grounded || contact.is_dead(self.clear_at),
                     out: contact.is_out_since(self.clear_at),
                     detours: contact.tells(DETOURS),
                     ..contact.state
@@ -398,6 +399,17 @@ impl<const V: usize> Neighbours<V> {
         self.clear_at = at;
     }
 
+    /// Whether that was found at `at` or later.
+    pub fn is_clear_since(&self, at: Instant) -> bool {
+        self.clear_at >= at
+    }
+
+    /// There is another plan: what was found, and who was flown around, does not count any more.
+    pub fn forget_plan(&mut self) {
+        self.clear_at = Instant::ZERO;
+        self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
+    }
+
     /// Where all neighbours are while they stand, those out of the plan among them.
     pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts.iter().filter(|c| c.position_at.is_some());
@@ -417,7 +429,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical.
+    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as near beside it.
     pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;

@@ -101,3 +101,27 @@ fn silence_is_that_of_those_who_fly() {
     table.handle_intent(at(5000), 1, &Intent { system_id: 3, ..intent(LANDED, 1, 2) }, 1, None);
     assert_eq!(table.silence(at(9000), at(2000)), Duration::default(), "all have landed");
 }
+
+#[test]
+fn who_is_out_opens_gates_only_after_it_was_looked_at() {
+    let at = Instant::from_millis;
+    let mut table = table();
+    let out = |table: &mut Neighbours<4>, now: Instant| table.at(now)[0].out;
+    table.handle_position(at(1000), &ORIGIN, 9, &place(50, 1000));
+    table.handle_intent(at(1000), 1, &intent(OUT, 7, 8), 7, None);
+    assert!(!out(&mut table, at(1100)), "nobody has looked");
+    table.found_clear(at(900));
+    assert!(!out(&mut table, at(1200)), "it went out while somebody looked");
+    table.found_clear(at(1000));
+    assert!(out(&mut table, at(1300)));
+    table.forget_plan();
+    assert!(!out(&mut table, at(1400)), "another plan, another look");
+    table.found_clear(at(1400));
+    table.handle_intent(at(1500), 1, &intent(0, 7, 8), 7, None);
+    assert!(!out(&mut table, at(1600)), "it is not out any more");
+    // Silent from now on: dead later, but nobody counts on that before the next look.
+    let dead = at(1500) + DEAD;
+    assert!(!out(&mut table, dead) && !table.at(dead)[0].grounded);
+    table.found_clear(dead);
+    assert!(out(&mut table, dead) && table.at(dead)[0].grounded);
+}

@@ -9,17 +9,19 @@ use planner_core::detour::KeepOff;
 /// How far the question has come.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sweep {
+    /// Who is asked now, of how many.
     source: usize,
+    sources: usize,
     /// Sources that were asked.
     asked: usize,
     /// Things of this source that were asked about.
-    place: usize,
+    things: usize,
 }
 
 impl Sweep {
     /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source one. `Some(true)` once one of
     /// them `is_in_the_way`, `Some(false)` when none of all `sources` is, then anew; `None` when the budget is spent, which has to
-    /// begin with at least `each`.
+    /// begin with at least `each`. Where the number of sources changes all are asked anew.
     pub fn go_on(
         &mut self,
         sources: usize,
@@ -28,35 +30,39 @@ impl Sweep {
         tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
         is_in_the_way: impl Fn(&KeepOff) -> bool,
     ) -> Option<bool> {
+        if self.sources != sources {
+            self.sources = sources;
+            self.restart();
+        }
         while self.asked < sources {
-            let (mut told, mut place, mut found) = (0, self.place, false);
+            let (mut told, mut things, mut found) = (0, self.things, false);
             self.source %= sources;
             tell(self.source, &mut |keep_off| {
-                if told == place && !found && *budget >= each {
+                if told == things && !found && *budget >= each {
                     *budget -= each;
-                    place += 1;
+                    things += 1;
                     found = is_in_the_way(&keep_off);
                 }
                 told += 1;
             });
             if found {
-                *self = Self { source: self.source, ..Self::default() };
+                self.restart();
                 return Some(true);
             }
-            if place < told {
-                self.place = place;
+            if things < told {
+                self.things = things;
                 return None;
             }
             *budget = budget.saturating_sub(1);
-            (self.source, self.asked, self.place) = (self.source + 1, self.asked + 1, 0);
+            (self.source, self.asked, self.things) = (self.source + 1, self.asked + 1, 0);
         }
         self.asked = 0;
         Some(false)
     }
 
-    /// Asks anew, in the same order.
+    /// Asks all anew, from the source at hand on.
     pub fn restart(&mut self) {
-        (self.asked, self.place) = (0, 0);
+        (self.asked, self.things) = (0, 0);
     }
 }
 
@@ -77,7 +83,7 @@ mod tests {
         }
     }
 
-    /// Answer to where the thing is that is in the way, and the steps it took.
+    /// The answer where the thing `at` is in the way, and the steps it took.
     fn ask(sweep: &mut Sweep, each: u16, at: Option<(f32, f32)>) -> (bool, usize) {
         for steps in 1.. {
             let mut budget = 5;
@@ -115,9 +121,13 @@ mod tests {
     }
 
     #[test]
-    fn sources_may_become_fewer_on_the_way() {
+    fn where_sources_come_or_go_all_are_asked_anew() {
         let mut sweep = Sweep::default();
         assert_eq!(sweep.go_on(7, &mut 12, 1, tell, |_| false), None);
         assert_eq!(sweep.go_on(2, &mut 12, 1, tell, |_| false), Some(false));
+        assert_eq!(sweep.go_on(2, &mut 2, 1, tell, |_| false), None);
+        // Its first things were asked about already.
+        let first = |k: &KeepOff| k.from.x == 1.0 && k.from.y == 0.0;
+        assert_eq!(sweep.go_on(7, &mut 99, 1, tell, first), Some(true));
     }
 }

@@ -20,6 +20,7 @@ const ALONE_BESIDE_M: f32 = 0.5;
 impl Guidance {
     /// Stops the reference within its braking distance; off the path, where the vehicle is.
     pub fn brake(&mut self, position: &Point) {
+        self.shelter.reset();
         if self.on_path {
             let braking = self.tracker.speed_mps * self.tracker.speed_mps / (2.0 * self.track.accel_mps2);
             self.brake_at_m = self.tracker.along_m + braking;

@@ -184,8 +184,8 @@ impl<'g, 'a> Sight<'g, 'a> {
         }
         // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead, and as far
         // away as the clearance.
-        let inside = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + view.inset) / d[axis].abs());
-        let known = inside[0].min(inside[1]).min(inside[2]).clamp(0.0, 1.0);
+        let near = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + view.inset) / d[axis].abs());
+        let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
         Judgement::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
 
