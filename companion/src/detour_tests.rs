@@ -154,10 +154,16 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+        // So many things beside the path that the one in the way is looked at in a later step.
+        for i in 0..OBSTACLES {
+            bench.companion.exclude(&sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
+        }
         bench.until(State::Ready, 8.0);
         bench.run(0.1 * tenth as f32);
         bench.start();
-        bench.run(0.7);
+        bench.run(0.25);
+        assert_eq!(bench.state(), State::Scheduled, "{tenth}");
+        bench.run(0.8);
         assert_eq!(bench.state(), State::Scheduled, "{tenth}");
         assert!(bench.companion.around.blocked, "{tenth}");
     }
@@ -186,6 +192,20 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
         bench.run(0.7);
         assert_eq!(bench.state(), State::Scheduled, "{tenth}");
     }
+}
+
+#[test]
+fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
+    let mut bench = Bench::new(two_vehicles());
+    bench.no_position = true;
+    bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+    bench.run(3.0);
+    bench.companion.neighbours.avoid(bench.now);
+    bench.no_position = false;
+    bench.until(State::Ready, 20.0);
+    bench.start();
+    bench.run(0.7);
+    assert!(bench.companion.around.in_the_way, "{:?}", bench.state());
 }
 
 #[test]

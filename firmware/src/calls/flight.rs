@@ -32,6 +32,8 @@ const SYSTEM: u8 = 1;
 pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
+/// So far away at least is a neighbour that is beside.
+const BESIDE_M: f32 = 4.0;
 /// Control steps counted in each flight.
 const STEPS: usize = 200;
 /// Most steps of 0.9 s before them, in which silent neighbours grow old. A longer one would be a gap in the position.
@@ -130,6 +132,12 @@ pub fn is_hard(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
+/// Where a neighbour is from here. In every other hard flight it is beside, so that the path is looked at to its end.
+fn near(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
+    let at = anywhere(rng, reach_m);
+    if seed.is_multiple_of(4) { at + at * (BESIDE_M / at.norm().max(0.1)) } else { at }
+}
+
 /// One flight, its control steps counted by `meter`; how many there were.
 ///
 /// # Panics
@@ -167,7 +175,7 @@ pub fn fly<M: Meter>(
         };
         // One always speaks, so that it is not alone.
         (other.flags, other.silent) = (flags, silent && i > 0);
-        other.place = flight.place + anywhere(&mut rng, if hard { 6.0 } else { 20.0 });
+        other.place = flight.place + near(seed, &mut rng, if hard { 6.0 } else { 20.0 });
         other.progress_m = uniform(&mut rng, 0.0, 60.0);
     }
     flight.tell_all(&mut rng, |_| true);
@@ -184,7 +192,7 @@ pub fn fly<M: Meter>(
         if step.is_multiple_of(8) {
             let here = flight.place;
             for other in flight.others.iter_mut().filter(|other| !other.silent) {
-                other.place = here + anywhere(&mut rng, if hard { 3.0 } else { 12.0 });
+                other.place = here + near(seed, &mut rng, if hard { 3.0 } else { 12.0 });
             }
             flight.tell_all(&mut rng, |other| !other.silent);
         }
