@@ -89,7 +89,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("Companion::handle_timeout, 32 speak", "advice, w, v, 4 rows of the table"),
     (
         "Companion::handle_timeout, most gone",
-        "the same; 128 legs against what is out, 96 columns of what comes down",
+        "the same; 160 legs against what is out, 96 columns of what comes down",
     ),
     ("Companion::handle_timeout, else", "the same"),
     ("Companion::handle_plan", "w and g copied"),

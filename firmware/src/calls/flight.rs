@@ -90,21 +90,21 @@ pub fn config() -> Config<VEHICLES> {
     config
 }
 
-/// A random path as long as a board's may be: of short legs or long ones, nearly straight on or to and fro.
+/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight on or to and fro.
 pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
     let leg_m = [0.2, 1.0, 5.0][below(rng, 3)];
     let onward = anywhere(rng, leg_m);
     let straight = below(rng, 2) == 0;
     let mut path = Path::new();
     let mut at = Point::new(0.0, 0.0, 10.0);
-    for _ in 0..WAYPOINTS {
+    for _ in 0..[4, 8, WAYPOINTS][below(rng, 3)] {
         path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
         at += if straight { onward + anywhere(rng, 0.01 * leg_m) } else { anywhere(rng, leg_m) };
     }
     path
 }
 
-/// A random plan as long as a board's may be.
+/// A random plan with as many gates as a board's may have.
 pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let path = random_path(rng);
     let length_m = path.length_m();
