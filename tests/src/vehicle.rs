@@ -27,6 +27,15 @@ const STEP: Duration = Duration::from_millis(4);
 const LATEST: Duration = Duration::from_millis(200);
 /// A machine may stand still for long; a megabyte of garbage takes less than half as long.
 const PATIENCE: Duration = Duration::from_secs(400);
+/// States of a mission that was not started, or still waits.
+const ON_PAD: [State; 6] = [
+    State::WaitAutopilot,
+    State::WaitPosition,
+    State::Planning,
+    State::Ready,
+    State::Scheduled,
+    State::PadReplanning,
+];
 /// ArduCopter's estimator is ready sooner than the real one's.
 const READY_S: f32 = 2.0;
 
@@ -201,16 +210,17 @@ impl Vehicle {
         self.until(text, |vehicle| vehicle.heard.texts.iter().any(|said| said.starts_with(text)));
     }
 
-    /// Starts the mission, once it is ready, and steps until it has left the pad's states.
+    /// Starts the mission whenever it is ready, and steps until it has left the pad's states: a state heard is up to a second
+    /// old, and a board that has just lost its autopilot may still seem ready.
     pub fn start(&mut self) {
-        self.until("ready", |vehicle| vehicle.heard.state == State::Ready);
-        let mut last = Clock::now() - PATIENCE;
+        let mut last = None;
         self.until("started", |vehicle| {
-            if vehicle.heard.state == State::Ready && last.elapsed() > Duration::from_secs(1) {
-                last = Clock::now();
+            let due = last.is_none_or(|last: Clock| last.elapsed() > Duration::from_secs(1));
+            if vehicle.heard.state == State::Ready && due {
+                last = Some(Clock::now());
                 vehicle.order(MavCmd::MAV_CMD_MISSION_START, 0.0);
             }
-            !matches!(vehicle.heard.state, State::Ready | State::Scheduled)
+            !ON_PAD.contains(&vehicle.heard.state)
         });
     }
 
