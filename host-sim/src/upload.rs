@@ -1,7 +1,9 @@
 //! A MAVLink FTP client: uploads a file to a companion and compares CRCs.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is not answered is sent again
-//! with the same sequence number.
+//! with the same sequence number, at the pace that this link bears ([`pace`]).
+
+mod pace;
 
 use std::collections::BTreeMap;
 use std::thread::sleep;
@@ -14,14 +16,11 @@ use companion::store::File;
 use companion::{COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
+use self::pace::Pace;
 use crate::link::Link;
 
 /// System and component id of a ground station.
 const US: (u8, u8) = (255, 190);
-/// Pieces under way at once.
-const UNDER_WAY: usize = 4;
-/// What is not answered is sent again after this time.
-const AGAIN: Duration = Duration::from_millis(400);
 /// The companion may have to erase its flash first: eight sectors of two seconds each.
 const PATIENCE: Duration = Duration::from_secs(30);
 const BEAT: Duration = Duration::from_secs(1);
@@ -44,6 +43,15 @@ pub struct Client {
     system: Option<u8>,
     sequence: u16,
     session: u8,
+    pace: Pace,
+}
+
+/// A piece that is not answered yet.
+struct Piece {
+    request: [u8; PAYLOAD_LEN],
+    length: usize,
+    sent_at: Clock,
+    repeated: bool,
 }
 
 struct Answer {
@@ -71,6 +79,7 @@ impl Client {
             system,
             sequence,
             session: 0,
+            pace: Pace::new(now),
         }
     }
 
@@ -170,11 +179,13 @@ impl Client {
     /// Asks until it is answered.
     fn done(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
         let request = self.request(opcode, 0, data);
-        let (began, mut asked): (_, Option<Clock>) = (Clock::now(), None);
+        let began = Clock::now();
+        let mut asked_at = began;
+        self.ask(&request)?;
         while began.elapsed() < PATIENCE {
-            if asked.is_none_or(|at| at.elapsed() > AGAIN) {
+            if self.pace.is_over(asked_at, Clock::now()) {
                 self.ask(&request)?;
-                asked = Some(Clock::now());
+                asked_at = Clock::now();
             }
             let sequence = self.sequence;
             let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
@@ -196,15 +207,16 @@ impl Client {
         self.done(RESET, &[])?;
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
         let mut pieces = bytes.chunks(DATA).enumerate();
-        let mut under_way: BTreeMap<u16, ([u8; PAYLOAD_LEN], Clock, usize)> = BTreeMap::new();
+        let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
         let (mut arrived, mut heard_at) = (0, Clock::now());
         loop {
-            while under_way.len() < UNDER_WAY
+            while under_way.len() < self.pace.window()
                 && let Some((i, piece)) = pieces.next()
             {
                 let request = self.request(WRITE, (i * DATA) as u32, piece);
                 self.ask(&request)?;
-                under_way.insert(self.sequence, (request, Clock::now(), piece.len()));
+                let piece = Piece { request, length: piece.len(), sent_at: Clock::now(), repeated: false };
+                under_way.insert(self.sequence, piece);
             }
             if under_way.is_empty() {
                 break;
@@ -216,22 +228,25 @@ impl Client {
                 if !answer.yes {
                     bail!("{}", why(&answer.data));
                 }
-                if let Some((_, _, length)) = under_way.remove(&answer.sequence) {
-                    arrived += length;
+                if let Some(piece) = under_way.remove(&answer.sequence) {
+                    arrived += piece.length;
                     heard_at = Clock::now();
+                    // Of one that was sent twice nobody knows which was answered.
+                    if !piece.repeated {
+                        self.pace.answered_after(piece.sent_at.elapsed());
+                    }
                     progress(arrived as u64);
                 }
             }
             if heard_at.elapsed() > PATIENCE {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
-            let late: Vec<_> = under_way.values_mut().filter(|(_, at, _)| at.elapsed() > AGAIN).collect();
-            let mut again = Vec::new();
-            for (request, at, _) in late {
-                *at = Clock::now();
-                again.push(*request);
+            for piece in under_way.values_mut() {
+                if self.pace.is_over(piece.sent_at, Clock::now()) {
+                    self.ask(&piece.request)?;
+                    (piece.sent_at, piece.repeated) = (Clock::now(), true);
+                }
             }
-            again.iter().try_for_each(|request| self.ask(request))?;
         }
         self.done(TERMINATE, &[]).context("not stored")?;
         if self.sum(file).context("cannot compare")? != crc32(bytes) {

@@ -1,0 +1,158 @@
+//! How long to wait for an answer before asking again, and how many pieces to have under way at once.
+//!
+//! Source: RFC 6298 (retransmission timeout) and RFC 5681 (congestion window). A radio in the air gives files 250 bytes a second:
+//! four answers take it longer than any fixed time that suits a cable, and each request repeated too early is answered too, which
+//! makes the next answer later still. So the wait follows the round trips of this link, taken of requests that were sent once
+//! (Karn), and doubles where nothing comes; then half as many pieces are under way, until answers come in time.
+
+use std::time::{Duration, Instant as Clock};
+
+/// The first wait, and the shortest: a companion that plans answers later than one that rests.
+const SHORTEST_S: f32 = 0.4;
+/// The longest: MAVLink FTP servers know a repeated request as such for a few seconds, ours for at least three.
+const LONGEST_S: f32 = 2.0;
+/// Weights of a new round trip and of its deviation, and how many deviations are waited for (section 2).
+const GAIN: f32 = 0.125;
+const DEVIATION_GAIN: f32 = 0.25;
+const DEVIATIONS: f32 = 4.0;
+/// Pieces under way at once, at most: the companion keeps six requests.
+const UNDER_WAY: usize = 4;
+
+/// The pace of one link.
+pub struct Pace {
+    /// The smoothed round trip and its deviation, seconds.
+    round_trip: Option<(f32, f32)>,
+    wait: Duration,
+    /// When it last doubled: requests that are sent together are late together.
+    doubled_at: Clock,
+    window: usize,
+}
+
+impl Pace {
+    /// That of a link on which nothing was answered yet.
+    pub fn new(now: Clock) -> Self {
+        Self {
+            round_trip: None,
+            wait: Duration::from_secs_f32(SHORTEST_S),
+            doubled_at: now,
+            window: UNDER_WAY,
+        }
+    }
+
+    /// How many pieces may be under way at once.
+    pub fn window(&self) -> usize {
+        self.window
+    }
+
+    /// Whether what was sent then is to be sent again now. If so the wait doubles, once for all that was sent before.
+    pub fn is_over(&mut self, sent_at: Clock, now: Clock) -> bool {
+        let over = now.saturating_duration_since(sent_at) > self.wait;
+        if over && sent_at >= self.doubled_at {
+            self.wait = (2 * self.wait).min(Duration::from_secs_f32(LONGEST_S));
+            self.doubled_at = now;
+            self.window = (self.window / 2).max(1);
+        }
+        over
+    }
+
+    /// A piece that was sent once is answered. Answers that wait for flash to be erased tell nothing of the link.
+    pub fn answered_after(&mut self, time: Duration) {
+        let time_s = time.as_secs_f32();
+        let (smoothed_s, deviation_s) = match self.round_trip {
+            None => (time_s, 0.5 * time_s),
+            Some((smoothed_s, deviation_s)) => (
+                smoothed_s + GAIN * (time_s - smoothed_s),
+                deviation_s + DEVIATION_GAIN * ((time_s - smoothed_s).abs() - deviation_s),
+            ),
+        };
+        self.round_trip = Some((smoothed_s, deviation_s));
+        let wait_s = (smoothed_s + DEVIATIONS * deviation_s).clamp(SHORTEST_S, LONGEST_S);
+        self.wait = Duration::from_secs_f32(wait_s);
+        self.window = (self.window + 1).min(UNDER_WAY);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::VecDeque;
+
+    use super::*;
+
+    /// 200 pieces on a link whose answers come one each `every_ms`, and every `loses`th of what is sent is lost: how many were sent,
+    /// and seconds it took.
+    fn upload(every_ms: u64, loses: usize) -> (usize, f32) {
+        const PIECES: usize = 200;
+        let began = Clock::now();
+        let mut pace = Pace::new(began);
+        // Requests that wait for their answers.
+        let mut line = VecDeque::new();
+        let mut under_way: Vec<(usize, Clock, bool)> = Vec::new();
+        let (mut next, mut answered, mut sent, mut ms) = (0, 0, 0, 0);
+        while answered < PIECES {
+            let now = began + Duration::from_millis(ms);
+            let mut send = |piece| {
+                sent += 1;
+                if sent % loses != 0 {
+                    line.push_back(piece);
+                }
+            };
+            while under_way.len() < pace.window() && next < PIECES {
+                under_way.push((next, now, false));
+                send(next);
+                next += 1;
+            }
+            for (piece, sent_at, repeated) in &mut under_way {
+                if pace.is_over(*sent_at, now) {
+                    (*sent_at, *repeated) = (now, true);
+                    send(*piece);
+                }
+            }
+            ms += 10;
+            let answer = ms.is_multiple_of(every_ms).then(|| line.pop_front()).flatten();
+            if let Some(at) = under_way.iter().position(|(piece, ..)| Some(*piece) == answer) {
+                let (_, sent_at, repeated) = under_way.remove(at);
+                answered += 1;
+                if !repeated {
+                    pace.answered_after(began + Duration::from_millis(ms) - sent_at);
+                }
+            }
+        }
+        (sent, ms as f32 * 1e-3)
+    }
+
+    #[test]
+    fn a_slow_link_is_not_filled_with_repeats() {
+        // On a cable, of 30-byte answers in the air, and behind a machine that emulates at a third of its speed.
+        for every_ms in [10, 120, 360] {
+            let (sent, took_s) = upload(every_ms, usize::MAX);
+            assert!(sent < 220, "every {every_ms} ms an answer: {sent} sent for 200");
+            assert!(took_s < 0.25 * every_ms as f32, "every {every_ms} ms an answer: {took_s} s");
+        }
+    }
+
+    #[test]
+    fn a_link_that_loses_every_third_is_still_used() {
+        let (sent, took_s) = upload(10, 3);
+        assert!(sent < 320 && took_s < 40.0, "{sent} sent for 200 in {took_s} s");
+    }
+
+    #[test]
+    fn silence_doubles_the_wait_up_to_its_bound_and_an_answer_ends_that() {
+        let began = Clock::now();
+        let mut pace = Pace::new(began);
+        let mut sent_at = began;
+        let waits: Vec<u128> = (0..4)
+            .map(|_| {
+                let over = (1..)
+                    .map(|ms| sent_at + Duration::from_millis(ms))
+                    .find(|now| pace.is_over(sent_at, *now));
+                let wait = over.expect("some time") - sent_at;
+                sent_at += wait;
+                wait.as_millis()
+            })
+            .collect();
+        assert_eq!(waits, [401, 801, 1601, 2001]);
+        pace.answered_after(Duration::from_millis(20));
+        assert!(pace.is_over(sent_at, sent_at + Duration::from_millis(401)));
+    }
+}
