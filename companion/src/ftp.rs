@@ -7,7 +7,8 @@
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
 //! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for
-//! [`MEMORY`] and only answered again. What cannot be taken now is not answered: clients ask again. One session at a time; one
+//! [`MEMORY`] and only answered again; the last of all requests for longer, since a client that hears nothing may wait before it
+//! repeats it (QGroundControl 3 s, MAVSDK up to 4 s). What cannot be taken now is not answered: clients ask again. One session at a time; one
 //! request at a time, the others wait in a short queue. An answer that needs the flash is given when the flash is done.
 
 mod packet;
@@ -37,7 +38,7 @@ const QUEUE: usize = 6;
 const BURST: u8 = 16;
 /// A session whose client was silent this long may be taken by another.
 const IDLE: Duration = Duration::from_secs(10);
-/// A repeated request is known as one for this long.
+/// A request that is repeated after others is known for this long.
 pub const MEMORY: Duration = Duration::from_secs(3);
 
 #[derive(Clone, Copy, Debug)]
@@ -92,6 +93,8 @@ pub struct Ftp {
     stream: Option<Stream>,
     done: [Option<Done>; 8],
     next_done: usize,
+    /// The last request and when it came.
+    last: Option<(Print, Instant)>,
     text: Option<Text>,
     now: Instant,
 }
@@ -106,6 +109,7 @@ impl Default for Ftp {
             stream: None,
             done: [None; 8],
             next_done: 0,
+            last: None,
             text: None,
             now: Instant::ZERO,
         }
@@ -235,7 +239,8 @@ impl Ftp {
     }
 
     fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        if let Some(done) = self.remembered(request) {
+        let before = self.last.replace((print(request), self.now));
+        if let Some(done) = self.remembered(request, before) {
             if !is_open(request) {
                 self.respond(request, done);
             } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
@@ -430,9 +435,10 @@ impl Ftp {
         self.put(&request, ACK, u8::from(last), bytes);
     }
 
-    fn remembered(&self, request: &Request) -> Option<Result<(), No>> {
+    fn remembered(&self, request: &Request, before: Option<(Print, Instant)>) -> Option<Result<(), No>> {
         let print = print(request);
-        let known = |done: &&Done| done.request == print && self.now - done.at < MEMORY;
+        let repeats = before.is_some_and(|(last, at)| last == print && self.now - at < IDLE);
+        let known = |done: &&Done| done.request == print && (repeats || self.now - done.at < MEMORY);
         self.done.iter().flatten().find(known).map(|done| done.result)
     }
 

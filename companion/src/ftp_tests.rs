@@ -358,6 +358,31 @@ fn nothing_is_erased_while_armed() {
 }
 
 #[test]
+fn a_client_that_waits_long_before_it_repeats_is_answered_as_before() {
+    let mut world = World::new(70, 0, 0);
+    let file = roadmap(80);
+    let create = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
+    for _ in 0..3 {
+        assert_eq!(world.ask_again(&create).opcode, ACK);
+        world.now = world.now + Duration::from_secs(4);
+    }
+    for (i, piece) in file.chunks(DATA).enumerate() {
+        assert_eq!(world.ask(0, op::WRITE, (i * DATA) as u32, piece).opcode, ACK);
+    }
+    let close = world.packet(0, op::TERMINATE, 0, 0, &[]);
+    for _ in 0..3 {
+        assert_eq!(world.ask_again(&close).opcode, ACK, "its answer was lost");
+        world.now = world.now + Duration::from_secs(4);
+    }
+    assert_eq!(world.texts, ["Roadmap stored: used from the next start"]);
+    let remove = world.packet(0, op::REMOVE, 11, 0, b"roadmap.bin");
+    for _ in 0..3 {
+        assert_eq!(world.ask_again(&remove).opcode, ACK, "not: no such file");
+        world.now = world.now + Duration::from_secs(4);
+    }
+}
+
+#[test]
 fn any_packets_in_any_order_are_survived() {
     for seed in 0..60 {
         let mut world = World::new(100 + seed, 20, 80);
