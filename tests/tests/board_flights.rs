@@ -61,8 +61,10 @@ const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 const VEHICLE: &str = "[[vehicles]]";
 /// Garbage on each line of a run that does not say how much, bytes.
 const GARBAGE: usize = 200_000;
-/// So much of it in each step of 4 ms: 10 kB/s, beside the autopilot's 4 kB/s; the emulated UART takes 18 kB/s.
-const HANDFUL: usize = 40;
+/// So much of it in a millisecond of the board's time, beside the autopilot's 4 kB/s; the emulated UART takes 18 kB/s.
+const PER_MS: usize = 10;
+/// The most at once, after this machine stood still.
+const HANDFUL: usize = 400;
 /// An instruction takes 2⁴ ns of the board's time, as in `cargo xtask emulate`.
 const SHIFT: u32 = 4;
 /// Flights of which one has to be as it should be.
@@ -278,14 +280,18 @@ fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
     vehicle.tell(&exclude);
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut left, mut steps) = (length, 0);
+    let board_ms = |vehicle: &Vehicle| vehicle.heard.setpoints.last().map_or(0, |last| last.time_boot_ms);
+    let began_ms = board_ms(&vehicle);
     vehicle.until("done with garbage and upload", |vehicle| {
         steps += 1;
+        let due = PER_MS * (board_ms(vehicle) - began_ms) as usize;
+        let handful = due.saturating_sub(length - left).min(HANDFUL).min(left);
         for port in [Port::Autopilot, Port::Swarm] {
             let mut garbage = [0; HANDFUL];
             rng.fill_bytes(&mut garbage);
-            vehicle.send(port, &garbage[..left.min(HANDFUL)]);
+            vehicle.send(port, &garbage[..handful]);
         }
-        left = left.saturating_sub(HANDFUL);
+        left -= handful;
         let heard = core::mem::take(&mut vehicle.radio);
         heard.chunks(1024).for_each(|bytes| to_client.send(bytes.to_vec()).unwrap_or_default());
         from_client.try_iter().for_each(|bytes| vehicle.send(Port::Swarm, &bytes));
@@ -296,7 +302,7 @@ fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
         } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
             vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
         }
-        left == 0 && upload.is_finished() && is_over(vehicle)
+        upload.is_finished() && is_over(vehicle)
     });
     vehicle.until_said("Setpoints: ");
     let upload = upload.join().expect("a client");
@@ -317,6 +323,7 @@ fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
     assert_eq!(count, times.len(), "setpoints were lost");
     assert_eq!(heard.missing, [0, 0], "frames were lost");
     done(&vehicle)?;
+    assert_eq!(left, 0, "it was over before all garbage had come");
     upload.expect("the upload arrives");
     assert!(heard.texts.iter().any(|text| text == "Flying around"));
     if gap_ms > GAP_MS { Err(format!("setpoints were {gap_ms} ms apart")) } else { Ok(()) }
