@@ -90,6 +90,15 @@ impl Autopilot {
         self.firmware.status(&self.body, &self.body.sense()).custom_mode
     }
 
+    /// Whether it lands where it is, by itself.
+    pub fn lands(&self) -> bool {
+        let land = match self.body.config.personality {
+            Personality::Px4 => Mode::Land.custom_mode(),
+            Personality::Ardupilot => ardupilot::Mode::Land.number(),
+        };
+        self.custom_mode() == land
+    }
+
     /// Whether a failsafe flies.
     pub fn in_failsafe(&self) -> bool {
         self.firmware.in_failsafe()

@@ -366,7 +366,9 @@ impl Member {
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.truth();
         let state = self.state();
-        let phase = match (truth.touching, on_path(state)) {
+        // What a board tells of its state is up to a second old; what its autopilot does is seen.
+        let lands = self.board.is_some() && self.autopilot.lands();
+        let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {
                 if touching {
                     Phase::Wreck
