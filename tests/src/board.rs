@@ -1,7 +1,7 @@
 //! Boards in QEMU: the built firmware, and what it is run with.
 
 use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::thread::sleep;
@@ -15,7 +15,7 @@ use host_sim::flash::{DeskFlash, LAYOUT};
 use host_sim::link::{Link, LinkUrl};
 use planner_core::voxel::VoxelGrid;
 
-use crate::Guard;
+use crate::{Guard, free_port};
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
@@ -74,7 +74,7 @@ impl Emulated {
     /// QEMU does not start.
     pub fn start(program: &Path, shift: Option<u32>, bank: Option<&[u8]>) -> Self {
         let scratch = tempfile::tempdir().expect("a temporary directory");
-        let [autopilot, radio, monitor] = free_ports();
+        let [autopilot, radio, monitor] = [(); 3].map(|()| free_port());
         let ports = [autopilot, radio];
         let listen = |port: u16| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
         let mut qemu = qemu(program);
@@ -191,12 +191,6 @@ pub fn bank(roadmap: &[u8], mission: &[u8]) -> Vec<u8> {
 /// QEMU's option that puts a file into memory at every reset.
 fn loader(file: &Path, at: u32) -> String {
     format!("loader,file={},addr={at:#x},force-raw=on", file.display())
-}
-
-/// TCP ports that nobody has now.
-fn free_ports() -> [u16; 3] {
-    let held = [(); 3].map(|()| TcpListener::bind("127.0.0.1:0").expect("a free port"));
-    held.each_ref().map(|listener| listener.local_addr().expect("it is bound").port())
 }
 
 /// Connects to what is about to listen.

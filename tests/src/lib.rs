@@ -6,9 +6,10 @@ pub mod logs;
 pub mod vehicle;
 
 use std::io::{BufRead, BufReader};
-use std::net::UdpSocket;
+use std::net::{TcpListener, UdpSocket};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicU16, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
@@ -117,12 +118,18 @@ pub fn autopilot(listen: &[&str], options: &[&str]) -> (Guard, Vec<String>) {
     listening(command, listen.len())
 }
 
-/// A UDP port that nobody has now.
+/// A port that nobody has now, of TCP and UDP, and that no other test of this process is given. Not one of those that the system
+/// hands out by itself: another process may be handed it before it is used.
 ///
 /// # Panics
 /// There is none.
-pub fn free_udp_port() -> u16 {
-    UdpSocket::bind("127.0.0.1:0").and_then(|socket| socket.local_addr()).expect("a free port").port()
+pub fn free_port() -> u16 {
+    static NEXT: AtomicU16 = AtomicU16::new(0);
+    let next = |_| 20_000 + NEXT.fetch_add(1, Ordering::Relaxed) % 10_000;
+    let free = |port: &u16| {
+        TcpListener::bind(("127.0.0.1", *port)).is_ok() && UdpSocket::bind(("127.0.0.1", *port)).is_ok()
+    };
+    (0..10_000).map(next).find(free).expect("one of so many is free")
 }
 
 /// The browser that opens reports: `FLOCKMATE_CHROMIUM`, else the first on the path; `None` with a line that says so.

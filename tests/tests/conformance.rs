@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, python, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, python, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -45,7 +45,7 @@ fn pymavlink(script: &str, scheme: &str, listen: &str, options: &[&str]) {
 /// Runs a MAVSDK script: it listens and the autopilot speaks first, as PX4's SITL does on 14540.
 fn mavsdk(script: &str, arguments: &[&str], options: &[&str]) {
     let Some(python) = python() else { return };
-    let address = format!("127.0.0.1:{}", free_udp_port());
+    let address = format!("127.0.0.1:{}", free_port());
     let _autopilot = autopilot(&[&format!("udp:{address}")], options);
     run(&python, script, &[&[format!("udpin://{address}").as_str()], arguments].concat());
 }
@@ -122,7 +122,7 @@ impl Onboard {
 /// Runs a script on a link of the autopilot that the companion is not on.
 fn onboard(script: &str, listen: &str, address: impl Fn(&str) -> String) {
     let Some(python) = python() else { return };
-    let port = free_udp_port();
+    let port = free_port();
     let (_autopilot, at) = autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
     let companion = Onboard::new(port);
     run(&python, script, &[&address(&at[0]), &companion.file("roadmap.bin"), &companion.file("mission.bin")]);
@@ -135,7 +135,7 @@ fn pymavlink_uses_the_companions_files_and_parameters_through_the_autopilot() {
 
 #[test]
 fn mavsdk_uses_the_companions_files_and_parameters_through_the_autopilot() {
-    let address = format!("127.0.0.1:{}", free_udp_port());
+    let address = format!("127.0.0.1:{}", free_port());
     onboard("onboard_mavsdk.py", &format!("udp:{address}"), |_| format!("udpin://{address}"));
 }
 
@@ -153,7 +153,7 @@ fn mavproxy_uses_the_companions_files_and_parameters_through_the_autopilot() {
 fn pymavlink_watches_the_swarm_and_talks_to_each_vehicle() {
     let Some(python) = python() else { return };
     let out = tempfile::tempdir().expect("a directory");
-    let address = format!("udp:127.0.0.1:{}", free_udp_port());
+    let address = format!("udp:127.0.0.1:{}", free_port());
     let fly = Command::new(host_sim(Profile::Debug))
         .arg("fly")
         .arg(workspace().join("host-sim/scenarios/demo.toml"))

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant as Clock};
 
 use companion::Instant;
 use companion::frame::{self, Framer, Header};
-use flockmate_tests::{Guard, Profile, autopilot, free_udp_port, host_sim, listening, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, listening, workspace};
 use host_sim::link::{Link, LinkUrl};
 use serialport::TTYPort;
 
@@ -195,7 +195,7 @@ fn arducopter_is_flown_over_a_serial_line() {
 
 #[test]
 fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
-    let port = free_udp_port();
+    let port = free_port();
     let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut operator = Ground::new(&format!("udp:127.0.0.1:{port}"));
@@ -212,7 +212,7 @@ fn px4_is_flown_over_udp_and_given_back_by_its_pilot() {
 
 #[test]
 fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
-    let port = free_udp_port();
+    let port = free_port();
     let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     pilot.set_integer("COM_OBL_RC_ACT", 4);
@@ -249,7 +249,7 @@ fn files_go_up_through_the_autopilot_and_over_a_radio_that_loses() {
     let mut plan = Command::new(host_sim(Profile::Debug));
     plan.arg("plan").arg(&lobby).arg("--out").arg(files.path()).stdout(Stdio::null());
     assert!(plan.status().expect("host-sim starts").success());
-    let port = free_udp_port();
+    let port = free_port();
     let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let (_radio, ends) = radio(2, "0.1");
     let companion = Command::new(host_sim(Profile::Debug))

@@ -60,8 +60,10 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
     let out = std::path::absolute(&args.out)?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot write {}", out.display()))?;
-    let boards: Vec<_> =
-        (1..=args.vehicles).map(|id| Emulated::start(&firmware, &out, id)).collect::<Result<_>>()?;
+    let mut ports = free_ports();
+    let boards: Vec<_> = (1..=args.vehicles)
+        .map(|id| Emulated::start(&firmware, &out, id, &mut ports))
+        .collect::<Result<_>>()?;
     let scenario = out.join("scenario.toml");
     std::fs::write(&scenario, cut_demo(&boards)?)?;
     run(host_sim().arg("plan").arg(&scenario).arg("--out").arg(out.join("plan")))?;
@@ -137,9 +139,9 @@ struct Emulated {
 }
 
 impl Emulated {
-    fn start(firmware: &Path, out: &Path, id: u8) -> Result<Self> {
-        let [autopilot, radio, monitor] = free_ports()?;
-        let ports = [autopilot, radio];
+    fn start(firmware: &Path, out: &Path, id: u8, free: &mut impl Iterator<Item = u16>) -> Result<Self> {
+        let mut port = || free.next().context("no TCP port is free");
+        let (ports, monitor) = ([port()?, port()?], port()?);
         let log = out.join(format!("board-{id}.defmt"));
         let mut qemu = command("qemu-system-arm");
         qemu.args(["-machine", "mps2-an500", "-display", "none", "-icount", SHIFT])
@@ -174,10 +176,8 @@ impl Drop for Emulated {
     }
 }
 
-/// TCP ports that nobody has now.
-fn free_ports() -> Result<[u16; 3]> {
-    let bind = || TcpListener::bind("127.0.0.1:0");
-    let held = [bind()?, bind()?, bind()?];
-    let [a, b, c] = held.each_ref().map(TcpListener::local_addr);
-    Ok([a?.port(), b?.port(), c?.port()])
+/// TCP ports that nobody has now. Not those that the system hands out by itself: another process may be handed them before a board
+/// has them.
+fn free_ports() -> impl Iterator<Item = u16> {
+    (20_000..30_000).filter(|port| TcpListener::bind(("127.0.0.1", *port)).is_ok())
 }

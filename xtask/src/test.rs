@@ -8,6 +8,9 @@ use crate::bare_metal::{self, Board};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size};
 
+/// Tests at once: those of boards and clients mostly wait for the clock.
+const AT_ONCE: &str = "4";
+
 /// Which steps to run.
 #[derive(clap::Args)]
 pub struct Args {
@@ -51,7 +54,7 @@ fn steps(args: &Args) -> Result<()> {
     step("release build", || shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"])))?;
     step("host tests", || {
         let mut tests = cargo();
-        tests.args(["test", "--workspace", "--locked"]);
+        tests.args(["test", "--workspace", "--locked"]).env("RUST_TEST_THREADS", AT_ONCE);
         if let Some(python) = &python {
             tests.env("FLOCKMATE_PYTHON", python);
         }
