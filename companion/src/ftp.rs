@@ -7,8 +7,8 @@
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
 //! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for
-//! [`MEMORY`] and only answered again; the last of all requests for longer, since a client that hears nothing may wait before it
-//! repeats it (QGroundControl 3 s, MAVSDK up to 4 s). What cannot be taken now is not answered: clients ask again. One session at a time; one
+//! [`MEMORY`] and only answered again; a client's last one for [`LAST_MEMORY`], since who hears no answer waits ever longer before
+//! it asks again (MAVSDK up to 4 s). What cannot be taken now is not answered: clients ask again. One session at a time; one
 //! request at a time, the others wait in a short queue. An answer that needs the flash is given when the flash is done.
 
 mod packet;
@@ -38,8 +38,10 @@ const QUEUE: usize = 6;
 const BURST: u8 = 16;
 /// A session whose client was silent this long may be taken by another.
 const IDLE: Duration = Duration::from_secs(10);
-/// A request that is repeated after others is known for this long.
+/// A request that is repeated after others of its client is known for this long.
 pub const MEMORY: Duration = Duration::from_secs(3);
+/// One that is repeated before its client asked for anything else.
+pub const LAST_MEMORY: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
 struct Reply {
@@ -81,6 +83,8 @@ struct Done {
     request: Print,
     result: Result<(), No>,
     at: Instant,
+    /// Its client asked for nothing else since.
+    last: bool,
 }
 
 /// The server. 4 kB, most of it requests that wait.
@@ -93,8 +97,6 @@ pub struct Ftp {
     stream: Option<Stream>,
     done: [Option<Done>; 8],
     next_done: usize,
-    /// The last request and when it came.
-    last: Option<(Print, Instant)>,
     text: Option<Text>,
     now: Instant,
 }
@@ -109,7 +111,6 @@ impl Default for Ftp {
             stream: None,
             done: [None; 8],
             next_done: 0,
-            last: None,
             text: None,
             now: Instant::ZERO,
         }
@@ -239,9 +240,8 @@ impl Ftp {
     }
 
     fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        let before = self.last.replace((print(request), self.now));
-        if let Some(done) = self.remembered(request, before) {
-            if !is_open(request) {
+        if let Some(done) = self.remembered(request) {
+            if !is_open(request) || done.is_err() {
                 self.respond(request, done);
             } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
                 // Its answer was lost; what was opened since then stays open otherwise.
@@ -249,6 +249,7 @@ impl Ftp {
             }
             return;
         }
+        self.follow(request);
         if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
             self.stream = None;
         }
@@ -435,11 +436,22 @@ impl Ftp {
         self.put(&request, ACK, u8::from(last), bytes);
     }
 
-    fn remembered(&self, request: &Request, before: Option<(Print, Instant)>) -> Option<Result<(), No>> {
+    fn remembered(&self, request: &Request) -> Option<Result<(), No>> {
         let print = print(request);
-        let repeats = before.is_some_and(|(last, at)| last == print && self.now - at < IDLE);
-        let known = |done: &&Done| done.request == print && (repeats || self.now - done.at < MEMORY);
+        let memory = |done: &Done| if done.last { LAST_MEMORY } else { MEMORY };
+        let known = |done: &&Done| done.request == print && self.now - done.at < memory(done);
         self.done.iter().flatten().find(known).map(|done| done.result)
+    }
+
+    /// Notes that a client asks for something else; what once came of the same request counts no more.
+    fn follow(&mut self, request: &Request) {
+        let print = print(request);
+        for held in &mut self.done {
+            held.take_if(|done| done.request == print);
+            if let Some(done) = held.as_mut().filter(|done| done.request.0 == request.client) {
+                done.last = false;
+            }
+        }
     }
 
     /// Answers, and remembers the answer.
@@ -449,7 +461,7 @@ impl Ftp {
     }
 
     fn remember(&mut self, request: &Request, result: Result<(), No>) {
-        self.done[self.next_done] = Some(Done { request: print(request), result, at: self.now });
+        self.done[self.next_done] = Some(Done { request: print(request), result, at: self.now, last: true });
         self.next_done = (self.next_done + 1) % self.done.len();
     }
 

@@ -350,9 +350,12 @@ fn nothing_is_erased_while_armed() {
     (0..3).for_each(|_| world.step());
     assert!(world.heard.is_empty());
     world.erasing = Erasing::Forbidden;
-    let refused = world.ask_again(&opens);
-    assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
-    assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+    for _ in 0..3 {
+        let refused = world.ask_again(&opens);
+        assert_eq!((refused.opcode, refused.data), (NAK, vec![9]), "each time that it is asked");
+        assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+        world.now = world.now + Duration::from_secs(2);
+    }
     world.erasing = Erasing::Allowed;
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
@@ -379,6 +382,27 @@ fn a_client_that_waits_long_before_it_repeats_is_answered_as_before() {
     for _ in 0..3 {
         assert_eq!(world.ask_again(&remove).opcode, ACK, "not: no such file");
         world.now = world.now + Duration::from_secs(4);
+    }
+}
+
+#[test]
+fn what_came_of_an_earlier_request_of_the_same_number_is_not_told_of_a_later_one() {
+    for pause in [4, 60] {
+        let mut world = World::new(71, 0, 0);
+        let (good, mut damaged) = (roadmap(80), roadmap(80));
+        damaged[100] ^= 1;
+        assert_eq!(world.upload("roadmap.bin", &damaged, 239).opcode, NAK);
+        world.now = world.now + Duration::from_secs(pause);
+        // A client that was started anew counts from zero again, and hears no late answers.
+        world.sequence = 0;
+        world.heard.clear();
+        assert_eq!(world.upload("roadmap.bin", &good, 239).opcode, ACK, "{pause} s later");
+        world.sequence -= 1;
+        let close = world.packet(0, op::TERMINATE, 0, 0, &[]);
+        for _ in 0..3 {
+            assert_eq!(world.ask_again(&close).opcode, ACK, "{pause} s later");
+            world.now = world.now + Duration::from_secs(2);
+        }
     }
 }
 

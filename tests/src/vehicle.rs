@@ -25,7 +25,7 @@ use crate::board::Emulated;
 const STEP: Duration = Duration::from_millis(4);
 /// Time that a machine which stood still does not make up for.
 const LATEST: Duration = Duration::from_millis(200);
-/// A machine may stand still for long; a megabyte of garbage takes less than half as long.
+/// A machine may stand still for long; a megabyte of garbage takes 100 s of the board's time.
 const PATIENCE: Duration = Duration::from_secs(400);
 /// States of a mission that was not started, or still waits.
 const ON_PAD: [State; 6] = [

@@ -298,8 +298,8 @@ fn an_armed_board_erases_nothing() {
     }
     drop(client);
     // Without an autopilot it is known after ten seconds of the board's time that none is armed; no time of its own passes faster.
-    board.reset();
     let began = Clock::now();
+    board.reset();
     while board.torn().is_empty() {
         assert!(began.elapsed() < PATIENCE, "it erases nothing without an autopilot");
         sleep(Duration::from_millis(100));

@@ -113,7 +113,8 @@ impl Ground {
     /// Waits for the autopilot's HEARTBEAT with this MAV_STATE.
     fn until_state(&mut self, state: u8) {
         let mut buffer = [0; 2048];
-        while self.began.elapsed() < PATIENCE {
+        let began = Clock::now();
+        while began.elapsed() < PATIENCE {
             let length = self.link.receive(&mut buffer).unwrap();
             let now = Instant::from_micros(self.began.elapsed().as_micros() as u64);
             let mut input = &buffer[..length];
@@ -122,7 +123,9 @@ impl Ground {
                     return;
                 }
             }
-            sleep(Duration::from_millis(5));
+            if length == 0 {
+                sleep(Duration::from_millis(5));
+            }
         }
         panic!("no HEARTBEAT with state {state}");
     }
@@ -215,9 +218,10 @@ fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
     let port = free_port();
     let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
-    pilot.set_integer("COM_OBL_RC_ACT", 4);
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
-    flight.until("Climb → Follow", || ());
+    // Again and again: who is silent for long is told nothing any more.
+    flight.until("Climb → Follow", || pilot.set_integer("COM_OBL_RC_ACT", 4));
+    pilot.set_integer("COM_OBL_RC_ACT", 4);
     flight.signal("-STOP");
     pilot.until_state(5);
     flight.signal("-CONT");
@@ -231,7 +235,8 @@ fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
 
 #[test]
 fn an_arducopter_that_reboots_in_flight_ends_the_mission_on_the_ground() {
-    let (mut first, at) = autopilot(&["tcp-listen:127.0.0.1:0"], ARDUPILOT);
+    let port = free_port();
+    let (mut first, at) = autopilot(&[&format!("tcp-listen:127.0.0.1:{port}")], ARDUPILOT);
     let mut flight = Flight::begin(&format!("tcp:{}", at[0]));
     flight.until("Climb → Follow", || ());
     let killed = |child: &mut Child| child.kill().and_then(|()| child.wait());

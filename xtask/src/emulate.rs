@@ -179,5 +179,7 @@ impl Drop for Emulated {
 /// TCP ports that nobody has now. Not those that the system hands out by itself: another process may be handed them before a board
 /// has them.
 fn free_ports() -> impl Iterator<Item = u16> {
-    (20_000..30_000).filter(|port| TcpListener::bind(("127.0.0.1", *port)).is_ok())
+    // Those of another checkout begin elsewhere.
+    let first = (std::process::id() % 100) as u16 * 100;
+    (20_000 + first..30_000).filter(|port| TcpListener::bind(("127.0.0.1", *port)).is_ok())
 }

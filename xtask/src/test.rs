@@ -8,9 +8,6 @@ use crate::bare_metal::{self, Board};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size};
 
-/// Tests at once: those of boards and clients mostly wait for the clock.
-const AT_ONCE: &str = "4";
-
 /// Which steps to run.
 #[derive(clap::Args)]
 pub struct Args {
@@ -54,7 +51,7 @@ fn steps(args: &Args) -> Result<()> {
     step("release build", || shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"])))?;
     step("host tests", || {
         let mut tests = cargo();
-        tests.args(["test", "--workspace", "--locked"]).env("RUST_TEST_THREADS", AT_ONCE);
+        tests.args(["test", "--workspace", "--locked"]).env("RUST_TEST_THREADS", tests_at_once().to_string());
         if let Some(python) = &python {
             tests.env("FLOCKMATE_PYTHON", python);
         }
@@ -74,6 +71,11 @@ fn steps(args: &Args) -> Result<()> {
         }
         Ok(())
     })
+}
+
+/// Those of boards and clients mostly wait for the clock, so more than there are cores.
+fn tests_at_once() -> usize {
+    std::thread::available_parallelism().map_or(4, |cores| cores.get().max(4))
 }
 
 /// Runs the steps and says how long each took.

@@ -55,7 +55,7 @@ impl Pace {
         over
     }
 
-    /// A piece that was sent once is answered. Answers that wait for flash to be erased tell nothing of the link.
+    /// A piece that was sent once is answered.
     pub fn answered_after(&mut self, time: Duration) {
         let time_s = time.as_secs_f32();
         let (smoothed_s, deviation_s) = match self.round_trip {
