@@ -7,8 +7,9 @@
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
 //! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for
-//! [`MEMORY`] and only answered again; a client's last one for [`LAST_MEMORY`], since who hears no answer waits ever longer before
-//! it asks again (MAVSDK up to 4 s). What cannot be taken now is not answered: clients ask again. One session at a time; one
+//! [`MEMORY`] and only answered again. MAVSDK repeats under a new sequence number, after up to 4 s: so a session that nothing was
+//! written to is not opened anew for its client, and what closing a session came to is told for [`CLOSED_MEMORY`] under any number.
+//! What cannot be taken now is not answered: clients ask again. One session at a time; one
 //! request at a time, the others wait in a short queue. An answer that needs the flash is given when the flash is done.
 
 mod packet;
@@ -38,10 +39,10 @@ const QUEUE: usize = 6;
 const BURST: u8 = 16;
 /// A session whose client was silent this long may be taken by another.
 const IDLE: Duration = Duration::from_secs(10);
-/// A request that is repeated after others of its client is known for this long.
+/// A repeated request is known as one for this long.
 pub const MEMORY: Duration = Duration::from_secs(3);
-/// One that is repeated before its client asked for anything else.
-pub const LAST_MEMORY: Duration = Duration::from_secs(10);
+/// What came of the last session is told for this long.
+const CLOSED_MEMORY: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
 struct Reply {
@@ -56,6 +57,8 @@ struct Session {
     client: (u8, u8),
     file: File,
     writes: bool,
+    /// Nothing was written to it yet.
+    fresh: bool,
     opened_by: Request,
     used: Instant,
 }
@@ -83,8 +86,15 @@ struct Done {
     request: Print,
     result: Result<(), No>,
     at: Instant,
-    /// Its client asked for nothing else since.
-    last: bool,
+}
+
+/// A session that was closed, and what came of it.
+#[derive(Clone, Copy, Debug)]
+struct Closed {
+    client: (u8, u8),
+    session: u8,
+    result: Result<(), No>,
+    at: Instant,
 }
 
 /// The server. 4 kB, most of it requests that wait.
@@ -97,6 +107,7 @@ pub struct Ftp {
     stream: Option<Stream>,
     done: [Option<Done>; 8],
     next_done: usize,
+    closed: Option<Closed>,
     text: Option<Text>,
     now: Instant,
 }
@@ -111,6 +122,7 @@ impl Default for Ftp {
             stream: None,
             done: [None; 8],
             next_done: 0,
+            closed: None,
             text: None,
             now: Instant::ZERO,
         }
@@ -216,6 +228,8 @@ impl Ftp {
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
                         self.doing = Doing::Nothing;
+                        // To erase for it may have taken longer than a client may be silent.
+                        self.session = self.session.map(|session| Session { used: self.now, ..session });
                         self.finish(&request, Ok(()));
                     }
                 }
@@ -249,7 +263,9 @@ impl Ftp {
             }
             return;
         }
-        self.follow(request);
+        if is_open(request) {
+            self.closed.take_if(|closed| closed.client == request.client);
+        }
         if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
             self.stream = None;
         }
@@ -264,7 +280,14 @@ impl Ftp {
                     self.session = None;
                     self.finish(request, Ok(()));
                 }
-                Err(no) => self.nak(request, no),
+                Err(no) => {
+                    let ours = |closed: &Closed| {
+                        (closed.client, closed.session) == (request.client, request.session)
+                    };
+                    let closed =
+                        self.closed.filter(|closed| ours(closed) && self.now - closed.at < CLOSED_MEMORY);
+                    self.respond(request, closed.map_or(Err(no), |closed| closed.result));
+                }
             },
             op::RESET => {
                 if self
@@ -340,6 +363,14 @@ impl Ftp {
 
     fn open(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
         let Some(file) = request.file() else { return self.nak(request, No::Protected) };
+        let same = |session: &&mut Session| {
+            (session.client, session.id, session.file) == (request.client, request.session, file)
+                && session.fresh
+        };
+        if let Some(session) = self.session.as_mut().filter(same) {
+            (session.opened_by, session.used) = (*request, self.now);
+            return self.ack(request, &[]);
+        }
         if !self.take_session(request, file, true, store) {
             return;
         }
@@ -366,7 +397,10 @@ impl Ftp {
             return self.nak(request, why.into());
         }
         match store.take(request.offset, request.bytes()) {
-            Taken::Yes => self.ack(request, &[]),
+            Taken::Yes => {
+                self.session = self.session.map(|session| Session { fresh: false, ..session });
+                self.ack(request, &[]);
+            }
             Taken::TooLarge => self.nak(request, No::Errno(EFBIG)),
             Taken::Later => {}
         }
@@ -408,7 +442,8 @@ impl Ftp {
         }
         self.drop_session(store);
         let Request { client, session: id, .. } = *request;
-        self.session = Some(Session { id, client, file, writes, opened_by: *request, used: self.now });
+        let opened_by = *request;
+        self.session = Some(Session { id, client, file, writes, fresh: writes, opened_by, used: self.now });
         true
     }
 
@@ -438,20 +473,8 @@ impl Ftp {
 
     fn remembered(&self, request: &Request) -> Option<Result<(), No>> {
         let print = print(request);
-        let memory = |done: &Done| if done.last { LAST_MEMORY } else { MEMORY };
-        let known = |done: &&Done| done.request == print && self.now - done.at < memory(done);
+        let known = |done: &&Done| done.request == print && self.now - done.at < MEMORY;
         self.done.iter().flatten().find(known).map(|done| done.result)
-    }
-
-    /// Notes that a client asks for something else; what once came of the same request counts no more.
-    fn follow(&mut self, request: &Request) {
-        let print = print(request);
-        for held in &mut self.done {
-            held.take_if(|done| done.request == print);
-            if let Some(done) = held.as_mut().filter(|done| done.request.0 == request.client) {
-                done.last = false;
-            }
-        }
     }
 
     /// Answers, and remembers the answer.
@@ -461,7 +484,12 @@ impl Ftp {
     }
 
     fn remember(&mut self, request: &Request, result: Result<(), No>) {
-        self.done[self.next_done] = Some(Done { request: print(request), result, at: self.now, last: true });
+        let at = self.now;
+        if request.opcode == op::TERMINATE {
+            self.closed = Some(Closed { client: request.client, session: request.session, result, at });
+            return;
+        }
+        self.done[self.next_done] = Some(Done { request: print(request), result, at });
         self.next_done = (self.next_done + 1) % self.done.len();
     }
 

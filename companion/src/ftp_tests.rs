@@ -360,29 +360,53 @@ fn nothing_is_erased_while_armed() {
     assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
 }
 
+/// Asks, and again after 4 s each, under the same sequence number or a new one; the answers' opcodes.
+fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) -> [u8; 3] {
+    let mut request = world.packet(0, opcode, data.len() as u8, 0, data);
+    [(); 3].map(|()| {
+        let answer = world.ask_again(&request).opcode;
+        world.now = world.now + Duration::from_secs(4);
+        if renumbers {
+            request = world.packet(0, opcode, data.len() as u8, 0, data);
+        }
+        answer
+    })
+}
+
 #[test]
-fn a_client_that_waits_long_before_it_repeats_is_answered_as_before() {
-    let mut world = World::new(70, 0, 0);
-    let file = roadmap(80);
-    let create = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
-    for _ in 0..3 {
-        assert_eq!(world.ask_again(&create).opcode, ACK);
-        world.now = world.now + Duration::from_secs(4);
+fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers() {
+    for (renumbers, damaged) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut world = World::new(70, 0, 0);
+        let mut file = roadmap(80);
+        file[100] ^= u8::from(damaged);
+        assert_eq!(ask_three_times(&mut world, renumbers, op::CREATE, b"roadmap.bin"), [ACK; 3]);
+        let erased = world.flash.programmed;
+        world.ask(0, op::CREATE, 0, b"roadmap.bin");
+        assert_eq!(world.flash.programmed, erased, "opened once");
+        for (i, piece) in file.chunks(DATA).enumerate() {
+            assert_eq!(world.ask(0, op::WRITE, (i * DATA) as u32, piece).opcode, ACK);
+        }
+        let told = if damaged { NAK } else { ACK };
+        assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [told; 3]);
+        assert_eq!(world.texts.len(), 1, "{:?}", world.texts);
+        world.now = world.now + Duration::from_secs(10);
+        assert_eq!(world.ask(0, op::TERMINATE, 0, &[]).opcode, NAK, "there is no session");
     }
-    for (i, piece) in file.chunks(DATA).enumerate() {
-        assert_eq!(world.ask(0, op::WRITE, (i * DATA) as u32, piece).opcode, ACK);
-    }
-    let close = world.packet(0, op::TERMINATE, 0, 0, &[]);
-    for _ in 0..3 {
-        assert_eq!(world.ask_again(&close).opcode, ACK, "its answer was lost");
-        world.now = world.now + Duration::from_secs(4);
-    }
-    assert_eq!(world.texts, ["Roadmap stored: used from the next start"]);
-    let remove = world.packet(0, op::REMOVE, 11, 0, b"roadmap.bin");
-    for _ in 0..3 {
-        assert_eq!(world.ask_again(&remove).opcode, ACK, "not: no such file");
-        world.now = world.now + Duration::from_secs(4);
-    }
+}
+
+#[test]
+fn an_upload_after_a_download_of_the_same_numbers_is_stored() {
+    let mut world = World::new(73, 0, 0);
+    let (old, new) = (roadmap(40), roadmap(80));
+    assert_eq!(world.upload("roadmap.bin", &old, 239).opcode, ACK);
+    world.restart();
+    world.sequence = 100;
+    assert_eq!(world.download("roadmap.bin", 239), old);
+    // Its TerminateSession has the number of the download's.
+    world.sequence -= 2 + new.chunks(239).len() as u16;
+    world.heard.clear();
+    assert_eq!(world.upload("roadmap.bin", &new, 239).opcode, ACK);
+    assert!(world.download("roadmap.bin", 239) == new, "said to be stored, and is not");
 }
 
 #[test]

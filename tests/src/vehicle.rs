@@ -65,7 +65,7 @@ pub struct Vehicle {
     pub heard: Heard,
     /// What was heard from the board's radio, as it came, for others to read.
     pub radio: Vec<u8>,
-    /// The longest that this machine kept us from a step.
+    /// The longest that this machine kept us from a step, since the last reset.
     pub stood_still: Duration,
     lines: [Option<Box<dyn Link>>; 2],
     framers: [Framer; 2],
@@ -130,6 +130,7 @@ impl Vehicle {
         self.board.halt(false);
         self.framers = [Framer::new(), Framer::new()];
         self.heard = Heard::default();
+        self.stood_still = Duration::ZERO;
     }
 
     /// Sends the companion a command.

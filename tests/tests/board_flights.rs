@@ -266,7 +266,7 @@ fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
     vehicle.start();
     vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow || is_over(vehicle));
     if is_over(&mut vehicle) {
-        return done(&vehicle);
+        return Err(format!("over before it was on its way: {:?}", vehicle.heard.texts));
     }
 
     // An upload by the radio, another roadmap than the one that is flown on.

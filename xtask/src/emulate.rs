@@ -181,5 +181,5 @@ impl Drop for Emulated {
 fn free_ports() -> impl Iterator<Item = u16> {
     // Those of another checkout begin elsewhere.
     let first = (std::process::id() % 100) as u16 * 100;
-    (20_000 + first..30_000).filter(|port| TcpListener::bind(("127.0.0.1", *port)).is_ok())
+    (20_000 + first..31_000).filter(|port| TcpListener::bind(("127.0.0.1", *port)).is_ok())
 }

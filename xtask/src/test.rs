@@ -73,7 +73,7 @@ fn steps(args: &Args) -> Result<()> {
     })
 }
 
-/// Those of boards and clients mostly wait for the clock, so more than there are cores.
+/// At least four: those of boards and clients mostly wait for the clock.
 fn tests_at_once() -> usize {
     std::thread::available_parallelism().map_or(4, |cores| cores.get().max(4))
 }

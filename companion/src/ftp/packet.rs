@@ -146,13 +146,13 @@ pub fn is_open(request: &Request) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 
-/// What a repeated request is known by. Two programs of one client's id may begin at the same sequence number: the data tells
-/// them apart.
-pub type Print = ((u8, u8), u16, u8, u32, u32);
+/// What a repeated request is known by. Two programs of one client's id may begin at the same sequence number: session and data
+/// may tell them apart.
+pub type Print = ((u8, u8), u16, (u8, u8), u32, u32);
 
 pub fn print(request: &Request) -> Print {
-    let Request { client, sequence, opcode, offset, .. } = *request;
-    (client, sequence, opcode, offset, crc32(request.bytes()))
+    let Request { client, sequence, session, opcode, offset, .. } = *request;
+    (client, sequence, (session, opcode), offset, crc32(request.bytes()))
 }
 
 /// Bytes asked for with each packet of a read.
