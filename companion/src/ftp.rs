@@ -6,20 +6,21 @@
 //! with its last packet marked.
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
-//! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for
-//! [`MEMORY`] and only answered again. MAVSDK repeats under a new sequence number, after up to 4 s: so a session that nothing was
-//! written to is not opened anew for its client, and what closing a session came to is told for [`CLOSED_MEMORY`] under any number.
-//! What cannot be taken now is not answered: clients ask again. One session at a time; one
-//! request at a time, the others wait in a short queue. An answer that needs the flash is given when the flash is done.
+//! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for a while
+//! and only answered again ([`memory`]); a session that nothing was written to is not opened anew for its client. What cannot be
+//! taken now is not answered: clients ask again. One session at a time; one request at a time, the others wait in a short queue.
+//! An answer that needs the flash is given when the flash is done.
 
+mod memory;
 mod packet;
 
 use heapless::Deque;
 
+use self::memory::Memory;
 #[cfg(test)]
 pub(crate) use self::packet::TEXTS;
 use self::packet::{
-    ACK, EFBIG, EIO, HEAD, NAK, No, Print, REMOVED, Request, Text, chunk, decimal, is_open, op, print, told,
+    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, told,
 };
 use crate::frame::Frame;
 use crate::store::window::Taken;
@@ -39,10 +40,6 @@ const QUEUE: usize = 6;
 const BURST: u8 = 16;
 /// A session whose client was silent this long may be taken by another.
 const IDLE: Duration = Duration::from_secs(10);
-/// A repeated request is known as one for this long.
-pub const MEMORY: Duration = Duration::from_secs(3);
-/// What came of the last session is told for this long.
-const CLOSED_MEMORY: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
 struct Reply {
@@ -81,22 +78,6 @@ struct Stream {
     left: u8,
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Done {
-    request: Print,
-    result: Result<(), No>,
-    at: Instant,
-}
-
-/// A session that was closed, and what came of it.
-#[derive(Clone, Copy, Debug)]
-struct Closed {
-    client: (u8, u8),
-    session: u8,
-    result: Result<(), No>,
-    at: Instant,
-}
-
 /// The server. 4 kB, most of it requests that wait.
 #[derive(Clone, Debug)]
 pub struct Ftp {
@@ -105,9 +86,7 @@ pub struct Ftp {
     session: Option<Session>,
     doing: Doing,
     stream: Option<Stream>,
-    done: [Option<Done>; 8],
-    next_done: usize,
-    closed: Option<Closed>,
+    memory: Memory,
     text: Option<Text>,
     now: Instant,
 }
@@ -120,9 +99,7 @@ impl Default for Ftp {
             session: None,
             doing: Doing::Nothing,
             stream: None,
-            done: [None; 8],
-            next_done: 0,
-            closed: None,
+            memory: Memory::default(),
             text: None,
             now: Instant::ZERO,
         }
@@ -254,7 +231,7 @@ impl Ftp {
     }
 
     fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        if let Some(done) = self.remembered(request) {
+        if let Some(done) = self.memory.recall(request, self.now) {
             if !is_open(request) || done.is_err() {
                 self.respond(request, done);
             } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
@@ -264,7 +241,7 @@ impl Ftp {
             return;
         }
         if is_open(request) {
-            self.closed.take_if(|closed| closed.client == request.client);
+            self.memory.forget_closed(request.client);
         }
         if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
             self.stream = None;
@@ -281,12 +258,8 @@ impl Ftp {
                     self.finish(request, Ok(()));
                 }
                 Err(no) => {
-                    let ours = |closed: &Closed| {
-                        (closed.client, closed.session) == (request.client, request.session)
-                    };
-                    let closed =
-                        self.closed.filter(|closed| ours(closed) && self.now - closed.at < CLOSED_MEMORY);
-                    self.respond(request, closed.map_or(Err(no), |closed| closed.result));
+                    let closed = self.memory.recall_closed(request, self.now);
+                    self.respond(request, closed.unwrap_or(Err(no)));
                 }
             },
             op::RESET => {
@@ -303,7 +276,7 @@ impl Ftp {
                 None => self.nak(request, No::NotFound),
                 Some((file, size)) => {
                     if self.take_session(request, file, false, store) {
-                        self.remember(request, Ok(()));
+                        self.memory.note(request, Ok(()), self.now);
                         self.ack(request, &size.to_le_bytes());
                     }
                 }
@@ -471,26 +444,10 @@ impl Ftp {
         self.put(&request, ACK, u8::from(last), bytes);
     }
 
-    fn remembered(&self, request: &Request) -> Option<Result<(), No>> {
-        let print = print(request);
-        let known = |done: &&Done| done.request == print && self.now - done.at < MEMORY;
-        self.done.iter().flatten().find(known).map(|done| done.result)
-    }
-
     /// Answers, and remembers the answer.
     fn finish(&mut self, request: &Request, result: Result<(), No>) {
-        self.remember(request, result);
+        self.memory.note(request, result, self.now);
         self.respond(request, result);
-    }
-
-    fn remember(&mut self, request: &Request, result: Result<(), No>) {
-        let at = self.now;
-        if request.opcode == op::TERMINATE {
-            self.closed = Some(Closed { client: request.client, session: request.session, result, at });
-            return;
-        }
-        self.done[self.next_done] = Some(Done { request: print(request), result, at });
-        self.next_done = (self.next_done + 1) % self.done.len();
     }
 
     fn respond(&mut self, request: &Request, result: Result<(), No>) {

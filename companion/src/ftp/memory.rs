@@ -1,0 +1,73 @@
+//! What the server remembers of requests that it must not obey twice.
+//!
+//! A repeated request is known for [`MEMORY`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
+//! what closing a session came to is told for [`CLOSED_MEMORY`] under any number, until its client opens the next.
+
+use super::packet::{No, Print, Request, op, print};
+use crate::time::{Duration, Instant};
+
+/// A repeated request is known as one for this long.
+const MEMORY: Duration = Duration::from_secs(3);
+/// What came of the last session is told for this long.
+const CLOSED_MEMORY: Duration = Duration::from_secs(10);
+/// Requests remembered.
+const REQUESTS: usize = 8;
+
+type Outcome = Result<(), No>;
+
+/// The memory.
+#[derive(Clone, Debug, Default)]
+pub struct Memory {
+    done: [Option<Done>; REQUESTS],
+    next: usize,
+    closed: Option<Closed>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Done {
+    request: Print,
+    outcome: Outcome,
+    at: Instant,
+}
+
+/// The last session that was closed.
+#[derive(Clone, Copy, Debug)]
+struct Closed {
+    client: (u8, u8),
+    session: u8,
+    outcome: Outcome,
+    at: Instant,
+}
+
+impl Memory {
+    /// Notes what came of a request: TerminateSession by its session, any other by all that is in it.
+    pub fn note(&mut self, request: &Request, outcome: Outcome, at: Instant) {
+        if request.opcode == op::TERMINATE {
+            self.closed = Some(Closed { client: request.client, session: request.session, outcome, at });
+        } else {
+            self.done[self.next] = Some(Done { request: print(request), outcome, at });
+            self.next = (self.next + 1) % REQUESTS;
+        }
+    }
+
+    /// What came of the same request a short time ago.
+    pub fn recall(&self, request: &Request, now: Instant) -> Option<Outcome> {
+        let print = print(request);
+        let known = |done: &&Done| done.request == print && now - done.at < MEMORY;
+        self.done.iter().flatten().find(known).map(|done| done.outcome)
+    }
+
+    /// What closing came to of the session that a request is of.
+    pub fn recall_closed(&self, request: &Request, now: Instant) -> Option<Outcome> {
+        let known = |closed: &&Closed| {
+            (closed.client, closed.session) == (request.client, request.session)
+                && now - closed.at < CLOSED_MEMORY
+        };
+        self.closed.as_ref().filter(known).map(|closed| closed.outcome)
+    }
+
+    /// A client opens a session: the one before it is not told of any more.
+    pub fn forget_closed(&mut self, client: (u8, u8)) {
+        self.closed.take_if(|closed| closed.client == client);
+    }
+}
