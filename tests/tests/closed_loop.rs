@@ -1,10 +1,12 @@
 //! Missions flown whole: planned by planner-core, flown by companions through MAVLink, watched by the referee.
 
+use std::net::TcpStream;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
-use flockmate_tests::{Guard, Profile, autopilot, host_sim, shared_data, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, shared_data, workspace};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
@@ -97,4 +99,50 @@ fn companion_and_autopilot_fly_in_two_processes() {
         .expect("the companion starts");
     let ended = Guard(companion).wait_for(Duration::from_secs(150));
     assert!(ended.is_some_and(|status| status.success()), "the companion ended with {ended:?}");
+}
+
+/// The demo's first vehicles, in a file.
+fn first_of_the_demo(vehicles: usize, path: &Path) {
+    let demo = std::fs::read_to_string(scenario_path("host-sim/scenarios/demo.toml")).expect("it is there");
+    let parts: Vec<_> = demo.split("[[vehicles]]").take(1 + vehicles).collect();
+    std::fs::write(path, parts.join("[[vehicles]]")).expect("a writable folder");
+}
+
+/// The companion of vehicle 1 in a process that listens for its autopilot and, if it shall, for its radio; then `fly` with the
+/// options that name these, in the order of its ports.
+fn fly_beside_a_process(vehicles: usize, options: &[&str]) {
+    let dir = tempfile::tempdir().expect("a directory");
+    let scenario = dir.path().join("scenario.toml");
+    first_of_the_demo(vehicles, &scenario);
+    let program = host_sim(Profile::Debug);
+    let mut companion = Command::new(&program);
+    let mut fly = Command::new(&program);
+    companion.args(["companion", "--id", "1"]).arg(&scenario);
+    fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path().join("out"));
+    let ports: Vec<_> = options.iter().map(|_| free_port()).collect();
+    for ((port, listens), option) in ports.iter().zip(["--autopilot", "--swarm"]).zip(options) {
+        companion.args([listens, &format!("tcp-listen:127.0.0.1:{port}")]);
+        fly.args([*option, &format!("tcp:127.0.0.1:{port}")]);
+    }
+    let _companion = Guard(companion.stdout(Stdio::null()).spawn().expect("the companion starts"));
+    let listens = |port: &u16| TcpStream::connect(("127.0.0.1", *port)).is_ok();
+    let began = Instant::now();
+    while !ports.iter().all(listens) {
+        assert!(began.elapsed() < Duration::from_secs(120), "the companion does not listen");
+        sleep(Duration::from_millis(100));
+    }
+    let flown = fly.output().expect("it runs");
+    let text = String::from_utf8_lossy(&flown.stdout);
+    assert!(flown.status.success(), "{text}{}", String::from_utf8_lossy(&flown.stderr));
+    assert!(text.contains("board 1: Landed"), "{text}");
+}
+
+#[test]
+fn a_companion_in_another_process_flies_among_those_of_the_simulation() {
+    fly_beside_a_process(2, &["--companion", "--radio"]);
+}
+
+#[test]
+fn a_companion_in_another_process_needs_no_radio_to_fly_alone() {
+    fly_beside_a_process(1, &["--companion"]);
 }

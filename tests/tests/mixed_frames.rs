@@ -131,7 +131,7 @@ fn fly(seed: u64) -> Errors {
             let goal = mission.goals[usize::from(plan.flights[i].goal.expect("a goal for each"))];
             nearest_m[i] = nearest_m[i].min((truth - goal).norm());
         }
-        ground_station.step(now_us, &members, &mut radio, &places);
+        ground_station.step(now_us, &mut members, &mut radio, &places);
         while let Some(packet) = radio.receive(now_us, listener) {
             let mut bytes = &packet[..];
             while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut bytes) {

@@ -65,14 +65,14 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
         .map(|id| Emulated::start(&firmware, &out, id, &mut ports))
         .collect::<Result<_>>()?;
     let scenario = out.join("scenario.toml");
-    std::fs::write(&scenario, cut_demo(&boards)?)?;
+    std::fs::write(&scenario, cut_demo(boards.len())?)?;
     run(host_sim().arg("plan").arg(&scenario).arg("--out").arg(out.join("plan")))?;
     println!("waiting until the boards have found that no autopilot is there, which could be armed");
     std::thread::sleep(ALONE_AFTER);
     for file in ["roadmap.bin", "mission.bin"] {
         upload(&boards, &out.join("plan").join(file))?;
     }
-    let gaps = fly(&scenario, &out)?;
+    let gaps = fly(&boards, &scenario, &out)?;
     ensure!(gaps.len() == boards.len(), "{} of {} boards told of their setpoints", gaps.len(), boards.len());
     ensure!(gaps.iter().all(|gap| *gap <= GAP_MS), "setpoints were {gaps:?} ms apart: {GAP_MS} are allowed");
     let stacks: Vec<_> =
@@ -83,8 +83,14 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
 }
 
 /// Flies, and shows what comes of it; what each board told of its setpoints, milliseconds.
-fn fly(scenario: &Path, out: &Path) -> Result<Vec<u32>> {
-    let mut fly = host_sim().arg("fly").arg(scenario).arg("--out").arg(out).stdout(Stdio::piped()).spawn()?;
+fn fly(boards: &[Emulated], scenario: &Path, out: &Path) -> Result<Vec<u32>> {
+    let mut fly = host_sim();
+    fly.arg("fly").arg(scenario).arg("--out").arg(out);
+    for board in boards {
+        let [autopilot, radio] = board.links();
+        fly.args(["--companion", &autopilot, "--radio", &radio]);
+    }
+    let mut fly = fly.stdout(Stdio::piped()).spawn()?;
     let mut gaps = Vec::new();
     for line in BufReader::new(fly.stdout.take().context("its output is piped")?).lines() {
         let line = line?;
@@ -101,26 +107,19 @@ fn host_sim() -> Command {
     command(target_dir().join("release/host-sim"))
 }
 
-/// The demo with as many vehicles as boards, each with the URLs of its board.
-fn cut_demo(boards: &[Emulated]) -> Result<String> {
+/// The demo's first vehicles.
+fn cut_demo(vehicles: usize) -> Result<String> {
     let demo = std::fs::read_to_string(root().join(DEMO)).with_context(|| format!("cannot read {DEMO}"))?;
-    let mut parts = demo.split(VEHICLE);
-    let mut scenario = parts.next().unwrap_or_default().to_owned();
-    let vehicles: Vec<_> = parts.take(boards.len()).collect();
-    ensure!(vehicles.len() == boards.len(), "{DEMO} has only {} vehicles", vehicles.len());
-    for (vehicle, board) in vehicles.iter().zip(boards) {
-        let [autopilot, radio] = board.ports.map(|port| format!("tcp:127.0.0.1:{port}"));
-        scenario += &format!("{VEHICLE}{}", vehicle.trim_end());
-        scenario += &format!("\ncompanion = \"{autopilot}\"\nradio = \"{radio}\"\n\n");
-    }
-    Ok(scenario)
+    let parts: Vec<_> = demo.split(VEHICLE).take(1 + vehicles).collect();
+    ensure!(parts.len() == 1 + vehicles, "{DEMO} has only {} vehicles", parts.len() - 1);
+    Ok(parts.join(VEHICLE))
 }
 
 /// Gives all boards a file, at the same time.
 fn upload(boards: &[Emulated], file: &Path) -> Result<()> {
     let start = |board: &Emulated| {
-        let link = format!("tcp:127.0.0.1:{}", board.ports[0]);
-        host_sim().arg("upload").args(["--link", &link]).arg(file).spawn().context("host-sim does not start")
+        let [link, _] = &board.links();
+        host_sim().arg("upload").args(["--link", link]).arg(file).spawn().context("host-sim does not start")
     };
     let uploads: Vec<_> = boards.iter().map(start).collect::<Result<_>>()?;
     for mut upload in uploads {
@@ -153,6 +152,11 @@ impl Emulated {
         }
         let qemu = qemu.arg("-kernel").arg(firmware).stdout(Stdio::null()).spawn();
         Ok(Self { qemu: qemu.context("qemu-system-arm does not start")?, ports, monitor })
+    }
+
+    /// URLs of its UARTs: to the autopilot, to the radio.
+    fn links(&self) -> [String; 2] {
+        self.ports.map(|port| format!("tcp:127.0.0.1:{port}"))
     }
 
     /// Bytes of the stack that were used since the start; `file` is scratch.

@@ -47,7 +47,7 @@ pub struct Args {
 
 /// Sleep between two looks at the links.
 const NAP: Duration = Duration::from_millis(1);
-/// After its end it goes on telling the others so, as a board does for good.
+/// After its end it goes on telling the others and ground stations so, as a board does for good.
 const FAREWELL: Duration = Duration::from_secs(2);
 
 /// Runs until the mission ends. Exit code 0 if it was flown to its end.
@@ -130,7 +130,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let state = companion.state();
         if !is_finished(state) {
             finished_at = None;
-        } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL || args.swarm.is_none() {
+        } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL {
             return Ok(if state == State::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE });
         }
         sleep(NAP);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
-use anyhow::Context;
+use anyhow::{Context, ensure};
 
 use super::load;
 use crate::link::LinkUrl;
@@ -13,7 +13,7 @@ use crate::output;
 use crate::progress::Progress;
 use crate::report::Level;
 use crate::say;
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Companion, Scenario};
 use crate::swarm;
 use crate::swarm::gateway::Gateway;
 
@@ -37,6 +37,14 @@ pub struct FlyArgs {
     /// Take this seed instead of the scenario's
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
+    /// A board or another process decides for the scenario's first vehicle; given again, for the second, and so on. Its port for
+    /// the autopilot: tcp:HOST:PORT, udp:HOST:PORT, serial:PATH:BAUD or one that listens. Flies at the speed of the clock
+    #[arg(long, value_name = "URL")]
+    companion: Vec<LinkUrl>,
+    /// The first such companion's port for the radio; given again, the second's, and so on. One without it hears only the
+    /// vehicles that its own radio joins
+    #[arg(long, value_name = "URL", requires = "companion")]
+    radio: Vec<LinkUrl>,
 }
 
 /// Arguments of `host-sim demo`.
@@ -52,7 +60,24 @@ pub struct DemoArgs {
 /// # Errors
 /// Bad input, by name and place.
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
-    plan_and_fly(load(&args.scenario, args.seed)?, "fly", &args.out, args.realtime, args.qgc.as_ref())
+    let mut scenario = load(&args.scenario, args.seed)?;
+    put_on_boards(&mut scenario, &args.companion, &args.radio)?;
+    plan_and_fly(scenario, "fly", &args.out, args.realtime, args.qgc.as_ref())
+}
+
+/// The first vehicles are decided for behind these links.
+fn put_on_boards(scenario: &mut Scenario, companions: &[LinkUrl], radios: &[LinkUrl]) -> anyhow::Result<()> {
+    let (boards, vehicles) = (companions.len(), scenario.vehicles.len());
+    ensure!(boards <= vehicles, "too many --companion: {boards}: {} has {vehicles} vehicles", scenario.path);
+    ensure!(
+        radios.len() <= boards,
+        "too many --radio: {}: each belongs to one --companion, of which there are {boards}",
+        radios.len()
+    );
+    for (i, (vehicle, autopilot)) in scenario.vehicles.iter_mut().zip(companions).enumerate() {
+        vehicle.companion = Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
+    }
+    Ok(())
 }
 
 /// Runs `demo`.

@@ -175,8 +175,8 @@ pub enum Companion {
     Url {
         /// Its port for the autopilot.
         autopilot: LinkUrl,
-        /// Its port for the radio.
-        radio: LinkUrl,
+        /// Its port for the radio; none where that is joined to others by something else, or to nothing.
+        radio: Option<LinkUrl>,
     },
 }
 

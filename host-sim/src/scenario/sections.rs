@@ -330,10 +330,10 @@ fn vehicle(
         None => Companion::InProcess,
         Some(value) => match value.str()? {
             "in-process" => Companion::InProcess,
-            _ => {
-                let radio = table.need("radio", "the URL of the board's port for the radio")?;
-                Companion::Url { autopilot: link(&value)?, radio: link(&radio)? }
-            }
+            _ => Companion::Url {
+                autopilot: link(&value)?,
+                radio: table.get("radio").map(|radio| link(&radio)).transpose()?,
+            },
         },
     };
     let vehicle = Vehicle {

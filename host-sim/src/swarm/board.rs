@@ -1,7 +1,7 @@
 //! A companion on a board or in another process: the far ends of its two serial ports, and what it tells of itself.
 //!
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
-//! heard on its radio's port.
+//! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
 
 use companion::frame::{Frame, Framer, MAX_SENT};
 use companion::intent::Intent;
@@ -15,26 +15,24 @@ use crate::link::{Link, LinkUrl};
 /// One board.
 pub struct Board {
     autopilot: Box<dyn Link>,
-    radio: Box<dyn Link>,
+    radio: Option<Box<dyn Link>>,
     framer: Framer,
     state: State,
-    progress_m: f32,
-    buffer: [u8; 2048],
+    progress_m: Option<f32>,
 }
 
 impl Board {
-    /// Connects to the board's port for the autopilot and the one for the radio.
+    /// Connects to the board's port for the autopilot and, if its radio is ours, the one for the radio.
     ///
     /// # Errors
     /// A link cannot be opened.
-    pub fn open(autopilot: &LinkUrl, radio: &LinkUrl) -> anyhow::Result<Self> {
+    pub fn open(autopilot: &LinkUrl, radio: Option<&LinkUrl>) -> anyhow::Result<Self> {
         Ok(Self {
             autopilot: autopilot.open()?,
-            radio: radio.open()?,
+            radio: radio.map(LinkUrl::open).transpose()?,
             framer: Framer::new(),
             state: State::default(),
-            progress_m: 0.0,
-            buffer: [0; 2048],
+            progress_m: None,
         })
     }
 
@@ -43,9 +41,14 @@ impl Board {
         self.state
     }
 
-    /// Its way along its own path as last told, metres.
-    pub fn progress_m(&self) -> f32 {
+    /// Its way along its own path as last told, metres; none if it has told of none.
+    pub fn progress_m(&self) -> Option<f32> {
         self.progress_m
+    }
+
+    /// Whether its radio is ours.
+    pub fn has_radio(&self) -> bool {
+        self.radio.is_some()
     }
 
     /// Gives it bytes of its autopilot.
@@ -61,15 +64,25 @@ impl Board {
     /// # Errors
     /// The link is gone for good.
     pub fn tell_radio(&mut self, packet: &[u8]) -> std::io::Result<()> {
-        self.radio.send(packet)
+        self.radio.as_mut().map_or(Ok(()), |radio| radio.send(packet))
     }
 
-    /// Bytes for its autopilot; 0 if there are none.
+    /// Bytes for its autopilot; 0 if there are none. Its words go to `said` if its radio is not ours.
     ///
     /// # Errors
     /// The link is gone for good.
-    pub fn hear_autopilot(&mut self, out: &mut [u8]) -> std::io::Result<usize> {
-        self.autopilot.receive(out)
+    pub fn hear_autopilot(
+        &mut self,
+        now: Instant,
+        out: &mut [u8],
+        mut said: impl FnMut(&str),
+    ) -> std::io::Result<usize> {
+        let length = self.autopilot.receive(out)?;
+        let mut input = &out[..if self.radio.is_some() { 0 } else { length }];
+        while let Some(frame) = self.framer.next(now, &mut input) {
+            self.note(&frame, &mut said);
+        }
+        Ok(length)
     }
 
     /// Moves what its radio sends out as whole packets to `sent`, and its words to `said`.
@@ -82,20 +95,40 @@ impl Board {
         mut sent: impl FnMut(&[u8]),
         mut said: impl FnMut(&str),
     ) -> std::io::Result<()> {
-        loop {
-            let length = self.radio.receive(&mut self.buffer)?;
-            let mut input = &self.buffer[..length];
+        let mut buffer = [0; 2048];
+        while let Some(radio) = &mut self.radio {
+            let length = radio.receive(&mut buffer)?;
+            let mut input = &buffer[..length];
             while let Some(frame) = self.framer.next(now, &mut input) {
                 let mut packet = [0; MAX_SENT];
                 let length = frame.encode(&mut packet);
                 sent(&packet[..length]);
-                if frame.component == COMPONENT {
-                    note(&frame, &mut self.state, &mut self.progress_m, &mut said);
-                }
+                self.note(&frame, &mut said);
             }
             if length == 0 {
-                return Ok(());
+                break;
             }
+        }
+        Ok(())
+    }
+
+    /// Keeps what the board tells of itself.
+    fn note(&mut self, frame: &Frame, said: &mut impl FnMut(&str)) {
+        if frame.component != COMPONENT {
+            return;
+        }
+        match frame.message_id {
+            HEARTBEAT_DATA::ID => self.state = told_state(frame).unwrap_or(self.state),
+            TUNNEL_DATA::ID => {
+                let intent = Intent::decode(frame.padded(), frame.system);
+                self.progress_m = intent.map(|intent| intent.progress_m).or(self.progress_m);
+            }
+            STATUSTEXT_DATA::ID => {
+                if let Some(text) = frame.decode::<STATUSTEXT_DATA>() {
+                    said(text.text.to_str().unwrap_or_default());
+                }
+            }
+            _ => {}
         }
     }
 }
@@ -105,21 +138,4 @@ pub fn told_state(frame: &Frame) -> Option<State> {
     let told = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
     let named = TABLE.iter().flat_map(|row| row.from.iter().chain([&row.to]));
     named.copied().find(|state| *state as u32 == told)
-}
-
-fn note(frame: &Frame, state: &mut State, progress_m: &mut f32, said: &mut impl FnMut(&str)) {
-    match frame.message_id {
-        HEARTBEAT_DATA::ID => *state = told_state(frame).unwrap_or(*state),
-        TUNNEL_DATA::ID => {
-            if let Some(intent) = Intent::decode(frame.padded(), frame.system) {
-                *progress_m = intent.progress_m;
-            }
-        }
-        STATUSTEXT_DATA::ID => {
-            if let Some(text) = frame.decode::<STATUSTEXT_DATA>() {
-                said(text.text.to_str().unwrap_or_default());
-            }
-        }
-        _ => {}
-    }
 }

@@ -3,6 +3,7 @@
 
 use companion::State;
 use companion::frame::{self, Header};
+use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -61,7 +62,16 @@ impl GroundStation {
     }
 
     /// Commands the start once all are ready, and again to each that has not heard it.
-    pub fn step(&mut self, now_us: u64, members: &[Member], radio: &mut Radio, places: &[Point]) {
+    pub fn step(&mut self, now_us: u64, members: &mut [Member], radio: &mut Radio, places: &[Point]) {
+        let frames = self.frames(now_us, members);
+        for frame in frames {
+            radio.broadcast(now_us, None, places, &frame);
+            members.iter_mut().for_each(|member| member.forward(now_us, &frame));
+        }
+    }
+
+    /// What it has to say.
+    fn frames(&mut self, now_us: u64, members: &[Member]) -> Vec<Vec<u8>> {
         let state = |m: &Member| m.state();
         if self.first_us.is_none() {
             let ready = || members.iter().filter(|m| state(m) == State::Ready);
@@ -70,20 +80,21 @@ impl GroundStation {
             }
             let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
             let waited = self.ready_us.is_some_and(|since_us| now_us >= since_us + PATIENCE_US);
-            if self.ready_us.is_some() && (settled || waited) {
-                self.first_us = Some(now_us);
-                self.last_us = now_us;
-                self.send(now_us, START, EVERYBODY, 0.0, radio, places);
+            if !(self.ready_us.is_some() && (settled || waited)) {
+                return Vec::new();
             }
-            return;
+            self.first_us = Some(now_us);
+            self.last_us = now_us;
+            return vec![self.frame(&order(START, EVERYBODY, 0.0))];
         }
         if now_us < self.last_us + REPEAT_US {
-            return;
+            return Vec::new();
         }
         self.last_us = now_us;
         self.resumes.retain(|&(_, until_us)| now_us < until_us);
+        let mut frames = Vec::new();
         for (centre, radius_m) in self.obstacles.clone() {
-            let command = COMMAND_INT_DATA {
+            frames.push(self.frame(&COMMAND_INT_DATA {
                 command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
                 target_system: EVERYBODY,
                 frame: MavFrame::MAV_FRAME_GLOBAL,
@@ -92,37 +103,25 @@ impl GroundStation {
                 y: (centre.lon_deg * 1e7).round() as i32,
                 z: centre.alt_m as f32,
                 ..COMMAND_INT_DATA::DEFAULT
-            };
-            let mut buffer = [0; frame::MAX_SENT];
-            let header = Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence: self.sequence };
-            let length = frame::encode(header, &command, &mut buffer);
-            self.sequence = self.sequence.wrapping_add(1);
-            radio.broadcast(now_us, None, places, &buffer[..length]);
+            }));
         }
         for (i, member) in members.iter().enumerate() {
             let id = member.system_id();
             if state(member) == State::Ready {
-                self.send(now_us, START, id, 0.0, radio, places);
+                frames.push(self.frame(&order(START, id, 0.0)));
             }
             if state(member) == State::PilotControl && self.resumes.iter().any(|&(of, _)| of == i) {
-                self.send(now_us, PAUSE_CONTINUE, id, 1.0, radio, places);
+                frames.push(self.frame(&order(PAUSE_CONTINUE, id, 1.0)));
             }
         }
+        frames
     }
 
-    fn send(
-        &mut self,
-        now_us: u64,
-        command: MavCmd,
-        target_system: u8,
-        param1: f32,
-        radio: &mut Radio,
-        places: &[Point],
-    ) {
+    fn frame(&mut self, command: &impl MessageData) -> Vec<u8> {
         let mut buffer = [0; frame::MAX_SENT];
-        let length = encode(command, target_system, param1, self.sequence, &mut buffer);
+        let length = encode(command, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);
-        radio.broadcast(now_us, None, places, &buffer[..length]);
+        buffer[..length].to_vec()
     }
 }
 
@@ -134,16 +133,13 @@ const EVERYBODY: u8 = 0;
 
 /// A frame that commands the start; returns its length.
 pub fn mission_start(target_system: u8, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
-    encode(START, target_system, 0.0, sequence, out)
+    encode(&order(START, target_system, 0.0), sequence, out)
 }
 
-fn encode(
-    command: MavCmd,
-    target_system: u8,
-    param1: f32,
-    sequence: u8,
-    out: &mut [u8; frame::MAX_SENT],
-) -> usize {
-    let command = COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT };
-    frame::encode(Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence }, &command, out)
+fn order(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
+    COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT }
+}
+
+fn encode(command: &impl MessageData, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
+    frame::encode(Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence }, command, out)
 }

@@ -229,23 +229,23 @@ impl Member {
         let (now, id) = (self.companion_now(now_us), self.system_id());
         let Some(board) = &mut self.board else { return };
         let mut buffer = [0; 512];
+        let mut said = |text: &str| {
+            say!("board {id}: {text}");
+            let t_s = (now_us as f64 * 1e-6) as f32;
+            log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
+        };
         let mut exchange = || {
             board.tell_autopilot(&self.bytes)?;
             while let Some(packet) = radio.receive(now_us, station) {
                 board.tell_radio(&packet)?;
             }
             loop {
-                let length = board.hear_autopilot(&mut buffer)?;
+                let length = board.hear_autopilot(now, &mut buffer, &mut said)?;
                 if length == 0 {
                     break;
                 }
                 self.down.write(now_us, &buffer[..length]);
             }
-            let mut said = |text: &str| {
-                say!("board {id}: {text}");
-                let t_s = (now_us as f64 * 1e-6) as f32;
-                log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
-            };
             board.hear_radio(now, |packet| radio.broadcast(now_us, Some(station), places, packet), &mut said)
         };
         // A board that is gone is silent, as one without power.
@@ -286,6 +286,13 @@ impl Member {
         if restarts {
             // It could be made once, so it can again.
             let _ = self.reset_companion(now_us);
+        }
+    }
+
+    /// Passes on to a board without a radio what a ground station tells its companion: by the autopilot, as that forwards it.
+    pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
+        if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_mute(now_us) {
+            self.up.write(now_us, frame);
         }
     }
 
@@ -382,7 +389,8 @@ impl Member {
         };
         // Who stands by order of a person is in no deadlock.
         let ordered = matches!(state, State::Paused | State::PilotControl);
-        let progress_m = self.board.as_ref().map_or_else(|| self.companion.progress_m(), Board::progress_m);
+        let progress_m =
+            self.board.as_ref().map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
         Observation { position: truth.position, phase, ordered, progress_m }
     }
 }

@@ -151,7 +151,7 @@ fn simulate(
                 nearest_goal_m[i] = nearest_goal_m[i].min((places[i] - goal).norm());
             }
         }
-        ground_station.step(now_us, &members, &mut radio, &places);
+        ground_station.step(now_us, &mut members, &mut radio, &places);
         if let Some(gateway) = &mut gateway {
             gateway.step(now_us, &mut members, &mut radio, &places).context("link lost: --qgc")?;
         }
@@ -313,7 +313,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
             if let scenario::Companion::Url { autopilot, radio } = &vehicle.companion {
-                member.put_on(Board::open(autopilot, radio)?);
+                member.put_on(Board::open(autopilot, radio.as_ref())?);
             }
             Ok(member)
         })

@@ -16,6 +16,8 @@ const TOUCH_M: f32 = 1e-3;
 const DEADLOCK_S: f64 = 20.0;
 /// Progress that counts, metres.
 const PROGRESS_M: f32 = 0.1;
+/// From where one that tells of no progress hovered, metres: more than it sways.
+const AWAY_M: f32 = 1.0;
 /// Spacing of recorded points, seconds.
 const RECORD_S: f64 = 0.2;
 
@@ -43,8 +45,8 @@ pub struct Observation {
     pub phase: Phase,
     /// Whether it stands by order of a person.
     pub ordered: bool,
-    /// Arc length along its path, metres.
-    pub progress_m: f32,
+    /// Arc length along its path, metres; without it any way flown is progress.
+    pub progress_m: Option<f32>,
 }
 
 /// What was recorded at one time.
@@ -67,6 +69,7 @@ struct Watched {
     /// Where its distance to the nearest obstacle was last measured, and that distance, metres.
     measured: Option<(Point, f32)>,
     best_progress_m: f32,
+    progressed_at: Point,
     progressed_s: f64,
     stuck: bool,
     track: Vec<(f32, Point)>,
@@ -119,6 +122,7 @@ impl<'a> Monitor<'a> {
             in_contact: false,
             measured: None,
             best_progress_m: f32::NEG_INFINITY,
+            progressed_at: Point::zeros(),
             progressed_s: 0.0,
             stuck: false,
             track: Vec::new(),
@@ -288,9 +292,14 @@ impl<'a> Monitor<'a> {
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
-        let moved = now.progress_m > vehicle.best_progress_m + PROGRESS_M;
+        let moved = match now.progress_m {
+            Some(progress_m) => progress_m > vehicle.best_progress_m + PROGRESS_M,
+            None => (now.position - vehicle.progressed_at).norm() > AWAY_M,
+        };
         if now.phase != Phase::Flying || now.ordered || moved {
-            vehicle.best_progress_m = vehicle.best_progress_m.max(now.progress_m);
+            vehicle.best_progress_m =
+                now.progress_m.unwrap_or(f32::NEG_INFINITY).max(vehicle.best_progress_m);
+            vehicle.progressed_at = now.position;
             vehicle.progressed_s = t_s;
             let ends = moved || now.phase == Phase::TakeOffOrLanding;
             if std::mem::take(&mut vehicle.stuck) && ends && self.waits_end {
@@ -333,7 +342,7 @@ mod tests {
     }
 
     fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
-        Observation { position: Point::new(x, y, z), phase, ordered: false, progress_m: x }
+        Observation { position: Point::new(x, y, z), phase, ordered: false, progress_m: Some(x) }
     }
 
     #[test]
@@ -393,6 +402,23 @@ mod tests {
             let seen = [at(2.0, 2.0, 5.0, Phase::Flying), at(5.0, 5.0, 5.0, Phase::Grounded)];
             for step in 0..300 {
                 monitor.observe(f64::from(step) * 0.1, &seen);
+            }
+            assert_eq!(monitor.deadlocks, 1);
+        });
+    }
+
+    #[test]
+    fn one_that_tells_of_no_progress_makes_some_by_flying_on() {
+        with_monitor(|mut monitor| {
+            let silent = |x| Observation { progress_m: None, ..at(x, 2.0, 5.0, Phase::Flying) };
+            let rests = at(5.0, 5.0, 5.0, Phase::Grounded);
+            for step in 0..300 {
+                monitor.observe(f64::from(step) * 0.1, &[silent(2.0 + step as f32 * 0.02), rests]);
+            }
+            assert_eq!(monitor.deadlocks, 0);
+            for step in 300..600 {
+                let sways = if step % 20 < 10 { 0.2 } else { -0.2 };
+                monitor.observe(f64::from(step) * 0.1, &[silent(5.0 + sways), rests]);
             }
             assert_eq!(monitor.deadlocks, 1);
         });
