@@ -159,7 +159,7 @@ impl Mission {
         let path = &self.scenario.path;
         match error {
             PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
-                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\n  \
+                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\n\
                  hint: move its start or goal out of their way, or give the roadmap more nodes"
             ),
             PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {path}: {error:?}"),
@@ -316,17 +316,17 @@ fn height_over_ground(
     let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
     if map.never_sample().is_blocked_at(point) {
         bail!(
-            "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map\n  \
+            "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map\n\
              hint: `host-sim map info` tells the map's extent"
         );
     }
     let Some(ground_m) = map.ground_below(point) else {
-        bail!("{what} has no ground below it: {at} is over nothing\n  hint: choose a place over a floor");
+        bail!("{what} has no ground below it: {at} is over nothing\nhint: choose a place over a floor");
     };
     let height_m = point.z - ground_m - radius_m;
     if height_m < 0.0 {
         bail!(
-            "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n  \
+            "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n\
              hint: give it a height of at least {:.2} m",
             point.z - ground_m,
             ground_m + radius_m

@@ -134,7 +134,7 @@ impl Client {
             }
         }
         bail!(
-            "no companion heard: component {COMPONENT}{} said nothing for {} s\n  hint: between two of its ports PX4 passes \
+            "no companion heard: component {COMPONENT}{} said nothing for {} s\nhint: between two of its ports PX4 passes \
              messages on where MAV_x_FORWARD is set",
             self.system.map_or(String::new(), |system| format!(" of system {system}")),
             PATIENCE.as_secs()
@@ -282,7 +282,7 @@ fn why(data: &[u8]) -> String {
         [4, ..] => "the companion was started anew",
         [5, ..] => "another client is uploading",
         [9, ..] => {
-            "the companion protects its file: the vehicle is armed, or a roadmap waits for a restart already\n  \
+            "the companion protects its file: the vehicle is armed, or a roadmap waits for a restart already\n\
              hint: restart the companion (MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN) and upload again"
         }
         _ => return format!("the companion refuses: NAK {data:?}"),

@@ -57,7 +57,7 @@ fn kind(bytes: &[u8]) -> anyhow::Result<File> {
         Ok(File::Mission)
     } else {
         bail!(
-            "it begins neither as a roadmap nor as a mission\n  hint: `host-sim plan` writes roadmap.bin and mission.bin"
+            "it begins neither as a roadmap nor as a mission\nhint: `host-sim plan` writes roadmap.bin and mission.bin"
         )
     }
 }
