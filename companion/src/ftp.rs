@@ -13,6 +13,7 @@
 
 mod memory;
 mod packet;
+mod stream;
 
 use heapless::Deque;
 
@@ -22,6 +23,7 @@ pub(crate) use self::packet::TEXTS;
 use self::packet::{
     ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, told,
 };
+use self::stream::{Stream, due};
 use crate::frame::Frame;
 use crate::store::window::Taken;
 use crate::store::{Answer, Erasing, File, Store, UploadError, UploadState};
@@ -36,8 +38,6 @@ pub const DATA: usize = 239;
 
 /// Requests that wait; `mavftp` has five under way.
 const QUEUE: usize = 6;
-/// Packets of one burst; then the client asks for the next.
-const BURST: u8 = 16;
 /// A session whose client was silent this long may be taken by another.
 const IDLE: Duration = Duration::from_secs(10);
 
@@ -68,14 +68,6 @@ enum Doing {
     Sum(Request, bool),
     Open(Request),
     Close(Request),
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Stream {
-    request: Request,
-    offset: u32,
-    sequence: u16,
-    left: u8,
 }
 
 /// The server. 4 kB, most of it requests that wait.
@@ -157,15 +149,19 @@ impl Ftp {
     pub fn answer(&mut self, answer: Answer<'_>) {
         match (core::mem::replace(&mut self.doing, Doing::Nothing), answer) {
             (Doing::Read(request, true), Answer::Bytes(bytes)) => match self.stream {
-                Some(stream) if stream.request.is(&request) => self.stream_packet(stream, bytes),
+                Some(stream) if stream.request().is(&request) => {
+                    let due = due(&request, Some(&stream));
+                    self.stream = stream.after(bytes.len());
+                    self.put(&due, ACK, u8::from(self.stream.is_none()), bytes);
+                }
                 _ => self.ack(&request, bytes),
             },
             (Doing::Sum(request, true), Answer::Sum(sum)) => {
                 self.ack(&request, &sum.to_le_bytes());
             }
             (Doing::Read(request, true) | Doing::Sum(request, true), _) => {
-                self.stream = None;
-                self.nak(&request, No::Errno(EIO));
+                let due = due(&request, self.stream.take().as_ref());
+                self.nak(&due, No::Errno(EIO));
             }
             (other, _) => self.doing = other,
         }
@@ -176,18 +172,14 @@ impl Ftp {
         match &mut self.doing {
             Doing::Nothing | Doing::Read(_, true) | Doing::Sum(_, true) => {}
             Doing::Read(request, asked) => {
-                let offset = match &self.stream {
-                    Some(stream) if stream.request.is(request) => stream.offset,
-                    _ => request.offset,
-                };
+                let due = due(request, self.stream.as_ref());
                 let file = self.session.map(|session| session.file);
-                let within = |file: &File| store.size(*file).is_some_and(|size| offset < size);
+                let within = |file: &File| store.size(*file).is_some_and(|size| due.offset < size);
                 if let Some(file) = file.filter(within) {
-                    *asked = store.read(file, offset, chunk(request));
+                    *asked = store.read(file, due.offset, chunk(&due));
                 } else {
-                    let request = *request;
                     (self.doing, self.stream) = (Doing::Nothing, None);
-                    self.nak(&request, No::EndOfFile);
+                    self.nak(&due, No::EndOfFile);
                 }
             }
             Doing::Sum(request, asked) => match request.file().filter(|file| store.size(*file).is_some()) {
@@ -284,9 +276,7 @@ impl Ftp {
             op::READ | op::BURST_READ => match self.session_of(request) {
                 Ok(Session { writes: true, .. }) => self.nak(request, No::InvalidSession),
                 Ok(_) => {
-                    let (sequence, offset) = (request.sequence, request.offset);
-                    let stream = Stream { request: *request, offset, sequence, left: BURST };
-                    self.stream = (request.opcode == op::BURST_READ).then_some(stream);
+                    self.stream = (request.opcode == op::BURST_READ).then(|| Stream::new(request));
                     self.doing = Doing::Read(*request, false);
                 }
                 Err(no) => self.nak(request, no),
@@ -429,19 +419,9 @@ impl Ftp {
     /// The next packet of a burst.
     fn next_of_stream(&mut self, store: &mut Store) {
         if let Some(stream) = self.stream {
-            self.doing = Doing::Read(stream.request, false);
+            self.doing = Doing::Read(stream.request(), false);
             self.go_on(store);
         }
-    }
-
-    fn stream_packet(&mut self, mut stream: Stream, bytes: &[u8]) {
-        let request = Request { sequence: stream.sequence, offset: stream.offset, ..stream.request };
-        stream.left -= 1;
-        stream.offset += bytes.len() as u32;
-        stream.sequence = stream.sequence.wrapping_add(1);
-        let last = stream.left == 0 || bytes.len() < chunk(&request);
-        self.stream = (!last).then_some(stream);
-        self.put(&request, ACK, u8::from(last), bytes);
     }
 
     /// Answers, and remembers the answer.

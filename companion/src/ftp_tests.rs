@@ -9,6 +9,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::packet::{ACK, EFBIG, EIO, NAK, op};
+use super::stream::BURST;
 use super::*;
 use crate::fake_flash::{Flash, LAYOUT, obey, roadmap, started};
 use crate::frame::{self, Framer, Header};
@@ -271,6 +272,25 @@ fn a_burst_comes_in_packets_that_count_on() {
     assert_eq!(rounds, file.len().div_ceil(80 * usize::from(BURST)));
     let end = world.packet(opened.session, op::BURST_READ, 80, file.len() as u32, &[]);
     assert_eq!(world.ask_again(&end).data, [6], "the end");
+}
+
+#[test]
+fn a_burst_that_ends_with_a_whole_packet_says_where_the_end_is() {
+    let mut world = World::new(52, 0, 0);
+    let file = roadmap(300);
+    world.upload("roadmap.bin", &file, 239);
+    let opened = world.ask(0, op::OPEN_READ, 0, b"roadmap.bin");
+    let (size, packets) = (file.len() / (file.len() / 200), 3);
+    let from = file.len() - packets * size;
+    let request = world.packet(opened.session, op::BURST_READ, size as u8, from as u32, &[]);
+    let first = world.sequence;
+    world.heard.clear();
+    world.send(&request);
+    (0..20).for_each(|_| world.step());
+    let heard: Vec<_> = world.heard.iter().map(|p| (p.sequence, p.offset as usize, p.opcode)).collect();
+    let mut want: Vec<_> = (0..packets).map(|i| (first + i as u16, from + i * size, ACK)).collect();
+    want.push((first + packets as u16, file.len(), NAK));
+    assert_eq!(heard, want);
 }
 
 #[test]

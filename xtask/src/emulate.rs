@@ -167,6 +167,7 @@ impl Emulated {
         // It says what it does until it has quit.
         monitor.read_to_end(&mut Vec::new())?;
         let stack = std::fs::read(file)?;
+        std::fs::remove_file(file)?;
         ensure!(stack.len() == STACK_LEN, "QEMU gave {} bytes of stack", stack.len());
         Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == PAINT).count())
     }

@@ -1,0 +1,44 @@
+//! A burst: one request that is answered by packets, each as if it had been asked for by itself.
+
+use super::packet::{Request, chunk};
+
+/// Packets of one burst; then the client asks for the next.
+pub const BURST: u8 = 16;
+
+/// A burst that has begun.
+#[derive(Clone, Copy, Debug)]
+pub struct Stream {
+    request: Request,
+    offset: u32,
+    sequence: u16,
+    left: u8,
+}
+
+impl Stream {
+    /// One of which nothing was sent yet.
+    pub fn new(request: &Request) -> Self {
+        Self { request: *request, offset: request.offset, sequence: request.sequence, left: BURST }
+    }
+
+    /// What asked for it.
+    pub fn request(&self) -> Request {
+        self.request
+    }
+
+    /// The request that its next packet answers.
+    fn due(&self) -> Request {
+        Request { sequence: self.sequence, offset: self.offset, ..self.request }
+    }
+
+    /// The same after a packet of as many bytes; `None` where that was the last.
+    pub fn after(&self, len: usize) -> Option<Self> {
+        let last = self.left == 1 || len < chunk(&self.request);
+        let (offset, sequence) = (self.offset + len as u32, self.sequence.wrapping_add(1));
+        (!last).then_some(Self { offset, sequence, left: self.left - 1, ..*self })
+    }
+}
+
+/// A request of one packet, or that of the next packet of the burst which it asked for.
+pub fn due(request: &Request, stream: Option<&Stream>) -> Request {
+    stream.filter(|stream| stream.request.is(request)).map_or(*request, Stream::due)
+}
