@@ -353,11 +353,13 @@ impl Shell {
         asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS && !self.writes.load(Ordering::Relaxed)
     }
 
-    /// Whether every task of the links and of time came by lately: else the watchdog is left to bite.
+    /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
+    /// watchdog is left to bite.
     pub fn is_alive(&self) -> bool {
         let now = now_ms();
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
+            && self.setpoints.since(awake_ms()).is_none_or(|passed| passed < limit)
     }
 }
 
@@ -388,6 +390,13 @@ impl Setpoints {
         self.mark(now_ms, now_ms.max(1));
     }
 
+    /// Time since the last, if more are to come, milliseconds.
+    fn since(&self, now_ms: u32) -> Option<u32> {
+        let last_ms = self.last_ms.load(Ordering::Relaxed);
+        // The time less what was overslept may step back by a little.
+        (last_ms != 0).then(|| (now_ms.wrapping_sub(last_ms) as i32).max(0) as u32)
+    }
+
     /// The companion streams none, for now.
     fn end(&self, now_ms: u32) {
         self.mark(now_ms, 0);
@@ -411,4 +420,22 @@ impl Setpoints {
 /// SET_POSITION_TARGET_LOCAL_NED, by the message id of a MAVLink 2 frame.
 fn is_setpoint(frame: &[u8]) -> bool {
     frame.get(7..10) == Some(&[84, 0, 0])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_setpoint_is_missed_only_while_more_are_to_come() {
+        let setpoints = Setpoints::new();
+        assert_eq!(setpoints.since(1000), None);
+        setpoints.note(1000);
+        setpoints.note(1050);
+        assert_eq!((setpoints.since(1049), setpoints.since(1500)), (Some(0), Some(450)));
+        setpoints.end(1500);
+        assert_eq!(setpoints.since(9000), None);
+        assert_eq!(setpoints.take(9000), Some([2, 450]));
+        assert_eq!(setpoints.take(9000), None);
+    }
 }

@@ -13,9 +13,11 @@ use companion::store::window::Taken;
 use companion::store::{Erasing, File, READ, Store, UploadState, WORD};
 use host_sim::flash::{DeskFlash, LAYOUT};
 use host_sim::link::{Link, LinkUrl};
+use object::{Object, ObjectSymbol, Symbol};
 use planner_core::voxel::VoxelGrid;
 
-use crate::{Guard, free_port};
+use crate::debugger::Debugger;
+use crate::{Guard, free_port, workspace};
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
@@ -34,14 +36,23 @@ const PROMPT: &[u8] = b"(qemu) ";
 /// Where a map for measurements lies.
 const MAP: u32 = 0x6080_0000;
 
-/// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names; `None` with a line that says what is
-/// skipped.
+/// An address of no memory.
+const NOWHERE: u32 = 0xF000_0000;
+/// The far end of the stack, which nothing reaches.
+const SPARE: u32 = 0x2008_0400;
+/// `cpsid i`, then a branch to itself.
+const SPIN: [u8; 4] = [0x72, 0xB6, 0xFE, 0xE7];
+/// In the name of a function of `core` that does nothing but panic, at a place of its own.
+const PANICS: &str = "smallsort22panic_on_ord_violation";
+
+/// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names, as seen from the checkout; `None` with a line
+/// that says what is skipped.
 pub fn program(name: &str) -> Option<PathBuf> {
     let Some(folder) = std::env::var_os("FLOCKMATE_FIRMWARE") else {
         println!("skipped: FLOCKMATE_FIRMWARE names no built firmware (`cargo xtask test` builds it)");
         return None;
     };
-    Some(Path::new(&folder).join(name))
+    Some(workspace().join(folder).join(name))
 }
 
 /// QEMU with a program on the board.
@@ -57,9 +68,39 @@ fn qemu(program: &Path) -> Command {
     command
 }
 
+/// What brings a board down.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Downfall {
+    /// Somebody presses reset.
+    Reset,
+    /// The processor runs where nothing is.
+    Fault,
+    /// The program finds itself wrong.
+    Panic,
+    /// The program goes nowhere, and hears no interrupt.
+    Hang,
+}
+
+impl Downfall {
+    /// All there are.
+    pub const ALL: [Self; 4] = [Self::Reset, Self::Fault, Self::Panic, Self::Hang];
+
+    /// How what the next start says of it begins.
+    pub fn said(self) -> &'static str {
+        match self {
+            Self::Reset | Self::Hang => "Restarted: watchdog, reset key or brown-out",
+            Self::Fault => "Restarted: fault at 0xf0000000",
+            Self::Panic => "Restarted: panic at smallsort.rs:",
+        }
+    }
+}
+
 /// A board in QEMU that runs the firmware; it ends with us.
 pub struct Emulated {
     monitor: TcpStream,
+    program: PathBuf,
+    /// TCP port of QEMU's stub for debuggers.
+    stub: u16,
     /// TCP ports of its UARTs: to the autopilot, to the radio.
     ports: [u16; 2],
     scratch: tempfile::TempDir,
@@ -74,11 +115,12 @@ impl Emulated {
     /// QEMU does not start.
     pub fn start(program: &Path, shift: Option<u32>, bank: Option<&[u8]>) -> Self {
         let scratch = tempfile::tempdir().expect("a temporary directory");
-        let [autopilot, radio, monitor] = [(); 3].map(|()| free_port());
+        let [autopilot, radio, monitor, stub] = [(); 4].map(|()| free_port());
         let ports = [autopilot, radio];
         let listen = |port: u16| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
         let mut qemu = qemu(program);
         qemu.args(["-monitor", &listen(monitor), "-serial", &listen(autopilot), "-serial", &listen(radio)])
+            .args(["-gdb", &format!("tcp:127.0.0.1:{stub}")])
             .args(["-semihosting-config", "enable=on,target=native,chardev=log"])
             .args(["-chardev", &format!("file,id=log,path={}", scratch.path().join("log").display())]);
         if let Some(shift) = shift {
@@ -97,7 +139,7 @@ impl Emulated {
         }
         let qemu = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
         let monitor = connect(monitor);
-        let mut board = Self { monitor, ports, scratch, _qemu: qemu };
+        let mut board = Self { monitor, program: program.to_owned(), stub, ports, scratch, _qemu: qemu };
         board.answer();
         board
     }
@@ -114,6 +156,37 @@ impl Emulated {
     /// Presses reset; the flash keeps what it holds, torn words too.
     pub fn reset(&mut self) {
         self.order("system_reset");
+    }
+
+    /// Brings it down; the flash keeps what it holds, torn words too. It is to start again by itself.
+    ///
+    /// # Panics
+    /// The program has no function that panics by itself.
+    pub fn bring_down(&mut self, how: Downfall) {
+        match how {
+            Downfall::Reset => self.reset(),
+            Downfall::Fault => self.jump(NOWHERE),
+            Downfall::Panic => {
+                let bytes = std::fs::read(&self.program).expect("it was started");
+                let elf = object::File::parse(&*bytes).expect("a program");
+                let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(|name| name.contains(PANICS));
+                let place = elf.symbols().find(named).expect("a function that panics by itself").address();
+                self.jump(place as u32 & !1);
+            }
+            Downfall::Hang => {
+                self.order("watchdog_action reset");
+                let mut debugger = Debugger::new(connect(self.stub));
+                debugger.write(SPARE, &SPIN);
+                debugger.jump(SPARE);
+                debugger.leave();
+            }
+        }
+    }
+
+    fn jump(&self, address: u32) {
+        let mut debugger = Debugger::new(connect(self.stub));
+        debugger.jump(address);
+        debugger.leave();
     }
 
     /// Halts the board where it is, or lets it run on.

@@ -2,6 +2,7 @@
 
 pub mod board;
 pub mod bounds;
+pub mod debugger;
 pub mod logs;
 pub mod vehicle;
 

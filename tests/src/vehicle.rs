@@ -20,7 +20,7 @@ use planner_core::Point;
 use planner_core::frames::geodetic_to_enu;
 use planner_core::path::Path;
 
-use crate::board::Emulated;
+use crate::board::{Downfall, Emulated};
 
 const STEP: Duration = Duration::from_millis(4);
 /// Time that a machine which stood still does not make up for.
@@ -122,11 +122,11 @@ impl Vehicle {
         self.heard.last[port as usize] = None;
     }
 
-    /// Resets the board, now; what it sent before was heard before.
-    pub fn reset(&mut self) {
+    /// Brings the board down, now; what it sent before was heard before.
+    pub fn bring_down(&mut self, how: Downfall) {
         self.board.halt(true);
         self.hear();
-        self.board.reset();
+        self.board.bring_down(how);
         self.board.halt(false);
         self.framers = [Framer::new(), Framer::new()];
         self.heard = Heard::default();

@@ -69,7 +69,8 @@ pub fn build(board: Board) -> Result<PathBuf> {
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
     let arguments = ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
     let products = target_dir().join("firmware");
-    let mut flags = String::new();
+    // What only boards have no lint of the desk's sees.
+    let mut flags = String::from("-Dwarnings ");
     let mut building = if rustup_has(target) {
         println!("{}: rustup's {target}", board.name());
         cargo()

@@ -7,6 +7,9 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
+use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHF_WRITE, SHT_NOBITS};
+use object::{Object, ObjectSection, SectionFlags};
+use serde_json::json;
 
 use crate::bare_metal::{self, Board};
 use crate::emulate;
@@ -29,14 +32,11 @@ pub fn run(args: &Args) -> Result<()> {
     if let Some(out) = &args.out {
         let row = |(name, ours, theirs): &(&str, usize, usize)| {
             let ratio = *theirs as f64 / *ours as f64;
-            format!(
-                "{{\"name\": \"{name}\", \"ours\": {ours}, \"theirs\": {theirs}, \"ratio\": {ratio:.3}, \
-                 \"unit\": \"bytes\", \"n\": 1}}"
-            )
+            json!({ "name": name, "ours": ours, "theirs": theirs, "ratio": ratio, "unit": "bytes", "n": 1 })
         };
         let rows: Vec<_> = rows.iter().map(row).collect();
-        std::fs::write(out, format!("[{}]\n", rows.join(",\n ")))
-            .with_context(|| format!("cannot write {}", out.display()))?;
+        std::fs::write(out, serde_json::to_string_pretty(&rows)?)
+            .with_context(|| format!("cannot write: {}", out.display()))?;
     }
     Ok(())
 }
@@ -74,32 +74,25 @@ struct Parts {
     zeroed: usize,
 }
 
-/// Adds up the sections of a 32-bit little-endian ELF file that take memory.
+/// Adds up the sections of a program that take memory.
 fn parts(program: &Path) -> Result<Parts> {
-    const ALLOCATED: usize = 2;
-    const WRITABLE: usize = 1;
-    const EXECUTABLE: usize = 4;
-    const NOBITS: usize = 8;
-    let elf = std::fs::read(program).with_context(|| format!("cannot read {}", program.display()))?;
-    let number = |at: usize, len: usize| -> Result<usize> {
-        let bytes = elf.get(at..at + len).context("the program's file is cut")?;
-        Ok(bytes.iter().rev().fold(0, |sum, byte| sum << 8 | usize::from(*byte)))
-    };
-    ensure!(elf.starts_with(b"\x7fELF\x01\x01"), "{} is no program for a board", program.display());
-    let (first, each, count) = (number(32, 4)?, number(46, 2)?, number(48, 2)?);
+    let bytes = std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
+    let elf = object::File::parse(&*bytes)
+        .with_context(|| format!("no program for a board: {}", program.display()))?;
     let mut parts = Parts::default();
-    for header in (0..count).map(|i| first + i * each) {
-        let (kind, flags, size) = (number(header + 4, 4)?, number(header + 8, 4)?, number(header + 20, 4)?);
-        if flags & ALLOCATED == 0 {
+    for section in elf.sections() {
+        let SectionFlags::Elf { sh_type, sh_flags } = section.flags() else { continue };
+        let has = |flag| sh_flags & flag == flag;
+        if !has(SHF_ALLOC) {
             continue;
         }
-        let part = match (kind == NOBITS, flags & WRITABLE != 0, flags & EXECUTABLE != 0) {
+        let part = match (sh_type == SHT_NOBITS, has(SHF_WRITE), has(SHF_EXECINSTR)) {
             (true, _, _) => &mut parts.zeroed,
             (false, true, _) => &mut parts.initialised,
             (false, false, true) => &mut parts.code,
             (false, false, false) => &mut parts.constants,
         };
-        *part += size;
+        *part += section.size() as usize;
     }
     Ok(parts)
 }

@@ -8,7 +8,8 @@
 //! asked: a load that the processor made ahead of time, and dropped, may have set it.
 //!
 //! Those flags stay until they are cleared in FLASH_CCR2, and as long as one stands embassy-stm32 0.6 takes every erasure and program for
-//! failed: it clears them by FLASH_SR2, which on this chip is read-only for them. So they are cleared before.
+//! failed: it clears them by FLASH_SR2, which on this chip is read-only for them. So they are cleared before. It leaves PSIZE at 8 bits
+//! when it has programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so that is widened before.
 //!
 //! None of this has run on a chip.
 #![expect(unsafe_code, reason = "flash is memory, and its errors are faults")]
@@ -25,6 +26,10 @@ use embassy_stm32::pac;
 const BANK2: u32 = 1 << 20;
 /// The same as an address.
 const BANK2_ADDRESS: usize = 0x0810_0000;
+/// What FLASH_KEYR2 takes, one after the other, to unlock FLASH_CR2.
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// `CR.PSIZE` of 64 bits.
+const X64: u8 = 3;
 /// `CCR.BFHFNMIGN`: at priority −1 and above, bus errors of loads are ignored.
 const BFHFNMIGN: u32 = 1 << 8;
 /// `CFSR`'s byte of bus faults; ones clear it.
@@ -116,9 +121,19 @@ fn clear_errors() {
     });
 }
 
+/// Has bank 2 erased 64 bits at a time, as after a reset.
+fn widen() {
+    let bank = pac::FLASH.bank(1);
+    if bank.cr().read().lock() {
+        KEYS.into_iter().for_each(|key| bank.keyr().write_value(key));
+    }
+    bank.cr().modify(|w| w.set_psize(X64));
+}
+
 impl crate::shell::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
         clear_errors();
+        widen();
         self.0.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
     }
 
