@@ -6,7 +6,7 @@
 #![no_main]
 #![expect(unsafe_code, reason = "the handler of faults")]
 
-use companion::mission_file::{self, MissionView};
+use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::{ReadFlash, Store};
 use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
@@ -28,6 +28,8 @@ use static_cell::{ConstStaticCell, StaticCell};
 const MISSION: usize = mission_file::encoded_len(VEHICLES, VEHICLES);
 /// Where a board without a mission believes to be.
 const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+/// What a board says to which its mission gives nothing to do.
+const STRANGER: &str = "This system id is not in the mission: no plan";
 
 static SHELL: ConstStaticCell<Shell> = ConstStaticCell::new(Shell::new());
 static MEMORY: ConstStaticCell<Memory> = ConstStaticCell::new(Memory::new());
@@ -88,14 +90,16 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
         roadmap.is_some(),
         mission.is_some()
     );
-    let config = mission
-        .as_ref()
-        .and_then(|mission| mission.config(system_id).ok())
-        .unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
+    let own = mission.as_ref().map(|mission| mission.config(system_id));
+    let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
+    let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
     let mut companion = BoardCompanion::new(config).expect("every setting was checked");
     companion.mount(store);
     if let Some(text) = crashed {
         companion.say(true, CRASH.init(text).as_str());
+    }
+    if is_stranger {
+        companion.say(true, STRANGER);
     }
     let shell = SHELL.take();
     shell.start(companion);

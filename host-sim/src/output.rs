@@ -106,7 +106,7 @@ pub fn write_points(path: &Path, points: impl Iterator<Item = Point>) -> anyhow:
 
 /// Writes a file whole.
 pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    std::fs::write(path, bytes).with_context(|| format!("cannot write: {}", path.display()))
 }
 
 /// Prints what `result.json` holds, for a person.

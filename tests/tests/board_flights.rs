@@ -226,6 +226,15 @@ fn pull_cables(program: &Path, mission: &Mission) -> Result<(), String> {
     done(&vehicle)
 }
 
+#[test]
+fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
+    let Some(program) = board::program("flockmate") else { return };
+    let [ours, others] = [mission(LOBBY), mission(&LOBBY.replace("id = 1", "id = 7"))];
+    let bank = board::bank(&others.roadmap_file, &others.mission_file);
+    let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &ours, 1);
+    vehicle.until_said("This system id is not in the mission: no plan");
+}
+
 /// A client's end of a radio that the vehicle's thread serves.
 struct Radio {
     heard: Receiver<Vec<u8>>,

@@ -5,7 +5,7 @@
 //! the clock.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -59,7 +59,7 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     let firmware = bare_metal::build(Board::Qemu)?.join("flockmate");
     run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
     let out = std::path::absolute(&args.out)?;
-    std::fs::create_dir_all(&out).with_context(|| format!("cannot write {}", out.display()))?;
+    std::fs::create_dir_all(&out).with_context(|| format!("cannot write: {}", out.display()))?;
     let mut ports = free_ports();
     let boards: Vec<_> = (1..=args.vehicles)
         .map(|id| Emulated::start(&firmware, &out, id, &mut ports))
@@ -72,14 +72,21 @@ pub fn run_emulate(args: &Args) -> Result<usize> {
     for file in ["roadmap.bin", "mission.bin"] {
         upload(&boards, &out.join("plan").join(file))?;
     }
+    // They start anew, and paint their stacks, when they find their autopilots.
+    let uploading = deepest_stack(&boards, &out)?;
     let gaps = fly(&boards, &scenario, &out)?;
     ensure!(gaps.len() == boards.len(), "{} of {} boards told of their setpoints", gaps.len(), boards.len());
     ensure!(gaps.iter().all(|gap| *gap <= GAP_MS), "setpoints were {gaps:?} ms apart: {GAP_MS} are allowed");
-    let stacks: Vec<_> =
-        boards.iter().map(|board| board.stack(&out.join("stack.bin"))).collect::<Result<_>>()?;
-    let deepest = stacks.into_iter().max().unwrap_or_default();
+    let deepest = uploading.max(deepest_stack(&boards, &out)?);
     println!("stack      {deepest} bytes of {STACK_LEN} used at most");
     Ok(deepest)
+}
+
+/// The most that a board used of its stack since its start, bytes.
+fn deepest_stack(boards: &[Emulated], out: &Path) -> Result<usize> {
+    let stacks: Vec<_> =
+        boards.iter().map(|board| board.stack(&out.join("stack.bin"))).collect::<Result<_>>()?;
+    Ok(stacks.into_iter().max().unwrap_or_default())
 }
 
 /// Flies, and shows what comes of it; what each board told of its setpoints, milliseconds.
@@ -109,7 +116,7 @@ fn host_sim() -> Command {
 
 /// The demo's first vehicles.
 fn cut_demo(vehicles: usize) -> Result<String> {
-    let demo = std::fs::read_to_string(root().join(DEMO)).with_context(|| format!("cannot read {DEMO}"))?;
+    let demo = std::fs::read_to_string(root().join(DEMO)).with_context(|| format!("cannot read: {DEMO}"))?;
     let parts: Vec<_> = demo.split(VEHICLE).take(1 + vehicles).collect();
     ensure!(parts.len() == 1 + vehicles, "{DEMO} has only {} vehicles", parts.len() - 1);
     Ok(parts.join(VEHICLE))
@@ -163,8 +170,8 @@ impl Emulated {
     fn stack(&self, file: &Path) -> Result<usize> {
         let mut monitor = TcpStream::connect(("127.0.0.1", self.monitor))?;
         writeln!(monitor, "pmemsave {STACK} {STACK_LEN} \"{}\"", file.display())?;
-        writeln!(monitor, "quit")?;
-        // It says what it does until it has quit.
+        monitor.shutdown(Shutdown::Write)?;
+        // It says what it does until it has heard that there is no more.
         monitor.read_to_end(&mut Vec::new())?;
         let stack = std::fs::read(file)?;
         std::fs::remove_file(file)?;

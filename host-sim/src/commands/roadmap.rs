@@ -49,7 +49,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             print(&mission.view());
         }
         Action::Info { file } => {
-            let bytes = std::fs::read(file).with_context(|| format!("cannot read {}", file.display()))?;
+            let bytes = std::fs::read(file).with_context(|| format!("cannot read: {}", file.display()))?;
             let view = RoadmapView::parse(&bytes)
                 .map_err(|error| anyhow!("not a roadmap: {}: {}", file.display(), why(&error)))?;
             print(&view);
@@ -76,7 +76,8 @@ fn print(view: &RoadmapView<'_>) {
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
 
-fn why(error: &RoadmapError) -> String {
+/// What is wrong with a file.
+pub(super) fn why(error: &RoadmapError) -> String {
     match error {
         RoadmapError::Truncated => "it ends too early".to_owned(),
         RoadmapError::Magic => "it does not begin as a roadmap file does".to_owned(),

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail};
-use companion::mission_file::{self, MissionView};
+use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::File;
 use planner_core::roadmap::{self, RoadmapView};
 
@@ -33,7 +33,7 @@ pub struct Args {
 /// A file that is neither; no companion heard; a companion that refuses it; a link that fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = args.file.display();
-    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read {path}"))?;
+    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read: {path}"))?;
     let file = kind(&bytes).with_context(|| format!("not for upload: {path}"))?;
     let mut client = Client::new(args.link.open()?, args.id);
     let system = client.find()?;
@@ -50,14 +50,30 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn kind(bytes: &[u8]) -> anyhow::Result<File> {
     if bytes.starts_with(&roadmap::MAGIC) {
-        RoadmapView::parse(bytes).map_err(|e| anyhow!("the roadmap is not sound: {e:?}"))?;
+        RoadmapView::parse(bytes).map_err(|e| anyhow!("no sound roadmap: {}", super::roadmap::why(&e)))?;
         Ok(File::Roadmap)
     } else if bytes.starts_with(&mission_file::MAGIC) {
-        MissionView::parse(bytes).map_err(|e| anyhow!("the mission is not sound: {e:?}"))?;
+        MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {}", why(&e)))?;
         Ok(File::Mission)
     } else {
         bail!(
             "it begins neither as a roadmap nor as a mission\nhint: `host-sim plan` writes roadmap.bin and mission.bin"
         )
+    }
+}
+
+fn why(error: &MissionError) -> String {
+    match error {
+        MissionError::Truncated => "it ends too early".to_owned(),
+        MissionError::Magic => "it does not begin as a mission file does".to_owned(),
+        MissionError::Version(version) => format!("its version {version} is not known here"),
+        MissionError::Length => "its lengths and counts contradict one another".to_owned(),
+        MissionError::Crc => "its CRC-32 does not match: it is damaged".to_owned(),
+        MissionError::Header(field) => format!("its header field {field} is out of range"),
+        MissionError::Vehicle(index) => {
+            format!("its vehicle no. {} is out of range, or twice there", index + 1)
+        }
+        MissionError::Goal(index) => format!("its goal no. {} is out of range", index + 1),
+        other => format!("its contents are not sound: {other:?}"),
     }
 }

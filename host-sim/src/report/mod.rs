@@ -194,7 +194,7 @@ pub fn vehicle_color(index: usize) -> [u8; 3] {
 pub fn write(path: &Path, data: &ReportData) -> anyhow::Result<()> {
     check(data).with_context(|| format!("cannot report to {}", path.display()))?;
     let html = page::html(data)?;
-    fs::write(path, html).with_context(|| format!("cannot write {}", path.display()))
+    fs::write(path, html).with_context(|| format!("cannot write: {}", path.display()))
 }
 
 fn check(data: &ReportData) -> anyhow::Result<()> {

@@ -233,6 +233,13 @@ pub struct Fault {
     pub radius_m: Option<f32>,
 }
 
+impl Fault {
+    /// Whether it strikes this vehicle: one without a vehicle strikes all, an obstacle nobody.
+    pub fn strikes(&self, vehicle: &Vehicle) -> bool {
+        self.kind != FAULT_OBSTACLE && self.vehicle.is_none_or(|id| id == vehicle.id)
+    }
+}
+
 /// Every kind of fault.
 pub const FAULT_KINDS: [&str; 14] = [
     "kill",

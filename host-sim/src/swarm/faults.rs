@@ -27,7 +27,7 @@ use super::ground_station::GroundStation;
 use super::member::{Member, Planner};
 use super::radio::{Cut, Radio};
 use crate::report::{Event, Level};
-use crate::scenario::{FAULT_OBSTACLE, Fault, Scenario};
+use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
 
 /// Share of bytes changed by `serial-corrupt`: half of all frames of a setpoint's length are lost.
 const CORRUPTION: f64 = 0.01;
@@ -39,6 +39,30 @@ const JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
 const ORIGIN_MOVES_M: Point = Point::new(40.0, -30.0, 5.0);
 /// How long a stall or a boot lasts where the script does not say, seconds.
 const SPELL_S: f32 = 3.0;
+
+/// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in this process.
+///
+/// # Errors
+/// Names the fault and the vehicle.
+pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
+    for fault in &scenario.faults {
+        for vehicle in scenario.vehicles.iter().filter(|vehicle| fault.strikes(vehicle)) {
+            let in_vain = match (&vehicle.companion, fault.kind) {
+                (Companion::InProcess, _) => false,
+                (Companion::Url { .. }, "companion-reset" | "late-plan" | "bad-roadmap") => true,
+                (Companion::Url { radio, .. }, kind) => kind == "radio-cut" && radio.is_none(),
+            };
+            anyhow::ensure!(
+                !in_vain,
+                "no such fault here: {}: {} cannot strike vehicle {}, whose companion is on a board or in another process",
+                scenario.path,
+                fault.kind,
+                vehicle.id
+            );
+        }
+    }
+    Ok(())
+}
 
 /// What a fault acts on.
 pub struct World<'a> {
@@ -116,7 +140,7 @@ impl<'a> Script<'a> {
                 continue;
             }
             for (i, vehicle) in self.scenario.vehicles.iter().enumerate() {
-                if fault.vehicle.is_some_and(|id| id != vehicle.id) {
+                if !fault.strikes(vehicle) {
                     continue;
                 }
                 let done = if next == Stage::Acting {
@@ -182,4 +206,31 @@ fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: 
 fn give_back(i: usize, now_us: u64, world: &mut World<'_>) {
     world.members[i].autopilot.pilot_returns();
     world.ground_station.resume(now_us, i);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario;
+
+    #[test]
+    fn what_strikes_a_companion_is_refused_where_that_is_elsewhere() {
+        let refused = |companion: &str, kind: &str, whom: &str| {
+            let text = format!(
+                "[map]\nfile = \"builtin:building\"\n[mission]\ngoals = [[8.0, 2.0, 1.5]]\n\
+                 [[vehicles]]\nid = 1\nstart = [4.0, 2.0, 1.5]\n{companion}\n\
+                 [[vehicles]]\nid = 2\nstart = [4.0, 4.0, 1.5]\n\
+                 [[faults]]\nat_s = 1.0\nkind = \"{kind}\"\n{whom}\n"
+            );
+            check(&scenario::parse(&text, "faults.toml").expect("a scenario")).is_err()
+        };
+        let board = "companion = \"tcp:127.0.0.1:5761\"\nradio = \"tcp:127.0.0.1:5762\"";
+        let alone = "companion = \"tcp:127.0.0.1:5761\"";
+        for kind in ["companion-reset", "late-plan", "bad-roadmap"] {
+            assert!(refused(board, kind, "vehicle = 1") && refused(board, kind, ""), "{kind}");
+            assert!(!refused(board, kind, "vehicle = 2") && !refused("", kind, ""), "{kind}");
+        }
+        assert!(refused(alone, "radio-cut", "") && !refused(board, "radio-cut", ""));
+        assert!(!refused(alone, "kill", "vehicle = 1"));
+    }
 }

@@ -96,6 +96,7 @@ fn simulate(
 ) -> anyhow::Result<Flight> {
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
+    faults::check(scenario)?;
     let mut members = members(mission)?;
     let mut radio = Radio::new(
         RadioConfig {
