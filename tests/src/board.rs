@@ -42,6 +42,8 @@ const NOWHERE: u32 = 0xF000_0000;
 const SPARE: u32 = 0x2008_0400;
 /// `cpsid i`, then a branch to itself.
 const SPIN: [u8; 4] = [0x72, 0xB6, 0xFE, 0xE7];
+/// So many instructions later a panic has turned the interrupts off.
+const TO_PANIC: usize = 200;
 /// In the name of a function of `core` that does nothing but panic, at a place of its own.
 const PANICS: &str = "smallsort22panic_on_ord_violation";
 
@@ -165,27 +167,27 @@ impl Emulated {
     pub fn bring_down(&mut self, how: Downfall) {
         match how {
             Downfall::Reset => self.reset(),
-            Downfall::Fault => self.jump(NOWHERE),
+            Downfall::Fault => self.jump(NOWHERE, 1),
             Downfall::Panic => {
                 let bytes = std::fs::read(&self.program).expect("it was started");
                 let elf = object::File::parse(&*bytes).expect("a program");
                 let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(|name| name.contains(PANICS));
                 let place = elf.symbols().find(named).expect("a function that panics by itself").address();
-                self.jump(place as u32 & !1);
+                self.jump(place as u32 & !1, TO_PANIC);
             }
             Downfall::Hang => {
                 self.order("watchdog_action reset");
                 let mut debugger = Debugger::new(connect(self.stub));
                 debugger.write(SPARE, &SPIN);
-                debugger.jump(SPARE);
+                debugger.jump(SPARE, 1);
                 debugger.leave();
             }
         }
     }
 
-    fn jump(&self, address: u32) {
+    fn jump(&self, address: u32, instructions: usize) {
         let mut debugger = Debugger::new(connect(self.stub));
-        debugger.jump(address);
+        debugger.jump(address, instructions);
         debugger.leave();
     }
 

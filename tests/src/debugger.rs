@@ -30,10 +30,14 @@ impl Debugger {
         debugger
     }
 
-    /// Has the processor go on at another place.
-    pub fn jump(&mut self, address: u32) {
+    /// Has the processor go on at another place, and takes it so many instructions there: meanwhile no interrupt is taken.
+    pub fn jump(&mut self, address: u32, instructions: usize) {
         self.set(XPSR, THUMB);
         self.set(PC, address);
+        for _ in 0..instructions {
+            let stopped = self.ask("s");
+            assert!(stopped.starts_with('T') || stopped.starts_with('S'), "{stopped}");
+        }
     }
 
     /// Puts bytes into its memory.

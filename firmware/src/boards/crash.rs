@@ -75,8 +75,9 @@ fn write(record: Record) {
     unsafe { to.cast::<Record>().write_volatile(record) };
 }
 
-/// Keeps where it was and starts anew.
+/// Keeps where it was and starts anew. What runs above it does not go on in a program that is wrong.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
+    cortex_m::interrupt::disable();
     let mut text = String::<200>::new();
     if let Some(place) = info.location() {
         let file = place.file().rsplit('/').next().unwrap_or_default();
