@@ -204,7 +204,9 @@ impl Shell {
                     Event::StateChanged { .. } => {}
                 }
             }
-            if !companion.streams() {
+            if companion.streams() {
+                self.setpoints.begin(awake_ms());
+            } else {
                 self.setpoints.end(awake_ms());
             }
             result
@@ -356,10 +358,13 @@ impl Shell {
     /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
     /// watchdog is left to bite.
     pub fn is_alive(&self) -> bool {
-        let now = now_ms();
+        self.is_alive_at(now_ms(), awake_ms())
+    }
+
+    fn is_alive_at(&self, now_ms: u32, awake_ms: u32) -> bool {
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
-        self.seen_ms.iter().all(|seen| now.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
-            && self.setpoints.since(awake_ms()).is_none_or(|passed| passed < limit)
+        self.seen_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
+            && self.setpoints.since(awake_ms).is_none_or(|passed| passed < limit)
     }
 }
 
@@ -373,9 +378,9 @@ impl Default for Shell {
 /// says so, not until a pause: else the longest pauses would not be seen.
 struct Setpoints {
     count: AtomicU32,
-    /// The longest time between two, or between the last and the stream's end, milliseconds.
+    /// The longest time between two, or from the stream's begin to the first or from the last to its end, milliseconds.
     gap_ms: AtomicU32,
-    /// When the last went out, milliseconds; 0 while there is no stream.
+    /// When the last went out, or the stream began, milliseconds; 0 while there is no stream.
     last_ms: AtomicU32,
 }
 
@@ -390,11 +395,14 @@ impl Setpoints {
         self.mark(now_ms, now_ms.max(1));
     }
 
+    /// The companion streams them, from now on if it did not before.
+    fn begin(&self, now_ms: u32) {
+        let _ = self.last_ms.compare_exchange(0, now_ms.max(1), Ordering::Relaxed, Ordering::Relaxed);
+    }
+
     /// Time since the last, if more are to come, milliseconds.
     fn since(&self, now_ms: u32) -> Option<u32> {
-        let last_ms = self.last_ms.load(Ordering::Relaxed);
-        // The time less what was overslept may step back by a little.
-        (last_ms != 0).then(|| (now_ms.wrapping_sub(last_ms) as i32).max(0) as u32)
+        passed_ms(self.last_ms.load(Ordering::Relaxed), now_ms)
     }
 
     /// The companion streams none, for now.
@@ -403,9 +411,8 @@ impl Setpoints {
     }
 
     fn mark(&self, now_ms: u32, next_ms: u32) {
-        let last_ms = self.last_ms.swap(next_ms, Ordering::Relaxed);
-        if last_ms != 0 {
-            self.gap_ms.fetch_max(now_ms.wrapping_sub(last_ms), Ordering::Relaxed);
+        if let Some(gap_ms) = passed_ms(self.last_ms.swap(next_ms, Ordering::Relaxed), now_ms) {
+            self.gap_ms.fetch_max(gap_ms, Ordering::Relaxed);
         }
     }
 
@@ -415,6 +422,11 @@ impl Setpoints {
         let told = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
         (told[0] > 0).then_some(told)
     }
+}
+
+/// What passed since the last, if there was one. The time less what was overslept may step back by a little.
+fn passed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
+    (last_ms != 0).then(|| (now_ms.wrapping_sub(last_ms) as i32).max(0) as u32)
 }
 
 /// SET_POSITION_TARGET_LOCAL_NED, by the message id of a MAVLink 2 frame.
@@ -435,7 +447,26 @@ mod tests {
         assert_eq!((setpoints.since(1049), setpoints.since(1500)), (Some(0), Some(450)));
         setpoints.end(1500);
         assert_eq!(setpoints.since(9000), None);
-        assert_eq!(setpoints.take(9000), Some([2, 450]));
+        setpoints.begin(9000);
+        setpoints.note(8999);
+        assert_eq!(setpoints.take(9000), Some([3, 450]));
         assert_eq!(setpoints.take(9000), None);
+    }
+
+    #[test]
+    fn the_watchdog_is_fed_only_while_tasks_come_by_and_setpoints_flow() {
+        let shell = Shell::new();
+        let come_by = |ms| shell.seen_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
+        come_by(1000);
+        assert!(shell.is_alive_at(1399, 1399) && !shell.is_alive_at(1400, 1400));
+        come_by(5000);
+        shell.setpoints.begin(5000);
+        assert!(shell.is_alive_at(5399, 5399));
+        come_by(5300);
+        assert!(!shell.is_alive_at(5400, 5400), "the first setpoint is late");
+        shell.setpoints.note(5400);
+        assert!(shell.is_alive_at(5400, 5400));
+        shell.seen_ms[TIME].store(4000, Ordering::Relaxed);
+        assert!(!shell.is_alive_at(5400, 5400), "one task hangs");
     }
 }

@@ -135,7 +135,7 @@ impl Client {
         }
         bail!(
             "no companion heard: component {COMPONENT}{} said nothing for {} s\nhint: between two of its ports PX4 passes \
-             messages on where MAV_x_FORWARD is set",
+             messages on where MAV_x_FORWARD is set for both",
             self.system.map_or(String::new(), |system| format!(" of system {system}")),
             PATIENCE.as_secs()
         )

@@ -21,7 +21,7 @@ impl Debugger {
     /// Halts the board behind a fresh connection to the stub.
     ///
     /// # Panics
-    /// The stub speaks of something else.
+    /// The stub is silent, or speaks of something else.
     pub fn new(stub: TcpStream) -> Self {
         let mut debugger = Self { stub };
         // The stub takes numbers of registers only from who knows them.
@@ -31,6 +31,9 @@ impl Debugger {
     }
 
     /// Has the processor go on at another place, and takes it so many instructions there: meanwhile no interrupt is taken.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
     pub fn jump(&mut self, address: u32, instructions: usize) {
         self.set(XPSR, THUMB);
         self.set(PC, address);
@@ -41,12 +44,18 @@ impl Debugger {
     }
 
     /// Puts bytes into its memory.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
     pub fn write(&mut self, address: u32, bytes: &[u8]) {
         let hex: String = bytes.iter().map(|byte| format!("{byte:02x}")).collect();
         self.tell(&format!("M{address:x},{:x}:{hex}", bytes.len()));
     }
 
     /// Lets the board run on.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
     pub fn leave(mut self) {
         self.tell("D");
     }

@@ -1,11 +1,14 @@
 //! Programs for boards: by rustup's target where there is one, else by Debian's toolchain, which builds `core` itself.
 
+use std::io::{BufRead, BufReader};
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use serde_json::Value;
 
 use crate::install;
-use crate::shell::{cargo, command, run, target_dir};
+use crate::shell::{cargo, command, target_dir};
 
 /// A board of the firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -63,14 +66,21 @@ impl Board {
     }
 }
 
-/// Builds a board's programs; the directory they are in.
-pub fn build(board: Board) -> Result<PathBuf> {
+/// A board's programs.
+pub struct Built {
+    /// The directory they are in.
+    pub folder: PathBuf,
+    /// What the compiler warned of, if not in this build then in an earlier one.
+    pub warnings: usize,
+}
+
+/// Builds a board's programs.
+pub fn build(board: Board) -> Result<Built> {
     let target = board.target();
     let programs = board.programs().iter().flat_map(|name| ["--bin", name]);
     let arguments = ["build", "--release", "--locked", "--target", target, "-p", "firmware", "--features"];
     let products = target_dir().join("firmware");
-    // What only boards have no lint of the desk's sees.
-    let mut flags = String::from("-Dwarnings ");
+    let mut flags = String::new();
     let mut building = if rustup_has(target) {
         println!("{}: rustup's {target}", board.name());
         cargo()
@@ -91,14 +101,37 @@ pub fn build(board: Board) -> Result<PathBuf> {
     };
     flags += &format!("-Ctarget-cpu={}", board.cpu());
     building.args(arguments).arg(board.name()).args(programs).env(variable(target, "RUSTFLAGS"), flags);
-    run(building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info"))?;
+    // Either would take the place of the flags above.
+    building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
+    building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
+    let warnings = compile(&mut building)?;
     // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
     let aside = products.join(board.name());
     std::fs::create_dir_all(&aside)?;
     for program in board.programs() {
         std::fs::copy(products.join(target).join("release").join(program), aside.join(program))?;
     }
-    Ok(aside)
+    Ok(Built { folder: aside, warnings })
+}
+
+/// Runs a `cargo build`, shows what the compiler says, and counts its warnings.
+fn compile(building: &mut Command) -> Result<usize> {
+    let mut child = building
+        .arg("--message-format=json")
+        .stdout(Stdio::piped())
+        .spawn()
+        .with_context(|| format!("cannot start {building:?}"))?;
+    let mut warnings = 0;
+    for line in BufReader::new(child.stdout.take().context("its output is piped")?).lines() {
+        // What is no message of cargo's is nothing to us.
+        let line: Value = serde_json::from_str(&line?).unwrap_or_default();
+        let message = &line["message"];
+        eprint!("{}", message["rendered"].as_str().unwrap_or_default());
+        warnings += usize::from(message["level"] == "warning");
+    }
+    let status = child.wait()?;
+    ensure!(status.success(), "{building:?} failed: {status}");
+    Ok(warnings)
 }
 
 /// Cargo's environment variable for a target's setting.

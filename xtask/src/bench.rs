@@ -44,7 +44,7 @@ pub fn run_bench(args: &Args) -> Result<()> {
     bench.args(["bench", "--"]);
     if args.only.as_deref().is_none_or(|only| "worst-case".contains(only)) {
         install::debian(install::EMULATOR)?;
-        bench.env("FLOCKMATE_FIRMWARE", bare_metal::build(Board::Qemu)?);
+        bench.env("FLOCKMATE_FIRMWARE", bare_metal::build(Board::Qemu)?.folder);
     }
     match peer() {
         Ok(peer) => {

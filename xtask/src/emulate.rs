@@ -56,7 +56,7 @@ impl Default for Args {
 /// at most, bytes.
 pub fn run_emulate(args: &Args) -> Result<usize> {
     install::debian(install::EMULATOR)?;
-    let firmware = bare_metal::build(Board::Qemu)?.join("flockmate");
+    let firmware = bare_metal::build(Board::Qemu)?.folder.join("flockmate");
     run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"]))?;
     let out = std::path::absolute(&args.out)?;
     std::fs::create_dir_all(&out).with_context(|| format!("cannot write: {}", out.display()))?;

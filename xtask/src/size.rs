@@ -35,7 +35,7 @@ pub fn run(args: &Args) -> Result<()> {
             json!({ "name": name, "ours": ours, "theirs": theirs, "ratio": ratio, "unit": "bytes", "n": 1 })
         };
         let rows: Vec<_> = rows.iter().map(row).collect();
-        std::fs::write(out, serde_json::to_string_pretty(&rows)?)
+        std::fs::write(out, serde_json::to_string_pretty(&rows)? + "\n")
             .with_context(|| format!("cannot write: {}", out.display()))?;
     }
     Ok(())
@@ -43,7 +43,7 @@ pub fn run(args: &Args) -> Result<()> {
 
 /// The rows of a board, printed: name, bytes, bytes there are. Too much is an error.
 pub fn rows(board: Board, stack: usize) -> Result<Vec<(&'static str, usize, usize)>> {
-    let program = bare_metal::build(board)?.join("flockmate");
+    let program = bare_metal::build(board)?.folder.join("flockmate");
     let Parts { code, constants, initialised, zeroed } = parts(&program)?;
     let (most_flash, most_ram) = board.memory();
     let (flash, statics) = (code + constants + initialised, initialised + zeroed);

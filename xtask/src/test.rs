@@ -2,9 +2,9 @@
 
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 
-use crate::bare_metal::{self, Board};
+use crate::bare_metal::{self, Board, Built};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size};
 
@@ -36,7 +36,8 @@ fn steps(args: &Args) -> Result<()> {
     let mut firmware = None;
     step("boards", || {
         for board in Board::ALL {
-            let programs = bare_metal::build(board)?;
+            let Built { folder: programs, warnings } = bare_metal::build(board)?;
+            ensure!(warnings == 0, "the firmware for {} has warnings", board.name());
             firmware = firmware.take().or((board == Board::Qemu).then_some(programs));
         }
         install::debian(install::EMULATOR)

@@ -15,6 +15,7 @@ use crate::report::Level;
 use crate::say;
 use crate::scenario::{self, Companion, Scenario};
 use crate::swarm;
+use crate::swarm::faults;
 use crate::swarm::gateway::Gateway;
 
 /// The demo's scenario, in the program itself: nothing to find on the machine.
@@ -41,8 +42,8 @@ pub struct FlyArgs {
     /// the autopilot: tcp:HOST:PORT, udp:HOST:PORT, serial:PATH:BAUD or one that listens. Flies at the speed of the clock
     #[arg(long, value_name = "URL")]
     companion: Vec<LinkUrl>,
-    /// The first such companion's port for the radio; given again, the second's, and so on. One without it hears only the
-    /// vehicles that its own radio joins
+    /// The first such companion's port for the radio; given again, the second's, and so on. One without it and the
+    /// others hear each other only where its own radio joins them, and do not start where they are to
     #[arg(long, value_name = "URL", requires = "companion")]
     radio: Vec<LinkUrl>,
 }
@@ -96,6 +97,7 @@ fn plan_and_fly(
     realtime: bool,
     qgc: Option<&LinkUrl>,
 ) -> anyhow::Result<ExitCode> {
+    faults::check(&scenario)?;
     let gateway = qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
     let began = Instant::now();
     let progress = Progress::on_terminal();

@@ -78,9 +78,11 @@ impl Board {
         mut said: impl FnMut(&str),
     ) -> std::io::Result<usize> {
         let length = self.autopilot.receive(out)?;
-        let mut input = &out[..if self.radio.is_some() { 0 } else { length }];
-        while let Some(frame) = self.framer.next(now, &mut input) {
-            self.note(&frame, &mut said);
+        if self.radio.is_none() {
+            let mut input = &out[..length];
+            while let Some(frame) = self.framer.next(now, &mut input) {
+                self.note(&frame, &mut said);
+            }
         }
         Ok(length)
     }
