@@ -5,6 +5,11 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 
+/// Most ground stations a mission names.
+pub const GROUND_STATIONS: usize = 4;
+/// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and pymavlink use.
+pub const USUAL_GROUND_STATIONS: [u8; GROUND_STATIONS] = [255, 0, 0, 0];
+
 /// One vehicle of the mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RosterEntry {
@@ -48,6 +53,8 @@ pub struct Config<const V: usize> {
     pub swarm_hz: u8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
+    /// System ids whose commands, parameters and files count; 0 is no id.
+    pub ground_stations: [u8; GROUND_STATIONS],
 }
 
 /// Why a configuration was refused.
@@ -85,6 +92,7 @@ impl<const V: usize> Config<V> {
             battery_low_percent: 15,
             swarm_hz: 5,
             geofence: None,
+            ground_stations: USUAL_GROUND_STATIONS,
         }
     }
 

@@ -197,6 +197,7 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
         },
         safety_distance_m: 1.5,
         geofence: None,
+        ground_stations: crate::config::USUAL_GROUND_STATIONS,
     };
     let task = |id| VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: None };
     let start = Point::new(1.0, 2.0, 3.0);

@@ -16,12 +16,14 @@ use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
 
-use crate::config::{Config, RosterEntry};
+use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS};
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
-/// Version this code writes and reads.
-pub const VERSION: u16 = 1;
+/// Version this code writes; it also reads version 1, which names no ground station and means 255.
+pub const VERSION: u16 = 2;
+/// The version before.
+const WITHOUT_GROUND_STATIONS: u16 = 1;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
 /// Bytes of a vehicle.
@@ -87,6 +89,8 @@ pub struct MissionHeader {
     pub safety_distance_m: f32,
     /// Minimum and maximum corner of the volume the vehicles may be in.
     pub geofence: Option<(Point, Point)>,
+    /// System ids whose commands count; 0 is no id.
+    pub ground_stations: [u8; GROUND_STATIONS],
 }
 
 /// One vehicle; vehicle `i` starts at node `i` of the roadmap.
@@ -150,6 +154,9 @@ impl MissionHeader {
         };
         if !self.geofence.as_ref().is_none_or(sound) {
             return refuse("geofence");
+        }
+        if self.ground_stations == [0; GROUND_STATIONS] {
+            return refuse("ground_stations");
         }
         Ok(())
     }
@@ -256,7 +263,7 @@ pub fn write(
     out[22..24].copy_from_slice(&flags.to_le_bytes());
     out[24..26].copy_from_slice(&vehicle_count.to_le_bytes());
     out[26..28].copy_from_slice(&goal_count.to_le_bytes());
-    out[28..32].fill(0);
+    out[28..32].copy_from_slice(&header.ground_stations);
     let origin = [header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m];
     for (to, number) in out[32..56].chunks_exact_mut(8).zip(origin) {
         to.copy_from_slice(&number.to_le_bytes());
@@ -304,9 +311,11 @@ impl<'a> MissionView<'a> {
         }
         let u16_at = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
         let u32_at = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
-        if u16_at(8) != VERSION {
-            return Err(MissionError::Version(u16_at(8)));
-        }
+        let ground_stations = match u16_at(8) {
+            WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
+            VERSION => [head[28], head[29], head[30], head[31]],
+            other => return Err(MissionError::Version(other)),
+        };
         let total = u32_at(12) as usize;
         let (vehicle_count, goal_count) = (usize::from(u16_at(24)), usize::from(u16_at(26)));
         if usize::from(u16_at(10)) != HEADER_LEN || encoded_len(vehicle_count, goal_count) != total {
@@ -347,11 +356,15 @@ impl<'a> MissionView<'a> {
                 FENCED => Some((point_at(head, 76), point_at(head, 88))),
                 _ => return Err(MissionError::Header("flags")),
             },
+            ground_stations,
         };
         header.check()?;
         let (vehicles, goals) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
         let view = Self { header, crc, vehicles: vehicles.as_chunks().0, goals: goals.as_chunks().0 };
         view.check_lists()?;
+        if u16_at(8) == VERSION && view.vehicles().any(|v| ground_stations.contains(&v.task.id)) {
+            return Err(MissionError::Header("ground_stations"));
+        }
         Ok(view)
     }
 
@@ -452,6 +465,7 @@ impl<'a> MissionView<'a> {
         config.safety_distance_m = header.safety_distance_m;
         config.method = header.method;
         config.geofence = header.geofence;
+        config.ground_stations = header.ground_stations;
         Ok(config)
     }
 }

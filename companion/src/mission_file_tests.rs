@@ -23,6 +23,7 @@ fn header() -> MissionHeader {
         },
         safety_distance_m: 1.5,
         geofence: Some((Point::new(-5.0, -5.0, 0.0), Point::new(50.0, 30.0, 60.0))),
+        ground_stations: [255, 0, 245, 9],
     }
 }
 
@@ -84,6 +85,7 @@ fn a_companion_is_configured_from_it() {
     let ids: List<u8> = config.roster.iter().map(|e| e.system_id).collect();
     assert_eq!((ids, config.mission_crc), (vec![2, 7, 250], view.crc()));
     assert_eq!((config.cruise_mps, config.geofence), (1.5, header().geofence));
+    assert_eq!(config.ground_stations, [255, 0, 245, 9]);
     assert_eq!(view.config::<3>(9), Err(MissionError::NotInRoster(9)));
     assert_eq!(view.config::<2>(2), Err(MissionError::RosterFull));
     assert!(view.request(&mut Vec::<_, 2>::new(), &mut Vec::new()).is_err());
@@ -102,6 +104,8 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(20, &[3]), MissionError::Header("mode")),
         (forged(21, &[3]), MissionError::Header("method")),
         (forged(22, &[2]), MissionError::Header("flags")),
+        (forged(28, &[0; 4]), MissionError::Header("ground_stations")),
+        (forged(29, &[2]), MissionError::Header("ground_stations")),
         (forged(32, &f64::NAN.to_le_bytes()), MissionError::Header("origin")),
         (forged(56, &nan), MissionError::Header("cruise_mps")),
         (forged(60, &(-1.0f32).to_le_bytes()), MissionError::Header("vertical_mps")),
@@ -124,6 +128,13 @@ fn what_is_not_sound_is_refused_by_name() {
     let one = [vehicle(1, None)];
     assert_eq!(write(&header(), &one, &[], &mut small), Err(MissionError::MissionFull { needed }));
     assert_eq!(write(&header(), &[vehicle(1, Some(0))], &[], &mut [0; 200]), Err(MissionError::Vehicle(0)));
+}
+
+#[test]
+fn a_file_of_version_1_means_the_usual_ground_station() {
+    let old = forged(8, &[1]);
+    let config = MissionView::parse(&old).unwrap().config::<3>(2).unwrap();
+    assert_eq!(config.ground_stations, [255, 0, 0, 0], "what its reserved bytes hold does not count");
 }
 
 #[test]

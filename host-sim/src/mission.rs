@@ -268,6 +268,7 @@ impl Mission {
             schedule: self.schedule,
             safety_distance_m: scenario.deconfliction.safety_distance_m,
             geofence: scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max)),
+            ground_stations: scenario.mission.ground_stations,
         };
         let vehicles: Vec<_> = scenario
             .vehicles

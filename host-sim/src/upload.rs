@@ -19,8 +19,10 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 use self::pace::Pace;
 use crate::link::Link;
 
-/// System and component id of a ground station.
-const US: (u8, u8) = (255, 190);
+/// System id of a ground station, unless another one is chosen.
+const USUAL_SYSTEM: u8 = 255;
+/// Its component id.
+const COMPONENT_ID: u8 = 190;
 /// The companion may have to erase its flash first: eight sectors of two seconds each.
 const PATIENCE: Duration = Duration::from_secs(30);
 const BEAT: Duration = Duration::from_secs(1);
@@ -40,6 +42,7 @@ pub struct Client {
     began: Clock,
     beat_at: Clock,
     frames: u8,
+    own_system: u8,
     system: Option<u8>,
     sequence: u16,
     session: u8,
@@ -76,11 +79,18 @@ impl Client {
             began: now,
             beat_at: now,
             frames: 0,
+            own_system: USUAL_SYSTEM,
             system,
             sequence,
             session: 0,
             pace: Pace::new(now),
         }
+    }
+
+    /// The same from another ground station than 255.
+    #[must_use]
+    pub fn from_ground_station(self, own_system: u8) -> Self {
+        Self { own_system, ..self }
     }
 
     fn send(&mut self, bytes: &[u8]) -> anyhow::Result<()> {
@@ -89,7 +99,7 @@ impl Client {
     }
 
     fn header(&self) -> Header {
-        Header { system: US.0, component: US.1, sequence: self.frames }
+        Header { system: self.own_system, component: COMPONENT_ID, sequence: self.frames }
     }
 
     /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
@@ -160,12 +170,12 @@ impl Client {
     }
 
     fn answers(&mut self) -> anyhow::Result<Vec<Answer>> {
-        let frames = self.hear()?;
+        let (us, frames) = ((self.own_system, COMPONENT_ID), self.hear()?);
         let for_us = frames
             .iter()
             .map(Frame::padded)
             .zip(&frames)
-            .filter(|(p, frame)| frame.message_id == MESSAGE && (p[1], p[2]) == US);
+            .filter(|(p, frame)| frame.message_id == MESSAGE && (p[1], p[2]) == us);
         let read = |p: &[u8; 255]| Answer {
             sequence: u16::from_le_bytes([p[3], p[4]]),
             session: p[5],

@@ -106,7 +106,7 @@ fn fly(seed: u64) -> Errors {
     // One station more than vehicles: it listens.
     let listener = members.len();
     let mut radio = Radio::new(RadioConfig { range_m: 1e6, loss: 0.0, delay_s: 0.05 }, listener + 1, seed);
-    let (mut framer, mut ground_station, mut log) = (Framer::new(), GroundStation::new(), Vec::new());
+    let (mut framer, mut ground_station, mut log) = (Framer::new(), GroundStation::new(255), Vec::new());
     let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
     places.push(Point::zeros());
     let mut tracks: Vec<Vec<Point>> = vec![Vec::new(); members.len()];

@@ -108,7 +108,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
                         let mut frame = [0; MAX_SENT];
-                        let length = mission_start(args.id, 0, &mut frame);
+                        let length = mission_start(config.ground_stations[0], args.id, &mut frame);
                         companion.handle_bytes(Link::Swarm, now(), &frame[..length]);
                     }
                 }

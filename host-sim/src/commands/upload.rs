@@ -25,6 +25,9 @@ pub struct Args {
     /// Which vehicle, by its MAVLink system id; the first companion heard if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     id: Option<u8>,
+    /// System id to send from: one that the companion's mission names as a ground station
+    #[arg(long, value_name = "N", default_value_t = 255, value_parser = clap::value_parser!(u8).range(1..))]
+    ground_station: u8,
 }
 
 /// Uploads, and compares the CRC-32 of what arrived. It is used from the companion's next start on.
@@ -35,7 +38,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = args.file.display();
     let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read: {path}"))?;
     let file = kind(&bytes).with_context(|| format!("not for upload: {path}"))?;
-    let mut client = Client::new(args.link.open()?, args.id);
+    let mut client = Client::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
     let system = client.find()?;
     let bar = Progress::on_terminal().steps("upload", bytes.len() as u64);
     client.upload(file, &bytes, |done| bar.at(done)).with_context(|| format!("upload failed: {path}"))?;

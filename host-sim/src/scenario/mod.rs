@@ -13,6 +13,7 @@ mod reader;
 
 use std::path::{Path, PathBuf};
 
+use companion::config::GROUND_STATIONS;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
@@ -102,6 +103,8 @@ pub struct Mission {
     pub goals: Vec<Point>,
     /// Where vehicles may be.
     pub geofence: Option<Geofence>,
+    /// System ids whose commands count; 0 is no id.
+    pub ground_stations: [u8; GROUND_STATIONS],
 }
 
 /// Who goes where.

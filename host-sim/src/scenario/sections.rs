@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 use toml::de::DeTable;
@@ -55,7 +56,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     )?;
     let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
     let mission_table = mission_table.unwrap_or_else(|| empty(text, "mission"));
-    let (mission, mode_span) = mission(&mission_table, folder, origin.as_ref())?;
+    let (mission, mode_span) = mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = self::deconfliction(&deconfliction.unwrap_or_else(|| empty(text, "deconfliction")))?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
@@ -182,7 +183,12 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
 }
 
 /// The mission, and where its mode stands.
-fn mission(table: &Table<'_>, folder: &Path, origin: Option<&Geodetic>) -> Result<(Mission, Option<Span>)> {
+fn mission(
+    table: &Table<'_>,
+    folder: &Path,
+    origin: Option<&Geodetic>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+) -> Result<(Mission, Option<Span>)> {
     let mode_span = table.get("mode").map(|v| v.span);
     let mode = table.word(
         "mode",
@@ -224,8 +230,26 @@ fn mission(table: &Table<'_>, folder: &Path, origin: Option<&Geodetic>) -> Resul
         return Err(table.text.error(&span, why));
     }
     let geofence = table.get("geofence").map(|v| geofence(&v)).transpose()?;
+    let ground_stations = table.get("ground_stations").map(|v| ground_stations(&v, vehicles)).transpose()?;
+    let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
     table.finish()?;
-    Ok((Mission { mode, objective, cruise_mps, goals, geofence }, mode_span))
+    Ok((Mission { mode, objective, cruise_mps, goals, geofence, ground_stations }, mode_span))
+}
+
+/// System ids whose commands count.
+fn ground_stations(value: &Value<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<[u8; GROUND_STATIONS]> {
+    let given = value.items()?;
+    if !(1..=GROUND_STATIONS).contains(&given.len()) {
+        return Err(value.error(&format!("takes 1 to {GROUND_STATIONS} MAVLink system ids")));
+    }
+    let mut ids = [0; GROUND_STATIONS];
+    for (id, given) in ids.iter_mut().zip(given) {
+        *id = given.whole(1..=255)? as u8;
+        if vehicles.iter().any(|(vehicle, _)| vehicle.id == *id) {
+            return Err(given.error("is a vehicle's id: a ground station has one of its own"));
+        }
+    }
+    Ok(ids)
 }
 
 /// A point of the mission frame, in metres or by latitude and longitude about the origin that was given.

@@ -21,6 +21,7 @@ fn a_short_scenario_has_the_defaults() {
     let roadmap = &scenario.roadmap;
     assert_eq!((roadmap.nodes, roadmap.edge_min_m, roadmap.edge_max_m), (2300, 0.5, 8.0));
     assert_eq!((scenario.mission.mode, scenario.mission.cruise_mps), (Mode::Unlabelled, 2.0));
+    assert_eq!(scenario.mission.ground_stations, [255, 0, 0, 0]);
     assert_eq!(scenario.mission.goals[1], Point::new(3.0, 4.0, 12.5));
     assert_eq!(
         (scenario.vehicles.len(), scenario.vehicles[1].id, scenario.vehicles[1].radius_m),
@@ -54,6 +55,20 @@ fn wrong_scenarios_are_told_where_and_why() {
             Some("did you mean `cruise_mps`?"),
         ),
         ("[mission]", "[misson]", "4:2", "unknown key `misson`", Some("did you mean `mission`?")),
+        (
+            "[mission]",
+            "[mission]\nground_stations = [255, 2]",
+            "5:25",
+            "mission.ground_stations[1] is a vehicle's id: a ground station has one of its own",
+            None,
+        ),
+        (
+            "[mission]",
+            "[mission]\nground_stations = []",
+            "5:19",
+            "mission.ground_stations takes 1 to 4 MAVLink system ids",
+            None,
+        ),
         ("[map]", "sede = 1\n[map]", "2:1", "unknown key `sede`", Some("did you mean `seed`?")),
         (
             "start = [8.0, 15.0",

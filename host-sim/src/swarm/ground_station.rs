@@ -11,8 +11,6 @@ use planner_core::frames::Geodetic;
 use super::member::{Member, is_finished};
 use super::radio::Radio;
 
-/// System id of ground stations.
-const SYSTEM_ID: u8 = 255;
 /// MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
 /// A command is repeated this often until it is obeyed, microseconds.
@@ -23,8 +21,9 @@ const PATIENCE_US: u64 = 90_000_000;
 const RESUME_US: u64 = 10_000_000;
 
 /// Sends MISSION_START to system 0.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct GroundStation {
+    system_id: u8,
     sequence: u8,
     ready_us: Option<u64>,
     first_us: Option<u64>,
@@ -36,9 +35,17 @@ pub struct GroundStation {
 }
 
 impl GroundStation {
-    /// Nothing sent yet.
-    pub fn new() -> Self {
-        Self::default()
+    /// A ground station with this system id that has sent nothing yet.
+    pub fn new(system_id: u8) -> Self {
+        Self {
+            system_id,
+            sequence: 0,
+            ready_us: None,
+            first_us: None,
+            last_us: 0,
+            resumes: Vec::new(),
+            obstacles: Vec::new(),
+        }
     }
 
     /// Whether the start was commanded.
@@ -119,7 +126,7 @@ impl GroundStation {
 
     fn frame(&mut self, command: &impl MessageData) -> Vec<u8> {
         let mut buffer = [0; frame::MAX_SENT];
-        let length = encode(command, self.sequence, &mut buffer);
+        let length = encode(command, self.system_id, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);
         buffer[..length].to_vec()
     }
@@ -131,15 +138,15 @@ const PAUSE_CONTINUE: MavCmd = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
 /// Target system that means all.
 const EVERYBODY: u8 = 0;
 
-/// A frame that commands the start; returns its length.
-pub fn mission_start(target_system: u8, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
-    encode(&order(START, target_system, 0.0), sequence, out)
+/// A frame by which ground station `from` commands the start; returns its length.
+pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
+    encode(&order(START, target_system, 0.0), from, 0, out)
 }
 
 fn order(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT }
 }
 
-fn encode(command: &impl MessageData, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
-    frame::encode(Header { system: SYSTEM_ID, component: COMPONENT_ID, sequence }, command, out)
+fn encode(command: &impl MessageData, system: u8, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
+    frame::encode(Header { system, component: COMPONENT_ID, sequence }, command, out)
 }

@@ -116,7 +116,7 @@ fn simulate(
     let safety_distance_m = scenario.deconfliction.safety_distance_m;
     let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
     monitor.waits_end = !scenario.faults.is_empty();
-    let mut ground_station = GroundStation::new();
+    let mut ground_station = GroundStation::new(scenario.mission.ground_stations[0]);
     let mut script = Script::new(scenario);
     let mut log = Vec::new();
     let mut nearest_goal_m = vec![f32::INFINITY; members.len()];

@@ -1,6 +1,7 @@
 //! The calls of companion on the ground: files, parameters, commands, hostile bytes.
 
 use companion::commands;
+use companion::config::USUAL_GROUND_STATIONS;
 use companion::frame::{self, Framer, Header, MAX_SENT};
 use companion::intent::{self, Intent};
 use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
@@ -106,6 +107,7 @@ fn missions(meter: &mut impl Meter) {
         schedule: cases::SCHEDULE,
         safety_distance_m: 1.5,
         geofence: None,
+        ground_stations: USUAL_GROUND_STATIONS,
     };
     let vehicle = |id: u8| MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: Some(0) },
