@@ -4,12 +4,17 @@
 //! their CRC seeds; framing is ours, because its reader drops unknown ids and then searches their payload for a start
 //! byte: one false 0xFD there holds back every frame behind it.
 //!
-//! A frame whose id the dialect does not know cannot be checked. It is skipped whole, by its length, when the byte
-//! after it is a start byte (or nothing follows within [`PARTIAL_LIFETIME`]); if another byte follows, the start was
-//! false and the search goes on one byte later. The same search follows a bad CRC, over bytes that are all still in
-//! the buffer, so no good frame behind a bad one is lost. Each byte costs O(1), and O(280) where starts are false.
+//! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible and whose id the
+//! dialect knows. Of candidates that overlap, the first whose checksum is right is the frame; a candidate with a wrong
+//! checksum costs its start byte only, and the search goes on behind that byte. So no garbage, whatever it is, hides a
+//! whole frame behind it. What no checksum covers is searched too: a frame of unknown id and a signature, which is not
+//! checked here. Their bytes are not counted as noise.
+//!
+//! A candidate that is not complete holds back what follows it, for [`PARTIAL_LIFETIME`] after its own first byte and
+//! an eighth of that at most. Each byte costs O(1), and O(267) where starts are false.
 
 use crc::{CRC_16_MCRF4XX, Crc, Table};
+use heapless::Vec;
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData};
 
@@ -17,9 +22,7 @@ use crate::time::{Duration, Instant};
 
 /// A frame not complete this long after its first byte is given up.
 pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
-/// The longest frame: 10 bytes of header, 255 of payload, 2 of CRC, 13 of signature.
-pub const MAX_FRAME: usize = 280;
-/// The longest frame we send: no signature.
+/// The longest frame without its signature: 10 bytes of header, 255 of payload, 2 of CRC.
 pub const MAX_SENT: usize = 267;
 
 const V1_START: u8 = 0xFE;
@@ -28,8 +31,11 @@ const V2_START: u8 = 0xFD;
 const COMPONENT_INFORMATION: u32 = 395;
 const SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
-/// One byte more than a frame, to see what follows an unknown one.
-const BUFFER: usize = MAX_FRAME + 1;
+/// Times of arrival are told apart by steps of an eighth of the lifetime; bytes received in one step count as received
+/// with the last of them.
+const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
+/// Steps that a lifetime touches, and one.
+const ARRIVALS: usize = 10;
 
 /// A frame whose CRC is right.
 #[derive(Clone, Debug, PartialEq)]
@@ -83,9 +89,9 @@ impl Frame {
 pub struct Counters {
     /// Frames given out.
     pub frames: u32,
-    /// Frames of a known id whose CRC was wrong; a false start byte in noise may count here too.
+    /// Candidates of a known id whose CRC was wrong; a false start byte in noise may count here too.
     pub bad_crc: u32,
-    /// Frames of unknown id, skipped.
+    /// Candidates of unknown id; a false start byte in noise may count here too.
     pub unknown: u32,
     /// Partial frames given up after [`PARTIAL_LIFETIME`].
     pub expired: u32,
@@ -93,15 +99,26 @@ pub struct Counters {
     pub noise_bytes: u32,
 }
 
-/// The decoder of one link. 296 bytes; all zero when new, so it may live in .bss.
+/// The bytes before `until` in the buffer were received at `at` or earlier.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    until: usize,
+    at: Instant,
+}
+
+/// The decoder of one link. At most 480 bytes; all zero when new, so it may live in .bss.
 #[derive(Clone, Debug)]
 pub struct Framer {
-    buf: [u8; BUFFER],
+    buf: [u8; MAX_SENT],
     len: usize,
-    since: Instant,
-    last_byte: Instant,
+    /// When the bytes of the buffer were received, oldest first; the last one covers the whole buffer.
+    arrivals: Vec<Arrival, ARRIVALS>,
+    /// How many of the next bytes belong to a frame of unknown id or to a signature.
+    uncounted: usize,
     counters: Counters,
 }
+
+const _: () = assert!(size_of::<Framer>() <= 480);
 
 /// What the bytes at the front of the buffer are.
 enum Front {
@@ -109,11 +126,11 @@ enum Front {
     Needs(usize),
     /// Not a frame.
     False,
-    /// A checked frame of this many bytes.
+    /// A checked frame of this many bytes, without its signature.
     Good(usize),
     /// Whole, of known id, wrong CRC.
     BadCrc,
-    /// Whole, of unknown id and this many bytes.
+    /// The header of an unknown id; this many bytes with the signature, if it is a frame.
     Unknown(usize),
 }
 
@@ -127,10 +144,10 @@ impl Framer {
     /// An empty decoder.
     pub const fn new() -> Self {
         Self {
-            buf: [0; BUFFER],
+            buf: [0; MAX_SENT],
             len: 0,
-            since: Instant::ZERO,
-            last_byte: Instant::ZERO,
+            arrivals: Vec::new(),
+            uncounted: 0,
             counters: Counters { frames: 0, bad_crc: 0, unknown: 0, expired: 0, noise_bytes: 0 },
         }
     }
@@ -142,43 +159,37 @@ impl Framer {
 
     /// When the partial frame held now expires, if one is held.
     pub fn expires_at(&self) -> Option<Instant> {
-        (self.len > 0).then(|| self.since + PARTIAL_LIFETIME)
+        self.arrivals.first().map(|oldest| oldest.at + PARTIAL_LIFETIME)
     }
 
     /// The next frame. Takes bytes off the front of `input` (all received at `now`) until a frame is whole or `input`
     /// is empty; call until `None`. With an empty `input` it lets a partial frame expire.
     pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
-        while let Some(due) = self.expires_at() {
-            if now <= due {
-                break;
-            }
-            if let Front::Good(total) = self.front() {
-                return Some(self.take(total, now));
-            }
-            if let Front::Unknown(total) = self.front() {
-                self.skip_unknown(total);
-            } else {
-                self.counters.expired += 1;
-                self.drop_start();
-            }
-            self.since = self.last_byte;
-        }
         loop {
             let needed = match self.front() {
-                Front::Good(total) => return Some(self.take(total, now)),
-                Front::Needs(needed) => needed,
-                Front::Unknown(total) if self.len == total => total + 1,
-                Front::Unknown(total) if is_start(self.buf[total]) => {
-                    self.skip_unknown(total);
-                    self.since = now;
-                    continue;
-                }
-                Front::BadCrc => {
-                    self.counters.bad_crc = self.counters.bad_crc.wrapping_add(1);
+                Front::Good(total) => return Some(self.take(total)),
+                Front::Needs(_) if self.expires_at().is_some_and(|due| now > due) => {
+                    let counted = u32::from(self.uncounted == 0);
+                    self.counters.expired = self.counters.expired.wrapping_add(counted);
                     self.drop_start();
                     continue;
                 }
-                Front::False | Front::Unknown(_) => {
+                Front::Needs(needed) => needed,
+                Front::Unknown(total) => {
+                    if self.uncounted == 0 {
+                        self.counters.unknown = self.counters.unknown.wrapping_add(1);
+                        self.uncounted = total;
+                    }
+                    self.drop_start();
+                    continue;
+                }
+                Front::BadCrc => {
+                    let counted = u32::from(self.uncounted == 0);
+                    self.counters.bad_crc = self.counters.bad_crc.wrapping_add(counted);
+                    self.drop_start();
+                    continue;
+                }
+                Front::False => {
                     self.drop_start();
                     continue;
                 }
@@ -188,48 +199,48 @@ impl Framer {
             }
             if self.len == 0 {
                 let noise = input.iter().position(|&b| is_start(b)).unwrap_or(input.len());
-                self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
+                self.count_noise(noise);
                 *input = &input[noise..];
-                self.since = now;
             }
             let count = input.len().min(needed - self.len);
             self.buf[self.len..self.len + count].copy_from_slice(&input[..count]);
             self.len += count;
             *input = &input[count..];
-            self.last_byte = now;
+            if count > 0 {
+                self.note_arrival(now);
+            }
         }
     }
 
     fn front(&self) -> Front {
         let b = &self.buf[..self.len];
-        let (header, crc_at, total, id) = match b {
+        let (header, crc_at, signature, id) = match b {
             [] | [V1_START | V2_START] => return Front::Needs(self.len + 1),
             [V1_START, len, ..] => {
-                let crc_at = 6 + usize::from(*len);
                 let id = b.get(5).map(|&id| u32::from(id));
-                (6, crc_at, crc_at + 2, id)
+                (6, 6 + usize::from(*len), 0, id)
             }
             [V2_START, _] => return Front::Needs(3),
             [V2_START, _, incompat, ..] if incompat & !SIGNED != 0 => return Front::False,
             [V2_START, len, incompat, ..] => {
-                let crc_at = 10 + usize::from(*len);
                 let signature = if incompat & SIGNED != 0 { SIGNATURE_LEN } else { 0 };
                 let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
-                (10, crc_at, crc_at + 2 + signature, id)
+                (10, 10 + usize::from(*len), signature, id)
             }
             _ => return Front::False,
         };
         let Some(id) = id else { return Front::Needs(header) };
+        let total = crc_at + 2;
+        let Some(extra) = extra_crc(id) else { return Front::Unknown(total + signature) };
         if self.len < total {
             return Front::Needs(total);
         }
-        let Some(extra) = extra_crc(id) else { return Front::Unknown(total) };
         let crc = u16::from_le_bytes([b[crc_at], b[crc_at + 1]]);
         if calculate_crc(&b[1..crc_at], extra) == crc { Front::Good(total) } else { Front::BadCrc }
     }
 
     /// Copies the good frame at the front out and removes it.
-    fn take(&mut self, total: usize, now: Instant) -> Frame {
+    fn take(&mut self, total: usize) -> Frame {
         let b = &self.buf;
         let len = b[1];
         let (version, at, sequence, system, component, message_id) = if b[0] == V1_START {
@@ -242,26 +253,51 @@ impl Framer {
         payload[..usize::from(len)].copy_from_slice(&b[at..at + usize::from(len)]);
         self.counters.frames = self.counters.frames.wrapping_add(1);
         self.remove(total);
-        self.since = now;
+        self.uncounted = if signed { SIGNATURE_LEN } else { 0 };
+        self.drop_to_start(0);
         Frame { version, sequence, system, component, message_id, signed, len, payload }
-    }
-
-    fn skip_unknown(&mut self, total: usize) {
-        self.counters.unknown = self.counters.unknown.wrapping_add(1);
-        self.remove(total);
     }
 
     /// Drops a false start byte and everything up to the next start byte in the buffer.
     fn drop_start(&mut self) {
-        let rest = &self.buf[1..self.len];
-        let next = 1 + rest.iter().position(|&b| is_start(b)).unwrap_or(rest.len());
-        self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(next as u32);
+        self.drop_to_start(1);
+    }
+
+    /// Drops everything up to the next start byte at `from` or later.
+    fn drop_to_start(&mut self, from: usize) {
+        let rest = &self.buf[from..self.len];
+        let next = from + rest.iter().position(|&b| is_start(b)).unwrap_or(rest.len());
+        self.count_noise(next);
         self.remove(next);
+    }
+
+    /// Counts bytes that belong to no frame.
+    fn count_noise(&mut self, count: usize) {
+        let noise = count.saturating_sub(self.uncounted);
+        self.uncounted = self.uncounted.saturating_sub(count);
+        self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
     }
 
     fn remove(&mut self, count: usize) {
         self.buf.copy_within(count..self.len, 0);
         self.len -= count;
+        self.arrivals.retain_mut(|arrival| {
+            arrival.until = arrival.until.saturating_sub(count);
+            arrival.until > 0
+        });
+    }
+
+    /// Bytes up to the end of the buffer were received at `now`.
+    fn note_arrival(&mut self, now: Instant) {
+        let arrival = Arrival { until: self.len, at: now };
+        let step = |at: Instant| at.micros() / ARRIVAL_STEP_US;
+        if let Some(last) = self.arrivals.last_mut().filter(|last| step(last.at) == step(now)) {
+            *last = arrival;
+        } else if let Err(arrival) = self.arrivals.push(arrival)
+            && let Some(last) = self.arrivals.last_mut()
+        {
+            *last = arrival;
+        }
     }
 }
 
