@@ -1,7 +1,8 @@
 //! Commands to the companion: COMMAND_LONG and COMMAND_INT, read by field, since the crate refuses a whole message whose
 //! command it does not know and UNSUPPORTED must still be answered.
 //!
-//! Obeyed on either link, when addressed to our system or to all (0), and to our component or to all (0). Answered only
+//! Obeyed on either link, from a ground station that the mission names (`senders`), when addressed to our system or to all (0),
+//! and to our component or to all (0). From others a command that acts is DENIED. Answered only
 //! when addressed to our system: a broadcast to the swarm acts on each and is answered by none. A command to all
 //! components that we do not know is somebody else's and stays unanswered.
 
@@ -56,6 +57,14 @@ pub struct Command {
     pub to_us: bool,
     /// Whether our component was named.
     pub to_component: bool,
+}
+
+impl Command {
+    /// Whether it is one of those that change something, and so counts only from a ground station of the mission.
+    pub(crate) fn acts(&self) -> bool {
+        let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
+        restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
+    }
 }
 
 /// Reads a command addressed to `system` or to all; `None` for other frames and other addressees.

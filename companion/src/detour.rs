@@ -61,9 +61,9 @@ const MARGIN_M: f32 = 0.5;
 
 /// Obstacles that were not on the map.
 const OBSTACLES: usize = 16;
-/// The largest of them, metres.
-const OBSTACLE_MAX_M: f32 = 1000.0;
-/// Two nearer than this are one that was told twice, metres.
+/// The greatest radius of one, metres: a wrong digit must not close a whole building.
+const OBSTACLE_MAX_M: f32 = 20.0;
+/// Two nearer than this are one that was sent twice, metres; a revocation this near means it.
 const SAME_M: f32 = 0.1;
 
 /// Obstacles that were not on the map, and for how many of them a way around was planned.
@@ -71,6 +71,20 @@ const SAME_M: f32 = 0.1;
 pub(crate) struct Obstacles {
     known: Vec<KeepOff, OBSTACLES>,
     pub(crate) avoided: usize,
+}
+
+impl Obstacles {
+    pub(crate) fn count(&self) -> usize {
+        self.known.len()
+    }
+
+    /// Forgets the obstacle at this place.
+    fn revoke(&mut self, centre: &Point) {
+        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_M) {
+            self.known.remove(at);
+            self.avoided -= usize::from(at < self.avoided);
+        }
+    }
 }
 
 /// What is known of the way ahead.
@@ -237,15 +251,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         )
     }
 
-    /// Takes an obstacle that is not on the map: its centre, and its radius.
+    /// Takes an obstacle that is not on the map: its centre, and its radius; a radius that is not above zero revokes the one at
+    /// that place. It stays until revoked, or until the companion starts again: a wall does not go away by itself.
     pub(crate) fn exclude(&mut self, command: &Command) -> u8 {
         let Some((lat, lon, alt_m)) = command.place else { return DENIED };
         let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
         let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
-        if !(place.is_valid() && (0.0..=OBSTACLE_MAX_M).contains(&command.param1)) {
+        if !(place.is_valid() && command.param1 <= OBSTACLE_MAX_M) {
             return DENIED;
         }
         let centre = frames::geodetic_to_enu(&self.config.origin, &place);
+        if command.param1 <= 0.0 {
+            self.obstacles.revoke(&centre);
+            // A look that is under way counts them by index.
+            self.around.sweep.restart();
+            self.around.look_began = None;
+            return ACCEPTED;
+        }
         let radius_m = command.param1 + self.config.required_clearance_m;
         let told = |o: &KeepOff| (o.from - centre).norm() < SAME_M && o.radius_m >= radius_m;
         if self.obstacles.known.iter().any(told) {

@@ -41,7 +41,7 @@ fn a_sphere_told_by_command_is_an_obstacle_with_the_clearance_around_it() {
 fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
     let mut bench = Bench::new(config());
     let at = |x: f32| Point::new(x, 30.0, 1.5);
-    for radius_m in [-1.0, f32::NAN, f32::INFINITY, 1001.0] {
+    for radius_m in [f32::NAN, f32::INFINITY, 20.1, 1000.0] {
         assert_eq!(bench.companion.exclude(&sphere(at(0.0), radius_m)), DENIED, "{radius_m}");
     }
     let nowhere = Command { place: None, ..sphere(at(0.0), 1.0) };
@@ -52,6 +52,61 @@ fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
         assert_eq!(bench.companion.exclude(&sphere(at(i as f32), 0.5)), ACCEPTED);
     }
     assert_eq!(bench.companion.exclude(&sphere(at(99.0), 0.5)), TEMPORARILY_REJECTED);
+}
+
+#[test]
+fn a_revoked_obstacle_does_not_block_any_more() {
+    let mut bench = Bench::accompanied(two_vehicles());
+    bench.until(State::Follow, 20.0);
+    let at = Point::new(14.0, 12.0, 1.5);
+    assert_eq!(bench.companion.exclude(&sphere(Point::new(90.0, 90.0, 1.5), 0.5)), ACCEPTED);
+    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED);
+    bench.until(State::Blocked, 5.0);
+    assert_eq!(bench.companion.exclude(&sphere(at, -1.0)), ACCEPTED);
+    assert_eq!(bench.companion.obstacles.count(), 1);
+    bench.until(State::Follow, 3.0);
+    assert_eq!(bench.companion.exclude(&sphere(at, 0.0)), ACCEPTED, "nothing is there: so it is revoked");
+}
+
+proptest::proptest! {
+    /// Whatever is reported and revoked, those that a detour was planned for stay the first ones.
+    #[test]
+    fn obstacles_are_those_reported_and_not_revoked(
+        orders in proptest::collection::vec((0u8..24, -1.0f32..25.0, proptest::prelude::any::<bool>()), 0..200),
+    ) {
+        let mut bench = Bench::new(config());
+        let mut model: std::vec::Vec<(u8, bool)> = std::vec::Vec::new();
+        for (x, radius_m, plans) in orders {
+            let result = bench.companion.exclude(&sphere(Point::new(f32::from(x), 30.0, 1.5), radius_m));
+            let known = model.iter().any(|(at, _)| *at == x);
+            // A larger one at the same place is another; keep the model to one a place.
+            if radius_m <= 0.0 {
+                model.retain(|(at, _)| *at != x);
+                proptest::prop_assert_eq!(result, ACCEPTED);
+            } else if radius_m > OBSTACLE_MAX_M {
+                proptest::prop_assert_eq!(result, DENIED);
+            } else if result == ACCEPTED && !known {
+                model.push((x, false));
+            } else {
+                let full = bench.companion.obstacles.count() == OBSTACLES;
+                proptest::prop_assert!(known || (result == TEMPORARILY_REJECTED && full));
+            }
+            if plans {
+                bench.companion.obstacles.avoided = bench.companion.obstacles.count();
+                model.iter_mut().for_each(|(_, avoided)| *avoided = true);
+            }
+            let obstacles = &bench.companion.obstacles;
+            proptest::prop_assert!(obstacles.avoided <= obstacles.count() && obstacles.count() <= OBSTACLES);
+            let places: std::collections::BTreeSet<i32> =
+                obstacles.known.iter().map(|o| libm::roundf(o.from.x) as i32).collect();
+            let wanted: std::collections::BTreeSet<i32> = model.iter().map(|(x, _)| i32::from(*x)).collect();
+            proptest::prop_assert_eq!(places, wanted);
+            for (x, avoided) in &model {
+                let new = obstacles.known[obstacles.avoided..].iter().any(|o| libm::roundf(o.from.x) as i32 == i32::from(*x));
+                proptest::prop_assert!(*avoided || new, "{}", x);
+            }
+        }
+    }
 }
 
 #[test]

@@ -36,6 +36,11 @@ pub const PAYLOAD_LEN: usize = 254;
 /// Most data of a packet.
 pub const DATA: usize = 239;
 
+/// Whether a FILE_TRANSFER_PROTOCOL begins an upload or removes a file.
+pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
+    matches!(padded[6], op::CREATE | op::OPEN_WRITE | op::REMOVE)
+}
+
 /// Requests that wait; `mavftp` has five under way.
 const QUEUE: usize = 6;
 /// A session whose client was silent this long may be taken by another.

@@ -65,6 +65,208 @@ proptest::proptest! {
     }
 }
 
+/// What a hostile radio peer sends: a command of each kind, a parameter, a file request, a question, a place, an intent.
+fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
+    use crate::frame::{Header, MAX_SENT, encode};
+    use mavlink::dialects::ardupilotmega::*;
+    let header = Header { system, component: if seed & 1 == 0 { 190 } else { 1 }, sequence: seed };
+    let target_system = if seed & 2 == 0 { SYSTEM } else { 0 };
+    let mut out = [0; MAX_SENT];
+    let long = |command, param1: f32, param2: f32| COMMAND_LONG_DATA {
+        command,
+        param1,
+        param2,
+        target_system,
+        target_component: crate::COMPONENT,
+        ..Default::default()
+    };
+    let place = planner_core::frames::enu_to_geodetic(&ORIGIN, &GOAL);
+    let (lat, lon) = ((place.lat_deg * 1e7) as i32, (place.lon_deg * 1e7) as i32);
+    let len = match kind % 14 {
+        0 => encode(header, &long(MavCmd::MAV_CMD_MISSION_START, 0.0, 0.0), &mut out),
+        1 => encode(header, &long(MavCmd::MAV_CMD_NAV_LAND, 0.0, 0.0), &mut out),
+        2 => encode(header, &long(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, 0.0), &mut out),
+        3 => encode(header, &long(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, f32::from(seed % 3), 0.0), &mut out),
+        4 => encode(header, &long(MavCmd::MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0, 1.0), &mut out),
+        5 => {
+            let obstacle = COMMAND_INT_DATA {
+                command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
+                param1: 5.0,
+                target_system,
+                target_component: crate::COMPONENT,
+                frame: MavFrame::MAV_FRAME_GLOBAL,
+                x: lat,
+                y: lon,
+                z: place.alt_m as f32,
+                ..Default::default()
+            };
+            encode(header, &obstacle, &mut out)
+        }
+        6 => {
+            let set = PARAM_SET_DATA {
+                param_value: 1.0,
+                target_system: SYSTEM,
+                target_component: crate::COMPONENT,
+                param_id: "FLK_SPEED_MAX".into(),
+                param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+            };
+            encode(header, &set, &mut out)
+        }
+        7 => encode(
+            header,
+            &PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT },
+            &mut out,
+        ),
+        8 => encode(header, &TIMESYNC_DATA { tc1: 0, ts1: i64::from(seed) + 1 }, &mut out),
+        9 => encode(header, &long(MavCmd::MAV_CMD_REQUEST_MESSAGE, 148.0, 0.0), &mut out),
+        10 => encode(header, &long(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, 0.0), &mut out),
+        11 => {
+            let mut payload = [0; 251];
+            (payload[0], payload[3]) = (seed, [3, 4, 6, 8][usize::from(seed % 4)]);
+            let (target_system, target_component) = (SYSTEM, crate::COMPONENT);
+            let file =
+                FILE_TRANSFER_PROTOCOL_DATA { target_network: 0, target_system, target_component, payload };
+            encode(header, &file, &mut out)
+        }
+        12 => {
+            // Far from every path: what is near one is the safety filter's.
+            let data = GLOBAL_POSITION_INT_DATA {
+                time_boot_ms: u32::from(seed) * 1000,
+                lat: lat + 20_000,
+                lon,
+                alt: (place.alt_m * 1e3) as i32,
+                ..Default::default()
+            };
+            encode(Header { component: crate::COMPONENT, ..header }, &data, &mut out)
+        }
+        _ => {
+            let intent = Intent {
+                system_id: system,
+                flags: seed,
+                mission_crc: 7,
+                plan_crc: 5,
+                progress_m: 1e6,
+                speed_mps: 0.0,
+                heard: u32::MAX,
+                points: heapless::Vec::from_slice(&[GOAL]).unwrap(),
+            };
+            let mut payload = [0; 133];
+            let len = intent.encode(&mut payload);
+            crate::frame::encode_raw(
+                Header { component: crate::COMPONENT, ..header },
+                TUNNEL_DATA::ID,
+                TUNNEL_DATA::EXTRA_CRC,
+                &payload[..len],
+                &mut out,
+            )
+        }
+    };
+    out[..len].to_vec()
+}
+
+/// System ids of hostile peers: of the roster, of nobody, the vehicle's own; never the ground station's.
+fn hostile_id(seed: u8) -> u8 {
+    match seed % 4 {
+        0 => 77,
+        1 => SYSTEM,
+        _ => 1 + (u16::from(seed) * 251 % 254) as u8,
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(48))]
+    /// On the pad nothing starts, in flight nothing changes, and the ground station is answered all the same.
+    #[test]
+    fn hostile_radio_peers_command_nothing_and_starve_nothing(
+        frames in proptest::collection::vec(proptest::prelude::any::<(u8, u8, u8, bool)>(), 1..400),
+        flies in proptest::prelude::any::<bool>(),
+    ) {
+        use mavlink::dialects::ardupilotmega::*;
+        let mut bench = Bench::accompanied(two_vehicles());
+        if flies {
+            bench.until(State::Follow, 20.0);
+        } else {
+            bench = Bench::new(two_vehicles());
+            bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), crate::intent::ON_PLAN | crate::intent::GROUNDED, 0.0, 5));
+            bench.until(State::Ready, 6.0);
+        }
+        let mut flash = crate::fake_flash::Flash::new(9);
+        bench.companion.mount(crate::fake_flash::started(&mut flash));
+        let (state, parameters) = (bench.state(), bench.companion.parameters().to_bytes());
+        let config = bench.companion.config.clone();
+        bench.events.clear();
+        for (i, (kind, seed, who, wired)) in frames.into_iter().enumerate() {
+            let link = if wired { Link::Autopilot } else { Link::Swarm };
+            // By the autopilot's link its own position would be believed: that is in SECURITY.md.
+            let kind = if wired && matches!(kind % 14, 12 | 13) { 8 } else { kind };
+            bench.companion.handle_bytes(link, bench.now, &forged(kind, hostile_id(who), seed));
+            if i % 8 == 0 {
+                bench.tick();
+            }
+            let landed = matches!(bench.state(), State::Land | State::Disarm | State::Done);
+            proptest::prop_assert!(bench.state() == state || (flies && landed), "{:?} {:?}", bench.state(), bench.texts);
+        }
+        proptest::prop_assert!(!bench.events.contains(&Event::RestartRequested));
+        proptest::prop_assert_eq!(bench.companion.obstacles.count(), 0);
+        proptest::prop_assert!(bench.companion.parameters().to_bytes() == parameters && bench.companion.config == config);
+        // The radio gives the ground station all it requests within as long as its budget needs.
+        bench.swarm.clear();
+        bench.acks.clear();
+        let ask = |bench: &mut Bench, bytes: &[u8]| bench.companion.handle_bytes(Link::Swarm, bench.now, bytes);
+        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT };
+        let mut out = [0; crate::frame::MAX_SENT];
+        let ground = |sequence| crate::frame::Header { system: 255, component: 190, sequence };
+        let len = crate::frame::encode(ground(200), &list, &mut out);
+        ask(&mut bench, &out[..len]);
+        let len = crate::frame::encode(ground(201), &TIMESYNC_DATA { tc1: 0, ts1: 4711 }, &mut out);
+        ask(&mut bench, &out[..len]);
+        bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 0.0, SYSTEM, crate::COMPONENT);
+        for i in 0..200u8 {
+            for k in 0..4 {
+                let bytes = forged(7 + k % 4, hostile_id(i.wrapping_mul(7) | 2), i.wrapping_mul(4) + k);
+                bench.companion.handle_bytes(Link::Swarm, bench.now, &bytes);
+            }
+            bench.tick();
+        }
+        let values = bench.swarm.iter().filter_map(Frame::decode::<PARAM_VALUE_DATA>).count();
+        let time = bench.swarm.iter().filter_map(Frame::decode::<TIMESYNC_DATA>).any(|t| t.ts1 == 4711);
+        proptest::prop_assert!(values >= crate::parameters::COUNT && time, "{values} {time}");
+        proptest::prop_assert!(bench.acks.iter().any(|ack| *ack == (512, 0, 255, 190)), "{:?}", bench.acks);
+        if flies {
+            bench.until(State::Done, 60.0);
+            proptest::prop_assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
+        } else {
+            bench.start();
+            bench.until(State::Follow, 20.0);
+        }
+    }
+}
+
+#[test]
+fn a_command_is_logged_with_its_sender_and_a_foreign_one_denied() {
+    let mut bench = Bench::new(config());
+    bench.until(State::Ready, 6.0);
+    bench.companion.handle_bytes(Link::Swarm, bench.now, &forged(0, 9, 4));
+    bench.drain();
+    assert_eq!((bench.state(), bench.acks.pop()), (State::Ready, Some((300, 2, 9, 190))));
+    assert!(
+        bench.texts.iter().any(|t| t == "Command 300 denied, not a ground station: 9/190"),
+        "{:?}",
+        bench.texts
+    );
+    bench.start();
+    assert_eq!((bench.state(), bench.acks.pop()), (State::Scheduled, Some((300, 0, 255, 190))));
+    assert!(bench.texts.iter().any(|t| t == "Start from 255/190"), "{:?}", bench.texts);
+    let mut other = config();
+    other.ground_stations = [9, 245, 0, 0];
+    let mut bench = Bench::new(other);
+    bench.until(State::Ready, 6.0);
+    bench.start();
+    assert_eq!((bench.state(), bench.acks.pop()), (State::Ready, Some((300, 2, 255, 190))));
+    bench.companion.handle_bytes(Link::Swarm, bench.now, &forged(0, 9, 4));
+    assert_eq!(bench.state(), State::Scheduled);
+}
+
 #[test]
 fn a_late_frame_does_not_bring_back_an_old_mode() {
     let mut bench = Bench::following(config());

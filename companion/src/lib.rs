@@ -40,6 +40,7 @@ pub mod parameters;
 pub mod px4;
 mod requests;
 mod retreat;
+mod senders;
 mod services;
 pub mod store;
 mod sweep;

@@ -22,6 +22,7 @@ use crate::mission::{self, Action, Guard, Row, State};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
+use crate::senders::{Kind as AnswerKind, Rates, Sender};
 use crate::store::{Erasing, Store};
 use crate::telemetry::{Change, Telemetry};
 use crate::time::{Duration, Instant};
@@ -79,6 +80,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
     pub(crate) radio: Budget,
+    pub(crate) rates: Rates,
     pub(crate) store: Option<Store>,
     pub(crate) parameters: Parameters,
     pub(crate) ftp: Ftp,
@@ -127,6 +129,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             position_due: false,
             intent_due: false,
             radio: Budget::default(),
+            rates: Rates::default(),
             store: None,
             parameters: Parameters::default(),
             ftp: Ftp::default(),
@@ -265,14 +268,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Returns whether the mission table should be looked at.
     fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
+        let sender = self.sender(link, frame);
         if let Some(command) = commands::read(frame, self.config.system_id) {
+            if sender != Sender::GroundStation && command.acts() {
+                self.deny(link, sender, &command);
+                return false;
+            }
             if !self.repeats.is_repeat(frame, command.command, self.now) {
-                self.handle_command(link, &command);
+                self.handle_command(link, sender, &command);
                 return true;
             }
             return false;
         }
-        if self.serve(link, frame) {
+        if self.serve(link, sender, frame) {
             return false;
         }
         match link {
@@ -301,11 +309,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
             return;
         }
-        if !self.neighbours.accept(id, frame.sequence, self.now) {
-            return;
-        }
+        // Its sequence number counts only if the frame decodes.
         if frame.message_id == TUNNEL_DATA::ID {
-            if let Some(intent) = Intent::decode(frame.padded(), id) {
+            let Some(intent) = Intent::decode(frame.padded(), id) else { return };
+            if intent.mission_crc != self.config.mission_crc {
+                if self.config.roster.iter().any(|entry| entry.system_id == id) {
+                    let text = "Vehicle # has another mission file";
+                    self.say_of(Sender::Other, true, text, [u32::from(id), 0, 0]);
+                }
+                return;
+            }
+            if self.neighbours.accept(id, frame.sequence, self.now) {
                 let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
                 self.neighbours.handle_intent(
                     self.now,
@@ -320,10 +334,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn handle_command(&mut self, link: Link, command: &Command) {
+    /// Answers a command of a sender whose commands do not count.
+    fn deny(&mut self, link: Link, sender: Sender, command: &Command) {
+        if command.to_us {
+            let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
+            self.answer_to(link, sender, AnswerKind::Ack, ack);
+        }
+        let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
+        self.say_of(sender, true, "Command # denied, not a ground station: #/#", numbers);
+    }
+
+    fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) {
+        let (before, known) = (self.wishes, self.obstacles.count());
         let result = match commands::apply(&mut self.wishes, self.state, command) {
             Some(result) => result,
-            None if command.command == commands::REQUEST => self.request(link, command.param1),
+            None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
             None if command.command == commands::EXCLUDE => self.exclude(command),
             None if command.command == commands::RESTART
                 && (command.to_component || command.param2 == 1.0) =>
@@ -336,11 +361,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         if command.to_us {
             let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-            self.outboxes[link as usize].push(ack);
+            self.answer_to(link, sender, AnswerKind::Ack, ack);
+        }
+        let restarts = command.command == commands::RESTART && result == ACCEPTED;
+        if restarts || self.wishes != before || self.obstacles.count() != known {
+            self.log_command(sender, command);
         }
     }
 
-    fn request(&mut self, link: Link, message: f32) -> u8 {
+    fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
+        if !self.may_answer(link, sender, AnswerKind::Message) {
+            return TEMPORARILY_REJECTED;
+        }
         if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
             return TEMPORARILY_REJECTED;
         }

@@ -48,6 +48,15 @@ const LEVEL_M: f32 = 1.0;
 const VAGUE_M: f32 = 0.5;
 /// What two vehicles in the air may stray together, one of which hovers, metres.
 const SWAY_M: f32 = 0.1;
+/// A position counts as the vehicle's of the roster if an intent of our mission was heard from it within this time: ten intents
+/// at the lowest rate.
+const BELONGS: Duration = Duration::from_secs(5);
+/// Most strangers that are kept; a full roster leaves room for one.
+const STRANGERS: usize = 4;
+/// A stranger that was not heard for this long is forgotten.
+const STRANGER_STAYS: Duration = Duration::from_secs(60);
+/// Rank of a stranger: behind everyone.
+const STRANGER: u16 = u16::MAX;
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
 
@@ -63,6 +72,8 @@ struct Contact {
     /// Since when it tells that it is out, and it is known where.
     out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
+    /// When an intent of our mission was last heard from it.
+    belongs_at: Option<Instant>,
     points: Vec<Point, POINTS>,
     /// Where it rested when a way around was planned.
     avoided: Option<Point>,
@@ -75,7 +86,7 @@ impl Contact {
     }
 
     fn is_dead(&self, now: Instant) -> bool {
-        self.heard_at.is_some_and(|at| now - at >= DEAD)
+        self.rank != STRANGER && self.heard_at.is_some_and(|at| now - at >= DEAD)
     }
 
     /// Whether it speaks, but has not known for long where it is.
@@ -112,7 +123,8 @@ impl Contact {
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
     fn comes_down(&self, now: Instant) -> bool {
         let silent = !self.heard_within(now, SILENT);
-        !self.tells(GROUNDED | LANDED)
+        self.rank != STRANGER
+            && !self.tells(GROUNDED | LANDED)
             && !self.is_out(now)
             && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
     }
@@ -183,7 +195,8 @@ impl Contact {
     }
 }
 
-/// The table. Vehicles of the roster have their slot from the start; others get one while there is room.
+/// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
+/// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
 pub struct Neighbours<const V: usize> {
     contacts: Vec<Contact, V>,
@@ -237,6 +250,7 @@ impl<const V: usize> Neighbours<V> {
             flags: 0,
             out_at: None,
             hears_us_at: None,
+            belongs_at: None,
             points: Vec::new(),
             avoided: None,
             state,
@@ -245,30 +259,56 @@ impl<const V: usize> Neighbours<V> {
         Some(self.contacts.len() - 1)
     }
 
-    /// The slot of `id`, made if need be; an intruder ranks behind everyone.
-    fn slot(&mut self, id: u8) -> Option<&mut Contact> {
-        let (roster, strangers) = self.contacts.split_at(self.roster);
-        let known = roster.binary_search_by_key(&id, |c| c.id).ok();
-        let stranger = || strangers.iter().position(|c| c.id == id).map(|at| at + self.roster);
-        let at = match known.or_else(stranger) {
-            Some(at) => at,
-            None => match self.add(id, u16::MAX) {
-                Some(at) => at,
-                None => {
-                    self.dropped = self.dropped.wrapping_add(1);
-                    return None;
-                }
-            },
-        };
-        Some(&mut self.contacts[at])
+    /// Where in the roster a vehicle is whose intents are of our mission.
+    fn member(&self, id: u8, now: Instant) -> Option<usize> {
+        let at = self.in_roster(id)?;
+        self.contacts[at].belongs_at.is_some_and(|heard| now - heard < BELONGS).then_some(at)
     }
 
-    /// Whether a frame of `id` is new: not repeated, not overtaken.
+    fn in_roster(&self, id: u8) -> Option<usize> {
+        self.contacts[..self.roster].binary_search_by_key(&id, |c| c.id).ok()
+    }
+
+    fn stranger(&self, id: u8) -> Option<usize> {
+        let strangers = &self.contacts[self.roster..];
+        strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
+    }
+
+    /// Forgets strangers that do not meet the condition.
+    fn keep_strangers(&mut self, mut keep: impl FnMut(&Contact) -> bool) {
+        let mut at = self.roster;
+        while let Some(contact) = self.contacts.get(at) {
+            if keep(contact) {
+                at += 1;
+            } else {
+                self.contacts.remove(at);
+            }
+        }
+    }
+
+    /// The slot of a position's sender: that of the roster, or a stranger's, made if there is room.
+    fn placed(&mut self, id: u8, now: Instant) -> Option<&mut Contact> {
+        if let Some(at) = self.member(id, now).or_else(|| self.stranger(id)) {
+            return self.contacts.get_mut(at);
+        }
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
+        let room = self.contacts.len() - self.roster < STRANGERS;
+        match Some(id).filter(|_| room).and_then(|id| self.add(id, STRANGER)) {
+            Some(at) => self.contacts.get_mut(at),
+            None => {
+                self.dropped = self.dropped.wrapping_add(1);
+                None
+            }
+        }
+    }
+
+    /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
+    /// what anybody can send must not make the next true one look late. Positions carry their time instead.
     pub fn accept(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
-        self.slot(id).is_some_and(|c| c.sequence.accept(sequence, now))
+        self.in_roster(id).is_some_and(|at| self.contacts[at].sequence.accept(sequence, now))
     }
 
-    /// A neighbour's position.
+    /// A neighbour's position. It is the roster's only if this vehicle's intents are of our mission; else it is a stranger's.
     pub fn handle_position(
         &mut self,
         now: Instant,
@@ -281,7 +321,7 @@ impl<const V: usize> Neighbours<V> {
             lon_deg: f64::from(data.lon) * 1e-7,
             alt_m: f64::from(data.alt) * 1e-3,
         };
-        let Some(contact) = self.slot(id) else { return };
+        let Some(contact) = self.placed(id, now) else { return };
         let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
         if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
             return;
@@ -294,7 +334,8 @@ impl<const V: usize> Neighbours<V> {
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
     }
 
-    /// A neighbour's intent. Its progress counts only where mission and plan are ours. `rank` is our own.
+    /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's CRC, its progress only if the plan
+    /// is ours too. `rank` is our own.
     pub fn handle_intent(
         &mut self,
         now: Instant,
@@ -303,11 +344,14 @@ impl<const V: usize> Neighbours<V> {
         mission_crc: u32,
         plan_crc: Option<u32>,
     ) {
-        let Some(contact) = self.slot(intent.system_id) else { return };
-        let same_mission = intent.mission_crc == mission_crc;
-        let shared =
-            same_mission && intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
-        contact.heard_at = Some(now);
+        let Some(at) = self.in_roster(intent.system_id).filter(|_| intent.mission_crc == mission_crc) else {
+            return;
+        };
+        // It is no stranger.
+        self.keep_strangers(|c| c.id != intent.system_id);
+        let contact = &mut self.contacts[at];
+        let shared = intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
         let out = contact.tells(OUT) && contact.position_at.is_some();
         contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
@@ -324,6 +368,7 @@ impl<const V: usize> Neighbours<V> {
     /// whether it is in the way ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
         for contact in &self.contacts {
             if let Some(at) = contact.position_at {
                 let state = Neighbour {
@@ -410,9 +455,9 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
     }
 
-    /// Where all neighbours are while they stand, those out of the plan among them.
+    /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
     pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let placed = self.contacts.iter().filter(|c| c.position_at.is_some());
+        let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
     }
 

@@ -25,9 +25,19 @@ fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
     Intent { system_id: 9, flags, mission_crc, plan_crc, progress_m: 4.0, speed_mps: 1.0, heard: 2, points }
 }
 
+/// The same with vehicles 3 and 9 heard of mission 1 at `at_ms`.
+fn joined(at_ms: u64) -> Neighbours<4> {
+    let mut table = table();
+    for system_id in [3, 9] {
+        let told = Intent { system_id, heard: 0, ..intent(0, 1, 2) };
+        table.handle_intent(Instant::from_millis(at_ms), 1, &told, 1, None);
+    }
+    table
+}
+
 #[test]
 fn a_position_reaches_the_mission_frame_and_ages() {
-    let mut table = table();
+    let mut table = joined(0);
     assert!(table.at(Instant::ZERO).is_empty());
     table.handle_position(Instant::from_millis(100), &ORIGIN, 9, &place(50, 1000));
     let heard = table.at(Instant::from_millis(600))[0];
@@ -40,7 +50,7 @@ fn a_position_reaches_the_mission_frame_and_ages() {
 
 #[test]
 fn below_is_lower_and_near_the_vertical() {
-    let mut table = table();
+    let mut table = joined(0);
     let above = Point::new(0.0, 1.0, 9.0);
     assert!(!table.any_below(&above, 2.0), "nobody was heard");
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 0));
@@ -50,7 +60,7 @@ fn below_is_lower_and_near_the_vertical() {
 
 #[test]
 fn late_and_repeated_positions_change_nothing_but_a_restart_does() {
-    let mut table = table();
+    let mut table = joined(0);
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(20_000, 1000));
     for late in [20_000, 19_900, 10_001] {
         table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(late, 0));
@@ -62,12 +72,14 @@ fn late_and_repeated_positions_change_nothing_but_a_restart_does() {
 
 #[test]
 fn progress_counts_only_on_our_mission_and_plan() {
-    let mut table = table();
+    let mut table = joined(0);
     table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(0, 0));
     for (flags, mission, plan, own_plan, progress) in [
         (ON_PLAN, 1, 2, Some(2), Some(4.0)),
         (0, 1, 2, Some(2), None),
-        (ON_PLAN, 7, 2, Some(2), None),
+        (ON_PLAN, 1, 2, Some(2), Some(4.0)),
+        // Another mission: the intent changes nothing.
+        (0, 7, 2, Some(2), Some(4.0)),
         (ON_PLAN, 1, 7, Some(2), None),
         (ON_PLAN, 1, 2, None, None),
     ] {
@@ -77,13 +89,76 @@ fn progress_counts_only_on_our_mission_and_plan() {
 }
 
 #[test]
-fn strangers_rank_last_and_overflow_is_counted() {
-    let mut table = table();
+fn strangers_rank_last_are_capped_and_expire() {
+    let at = Instant::from_millis;
+    let mut table = joined(0);
     for id in [200, 201, 202] {
-        table.handle_position(Instant::ZERO, &ORIGIN, id, &place(0, 0));
+        table.handle_position(at(0), &ORIGIN, id, &place(0, 0));
     }
-    assert_eq!((table.at(Instant::ZERO).len(), table.dropped()), (2, 1));
-    assert!(table.at(Instant::ZERO).iter().all(|n| n.rank == u16::MAX));
+    assert_eq!((table.at(at(0)).len(), table.dropped()), (2, 1));
+    assert!(table.at(at(0)).iter().all(|n| n.rank == u16::MAX));
+    table.handle_position(at(59_000), &ORIGIN, 201, &place(59_000, 0));
+    let ids = |table: &mut Neighbours<4>, ms| {
+        let mut ids = Vec::<u8, 4>::new();
+        table.at(at(ms)).iter().for_each(|n| ids.push(n.id).unwrap());
+        ids
+    };
+    assert_eq!(ids(&mut table, 59_900), [200, 201]);
+    assert_eq!(ids(&mut table, 60_000), [201]);
+    table.handle_position(at(60_000), &ORIGIN, 202, &place(0, 0));
+    assert_eq!(ids(&mut table, 60_000), [201, 202]);
+    assert_eq!(ids(&mut table, 120_000), [], "none for good");
+}
+
+#[test]
+fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
+    let at = Instant::from_millis;
+    let mut table = table();
+    table.handle_intent(at(0), 1, &intent(OUT | BLOCKED, 7, 8), 1, None);
+    table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
+    assert_eq!(table.at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
+    assert_eq!((table.heard_bits(at(0)), table.blocked_before(200)), (0, 0), "and its flags do not count");
+    table.handle_intent(at(100), 1, &intent(0, 1, 2), 1, None);
+    assert!(table.at(at(100)).is_empty(), "it is no stranger any more");
+    table.handle_position(at(200), &ORIGIN, 9, &place(200, 0));
+    assert_eq!(table.at(at(200))[0].rank, 2);
+    table.handle_position(at(5100), &ORIGIN, 9, &place(5100, 5000));
+    let (rostered, stranger) = (table.at(at(5100))[0], table.at(at(5100))[1]);
+    assert_eq!((rostered.rank, stranger.rank), (2, u16::MAX), "its mission was not heard for 5 s");
+    assert!(rostered.position.y < 1.0 && stranger.position.y > 50.0);
+}
+
+proptest::proptest! {
+    /// Whatever ids send whatever intents and positions, the roster keeps its slots, and what it is known by.
+    #[test]
+    fn strangers_never_displace_the_roster(
+        frames in proptest::collection::vec(
+            (1u8..=255, proptest::prelude::any::<bool>(), 0u64..2000, proptest::prelude::any::<u8>(), 2u32..9),
+            0..200,
+        ),
+    ) {
+        let at = Instant::from_millis;
+        let mut table = joined(0);
+        let mut now = 0;
+        for id in [3, 9] {
+            table.handle_position(at(0), &ORIGIN, id, &place(1_000_000, 1000));
+        }
+        for (id, position, later, flags, mission) in frames {
+            now += later;
+            if position && id != 3 && id != 9 {
+                table.handle_position(at(now), &ORIGIN, id, &place(now as u32, 0));
+            } else {
+                let told = Intent { system_id: id, ..intent(flags, mission, 2) };
+                table.handle_intent(at(now), 1, &told, 1, Some(2));
+            }
+            let heard = table.at(at(now));
+            proptest::prop_assert!(heard.len() <= 4);
+            let own = |id: u8| heard.iter().find(|n| n.id == id).map(|n| (n.rank, n.position.y > 11.0, n.out));
+            proptest::prop_assert_eq!((own(3), own(9)), (Some((0, true, false)), Some((2, true, false))));
+            proptest::prop_assert_eq!(table.blocked_before(255), 0);
+            proptest::prop_assert_eq!(table.silence(at(now), at(0)), Duration::from_millis(now));
+        }
+    }
 }
 
 #[test]
@@ -91,7 +166,7 @@ fn silence_is_that_of_those_who_fly() {
     let mut table = table();
     let at = Instant::from_millis;
     assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "never heard");
-    table.handle_position(at(5000), &ORIGIN, 9, &place(0, 0));
+    table.handle_intent(at(5000), 1, &Intent { heard: 0, ..intent(0, 1, 2) }, 1, None);
     assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(7000), "it does not hear us");
     table.handle_intent(at(5000), 1, &intent(0, 1, 2), 1, None);
     assert_eq!(table.silence(at(9000), at(2000)), Duration::from_millis(4000));
@@ -107,6 +182,7 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     let at = Instant::from_millis;
     let mut table = table();
     let out = |table: &mut Neighbours<4>, now: Instant| table.at(now)[0].out;
+    table.handle_intent(at(1000), 1, &intent(0, 7, 8), 7, None);
     table.handle_position(at(1000), &ORIGIN, 9, &place(50, 1000));
     table.handle_intent(at(1000), 1, &intent(OUT, 7, 8), 7, None);
     assert!(!out(&mut table, at(1100)), "nobody has looked");

@@ -29,8 +29,15 @@ pub enum Outgoing {
     TakeOff(f32),
     /// PARAM_SET of a REAL32.
     Parameter(&'static str, f32),
-    /// The answer to a TIMESYNC: our clock and the sender's, nanoseconds.
-    Timesync(i64, i64),
+    /// The answer to a TIMESYNC.
+    Timesync {
+        /// Our clock, nanoseconds.
+        tc1: i64,
+        /// The sender's, nanoseconds.
+        ts1: i64,
+        /// Whom: system and component. An autopilot does not forward what is addressed to itself.
+        to: (u8, u8),
+    },
     /// PARAM_VALUE of one of ours.
     ParameterValue {
         /// Its index.
@@ -75,8 +82,8 @@ pub enum Outgoing {
         warning: bool,
         /// At most 50 bytes with the numbers in it.
         text: &'static str,
-        /// What the first `#` stands for, and the second.
-        numbers: [u32; 2],
+        /// What each `#` stands for, in order.
+        numbers: [u32; 3],
     },
 }
 
@@ -171,8 +178,13 @@ impl Outbox {
                     out,
                 );
             }
-            Outgoing::Timesync(tc1, ts1) => {
-                return frame::encode(header, &TIMESYNC_DATA { tc1, ts1 }, out);
+            Outgoing::Timesync { tc1, ts1, to } => {
+                // By field: the crate's type lacks the addressee.
+                let mut payload = [0; TIMESYNC_DATA::ENCODED_LEN + 2];
+                payload[..8].copy_from_slice(&tc1.to_le_bytes());
+                payload[8..16].copy_from_slice(&ts1.to_le_bytes());
+                (payload[16], payload[17]) = to;
+                return frame::encode_raw(header, TIMESYNC_DATA::ID, TIMESYNC_DATA::EXTRA_CRC, &payload, out);
             }
             Outgoing::Arm(arm) => {
                 command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
@@ -207,7 +219,7 @@ fn severity(warning: bool) -> MavSeverity {
 }
 
 /// A text with its numbers in it; what is beyond 50 bytes is left out.
-fn filled(text: &str, numbers: [u32; 2]) -> String<50> {
+fn filled(text: &str, numbers: [u32; 3]) -> String<50> {
     let mut out = String::new();
     let mut numbers = numbers.iter();
     for piece in text.split_inclusive('#') {
@@ -231,10 +243,10 @@ mod tests {
     #[test]
     fn numbers_stand_where_the_text_says() {
         assert_eq!(
-            filled("Setpoints: #, at most # ms apart", [1234, 55]),
+            filled("Setpoints: #, at most # ms apart", [1234, 55, 0]),
             "Setpoints: 1234, at most 55 ms apart"
         );
-        assert_eq!(filled("Nothing", [1, 2]), "Nothing");
-        assert_eq!(filled("# # #", [u32::MAX, 0]), "4294967295 0 ");
+        assert_eq!(filled("Nothing", [1, 2, 3]), "Nothing");
+        assert_eq!(filled("# # # #", [u32::MAX, 0, 7]), "4294967295 0 7 ");
     }
 }

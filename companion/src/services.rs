@@ -1,5 +1,6 @@
 //! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served on either link, to frames
 //! addressed to our own system and component, so a ground station may come by the radio or through the autopilot's routing.
+//! Only a ground station of the mission sets parameters and uses files; what others may request is in `senders`.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -15,6 +16,7 @@ use crate::machine::Companion;
 use crate::mission::State;
 use crate::outbox::Outgoing;
 use crate::parameters::{self, Parameters, Refused};
+use crate::senders::{Kind, Sender};
 use crate::store::{Erasing, Fault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
@@ -77,7 +79,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Serves a frame, if it is one for the services; whether it was.
-    pub(crate) fn serve(&mut self, link: Link, frame: &Frame) -> bool {
+    pub(crate) fn serve(&mut self, link: Link, sender: Sender, frame: &Frame) -> bool {
         let p = frame.padded();
         let own = (self.config.system_id, crate::COMPONENT);
         if (frame.system, frame.component) == own {
@@ -86,12 +88,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
         match frame.message_id {
             ftp::MESSAGE if (p[1], p[2]) == own => {
-                if self.store.is_some() {
+                // From others not even answered: sessions are scarce.
+                if self.store.is_some() && sender == Sender::GroundStation {
+                    if ftp::changes_files(p) {
+                        self.log_sender(sender, "File request from #/#", (frame.system, frame.component));
+                    }
                     self.ftp.handle(link as usize, self.now, frame);
                 }
             }
             PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::COUNT).for_each(|index| self.tell_parameter(link, index));
+                (0..parameters::COUNT).for_each(|index| self.tell_parameter(link, sender, index));
             }
             PARAM_REQUEST_READ_DATA::ID if for_us(2) => {
                 let index = i16::from_le_bytes([p[0], p[1]]);
@@ -100,12 +106,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     Err(_) => Parameters::index_of(name(&p[4..20])),
                 };
                 match found {
-                    Some(index) => self.tell_parameter(link, index),
+                    Some(index) => self.tell_parameter(link, sender, index),
                     None if p[3] == own.1 => {
                         let mut id = [0; 16];
                         id.copy_from_slice(&p[4..20]);
                         self.refuse_parameter(
                             link,
+                            sender,
                             frame,
                             index,
                             id,
@@ -115,13 +122,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     None => {}
                 }
             }
-            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(link, frame),
+            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(link, sender, frame),
             TIMESYNC_DATA::ID => {
+                // Bytes 16 and 17 name an addressee, 0 for all.
+                let to_us = (p[16] == 0 || p[16] == own.0) && (p[17] == 0 || p[17] == own.1);
                 if let Some(request) = frame.decode::<TIMESYNC_DATA>()
                     && request.tc1 == 0
+                    && to_us
                 {
-                    let answer = Outgoing::Timesync(self.now.micros() as i64 * 1000, request.ts1);
-                    self.outboxes[link as usize].push(answer);
+                    let to = (frame.system, frame.component);
+                    let tc1 = self.now.micros() as i64 * 1000;
+                    let answer = Outgoing::Timesync { tc1, ts1: request.ts1, to };
+                    self.answer_to(link, sender, Kind::Time, answer);
                 }
             }
             _ => return false,
@@ -129,22 +141,26 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         true
     }
 
-    fn parameters(&self) -> &Parameters {
+    pub(crate) fn parameters(&self) -> &Parameters {
         self.store.as_ref().map_or(&self.parameters, Store::parameters)
     }
 
-    fn tell_parameter(&mut self, link: Link, index: usize) {
+    fn tell_parameter(&mut self, link: Link, sender: Sender, index: usize) {
         if let Some((name, value)) = self.parameters().get(index) {
-            self.outboxes[link as usize].push(Outgoing::ParameterValue { index, name, value });
+            let answer = Outgoing::ParameterValue { index, name, value };
+            self.answer_to(link, sender, Kind::Parameter, answer);
         }
     }
 
-    fn set_parameter(&mut self, link: Link, frame: &Frame) {
+    fn set_parameter(&mut self, link: Link, sender: Sender, frame: &Frame) {
         let p = frame.padded();
         let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
         let found = Parameters::index_of(name(&p[6..22]));
         let result = match found {
             None => Err(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST),
+            Some(_) if sender != Sender::GroundStation => {
+                Err(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED)
+            }
             Some(_) if kind != REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
             Some(index) => {
                 let result = match &mut self.store {
@@ -158,23 +174,34 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
         };
         self.untuned |= result.is_ok();
+        if result.is_ok() {
+            self.log_sender(sender, "Parameter set from #/#", (frame.system, frame.component));
+        }
         // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
         if let Some(index) = found {
-            self.tell_parameter(link, index);
+            self.tell_parameter(link, sender, index);
         }
         if let Err(why) = result
             && p[5] == crate::COMPONENT
         {
             let mut id = [0; 16];
             id.copy_from_slice(&p[6..22]);
-            self.refuse_parameter(link, frame, -1, id, why);
+            self.refuse_parameter(link, sender, frame, -1, id, why);
         }
     }
 
-    fn refuse_parameter(&mut self, link: Link, frame: &Frame, index: i16, id: [u8; 16], why: MavParamError) {
+    fn refuse_parameter(
+        &mut self,
+        link: Link,
+        sender: Sender,
+        frame: &Frame,
+        index: i16,
+        id: [u8; 16],
+        why: MavParamError,
+    ) {
         let to = (frame.system, frame.component);
         let error = Outgoing::ParameterError { index, id, why: why as u8, to };
-        self.outboxes[link as usize].push(error);
+        self.answer_to(link, sender, Kind::Parameter, error);
     }
 
     /// PREFLIGHT_REBOOT_SHUTDOWN: this companion starts anew, unless the vehicle is armed.

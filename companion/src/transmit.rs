@@ -76,6 +76,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// The same with numbers: each `#` of the text stands for one.
     pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+        let numbers = [numbers[0], numbers[1], 0];
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
     }
 
