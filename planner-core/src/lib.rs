@@ -13,6 +13,7 @@ pub mod path;
 pub mod plan;
 pub mod prm;
 pub mod roadmap;
+pub mod safety;
 pub mod schedule;
 pub mod search;
 pub mod segment;

@@ -1,0 +1,254 @@
+//! The safety filter's geometry: where can a vehicle be until it has stopped, and do two such sets meet?
+//!
+//! The set of this vehicle ([`Set::along`], [`Set::vertical`]) is what it can no longer take back: [`REACTION_S`] at
+//! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`Heard::set`]) follows
+//! from what was last heard and from nothing else: no gate, no progress, no advice.
+//!
+//! Two sets conflict ([`conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a
+//! distance that is already too small never does. A vehicle that stops as soon as its set conflicts stays inside the
+//! set of the step before, which did not: that is the safety argument (`docs/safety.md`).
+//!
+//! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason to come near. Cost:
+//! the segments of one set times those of the other; [`Heard::reach_m`] is a cheap bound for the many that are far.
+
+use heapless::Vec;
+use libm::{fmaxf, fminf, sqrtf};
+
+use crate::Point;
+use crate::schedule::segments_distance_sq;
+
+/// Time from a decision to the first motion that follows it, seconds: two setpoints.
+pub const REACTION_S: f32 = 0.1;
+/// A vehicle goes on to the reference that it lags: at most this time of flight behind it, seconds.
+pub const LAG_S: f32 = 0.25;
+/// Heard within this time counts as heard, seconds.
+pub const FRESH_S: f32 = 1.0;
+/// Further than this from the points that it reports a vehicle does not fly along them, metres: real vehicles lag by
+/// up to 0.5 m and stray by 0.4 m.
+pub const OFF_M: f32 = 0.9;
+/// Coming nearer by less than this is none, metres: rounding, and nothing that a vehicle could creep by.
+const NEARER_M: f32 = 0.003;
+/// Most points of a set: a vehicle's place and the eight points that it reports.
+const POINTS: usize = 9;
+
+/// How a vehicle stops.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Braking {
+    /// Braking that is counted on, m/s².
+    pub accel_mps2: f32,
+    /// Its change, m/s³.
+    pub jerk_mps3: f32,
+}
+
+impl Braking {
+    /// How far a vehicle flies on that begins to brake at this speed, metres.
+    pub fn stop_m(&self, speed_mps: f32) -> f32 {
+        let ramp_s = self.accel_mps2 / self.jerk_mps3;
+        0.5 * speed_mps * (speed_mps / self.accel_mps2 + ramp_s)
+    }
+}
+
+/// Where a vehicle can be: a polyline, perhaps a vertical column below its first point, and how much wider than a line
+/// both are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Set {
+    points: Vec<Point, POINTS>,
+    column_to_m: Option<f32>,
+    /// How far beside the line it can be, metres.
+    pub grow_m: f32,
+}
+
+impl Set {
+    /// One place.
+    pub fn at(place: Point) -> Self {
+        let mut points = Vec::new();
+        // The first of nine.
+        let _ = points.push(place);
+        Self { points, column_to_m: None, grow_m: 0.0 }
+    }
+
+    /// From `place` along the points `ahead`, for `length_m` from the first of them. Where they end the set ends.
+    pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
+        let mut set = Self::at(place);
+        let (mut left_m, mut last) = (length_m, None);
+        for point in ahead {
+            let Some(from) = last.replace(point) else {
+                let _ = set.points.push(point);
+                continue;
+            };
+            let leg: Point = point - from;
+            let leg_m = sqrtf(leg.norm_squared());
+            let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
+            if set.points.push(end).is_err() {
+                // More corners than there is room for: anywhere within what is left.
+                set.grow_m = fmaxf(left_m, 0.0);
+                return set;
+            }
+            left_m -= leg_m;
+            if left_m <= 0.0 {
+                break;
+            }
+        }
+        set
+    }
+
+    /// From `place` straight up or down to the height `to_m`.
+    pub fn vertical(place: Point, to_m: f32) -> Self {
+        let mut set = Self::at(place);
+        let _ = set.points.push(Point::new(place.x, place.y, to_m));
+        set
+    }
+
+    fn segments(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
+        let first = self.points[0];
+        let alone = (self.points.len() == 1).then_some((first, first));
+        let legs = self.points.windows(2).map(|leg| (leg[0], leg[1]));
+        let column = self.column_to_m.filter(|z| *z < first.z);
+        legs.chain(alone).chain(column.map(|z| (first, Point::new(first.x, first.y, z))))
+    }
+
+    /// Square of the least distance to a segment, or `within_sq` if it is not less.
+    fn distance_sq(&self, from: &Point, to: &Point, within_sq: f32) -> f32 {
+        let within_m = sqrtf(within_sq);
+        self.segments().fold(within_sq, |least, (a, b)| {
+            let beside = |axis: usize| {
+                let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
+                let (low, high) = sorted(a[axis], b[axis]);
+                let (least, most) = sorted(from[axis], to[axis]);
+                low - most > within_m || least - high > within_m
+            };
+            if (0..3).any(beside) {
+                return least;
+            }
+            fminf(least, segments_distance_sq((&a, &b), (from, to)))
+        })
+    }
+}
+
+/// What a neighbour's set follows from.
+#[derive(Clone, Copy, Debug)]
+pub struct Heard<'a> {
+    /// Place, ENU metres.
+    pub position: Point,
+    /// ENU m/s.
+    pub velocity: Point,
+    /// Its length.
+    pub speed_mps: f32,
+    /// Seconds since both were heard.
+    pub age_s: f32,
+    /// Points that it flies along next; empty if somebody else flies it.
+    pub points: &'a [Point],
+    /// Whether it stands on the ground.
+    pub grounded: bool,
+    /// Height down to which its column counts, metres; none while it stays on its points.
+    pub column_to_m: Option<f32>,
+}
+
+/// What a neighbour can do at most.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// How it stops.
+    pub braking: Braking,
+    /// Fastest flight, m/s.
+    pub speed_max_mps: f32,
+    /// A vehicle that nobody hears has stopped by then, seconds.
+    pub silent_s: f32,
+}
+
+impl Heard<'_> {
+    /// How far from its place it can be in any direction, `ahead_s` of flight included, metres.
+    pub fn reach_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
+        if self.grounded {
+            return 0.0;
+        }
+        if self.age_s > FRESH_S {
+            return self.ball_m(bounds);
+        }
+        self.along_m(bounds, ahead_s)
+            + self.wider_m(bounds)
+            + if self.points.is_empty() { 0.0 } else { OFF_M }
+    }
+
+    fn ball_m(&self, bounds: &Bounds) -> f32 {
+        bounds.speed_max_mps * fminf(self.age_s, bounds.silent_s)
+    }
+
+    /// How far it flies until it has stopped.
+    fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
+        // It may have begun to speed up since it was heard.
+        let gained_mps = bounds.braking.accel_mps2 * (self.age_s + REACTION_S);
+        let most_mps = fmaxf(self.speed_mps, bounds.speed_max_mps);
+        let speed_mps = fminf(fminf(self.speed_mps + gained_mps, most_mps), 2.0 * bounds.speed_max_mps);
+        let stop_m = bounds.braking.stop_m(speed_mps);
+        speed_mps * (self.age_s + REACTION_S + LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
+    }
+
+    fn wider_m(&self, bounds: &Bounds) -> f32 {
+        0.5 * bounds.braking.accel_mps2 * self.age_s * self.age_s
+    }
+
+    /// Where it can be; with `ahead_s` also where its points lead it in so much time.
+    pub fn set(&self, bounds: &Bounds, ahead_s: f32) -> Set {
+        let mut set = if self.grounded {
+            return Set::at(self.position);
+        } else if self.age_s > FRESH_S {
+            Set { grow_m: self.ball_m(bounds), ..Set::at(self.position) }
+        } else if let Some((leg, nearest)) = self.nearest() {
+            let ahead = core::iter::once(nearest).chain(self.points[leg..].iter().copied());
+            Set::along(self.position, ahead, self.along_m(bounds, ahead_s))
+        } else {
+            let share = if self.speed_mps > 0.0 { self.along_m(bounds, 0.0) / self.speed_mps } else { 0.0 };
+            let mut set = Set::at(self.position);
+            // The second of nine.
+            let _ = set.points.push(self.position + self.velocity * share);
+            Set { grow_m: self.wider_m(bounds), ..set }
+        };
+        set.column_to_m = self.column_to_m;
+        set
+    }
+
+    /// The nearest place on the points that it reports, and the first point behind it; none where it is not on them.
+    fn nearest(&self) -> Option<(usize, Point)> {
+        let mut best = (OFF_M * OFF_M, None);
+        let mut from = *self.points.first()?;
+        for (i, to) in self.points.iter().enumerate() {
+            let leg = to - from;
+            let length_sq = leg.norm_squared();
+            let share = if length_sq > 0.0 { (self.position - from).dot(&leg) / length_sq } else { 0.0 };
+            let place = from + leg * share.clamp(0.0, 1.0);
+            let apart_sq = (self.position - place).norm_squared();
+            if apart_sq < best.0 {
+                best = (apart_sq, Some((i, place)));
+            }
+            from = *to;
+        }
+        best.1
+    }
+}
+
+/// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place` now, and nearer than the
+/// vehicle is already.
+pub fn conflicts(own: &Set, other: &Set, place: &Point, apart_m: f32) -> bool {
+    let here = own.points[0];
+    let most_m = apart_m + other.grow_m + own.grow_m;
+    let least_sq = |within_sq: f32| {
+        own.segments().fold(within_sq, |least, (a, b)| fminf(least, other.distance_sq(&a, &b, least)))
+    };
+    let most_sq = most_m * most_m;
+    let motion_sq = least_sq(most_sq);
+    if motion_sq >= most_sq {
+        return false;
+    }
+    let now_m = sqrtf(other.distance_sq(&here, &here, most_sq));
+    if own.grow_m > 0.0 || sqrtf(motion_sq) < now_m - NEARER_M {
+        return true;
+    }
+    // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
+    let nearer = |from: &Point, to: &Point| segments_distance_sq((from, to), (place, place));
+    let least_sq = own.segments().fold(f32::INFINITY, |least, (a, b)| fminf(least, nearer(&a, &b)));
+    let limit_m = fminf(sqrtf((here - place).norm_squared()), 2.0 * most_m);
+    sqrtf(least_sq) < limit_m - NEARER_M
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,191 @@
+extern crate std;
+
+use proptest::prelude::*;
+use std::vec;
+use std::vec::Vec as StdVec;
+
+use super::*;
+
+const BRAKING: Braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
+const BOUNDS: Bounds = Bounds { braking: BRAKING, speed_max_mps: 2.0, silent_s: 3.0 };
+const APART_M: f32 = 1.5;
+
+fn point() -> impl Strategy<Value = Point> {
+    (-6.0_f32..6.0, -6.0_f32..6.0, 0.0_f32..6.0).prop_map(|(x, y, z)| Point::new(x, y, z))
+}
+
+fn points(most: usize) -> impl Strategy<Value = StdVec<Point>> {
+    proptest::collection::vec(point(), 1..most)
+}
+
+/// Places of a set, 2 cm apart.
+fn places(set: &Set) -> StdVec<Point> {
+    let mut places = StdVec::new();
+    for (a, b) in set.segments() {
+        let steps = ((b - a).norm() / 0.02) as usize + 1;
+        places.extend((0..=steps).map(|i| a + (b - a) * (i as f32 / steps as f32)));
+    }
+    places
+}
+
+fn least(from: &[Point], to: &[Point]) -> f32 {
+    from.iter().flat_map(|a| to.iter().map(move |b| (a - b).norm())).fold(f32::INFINITY, f32::min)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 60 } else { 600 }))]
+
+    #[test]
+    fn sets_conflict_where_their_places_do(
+        own in points(5), other in points(5), length_m in 0.0_f32..6.0, grow_m in 0.0_f32..2.0, floor in -3.0_f32..6.0,
+    ) {
+        let own = Set::along(own[0], own[1..].iter().copied(), length_m);
+        let mut other = Set { grow_m, ..Set::along(other[0], other[1..].iter().copied(), length_m) };
+        other.column_to_m = (floor > 0.0).then_some(floor);
+        let (here, there) = (places(&own), places(&other));
+        let motion_m = least(&here, &there) - grow_m;
+        let now_m = least(&here[..1], &there) - grow_m;
+        let place = there[0];
+        let conflict = conflicts(&own, &other, &place, APART_M);
+        if motion_m > APART_M + 0.05 {
+            prop_assert!(!conflict, "{motion_m} apart");
+        } else if motion_m < APART_M - 0.05 && motion_m < now_m - 0.05 {
+            prop_assert!(conflict, "{motion_m} apart, {now_m} now");
+        }
+        let nearer_m = least(&here, &[place]);
+        if conflict {
+            let towards = nearer_m < (own.points[0] - place).norm();
+            prop_assert!(motion_m < now_m || towards, "a motion that takes nobody nearer is allowed");
+        }
+    }
+
+    #[test]
+    fn a_vehicle_that_holds_to_its_limits_stays_inside_its_set(
+        path in points(8), speed_mps in 0.0_f32..2.0, age_s in 0.0_f32..0.99, goes_on_s in 0.0_f32..0.1,
+    ) {
+        prop_assume!(path.len() > 1);
+        let heard = Heard {
+            position: path[0],
+            velocity: (path[1] - path[0]).normalize() * speed_mps,
+            speed_mps,
+            age_s,
+            points: &path,
+            grounded: false,
+            column_to_m: None,
+        };
+        let there = places(&heard.set(&BOUNDS, 0.0));
+        // It flew on, and stops after the reaction.
+        let flown_m = speed_mps * (age_s + goes_on_s) + BRAKING.stop_m(speed_mps);
+        let set = Set::along(path[0], path.iter().copied(), flown_m);
+        for place in places(&set) {
+            prop_assert!(least(&[place], &there) < 0.03);
+            let reach_m = heard.reach_m(&BOUNDS, 0.0);
+            prop_assert!((place - path[0]).norm() <= reach_m + 0.01);
+        }
+    }
+}
+
+/// A vehicle that flies along a polyline and stops where its set conflicts.
+struct Flier {
+    path: StdVec<Point>,
+    along_m: f32,
+    speed_mps: f32,
+    /// What the other heard of it last: place, velocity, when.
+    told: (Point, Point, f32),
+}
+
+impl Flier {
+    fn new(path: StdVec<Point>) -> Self {
+        let told = (path[0], Point::zeros(), 0.0);
+        Self { path, along_m: 0.0, speed_mps: 0.0, told }
+    }
+
+    fn at(&self, along_m: f32) -> (Point, usize, Point) {
+        let mut left_m = along_m;
+        for (i, leg) in self.path.windows(2).enumerate() {
+            let leg_m = (leg[1] - leg[0]).norm();
+            if left_m <= leg_m {
+                let way = (leg[1] - leg[0]) / leg_m;
+                return (leg[0] + way * left_m, i + 1, way);
+            }
+            left_m -= leg_m;
+        }
+        (*self.path.last().unwrap(), self.path.len(), Point::zeros())
+    }
+
+    fn set(&self) -> Set {
+        let (place, next, _) = self.at(self.along_m);
+        let length_m = self.speed_mps * REACTION_S + BRAKING.stop_m(self.speed_mps) + 0.1;
+        let ahead = core::iter::once(place).chain(self.path[next.min(self.path.len())..].iter().copied());
+        Set::along(place, ahead, length_m)
+    }
+
+    fn step(&mut self, stop: bool, dt_s: f32) {
+        let accel = if stop { -1.5 } else { 1.5 };
+        self.speed_mps = (self.speed_mps + accel * dt_s).clamp(0.0, 2.0);
+        self.along_m += self.speed_mps * dt_s;
+        if self.at(self.along_m).1 == self.path.len() {
+            self.speed_mps = 0.0;
+        }
+    }
+}
+
+#[test]
+fn two_that_stop_where_their_sets_conflict_never_come_near() {
+    let mut rng =
+        proptest::test_runner::TestRng::deterministic_rng(proptest::test_runner::RngAlgorithm::ChaCha);
+    let mut draw = |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
+    let (mut nearest_m, mut stops, mut arrived) = (f32::INFINITY, 0, 0);
+    for case in 0..if cfg!(debug_assertions) { 300 } else { 5000 } {
+        let mut fliers: StdVec<Flier> = (0..2)
+            .map(|_| {
+                let vertical = draw(0.0, 1.0) < 0.3;
+                let mut path = vec![Point::new(draw(-5.0, 5.0), draw(-5.0, 5.0), draw(0.0, 6.0))];
+                for _ in 0..3 {
+                    let last = path[path.len() - 1];
+                    let next = Point::new(draw(-5.0, 5.0), draw(-5.0, 5.0), draw(0.0, 6.0));
+                    path.push(if vertical { Point::new(last.x, last.y, next.z) } else { next });
+                }
+                Flier::new(path)
+            })
+            .collect();
+        if (fliers[0].path[0] - fliers[1].path[0]).norm() < 2.0 {
+            continue;
+        }
+        let loss = draw(0.0, 0.4);
+        for tick in 0..600 {
+            let now_s = tick as f32 * 0.05;
+            for flier in &mut fliers {
+                if tick % 4 == 0 && (draw(0.0, 1.0) > loss || now_s - flier.told.2 > 0.7) {
+                    let (place, _, way) = flier.at(flier.along_m);
+                    flier.told = (place, way * flier.speed_mps, now_s);
+                }
+            }
+            let stop = [0, 1].map(|i| {
+                let other = &fliers[1 - i];
+                let (position, velocity, at_s) = other.told;
+                let next = other.at(other.along_m).1.saturating_sub(1).min(other.path.len() - 1);
+                let heard = Heard {
+                    position,
+                    velocity,
+                    speed_mps: velocity.norm(),
+                    age_s: now_s - at_s,
+                    points: &other.path[next..],
+                    grounded: false,
+                    column_to_m: None,
+                };
+                conflicts(&fliers[i].set(), &heard.set(&BOUNDS, 0.0), &position, APART_M)
+            });
+            for (flier, stop) in fliers.iter_mut().zip(stop) {
+                flier.step(stop, 0.05);
+                stops += u32::from(stop);
+            }
+            let apart_m = (fliers[0].at(fliers[0].along_m).0 - fliers[1].at(fliers[1].along_m).0).norm();
+            assert!(apart_m > APART_M - 0.1, "case {case}, {now_s} s: {apart_m} m");
+            nearest_m = nearest_m.min(apart_m);
+        }
+        arrived += fliers.iter().filter(|f| f.at(f.along_m).1 == f.path.len()).count();
+    }
+    std::println!("nearest {nearest_m} m, {stops} steps of a stop, {arrived} arrived");
+    assert!(stops > 100 && arrived > 100, "{stops} {arrived}");
+}
