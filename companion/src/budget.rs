@@ -17,7 +17,7 @@ pub const SAVED: u32 = 1000;
 /// Bytes of a position with its frame; nothing else that is asked for and made fresh is longer.
 pub(crate) const POSITION: usize = 40;
 /// The same and the longest intent with its frame.
-const STATE: u32 = POSITION as u32 + 137;
+const STATE: u32 = POSITION as u32 + 145;
 /// Bytes of a heartbeat with its frame.
 const HEARTBEAT: u32 = 21;
 

@@ -143,7 +143,7 @@ fn state_is_as_long_as_said() {
         "{}",
         bench.bytes()
     );
-    assert_eq!(STATE as usize, (28 + 12) + (5 + 24 + 12 * crate::intent::POINTS + 12));
+    assert_eq!(STATE as usize, (28 + 12) + (5 + 32 + 12 * crate::intent::POINTS + 12));
 }
 
 #[test]

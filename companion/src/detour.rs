@@ -145,11 +145,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn is_held(&self) -> bool {
-        let held = self.guidance.advice.waiting_for != 0;
+        let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
             State::Scheduled => self.around.blocked || (held && self.guidance.advice.stop_within_m <= 0.05),
             State::Follow => held && stands,
+            State::Climb => {
+                self.guidance.filter.is_stopped() && self.telemetry.velocity.norm() < STANDING_MPS
+            }
             State::Blocked => stands,
             _ => false,
         }
@@ -218,8 +221,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
         let astray = self.around.left && (!self.around.flying || aside);
         let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
+        let stopped = self.guidance.filter.blocked_for(now) > STUCK;
         self.around.blocked =
-            !self.guidance.returning && (stuck || astray || dead_end || self.around.in_the_way);
+            !self.guidance.returning && (stuck || astray || dead_end || stopped || self.around.in_the_way);
         if !self.neighbours.all_stand(now) {
             // Somebody moved: what stood in the way may have gone.
             (self.around.quiet_since, self.around.failed) = (None, 0);

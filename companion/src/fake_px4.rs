@@ -399,7 +399,7 @@ impl Bench {
             progress_m,
             speed_mps: 0.0,
             heard: u32::MAX,
-            points: heapless::Vec::new(),
+            ..Intent::default()
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);

@@ -1,6 +1,7 @@
 //! Where to be now: the setpoint of each state, made from the path, the neighbours and the autopilot's position.
 
 mod brakes;
+mod filter;
 
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -9,6 +10,7 @@ use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
 use crate::config::Config;
+use crate::guidance::filter::Filter;
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat::Search;
@@ -92,6 +94,10 @@ pub struct Guidance {
     descended_m: Option<f32>,
     /// Height over the ground at which the autopilot lands by itself, metres.
     low_m: f32,
+    /// Where along the path it will stop for now, whatever the safety filter does, metres.
+    pub(crate) stops_at_m: f32,
+    /// The safety filter.
+    pub(crate) filter: Filter,
 }
 
 /// What guidance reads beside its own state.
@@ -102,6 +108,8 @@ pub struct Scene<'a, const W: usize, const G: usize> {
     pub telemetry: &'a Telemetry,
     /// Rank in the roster.
     pub rank: u16,
+    /// MAVLink system id.
+    pub id: u8,
     /// Whether the path is one of its own around something.
     pub detours: bool,
 }
@@ -139,6 +147,8 @@ impl Guidance {
             aside: false,
             descended_m: None,
             low_m: config.required_clearance_m - config.radius_m,
+            stops_at_m: f32::NEG_INFINITY,
+            filter: Filter::default(),
         }
     }
 
@@ -157,6 +167,7 @@ impl Guidance {
         self.aside = false;
         self.descended_m = None;
         self.advice = NOT_ASKED;
+        self.filter.reset();
     }
 
     pub fn hold_at(&mut self, point: Point) {
@@ -287,7 +298,13 @@ impl Guidance {
             };
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
         }
-        if state == State::Climb {
+        let stop_m = match state {
+            State::Follow => self.advice.stop_within_m,
+            _ => self.brake_at_m - along_m,
+        };
+        self.stops_at_m = along_m + stop_m.max(0.0);
+        self.filter(state, scene, neighbours, now);
+        if state == State::Climb && !self.filter.is_stopped() {
             let top = plan.path.point_at(0.0).map_or(self.climb_z, |p| p.z);
             let lead = position.z + CLIMB_LEAD_M;
             let rate = self.climb_rate(top);
@@ -299,6 +316,8 @@ impl Guidance {
             } else {
                 Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
             };
+            advice.stop_within_m = advice.stop_within_m.min(self.filter.leaves_m(self.tracker.along_m));
+            advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
             self.reference =
                 self.retreat(state, &plan.path, &mut advice, neighbours, now, dt_s).or_else(|| {
                     path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s)
@@ -310,6 +329,22 @@ impl Guidance {
                 self.progress_m = self.tracker.along_m;
                 self.progress_at = now;
             }
+        }
+    }
+
+    /// Whether it leads the vehicle down.
+    pub(crate) fn descends(&self) -> bool {
+        self.descended_m.is_some()
+    }
+
+    /// Height of the ground below the vehicle, as far as the plan tells, metres.
+    pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
+        let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
+        let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
+        match self.on_path {
+            true if self.reached_end(&plan.path) => end_m,
+            true => pad_m.min(end_m),
+            false => pad_m,
         }
     }
 
@@ -332,6 +367,12 @@ impl Guidance {
             None if self.stands_at_end(scene) => 0.0,
             None => return,
         };
+        if self.filter.is_stopped() {
+            // Back up its own column, if it yields.
+            let up_m = if self.filter.backs_up(now) { self.climb_mps * dt_s } else { 0.0 };
+            self.descended_m = Some(descended_m - up_m).filter(|m| *m > 0.0);
+            return;
+        }
         let rate = self.vertical_rate(self.guided_m(descent_m) - descended_m);
         self.descended_m = Some(descended_m + rate * dt_s);
         if rate > 0.0 {
@@ -427,7 +468,7 @@ impl Guidance {
             State::PilotControl => Setpoint::Move(scene.telemetry.position, still, still),
             State::Climb => {
                 let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
-                let rate = self.climb_rate(start.z);
+                let rate = if self.filter.is_stopped() { 0.0 } else { self.climb_rate(start.z) };
                 let place = Point::new(start.x, start.y, self.climb_z);
                 Setpoint::Move(place, Point::new(0.0, 0.0, rate), still)
             }
@@ -435,7 +476,11 @@ impl Guidance {
                 Some(r) if self.on_path => {
                     let down_m = self.descended_m.unwrap_or(0.0);
                     let rate = match scene.plan {
-                        Some(plan) if state == State::Follow && self.descended_m.is_some() => {
+                        Some(plan)
+                            if state == State::Follow
+                                && self.descended_m.is_some()
+                                && !self.filter.is_stopped() =>
+                        {
                             self.vertical_rate(self.guided_m(plan.descent_m) - down_m)
                         }
                         _ => 0.0,

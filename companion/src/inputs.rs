@@ -63,6 +63,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05
+                && self.guidance.filter.column_clear()
                 && self.departure_due()
                 && !self.around.blocked
                 && self.neighbours.is_clear_since(self.entered_at)

@@ -4,7 +4,7 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 2 |
+//! | 0 | u8 | version, 3 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
 //! | 3 | u8 | number of path points, 0…8 |
@@ -13,7 +13,10 @@
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
 //! | 16 | f32 | speed, m/s |
 //! | 20 | u32 | whom it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
-//! | 24 | 12 × n | next path points, f32 east, north, up in the mission frame |
+//! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
+//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
+//! | 29 | 3 × u8 | 0 |
+//! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
@@ -22,11 +25,11 @@ use planner_core::Point;
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
-/// Most path points told.
+/// Most path points reported.
 pub const POINTS: usize = 8;
 /// Version of the layout.
-pub const VERSION: u8 = 2;
-const HEAD: usize = 24;
+pub const VERSION: u8 = 3;
+const HEAD: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
 /// Stands on the ground.
@@ -47,7 +50,7 @@ pub const BLOCKED: u8 = 64;
 pub const DETOURS: u8 = 128;
 
 /// One vehicle's intent.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Intent {
     /// MAVLink system id.
     pub system_id: u8,
@@ -63,7 +66,11 @@ pub struct Intent {
     pub speed_mps: f32,
     /// Whom it heard lately, a bit for each rank.
     pub heard: u32,
-    /// Next points of the path.
+    /// Height of the ground below it, as far as it knows, metres.
+    pub floor_m: f32,
+    /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
+    pub column: bool,
+    /// Points that it flies along next, as far as it will go for now; none while somebody else flies it.
     pub points: Vec<Point, POINTS>,
 }
 
@@ -80,6 +87,8 @@ impl Intent {
         body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
         body[16..20].copy_from_slice(&self.speed_mps.to_le_bytes());
         body[20..24].copy_from_slice(&self.heard.to_le_bytes());
+        body[24..28].copy_from_slice(&self.floor_m.to_le_bytes());
+        body[28..32].copy_from_slice(&[u8::from(self.column), 0, 0, 0]);
         for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
             to.copy_from_slice(&value.to_le_bytes());
         }
@@ -113,6 +122,8 @@ impl Intent {
             progress_m: float(12)?,
             speed_mps: float(16)?,
             heard: u32::from_le_bytes(word(20)),
+            floor_m: float(24)?,
+            column: body[28] & 1 != 0,
             points,
         })
     }
@@ -133,6 +144,8 @@ mod tests {
             progress_m: -1.25,
             speed_mps: 2.0,
             heard: 0x8000_0005,
+            floor_m: -0.5,
+            column: count == 3,
             points,
         }
     }
@@ -151,7 +164,7 @@ mod tests {
             assert_eq!(Intent::decode(&padded(&sample(count)), 9), Some(sample(count)));
         }
         assert_eq!(Intent::decode(&padded(&sample(2)), 8), None, "another sender");
-        for (at, value) in [(0, 0), (4, 23), (5, 1), (8, 9)] {
+        for (at, value) in [(0, 0), (4, 31), (5, 2), (8, 9)] {
             let mut bad = padded(&sample(2));
             bad[at] = value;
             assert_eq!(Intent::decode(&bad, 9), None, "byte {at}");

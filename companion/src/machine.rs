@@ -160,7 +160,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// System id of the vehicle waited for; 0 when free.
     pub fn waiting_for(&self) -> u8 {
-        self.guidance.advice.waiting_for
+        match self.guidance.filter.blocker() {
+            0 => self.guidance.advice.waiting_for,
+            id => id,
+        }
+    }
+
+    /// How often the safety filter stopped the vehicle.
+    pub fn filter_stops(&self) -> u32 {
+        self.guidance.filter.activations()
     }
 
     /// Way made along the own path, metres.
@@ -246,6 +254,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
             telemetry: &self.telemetry,
             rank: self.rank,
+            id: self.config.system_id,
             detours: self.around.flying,
         }
     }
@@ -403,6 +412,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
             telemetry: &self.telemetry,
             rank: self.rank,
+            id: self.config.system_id,
             detours: self.around.flying,
         };
         self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s);

@@ -11,6 +11,7 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOff, Nature};
 use planner_core::frames::{self, Geodetic};
+use planner_core::safety::Heard;
 
 use crate::config::RosterEntry;
 use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
@@ -57,6 +58,8 @@ const STRANGERS: usize = 4;
 const STRANGER_STAYS: Duration = Duration::from_secs(60);
 /// Rank of a stranger: behind everyone.
 const STRANGER: u16 = u16::MAX;
+/// A vehicle that stood for so long is not about to go on.
+const STANDS: Duration = Duration::from_secs(5);
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
 
@@ -75,6 +78,13 @@ struct Contact {
     /// When an intent of our mission was last heard from it.
     belongs_at: Option<Instant>,
     points: Vec<Point, POINTS>,
+    /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
+    column: bool,
+    floor_m: f32,
+    /// How fast it was when its position was heard, m/s.
+    speed_mps: f32,
+    /// When it was last known to move.
+    moved_at: Instant,
     /// Where it rested when a way around was planned.
     avoided: Option<Point>,
     state: Neighbour,
@@ -195,6 +205,20 @@ impl Contact {
     }
 }
 
+/// A neighbour as the safety filter sees it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Met<'a> {
+    pub(crate) id: u8,
+    /// Whether the roster does not name it.
+    pub(crate) stranger: bool,
+    /// Whether it follows the shared plan.
+    pub(crate) on_plan: bool,
+    /// Whether it has stood for a while.
+    pub(crate) stands: bool,
+    /// What its set follows from.
+    pub(crate) heard: Heard<'a>,
+}
+
 /// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
 /// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
 #[derive(Clone, Debug)]
@@ -252,6 +276,10 @@ impl<const V: usize> Neighbours<V> {
             hears_us_at: None,
             belongs_at: None,
             points: Vec::new(),
+            column: false,
+            floor_m: f32::NAN,
+            speed_mps: 0.0,
+            moved_at: Instant::ZERO,
             avoided: None,
             state,
         };
@@ -332,6 +360,10 @@ impl<const V: usize> Neighbours<V> {
         contact.state.position = frames::geodetic_to_enu(origin, &place);
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
+        contact.speed_mps = contact.state.velocity.norm();
+        if contact.speed_mps >= STANDING_MPS {
+            contact.moved_at = now;
+        }
     }
 
     /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's CRC, its progress only if the plan
@@ -360,6 +392,7 @@ impl<const V: usize> Neighbours<V> {
             contact.hears_us_at = Some(now);
         }
         contact.points.clone_from(&intent.points);
+        (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m = shared.then_some(intent.progress_m);
     }
@@ -384,6 +417,34 @@ impl<const V: usize> Neighbours<V> {
             }
         }
         &self.heard
+    }
+
+    /// Contact `i` as the safety filter sees it; none if its place was never heard.
+    pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
+        let contact = self.contacts.get(i)?;
+        let age_s = (now - contact.position_at?).secs_f32();
+        let here = contact.state.position;
+        let grounded = contact.tells(GROUNDED | LANDED);
+        let dead = contact.is_dead(now) && !contact.points.is_empty();
+        let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
+        let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
+        let heard = Heard {
+            position: here,
+            velocity: contact.state.velocity,
+            speed_mps: if dead { 0.0 } else { contact.speed_mps },
+            // Whoever flew along its points stopped on them, and rests where a reroute keeps off.
+            age_s: if dead { 0.0 } else { age_s },
+            points: if dead { &[] } else { &contact.points },
+            grounded,
+            column_to_m: (down && !grounded).then_some(floor_m),
+        };
+        Some(Met {
+            id: contact.id,
+            stranger: contact.rank == STRANGER,
+            on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
+            stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
+            heard,
+        })
     }
 
     /// Whom we heard lately, a bit for each rank.

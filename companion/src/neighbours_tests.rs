@@ -21,8 +21,16 @@ fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
 }
 
 fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
-    let points = Vec::new();
-    Intent { system_id: 9, flags, mission_crc, plan_crc, progress_m: 4.0, speed_mps: 1.0, heard: 2, points }
+    Intent {
+        system_id: 9,
+        flags,
+        mission_crc,
+        plan_crc,
+        progress_m: 4.0,
+        speed_mps: 1.0,
+        heard: 2,
+        ..Intent::default()
+    }
 }
 
 /// The same with vehicles 3 and 9 heard of mission 1 at `at_ms`.

@@ -191,10 +191,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::BLOCKED, self.around.blocked)
             | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
         let plan = self.plan.as_ref();
-        let mut points = heapless::Vec::new();
         let along_m = self.guidance.progress_m(self.state, &self.scene());
-        let ahead = plan.into_iter().flat_map(|plan| plan.path.waypoints()).filter(|w| w.along_m > along_m);
-        points.extend(ahead.take(intent::POINTS).map(|w| w.position));
+        let (points, column) = self.way_ahead();
         Intent {
             system_id: self.config.system_id,
             flags,
@@ -203,7 +201,53 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             progress_m: if self.around.flying { self.around.left_at_m } else { along_m },
             heard: self.neighbours.heard_bits(self.now),
             speed_mps: self.telemetry.velocity.norm(),
+            floor_m: plan.map_or(self.start.z, |plan| self.guidance.ground_m(plan)),
+            column,
             points,
         }
+    }
+
+    /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
+    fn way_ahead(&self) -> (heapless::Vec<Point, { intent::POINTS }>, bool) {
+        use State::*;
+        let mut points = heapless::Vec::new();
+        let here = self.telemetry.position;
+        let setpoint = match self.guidance.setpoint(self.state, &self.scene()) {
+            Setpoint::Move(place, ..) => place,
+            _ => here,
+        };
+        let mut add = |point: Point| {
+            // Full after eight: the rest is further than it can fly before it is heard again.
+            let _ = points.push(point);
+        };
+        let Some(plan) = &self.plan else { return (points, true) };
+        let path = &plan.path;
+        let (first, last) = (path.point_at(0.0), path.point_at(path.length_m()));
+        let mut column = true;
+        match self.state {
+            TakeOff | Climb => {
+                add(setpoint);
+                first.into_iter().for_each(add);
+            }
+            Land => {
+                add(here);
+                add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
+            }
+            Follow if self.guidance.descends() => {
+                add(setpoint);
+                last.into_iter()
+                    .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
+            }
+            Follow | Paused | Alone | Blocked | Replanning | Stopping => {
+                column = false;
+                add(setpoint);
+                let (from_m, to_m) = (self.guidance.along_m(), self.guidance.stops_at_m);
+                let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
+                ahead.for_each(|w| add(w.position));
+                path.point_at(to_m).filter(|_| to_m > from_m).into_iter().for_each(add);
+            }
+            _ => {}
+        }
+        (points, column)
     }
 }

@@ -99,6 +99,13 @@ impl Set {
         set
     }
 
+    /// How far from its first point it reaches at most, metres.
+    pub fn reach_m(&self) -> f32 {
+        let here = self.points[0];
+        let most_sq = self.points.iter().fold(0.0, |most, p| fmaxf(most, (p - here).norm_squared()));
+        sqrtf(most_sq) + self.grow_m
+    }
+
     fn segments(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
         let first = self.points[0];
         let alone = (self.points.len() == 1).then_some((first, first));

@@ -305,6 +305,7 @@ impl<M: Meter> Flight<'_, M> {
             speed_mps: 1.0,
             heard: u32::MAX,
             points,
+            ..Intent::default()
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);

@@ -84,6 +84,7 @@ fn bytes(meter: &mut impl Meter) {
         speed_mps: 1.0,
         heard: 7,
         points,
+        ..Intent::default()
     };
     let mut payload = [0; 133];
     let len = meter.call("intent::Intent::encode", 0, || intent.encode(&mut payload));

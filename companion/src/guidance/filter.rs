@@ -1,0 +1,355 @@
+//! The safety filter: the last word on every motion, whatever was planned, commanded or reported.
+//!
+//! In each step it compares what the vehicle can no longer take back with where each neighbour can be
+//! ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It goes on once the next metre of its way
+//! is free. The vehicle that yields also waits until the way of the other one is free ([`AHEAD_S`]), or that one stands.
+//! In a descent it flies back up its own column. The filter knows no gates, no progress and no advice: it only asks the
+//! gates who goes first where both have stopped.
+//!
+//! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than [`NEAR_MOST`] of those is a stop.
+
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::safety::{self, Bounds, Braking, REACTION_S, Set};
+
+use super::{Guidance, Scene};
+use crate::mission::State;
+use crate::neighbours::{Met, Neighbours};
+use crate::telemetry::Telemetry;
+use crate::time::{Duration, Instant};
+
+/// Change of acceleration in a stop by the filter, m/s³.
+const JERK_MPS3: f32 = 8.0;
+/// An unheard vehicle has stopped by then, seconds: it notices after 1.8 s and brakes.
+const SILENT_S: f32 = 3.0;
+/// So much of the way has to be free before the vehicle goes on, metres.
+const RESUME_M: f32 = 1.0;
+/// And for so long.
+const CLEAR: Duration = Duration::from_millis(300);
+/// The vehicle that yields waits until so many seconds of the other one's way are free.
+const AHEAD_S: f32 = 3.0;
+/// More neighbours than this are not compared in one step: with more nearby the vehicle stops.
+const NEAR_MOST: usize = 6;
+/// Before a vehicle that the roster does not name it stands no longer than this; then it goes on slowly.
+const STRANGER: Duration = Duration::from_secs(10);
+/// How fast.
+const SLOW_SHARE: f32 = 0.15;
+/// Distance between two hulls that is kept from a stranger then, metres.
+const HULLS_M: f32 = 0.3;
+/// What a vehicle may fly faster than its reference and yet stop with it, m/s.
+const SWAY_MPS: f32 = 0.3;
+/// The vehicle that yields in a descent flies back up after this.
+const BACK_UP: Duration = Duration::from_secs(1);
+
+/// What the filter found.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Filter {
+    /// Since when it keeps the vehicle stopped.
+    stopped_since: Option<Instant>,
+    /// Since when the way has been free again.
+    clear_since: Option<Instant>,
+    /// Where along the path the reference stops, metres.
+    stop_at_m: f32,
+    /// For which vehicle.
+    blocker: u8,
+    /// Whether this vehicle is the one that yields.
+    yields: bool,
+    stranger: bool,
+    /// Whether the way to the ground is free.
+    column_clear: bool,
+    /// How often it stopped the vehicle.
+    activations: u32,
+}
+
+/// The way a vehicle is about to fly.
+enum Way {
+    Stands,
+    /// Along the path, or back.
+    Path {
+        back: bool,
+    },
+    /// Straight up or down.
+    Vertical {
+        to_m: f32,
+        speed_mps: f32,
+    },
+}
+
+impl Filter {
+    /// For how long it has kept the vehicle stopped.
+    pub(crate) fn stopped_for(&self, now: Instant) -> Duration {
+        self.stopped_since.map_or(Duration::default(), |at| now - at)
+    }
+
+    pub(crate) fn is_stopped(&self) -> bool {
+        self.stopped_since.is_some()
+    }
+
+    /// For how long it has kept the vehicle stopped although it goes first.
+    pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
+        if self.yields { Duration::default() } else { self.stopped_for(now) }
+    }
+
+    /// For how long it has made the vehicle yield.
+    pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
+        if self.yields { self.stopped_for(now) } else { Duration::default() }
+    }
+
+    /// For which vehicle it stops; 0 for none.
+    pub(crate) fn blocker(&self) -> u8 {
+        if self.is_stopped() { self.blocker } else { 0 }
+    }
+
+    /// How often it stopped the vehicle.
+    pub(crate) fn activations(&self) -> u32 {
+        self.activations
+    }
+
+    /// Whether the column to the ground was free in the last step.
+    pub(crate) fn column_clear(&self) -> bool {
+        self.column_clear
+    }
+
+    pub(super) fn reset(&mut self) {
+        *self = Self { activations: self.activations, ..Self::default() };
+    }
+
+    /// Distance along the path that it leaves from `along_m`, metres.
+    pub(super) fn leaves_m(&self, along_m: f32) -> f32 {
+        if self.is_stopped() { (self.stop_at_m - along_m).max(0.0) } else { f32::INFINITY }
+    }
+
+    /// Share of the nominal speed that it leaves.
+    pub(super) fn speed_share(&self, now: Instant) -> f32 {
+        if self.passes_stranger(now) { SLOW_SHARE } else { 1.0 }
+    }
+
+    fn passes_stranger(&self, now: Instant) -> bool {
+        self.stranger && self.stopped_for(now) >= STRANGER
+    }
+
+    /// Whether the vehicle flies back up its column.
+    pub(super) fn backs_up(&self, now: Instant) -> bool {
+        self.yielded_for(now) >= BACK_UP
+    }
+}
+
+impl Guidance {
+    fn bounds(&self) -> Bounds {
+        let braking = Braking { accel_mps2: self.track.accel_mps2, jerk_mps3: JERK_MPS3 };
+        Bounds { braking, speed_max_mps: self.track.cruise_mps, silent_s: SILENT_S }
+    }
+
+    /// Compares the way ahead with all neighbours; to be called once a step, before the reference moves.
+    pub(super) fn filter<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) {
+        let Some(plan) = scene.plan else { return };
+        let position = &scene.telemetry.position;
+        self.filter.column_clear = true;
+        let ground_m = self.ground_m(plan).min(position.z);
+        let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
+        let way = match state {
+            State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
+            State::Land => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
+            State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.climb_rate(top_m) },
+            State::Follow if self.descended_m.is_some() => {
+                Way::Vertical { to_m: ground_m, speed_mps: self.climb_mps }
+            }
+            State::Follow
+            | State::Paused
+            | State::Alone
+            | State::Blocked
+            | State::Replanning
+            | State::Stopping
+                if self.on_path =>
+            {
+                Way::Path { back: self.tracker.speed_mps < 0.0 || self.retreating }
+            }
+            _ => Way::Stands,
+        };
+        if matches!(way, Way::Stands) {
+            self.filter.reset();
+            return;
+        }
+        let whole_column = matches!(state, State::Scheduled | State::Land);
+        let stopped = self.filter.is_stopped();
+        let extra_m = if stopped { RESUME_M } else { 0.0 };
+        let bounds = self.bounds();
+        let own = match way {
+            Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
+            Way::Vertical { to_m, speed_mps } => {
+                let speed_mps = if stopped { 0.0 } else { speed_mps };
+                let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
+                let down = to_m < position.z;
+                // The reference leads the vehicle, and the vehicle flies on to it.
+                let reference_m = self.vertical_reference_m(state, position);
+                let end_m = if down {
+                    (reference_m.min(position.z) - fly_m).max(to_m)
+                } else {
+                    (reference_m.max(position.z) + fly_m).min(to_m.max(position.z))
+                };
+                Set::vertical(*position, end_m)
+            }
+            Way::Path { back } => self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back),
+            Way::Stands => return,
+        };
+        let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
+        if whole_column {
+            self.filter.column_clear = found.is_none();
+            self.filter.reset_stop();
+            self.filter.blocker = found.map_or(0, |found| found.id);
+            return;
+        }
+        match found {
+            Some(found) => {
+                if !stopped {
+                    let speed_mps = self.tracker.speed_mps;
+                    let braking_m = speed_mps * speed_mps / (2.0 * self.track.accel_mps2);
+                    self.filter.stop_at_m = self.tracker.along_m + braking_m;
+                    self.filter.stopped_since = Some(now);
+                    self.filter.activations = self.filter.activations.wrapping_add(1);
+                }
+                self.filter.clear_since = None;
+                (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
+                self.filter.stranger = found.stranger;
+            }
+            None if stopped => {
+                let since = *self.filter.clear_since.get_or_insert(now);
+                // Past a stranger it goes on in the same stop, slowly.
+                if now - since >= CLEAR && !self.filter.passes_stranger(now) {
+                    self.filter.reset_stop();
+                } else if self.filter.passes_stranger(now) {
+                    self.filter.stop_at_m = f32::INFINITY;
+                    if now - since >= STRANGER {
+                        self.filter.reset_stop();
+                    }
+                }
+            }
+            None => {}
+        }
+    }
+
+    fn vertical_reference_m(&self, state: State, position: &Point) -> f32 {
+        match (state, self.reference) {
+            (State::Climb, _) => self.climb_z,
+            (_, Some(reference)) => reference.position.z - self.descended_m.unwrap_or(0.0),
+            _ => position.z,
+        }
+    }
+
+    /// What the vehicle can no longer take back on its path, and `extra_m`.
+    fn own_set<const W: usize>(
+        &self,
+        path: &Path<W>,
+        telemetry: &Telemetry,
+        bounds: &Bounds,
+        extra_m: f32,
+        back: bool,
+    ) -> Set {
+        let (position, velocity_mps) = (&telemetry.position, telemetry.velocity.norm());
+        let along_m = self.tracker.along_m;
+        let speed_mps = self.tracker.speed_mps.abs().max(velocity_mps - SWAY_MPS);
+        let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
+        let here = path.point_at(along_m).unwrap_or(*position);
+        let points = path.waypoints();
+        if back {
+            let next = points.partition_point(|w| w.along_m < along_m);
+            let behind = points[..next].iter().rev().map(|w| w.position);
+            return Set::along(*position, core::iter::once(here).chain(behind), fly_m);
+        }
+        // It stops for its gates in any case.
+        let fly_m = fly_m.min((self.stops_at_m - along_m).max(0.0));
+        let next = points.partition_point(|w| w.along_m <= along_m);
+        let ahead = points[next..].iter().map(|w| w.position);
+        Set::along(*position, core::iter::once(here).chain(ahead), fly_m)
+    }
+
+    /// The first neighbour whose set meets `own`.
+    fn first_conflict<const V: usize, const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        own: &Set,
+        bounds: &Bounds,
+        now: Instant,
+    ) -> Option<Found> {
+        let safety_m = self.deconflict.safety_distance_m;
+        let place = scene.telemetry.position;
+        let own_reach_m = own.reach_m();
+        let lands = state == State::Land;
+        let mut near = 0;
+        for i in 0..neighbours.len() {
+            let Some(mut met) = neighbours.met(i, now) else { continue };
+            if lands && met.heard.age_s > safety::FRESH_S {
+                // A landing does not wait for a vehicle that is silent: only its last place counts.
+                (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
+            }
+            let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
+            let apart_m = if met.stranger && self.filter.passes_stranger(now) {
+                2.0 * self.track.radius_m + HULLS_M
+            } else {
+                safety_m
+            };
+            let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
+            let away = met.heard.position - place;
+            let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
+            if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
+                continue;
+            }
+            near += 1;
+            let yields = self.yields_to(state, scene, &met);
+            let ahead_s = if yields { ahead_s } else { 0.0 };
+            let found = Found { id: met.id, yields, stranger: met.stranger };
+            if near > NEAR_MOST {
+                return Some(found);
+            }
+            let other = met.heard.set(bounds, ahead_s);
+            if safety::conflicts(own, &other, &met.heard.position, apart_m) {
+                return Some(found);
+            }
+        }
+        None
+    }
+
+    /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then the gates' order decides,
+    /// then the lower id goes.
+    fn yields_to<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        met: &Met<'_>,
+    ) -> bool {
+        let on_plan = !self.returning && !scene.detours && state != State::Land;
+        if met.stranger || met.on_plan != on_plan {
+            return met.stranger || met.on_plan;
+        }
+        let along_m = if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY };
+        let waits = |plan: &planner_core::schedule::VehiclePlan<W, G>| {
+            plan.gates.iter().any(|gate| gate.id == met.id && gate.at_m >= along_m)
+        };
+        if on_plan && scene.plan.is_some_and(waits) && self.advice.waiting_for == met.id {
+            return true;
+        }
+        met.id < scene.id
+    }
+}
+
+/// A neighbour whose set meets that of the vehicle.
+struct Found {
+    id: u8,
+    yields: bool,
+    stranger: bool,
+}
+
+impl Filter {
+    fn reset_stop(&mut self) {
+        (self.stopped_since, self.clear_since) = (None, None);
+        (self.yields, self.stranger) = (false, false);
+    }
+}
