@@ -4,6 +4,8 @@ pub mod board;
 pub mod bounds;
 pub mod debugger;
 pub mod logs;
+pub mod meeting;
+pub mod setpoints;
 pub mod vehicle;
 
 use std::io::{BufRead, BufReader};

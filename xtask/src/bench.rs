@@ -17,12 +17,16 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or the deconfliction suite.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or one of the
+    /// suites: deconfliction, meetings.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// Seeds of each case of the deconfliction suite.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
+    /// How many of a suite that has a number: meetings.
+    #[arg(long, value_name = "N")]
+    n: Option<u64>,
 }
 
 /// Runs every bench; the rows that need the baseline are skipped with a line where it cannot be built.
@@ -37,6 +41,13 @@ pub fn run_bench(args: &Args) -> Result<()> {
         }
         if let Some(out) = &args.out {
             bench.arg("--out").arg(std::path::absolute(out)?);
+        }
+        return run(&mut bench);
+    }
+    if args.only.as_deref() == Some("meetings") {
+        bench.args(["meetings", "--"]);
+        if let Some(n) = args.n {
+            bench.arg("--n").arg(n.to_string());
         }
         return run(&mut bench);
     }

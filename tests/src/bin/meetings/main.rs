@@ -1,0 +1,56 @@
+//! Random meetings of whole companions, judged by the truth; `cargo xtask bench --only meetings` runs ten thousand.
+
+use std::time::Instant;
+
+use clap::Parser;
+use flockmate_tests::meeting::{self, Outcome, scene};
+use flockmate_tests::setpoints::SetpointStats;
+use rayon::prelude::*;
+
+#[derive(Parser)]
+#[command(about = "Random meetings of whole companions")]
+struct Args {
+    /// Meetings.
+    #[arg(long, value_name = "N", default_value_t = 10_000)]
+    n: u64,
+    /// The first seed; alone with --trace: this one only.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    seed: u64,
+    /// Print what happens in one meeting.
+    #[arg(long)]
+    trace: bool,
+    /// Only meetings of this geometry.
+    #[arg(long, value_name = "KIND")]
+    kind: Option<String>,
+}
+
+fn main() {
+    let args = Args::parse();
+    if args.trace {
+        let outcome = meeting::fly(&scene::scene(args.seed), true);
+        outcome.trace.iter().for_each(|line| println!("{line}"));
+        println!("{}", meeting::line(&outcome));
+        outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
+        return;
+    }
+    let began = Instant::now();
+    let outcomes: Vec<Outcome> = (args.seed..args.seed + args.n)
+        .into_par_iter()
+        .map(scene::scene)
+        .filter(|scene| args.kind.as_deref().is_none_or(|kind| scene.kind == kind))
+        .map(|scene| meeting::fly(&scene, false))
+        .collect();
+    let took_s = began.elapsed().as_secs_f64();
+    for outcome in outcomes.iter().filter(|outcome| outcome.is_bad()) {
+        println!("{}", meeting::line(outcome));
+    }
+    let sum = meeting::summary(&outcomes);
+    println!("{sum}");
+    let mut setpoints = SetpointStats::default();
+    outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
+    println!("{setpoints}");
+    println!("{took_s:.0} s, {:.1} meetings/s", outcomes.len() as f64 / took_s);
+    if sum.is_bad() {
+        std::process::exit(1);
+    }
+}

@@ -1,0 +1,375 @@
+//! The judge of a meeting. It computes the sets of the safety filter by their definition, from the messages that a
+//! vehicle received and from the truth, and none of it with the companion's code.
+//!
+//! - *Own set*: 0.1 s at the present velocity, then a stop; the setpoint is ahead by what the vehicle lags. In a landing
+//!   the column to the floor.
+//! - *A neighbour's set*: heard within 1 s, the points it reports from its last position, as far as its speed takes it in
+//!   its age + 0.1 s and in a stop after that; off these points, its velocity, widened by ½·a·age²; older, a ball. A column
+//!   to the floor while it climbs, descends or lands.
+//!
+//! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first step at which its sets
+//! came too near, would have kept the distance.
+
+use companion::intent::{GROUNDED, Intent, LANDED};
+use planner_core::Point;
+
+use super::autopilot::STEP_S;
+use super::scene::{CRUISE_MPS, SAFETY_M};
+
+/// Braking along a path, m/s².
+const ACCEL: f32 = 1.5;
+/// The jerk of a stop by the safety filter, m/s³.
+const JERK: f32 = 8.0;
+/// What a real vehicle lags its setpoint, as time, seconds.
+const LAG_S: f32 = 0.35;
+/// Latest time at which a neighbour's points are believed, seconds.
+const FRESH_S: f32 = 1.0;
+/// A silent neighbour's ball grows so long, seconds.
+const GROWS_S: f32 = 3.0;
+/// Sets that come apart for no longer than this stay one approach, steps.
+const GAP_STEPS: usize = 40;
+/// A stop has to keep this much more than the distance to count as one that would have kept it, metres.
+const SURE_M: f32 = 0.05;
+
+/// What a vehicle last heard of another.
+#[derive(Clone, Debug, Default)]
+pub struct Heard {
+    /// Place, velocity, sender's clock and when it came, seconds.
+    pub position: Option<(Point, Point, u32, f32)>,
+    /// Intent.
+    pub intent: Option<Intent>,
+}
+
+/// A neighbour's set.
+#[derive(Clone, Debug, Default)]
+pub struct Set {
+    segments: Vec<(Point, Point)>,
+    radius_m: f32,
+}
+
+/// How far a vehicle goes at this speed: `before_s`, then a stop.
+fn reach(speed: f32, before_s: f32) -> f32 {
+    speed * before_s + speed * speed / (2.0 * ACCEL) + speed * ACCEL / (2.0 * JERK)
+}
+
+/// Distance between two segments.
+pub fn distance(p: (Point, Point), q: (Point, Point)) -> f32 {
+    // Alternating projections settle fast enough on segments: the distance is convex.
+    let onto = |at: Point, (from, to): (Point, Point)| {
+        let along = to - from;
+        let length_sq = along.norm_squared();
+        let share = if length_sq > 0.0 { ((at - from).dot(&along) / length_sq).clamp(0.0, 1.0) } else { 0.0 };
+        from + along * share
+    };
+    let ends = [p.0, p.1].map(|end| (end - onto(end, q)).norm());
+    let others = [q.0, q.1].map(|end| (end - onto(end, p)).norm());
+    let mut least = ends[0].min(ends[1]).min(others[0]).min(others[1]);
+    let mut at = (p.0 + p.1) * 0.5;
+    for _ in 0..12 {
+        at = onto(onto(at, q), p);
+        least = least.min((at - onto(at, q)).norm());
+    }
+    least
+}
+
+/// Where a neighbour can be, by what was heard of it.
+pub fn neighbour_set(heard: &Heard, now_s: f32, floor_z: f32) -> Option<Set> {
+    let (position, velocity, _, at_s) = heard.position?;
+    let age_s = now_s - at_s;
+    if age_s > FRESH_S {
+        let radius_m = CRUISE_MPS * age_s.min(GROWS_S);
+        return Some(Set { segments: vec![(position, position)], radius_m });
+    }
+    let intent = heard.intent.as_ref();
+    if intent.is_some_and(|i| i.flags & (GROUNDED | LANDED) != 0) {
+        return Some(Set { segments: vec![(position, position)], radius_m: 0.0 });
+    }
+    let speed = velocity.norm();
+    let mut left_m = reach(speed, age_s + 0.1);
+    let mut set = Set { segments: vec![(position, position)], radius_m: 0.0 };
+    let next = intent.and_then(|i| i.points.iter().find(|p| (*p - position).norm() > 0.05));
+    let on_points =
+        next.is_some_and(|next| speed < 0.3 || velocity.dot(&(next - position).normalize()) > 0.7 * speed);
+    if let (true, Some(intent)) = (on_points, intent) {
+        let mut from = position;
+        for to in &intent.points {
+            let leg_m = (to - from).norm();
+            if leg_m < 1e-3 {
+                continue;
+            }
+            let end = from + (to - from) * (left_m / leg_m).min(1.0);
+            set.segments.push((from, end));
+            left_m -= leg_m;
+            from = *to;
+            if left_m <= 0.0 {
+                break;
+            }
+        }
+    } else if speed > 1e-3 {
+        set.segments.push((position, position + velocity * (left_m / speed)));
+        set.radius_m = 0.5 * ACCEL * age_s * age_s;
+    }
+    if velocity.z < -0.2 {
+        set.segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
+    }
+    Some(set)
+}
+
+/// Where a vehicle that brakes now can be.
+pub fn own_set(position: Point, velocity: Point, lands: bool, floor_z: f32) -> Set {
+    let speed = velocity.norm();
+    let mut segments = vec![(position, position)];
+    if lands {
+        segments.push((position, Point::new(position.x, position.y, floor_z.min(position.z))));
+    } else if speed > 1e-3 {
+        segments.push((position, position + velocity * (reach(speed, 0.1 + LAG_S) / speed)));
+    }
+    Set { segments, radius_m: 0.0 }
+}
+
+impl Set {
+    /// Distance to another set.
+    pub fn distance(&self, other: &Self) -> f32 {
+        let pairs = self.segments.iter().flat_map(|p| other.segments.iter().map(move |q| (*p, *q)));
+        pairs.map(|(p, q)| distance(p, q)).fold(f32::INFINITY, f32::min) - self.radius_m - other.radius_m
+    }
+}
+
+/// A vehicle at a step.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen {
+    /// Truth.
+    pub position: Point,
+    /// Truth.
+    pub velocity: Point,
+    /// Off the ground.
+    pub airborne: bool,
+    /// Its companion can stop it.
+    pub own: bool,
+    /// It lands by its autopilot, as its companion commanded.
+    pub lands: bool,
+}
+
+/// Two vehicles that came too near.
+#[derive(Clone, Copy, Debug)]
+pub struct Violation {
+    /// Indices.
+    pub pair: (usize, usize),
+    /// When they were nearest, seconds.
+    pub at_s: f32,
+    /// Their distance then, metres.
+    pub least_m: f32,
+    /// When the sets of each first came too near, seconds.
+    pub warned_s: [Option<f32>; 2],
+    /// The distance that stops from there would have kept.
+    pub kept_m: f32,
+}
+
+impl Violation {
+    /// Whether a stop would have kept the safety distance.
+    pub fn is_failure(&self) -> bool {
+        self.kept_m >= SAFETY_M + SURE_M
+    }
+}
+
+#[derive(Clone, Copy, Debug, Default)]
+struct Approach {
+    since: usize,
+    last: usize,
+}
+
+/// Watches a meeting.
+#[derive(Debug)]
+pub struct Oracle {
+    count: usize,
+    tracks: Vec<Vec<Seen>>,
+    approaches: Vec<Option<Approach>>,
+    /// For each pair that is too near: since when, warned since when, and the nearest step and distance.
+    near: Vec<Option<Near>>,
+    /// What went wrong.
+    pub violations: Vec<Violation>,
+    touching: Vec<bool>,
+    /// Touches: seconds, the vehicle that moved, the other, metres.
+    pub touches: Vec<(f32, usize, usize, f32)>,
+    /// The smallest distance of two vehicles, one of them off the ground.
+    pub least_m: f32,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    warned: [Option<usize>; 2],
+    nearest: usize,
+    least_m: f32,
+}
+
+/// Centres nearer than this touch: twice the hull's radius.
+pub const TOUCH_M: f32 = 0.6;
+/// A vehicle that comes nearer at less does not move toward the other, m/s.
+const TOWARD_MPS: f32 = 0.15;
+/// Too near ends this far beyond, metres.
+const APART_M: f32 = 0.1;
+
+impl Oracle {
+    /// Watches `count` vehicles.
+    pub fn new(count: usize) -> Self {
+        Self {
+            count,
+            tracks: vec![Vec::new(); count],
+            approaches: vec![None; count * count],
+            near: vec![None; count * count],
+            violations: Vec::new(),
+            touching: vec![false; count * count],
+            touches: Vec::new(),
+            least_m: f32::INFINITY,
+        }
+    }
+
+    /// Takes a step in; `heard` is what vehicle a heard of vehicle b.
+    pub fn observe(
+        &mut self,
+        seen: &[Seen],
+        heard: impl Fn(usize, usize) -> Heard,
+        floor_z: impl Fn(&Point) -> f32,
+        judge_sets: bool,
+    ) {
+        let step = self.tracks[0].len();
+        self.tracks.iter_mut().zip(seen).for_each(|(track, seen)| track.push(*seen));
+        let now_s = step as f32 * STEP_S;
+        for a in 0..self.count {
+            for b in 0..self.count {
+                if a == b {
+                    continue;
+                }
+                if judge_sets && seen[a].airborne && seen[a].own {
+                    self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
+                }
+                if a < b {
+                    self.judge_distance(step, (a, b), seen);
+                }
+            }
+        }
+    }
+
+    fn judge_sets(
+        &mut self,
+        step: usize,
+        now_s: f32,
+        (a, b): (usize, usize),
+        own: &Seen,
+        heard: &Heard,
+        floor_z: &impl Fn(&Point) -> f32,
+    ) {
+        let Some((position, ..)) = heard.position else { return };
+        // Nothing reaches further.
+        if (position - own.position).xy().norm() > 15.0 {
+            return;
+        }
+        let Some(theirs) = neighbour_set(heard, now_s, floor_z(&position)) else { return };
+        let ours = own_set(own.position, own.velocity, own.lands, floor_z(&own.position));
+        if ours.distance(&theirs) < SAFETY_M {
+            let approach = &mut self.approaches[a * self.count + b];
+            match approach {
+                Some(known) if step - known.last <= GAP_STEPS => known.last = step,
+                _ => *approach = Some(Approach { since: step, last: step }),
+            }
+        }
+    }
+
+    fn judge_distance(&mut self, step: usize, (a, b): (usize, usize), seen: &[Seen]) {
+        let at = a * self.count + b;
+        if !seen[a].airborne && !seen[b].airborne {
+            self.end_near(a, b);
+            self.touching[at] = false;
+            return;
+        }
+        let apart = seen[b].position - seen[a].position;
+        let apart_m = apart.norm();
+        self.least_m = self.least_m.min(apart_m);
+        if apart_m < SAFETY_M && self.near[at].is_none() {
+            let warned = |from: usize, to: usize| {
+                let known = self.approaches[from * self.count + to];
+                known.filter(|known| step - known.last <= GAP_STEPS).map(|known| known.since)
+            };
+            self.near[at] =
+                Some(Near { warned: [warned(a, b), warned(b, a)], nearest: step, least_m: apart_m });
+        } else if apart_m > SAFETY_M + APART_M {
+            self.end_near(a, b);
+        }
+        if let Some(near) = &mut self.near[at]
+            && apart_m < near.least_m
+        {
+            (near.nearest, near.least_m) = (step, apart_m);
+        }
+        let toward = |own: &Seen, apart: Point| {
+            own.airborne && own.own && own.velocity.dot(&apart) > TOWARD_MPS * apart_m
+        };
+        if apart_m < TOUCH_M {
+            let now_s = step as f32 * STEP_S;
+            for (from, to, apart) in [(a, b, apart), (b, a, -apart)] {
+                if toward(&seen[from], apart) && !self.touching[at] {
+                    self.touches.push((now_s, from, to, apart_m));
+                    self.touching[at] = true;
+                }
+            }
+        } else {
+            self.touching[at] = false;
+        }
+    }
+
+    /// Where a vehicle would be if it had begun to stop at `warned`.
+    fn stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
+        let track = &self.tracks[vehicle];
+        let Some(warned) = warned.filter(|warned| *warned < step) else { return track[step].position };
+        if track[warned..=step].iter().any(|seen| !seen.own) {
+            // Somebody else took it: its companion could not have stopped it.
+            return track[step].position;
+        }
+        let speed = track[warned].velocity.norm();
+        let time_s = (step - warned) as f32 * STEP_S;
+        let before_s = 0.1 + LAG_S;
+        let braked_s = (time_s - before_s).max(0.0);
+        // The time that jerk costs goes at full speed.
+        let ramp_s = ACCEL / (2.0 * JERK);
+        let brakes_s = (braked_s - ramp_s).clamp(0.0, speed / ACCEL);
+        let gone_m = speed * (time_s.min(before_s) + braked_s.min(ramp_s)) + speed * brakes_s
+            - 0.5 * ACCEL * brakes_s * brakes_s;
+        // Along what it flew: it would have left it nowhere.
+        let mut left_m = gone_m;
+        for pair in track[warned..=step].windows(2) {
+            let part = (pair[1].position - pair[0].position).norm();
+            if part >= left_m {
+                return pair[0].position
+                    + (pair[1].position - pair[0].position) * if part > 0.0 { left_m / part } else { 0.0 };
+            }
+            left_m -= part;
+        }
+        track[step].position
+    }
+
+    fn end_near(&mut self, a: usize, b: usize) {
+        let Some(near) = self.near[a * self.count + b].take() else { return };
+        let first = near.warned.iter().flatten().min().copied().unwrap_or(near.nearest);
+        let mut kept_m = f32::INFINITY;
+        for step in first..=near.nearest {
+            let apart = self.stopped(a, near.warned[0], step) - self.stopped(b, near.warned[1], step);
+            kept_m = kept_m.min(apart.norm());
+        }
+        let seconds = |step: usize| step as f32 * STEP_S;
+        self.violations.push(Violation {
+            pair: (a, b),
+            at_s: seconds(near.nearest),
+            least_m: near.least_m,
+            warned_s: near.warned.map(|warned| warned.map(seconds)),
+            kept_m,
+        });
+    }
+
+    /// Ends the meeting.
+    pub fn finish(&mut self) {
+        for a in 0..self.count {
+            for b in a + 1..self.count {
+                self.end_near(a, b);
+            }
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to be flown.
+//!
+//! Speed, acceleration and jerk are differences of the positions that were sent, in the autopilot's frame, so they hold
+//! whatever feed-forward goes along. A gap longer than [`GAP_S`] begins another stream.
+
+use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
+use nalgebra::Vector3;
+
+/// After a longer pause the next setpoint is the first of another stream, seconds.
+const GAP_S: f32 = 0.3;
+/// Of the mask: the position is ignored.
+const NO_POSITION: u16 = 0b111;
+
+/// The greatest of everything that was asked for.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SetpointStats {
+    /// Setpoints with a position.
+    pub count: u64,
+    /// Distance from one to the next, metres.
+    pub step_m: f32,
+    /// Speed between two, m/s.
+    pub speed_mps: f32,
+    /// Change of that speed, m/s².
+    pub accel_mps2: f32,
+    /// Change of that acceleration, m/s³.
+    pub jerk_mps3: f32,
+    /// Difference between the velocity sent and the one the positions move at, m/s.
+    pub mismatch_mps: f32,
+    /// Setpoints with a number that is not finite.
+    pub not_finite: u64,
+    /// Setpoints outside the fence.
+    pub outside: u64,
+    /// Setpoints with more jerk than [`Limits::jerk_mps3`].
+    pub jerky: u64,
+    /// Setpoints further from the last one than [`Limits::speed_mps`] leads.
+    pub jumps: u64,
+}
+
+/// What a stream is held to.
+#[derive(Clone, Copy, Debug)]
+pub struct Limits {
+    /// Greatest speed, m/s.
+    pub speed_mps: f32,
+    /// Greatest jerk, m/s³.
+    pub jerk_mps3: f32,
+    /// Corners of the fence in the autopilot's frame, metres.
+    pub fence: Option<(Vector3<f32>, Vector3<f32>)>,
+}
+
+impl SetpointStats {
+    /// Takes those of another stream in.
+    pub fn merge(&mut self, other: &Self) {
+        self.count += other.count;
+        self.step_m = self.step_m.max(other.step_m);
+        self.speed_mps = self.speed_mps.max(other.speed_mps);
+        self.accel_mps2 = self.accel_mps2.max(other.accel_mps2);
+        self.jerk_mps3 = self.jerk_mps3.max(other.jerk_mps3);
+        self.mismatch_mps = self.mismatch_mps.max(other.mismatch_mps);
+        self.not_finite += other.not_finite;
+        self.outside += other.outside;
+        self.jerky += other.jerky;
+        self.jumps += other.jumps;
+    }
+}
+
+impl std::fmt::Display for SetpointStats {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "{} setpoints: step {:.3} m, {:.2} m/s, {:.2} m/s², {:.1} m/s³, velocity off by {:.2} m/s; {} jumps, {} \
+             jerky, {} outside, {} not finite",
+            self.count,
+            self.step_m,
+            self.speed_mps,
+            self.accel_mps2,
+            self.jerk_mps3,
+            self.mismatch_mps,
+            self.jumps,
+            self.jerky,
+            self.outside,
+            self.not_finite
+        )
+    }
+}
+
+/// What was sent last, as far as it goes back without a gap.
+#[derive(Clone, Copy, Debug)]
+struct Last {
+    at_s: f64,
+    position: Vector3<f32>,
+    velocity: Option<Vector3<f32>>,
+    accel: Option<Vector3<f32>>,
+    jerk_mps3: f32,
+}
+
+/// Watches one stream.
+#[derive(Clone, Debug)]
+pub struct SetpointCheck {
+    limits: Limits,
+    last: Option<Last>,
+    /// What was seen.
+    pub stats: SetpointStats,
+    /// The first few things that were not fit: seconds and what.
+    pub faults: Vec<(f64, String)>,
+}
+
+impl SetpointCheck {
+    /// Nothing seen yet.
+    pub fn new(limits: Limits) -> Self {
+        Self { limits, last: None, stats: SetpointStats::default(), faults: Vec::new() }
+    }
+
+    /// Jerk at the last setpoint, m/s³.
+    pub fn jerk_mps3(&self) -> f32 {
+        self.last.map_or(0.0, |last| last.jerk_mps3)
+    }
+
+    fn fault(&mut self, at_s: f64, what: String) {
+        if self.faults.len() < 8 {
+            self.faults.push((at_s, what));
+        }
+    }
+
+    /// Takes a setpoint in.
+    pub fn take(&mut self, at_s: f64, data: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
+        let fields =
+            [data.x, data.y, data.z, data.vx, data.vy, data.vz, data.afx, data.afy, data.afz, data.yaw];
+        if fields.iter().any(|field| !field.is_finite()) {
+            self.stats.not_finite += 1;
+            self.fault(at_s, format!("not finite: {fields:?}"));
+            return;
+        }
+        if data.type_mask.bits() & NO_POSITION != 0 {
+            self.last = None;
+            return;
+        }
+        let position = Vector3::new(data.x, data.y, data.z);
+        self.stats.count += 1;
+        if let Some((low, high)) = self.limits.fence
+            && (0..3).any(|axis| position[axis] < low[axis] || position[axis] > high[axis])
+        {
+            self.stats.outside += 1;
+            self.fault(at_s, format!("outside the fence: {position:?}"));
+        }
+        let before = self.last.filter(|last| ((at_s - last.at_s) as f32) < GAP_S);
+        let mut next = Last { at_s, position, velocity: None, accel: None, jerk_mps3: 0.0 };
+        if let Some(before) = before {
+            let dt_s = ((at_s - before.at_s) as f32).max(1e-3);
+            let moved = position - before.position;
+            let velocity = moved / dt_s;
+            next.velocity = Some(velocity);
+            let stats = &mut self.stats;
+            stats.step_m = stats.step_m.max(moved.norm());
+            stats.speed_mps = stats.speed_mps.max(velocity.norm());
+            let sent = Vector3::new(data.vx, data.vy, data.vz);
+            stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
+            let jumps = velocity.norm() > self.limits.speed_mps;
+            if jumps {
+                stats.jumps += 1;
+                self.fault(at_s, format!("a step of {:.2} m in {dt_s:.3} s", moved.norm()));
+            }
+            if let Some(velocity_before) = before.velocity {
+                let accel = (velocity - velocity_before) / dt_s;
+                next.accel = Some(accel);
+                let stats = &mut self.stats;
+                stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
+                if let Some(accel_before) = before.accel {
+                    next.jerk_mps3 = ((accel - accel_before) / dt_s).norm();
+                    stats.jerk_mps3 = stats.jerk_mps3.max(next.jerk_mps3);
+                    if next.jerk_mps3 > self.limits.jerk_mps3 {
+                        stats.jerky += 1;
+                        if !jumps {
+                            self.fault(at_s, format!("{:.1} m/s³", next.jerk_mps3));
+                        }
+                    }
+                }
+            }
+        }
+        self.last = Some(next);
+    }
+}
