@@ -418,7 +418,7 @@ impl<'a> MissionView<'a> {
         self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
     }
 
-    /// What the whole swarm's planner is asked, over lists that the caller keeps.
+    /// What the whole swarm's planner is asked, over lists that the caller keeps, for vehicles with room for `gates_most`.
     ///
     /// # Errors
     /// [`MissionError::RosterFull`] if there are more vehicles or goals than `V`.
@@ -426,6 +426,7 @@ impl<'a> MissionView<'a> {
         &self,
         tasks: &'b mut Vec<VehicleTask, V>,
         descents_m: &'b mut Vec<f32, V>,
+        gates_most: usize,
     ) -> Result<PlanRequest<'b>, MissionError> {
         if self.vehicles.len() > V || self.goals.len() > V {
             return Err(MissionError::RosterFull);
@@ -439,6 +440,7 @@ impl<'a> MissionView<'a> {
             descents_m,
             mode: self.header.mode,
             schedule: self.header.schedule,
+            gates_most,
         })
     }
 

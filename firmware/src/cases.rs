@@ -56,7 +56,7 @@ pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
 
 /// What is asked for that swarm.
 pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: MODE, schedule: SCHEDULE }
+    PlanRequest { vehicles, descents_m, mode: MODE, schedule: SCHEDULE, gates_most: GATES }
 }
 
 /// Scratch of [`plan_case`].

@@ -109,7 +109,8 @@ impl Planner<'_> {
         }
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
-        let request = mission.request(&mut tasks, &mut descents_m).map_err(|_| PlanFailure::Capacity)?;
+        let request =
+            mission.request(&mut tasks, &mut descents_m, GATES).map_err(|_| PlanFailure::Capacity)?;
         plan::plan_swarm(roadmap, &request, ws, &mut memory.plan).map_err(|error| failure(&error))?;
         plan::vehicle_plan(&memory.plan, index, &request.schedule, &mut ws.schedule, &mut memory.own)
             .map_err(|_| PlanFailure::Capacity)?;
@@ -119,7 +120,7 @@ impl Planner<'_> {
 
 fn failure(error: &PlanError) -> PlanFailure {
     match error {
-        PlanError::Terminals | PlanError::BadGoal(_) => PlanFailure::NoRoadmap,
+        PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
         PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
         | PlanError::SwarmFull
         | PlanError::Path(..)

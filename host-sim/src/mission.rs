@@ -138,6 +138,7 @@ impl Mission {
             descents_m: &self.descents_m,
             mode: planner_mode(&self.scenario.mission),
             schedule: self.schedule,
+            gates_most: GATES,
         };
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
@@ -357,7 +358,8 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
     }
     let (goal, wanted) = (given[0], scenario.vehicles.len());
     let required_m = scenario.required_clearance_m();
-    let apart_m = schedule.separation_m;
+    // Vehicles that stand on two of them must not keep each other from landing.
+    let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
     // As many discs of half the spacing as fit a circle, with room to spare for walls.
     let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
     let steps = (reach_m / SLOT_GRID_M) as i32;

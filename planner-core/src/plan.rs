@@ -17,7 +17,7 @@ use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::SippWorkspace;
-use crate::schedule::{self, Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
+use crate::schedule::{self, Flight, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
 use crate::search::{self, SearchError, SearchWorkspace};
 
 /// What an assignment makes small.
@@ -62,6 +62,8 @@ pub struct PlanRequest<'a> {
     pub mode: Mode,
     /// Separation and nominal speeds.
     pub schedule: ScheduleConfig,
+    /// Most gates of one vehicle: the least `G` that [`vehicle_plan`] is to be called with.
+    pub gates_most: usize,
 }
 
 /// Why there is no plan.
@@ -71,6 +73,8 @@ pub enum PlanError {
     Terminals,
     /// More vehicles or goals than `V`.
     SwarmFull,
+    /// Two vehicles have this id.
+    SameId(u8),
     /// A labelled goal that is not in the roadmap, for the vehicle with this id.
     BadGoal(u8),
     /// A search failed for a reason other than "no path", for the vehicle with this id.
@@ -88,7 +92,7 @@ pub enum PlanError {
 pub struct SwarmPlan<const V: usize, const W: usize> {
     /// One flight per vehicle.
     pub flights: Vec<Flight<W>, V>,
-    /// CRC-32 over ids, goals, waypoints and departures.
+    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times, and departures.
     pub crc: u32,
 }
 
@@ -238,6 +242,11 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
     if assigned.len() != request.vehicles.len() || usize::from(view.header().starts) != assigned.len() {
         return Err(PlanError::Terminals);
     }
+    for (i, vehicle) in request.vehicles.iter().enumerate() {
+        if request.vehicles[..i].iter().any(|other| other.id == vehicle.id) {
+            return Err(PlanError::SameId(vehicle.id));
+        }
+    }
     out.flights.clear();
     for (i, (vehicle, &goal)) in request.vehicles.iter().zip(assigned).enumerate() {
         let mut path = Path::new();
@@ -247,12 +256,16 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
-        let flight = Flight { id, goal, path, climb_m, descent_m, depart_s: 0.0 };
+        let flight = Flight { id, goal, path, climb_m, descent_m, depart_s: 0.0, piece_m: PIECE_M };
         // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     order::schedule_all(view, request, ws, out)?;
-    out.crc = crc(out);
+    for (index, flight) in out.flights.iter().enumerate() {
+        schedule::merged_m(&request.schedule, &out.flights, index, request.gates_most, &mut ws.schedule)
+            .map_err(|e| PlanError::Schedule(flight.id, e))?;
+    }
+    out.crc = crc(&request.schedule, out);
     Ok(())
 }
 
@@ -271,21 +284,25 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out.descent_m = flight.descent_m;
     out.depart_s = flight.depart_s;
     out.plan_crc = plan.crc;
-    let others = plan.flights.iter().enumerate().filter(|&(i, _)| i != index).map(|(_, f)| f);
-    schedule::gates(cfg, flight, others, ws, &mut out.gates)
+    schedule::gates(cfg, &plan.flights, index, ws, &mut out.gates)
 }
 
-fn crc<const V: usize, const W: usize>(plan: &SwarmPlan<V, W>) -> u32 {
+/// CRC-32 over all that gates follow from.
+fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V, W>) -> u32 {
     const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = CRC32.digest();
+    let mut numbers = |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
+    numbers(&[cfg.separation_m, cfg.parked_separation_m, cfg.cruise_mps, cfg.vertical_mps]);
+    for flight in &plan.flights {
+        numbers(&[flight.climb_m, flight.descent_m, flight.depart_s, flight.piece_m]);
+        for w in flight.path.waypoints() {
+            numbers(&[w.position.x, w.position.y, w.position.z, w.at_s, w.leave_s]);
+        }
+    }
     for flight in &plan.flights {
         digest.update(&[flight.id]);
         digest.update(&flight.goal.unwrap_or(u16::MAX).to_le_bytes());
-        digest.update(&flight.depart_s.to_le_bytes());
-        for waypoint in flight.path.waypoints() {
-            waypoint.position.iter().for_each(|c| digest.update(&c.to_le_bytes()));
-            digest.update(&waypoint.leave_s.to_le_bytes());
-        }
+        digest.update(&(flight.path.waypoints().len() as u32).to_le_bytes());
     }
     digest.finalize()
 }

@@ -24,12 +24,20 @@ use libm::{fmaxf, fminf};
 use crate::Point;
 use crate::path::Path;
 
-/// Longest piece of a path, metres: finer lets vehicles follow one another closer, coarser costs less.
+/// Longest timed segment, metres: finer lets vehicles follow one another closer, coarser costs less.
 pub const PIECE_M: f32 = 1.5;
-/// Most pieces of one flight.
+/// Most timed segments of one flight; on a flight that would need more they are longer.
 pub const PIECES: usize = 320;
+/// A vehicle that stands reports its progress at most this wrong, metres.
+pub const PROGRESS_ERROR_M: f32 = 0.25;
 /// Most forbidden intervals kept apart while a delay is sought; more are merged, which only forbids more.
 const INTERVALS: usize = 128;
+/// Timed segments grow at most this often, by two: to 1.5 km.
+const DOUBLINGS: usize = 10;
+/// A pad is held for at least this long after take-off, seconds: a vehicle that stands on it has not left it.
+const OFF_PAD_S: f32 = 0.05;
+/// This far above its pad a vehicle has left it at the least, metres.
+const OFF_PAD_M: f32 = 0.02;
 
 /// Tunables of the schedule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,9 +68,41 @@ pub struct Flight<const W: usize> {
     pub descent_m: f32,
     /// Scheduled take-off, seconds after the start at nominal speeds.
     pub depart_s: f32,
+    /// Longest timed segment of this flight, metres: [`PIECE_M`], or more on a flight that is long.
+    pub piece_m: f32,
+}
+
+impl<const W: usize> Flight<W> {
+    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`PIECES`].
+    pub(crate) fn fit_pieces(&mut self) {
+        self.piece_m = PIECE_M;
+        for _ in 0..DOUBLINGS {
+            if self.pieces() <= PIECES {
+                break;
+            }
+            self.piece_m *= 2.0;
+        }
+    }
+
+    /// Timed segments that [`cut`] makes of it.
+    pub(crate) fn pieces(&self) -> usize {
+        let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
+        let lengths = [self.climb_m, self.descent_m].into_iter().chain(legs);
+        let moving: u32 = lengths.map(|length_m| parts(length_m, self.piece_m)).sum();
+        let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
+        2 + moving as usize + holds
+    }
 }
 
 /// "Before my arc length `at_m`, vehicle `id` must have come past `until_m` of its own path."
+///
+/// Progress is what opens a gate, so a vehicle must report it by these rules:
+/// - On its pad it reports −climb. In the climb it reports what is left of it, negative; in the descent the path's length and
+///   how far it has come down.
+/// - It reports no more than the reference that it follows has come to, and at most [`PROGRESS_ERROR_M`] less once it stands.
+/// - It reports more than the path's length and the descent only when it stands on the ground, disarmed.
+///
+/// A vehicle that waits where it is sent reports enough to open every gate that waits for what lies behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
     /// Where to wait, metres along the own path; −climb is the pad.
@@ -103,14 +143,19 @@ pub enum ScheduleError {
     Blocked,
 }
 
-/// A stretch of a flight. Times are relative to take-off; the pad is held from −∞, the landing place to +∞.
+/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
+/// landing place to +∞.
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     from: Point,
     to: Point,
+    /// Where the vehicle waits before this segment, metres along its path: nobody waits within a climb or a descent.
     from_m: f32,
+    /// Where it ends, metres.
     to_m: f32,
+    /// When it may have to be free: when its vehicle leaves the place where it waits before it.
     from_s: f32,
+    /// When the vehicle has left it.
     to_s: f32,
     parked: bool,
 }
@@ -130,6 +175,10 @@ impl ScheduleWorkspace {
     }
 }
 
+/// Cuts a flight into timed segments of at most `flight.piece_m`.
+///
+/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
+/// held from its beginning; each is free again when the vehicle has left it.
 fn cut<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -140,7 +189,6 @@ fn cut<const W: usize>(
     let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) else {
         return Ok(());
     };
-    let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
     let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
     let stay = |at: Point, m: f32, from_s: f32, to_s: f32| Piece {
         from: at,
@@ -151,41 +199,101 @@ fn cut<const W: usize>(
         to_s,
         parked: true,
     };
+    let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
     if flight.goal.is_none() {
         return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
     }
-    push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, 0.0))?;
-    let moving =
-        |from, to, from_m, to_m, from_s, to_s| Piece { from, to, from_m, to_m, from_s, to_s, parked: false };
-    push(moving(pad, first.position, -flight.climb_m, 0.0, 0.0, first.at_s))?;
+    let climb = Leg::climb(pad, first.position, first.at_s);
+    let (left_m, left_s) = climb.first_part(flight.piece_m);
+    let on_pad = stay(pad, -flight.climb_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
+    push(Piece { to_m: left_m - flight.climb_m, ..on_pad })?;
+    for piece in climb.pieces(-flight.climb_m, 0.0, flight.piece_m) {
+        push(piece)?;
+    }
     for (i, waypoint) in waypoints.iter().enumerate() {
         if waypoint.leave_s > waypoint.at_s {
             let hold = stay(waypoint.position, waypoint.along_m, waypoint.at_s, waypoint.leave_s);
             push(Piece { parked: false, ..hold })?;
         }
         let Some(next) = waypoints.get(i + 1) else { break };
-        let parts = parts(next.along_m - waypoint.along_m);
-        for part in 0..parts {
-            let at = |i: u32| {
-                let share = i as f32 / parts as f32;
-                let mix = |a: f32, b: f32| a + (b - a) * share;
-                let point = waypoint.position + (next.position - waypoint.position) * share;
-                (point, mix(waypoint.along_m, next.along_m), mix(waypoint.leave_s, next.at_s))
-            };
-            let ((from, from_m, from_s), (to, to_m, to_s)) = (at(part), at(part + 1));
-            push(moving(from, to, from_m, to_m, from_s, to_s))?;
+        let leg = Leg {
+            from: waypoint.position,
+            to: next.position,
+            length_m: next.along_m - waypoint.along_m,
+            from_s: waypoint.leave_s,
+            to_s: next.at_s,
+            stops: Stops::Anywhere,
+        };
+        for piece in leg.pieces(waypoint.along_m, next.along_m, flight.piece_m) {
+            push(piece)?;
         }
     }
     let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
     let end_m = last.along_m + flight.descent_m;
     let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
-    push(moving(last.position, ground, last.along_m, end_m, last.leave_s, landed_s))?;
-    push(stay(ground, end_m, landed_s, f32::INFINITY))
+    let descent = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
+    for piece in descent.pieces(last.along_m, end_m, flight.piece_m) {
+        push(piece)?;
+    }
+    push(Piece { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
 }
 
-/// Pieces of a stretch of this length.
-fn parts(length_m: f32) -> u32 {
-    fmaxf(libm::ceilf(length_m / PIECE_M), 1.0) as u32
+/// Where a vehicle may wait on a leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Stops {
+    /// Before each of its timed segments.
+    Anywhere,
+    /// Before the leg only.
+    Before,
+}
+
+/// A straight stretch flown at one speed.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    from: Point,
+    to: Point,
+    length_m: f32,
+    from_s: f32,
+    to_s: f32,
+    stops: Stops,
+}
+
+impl Leg {
+    /// A vertical one from time 0.
+    fn climb(from: Point, to: Point, to_s: f32) -> Self {
+        Self { from, to, length_m: libm::fabsf(to.z - from.z), from_s: 0.0, to_s, stops: Stops::Before }
+    }
+
+    /// Length and duration of the first of its timed segments.
+    fn first_part(&self, piece_m: f32) -> (f32, f32) {
+        let share = 1.0 / fmaxf(parts(self.length_m, piece_m) as f32, 1.0);
+        (self.length_m * share, (self.to_s - self.from_s) * share)
+    }
+
+    /// Its timed segments; `from_m` and `to_m` are its ends along the path.
+    fn pieces(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = Piece> {
+        let parts = parts(self.length_m, piece_m);
+        let at = move |part: u32| {
+            if part == parts {
+                // The next one begins where this ends, bit by bit.
+                return (self.to, to_m, self.to_s);
+            }
+            let share = part as f32 / parts as f32;
+            let mix = |a: f32, b: f32| a + (b - a) * share;
+            (self.from + (self.to - self.from) * share, mix(from_m, to_m), mix(self.from_s, self.to_s))
+        };
+        (0..parts).map(move |part| {
+            let ((from, start_m, start_s), (to, to_m, to_s)) = (at(part), at(part + 1));
+            let (from_m, from_s) =
+                if self.stops == Stops::Before { (from_m, self.from_s) } else { (start_m, start_s) };
+            Piece { from, to, from_m, to_m, from_s, to_s, parked: false }
+        })
+    }
+}
+
+/// Timed segments of a stretch of this length; none of one without length.
+fn parts(length_m: f32, piece_m: f32) -> u32 {
+    libm::ceilf(length_m / piece_m) as u32
 }
 
 /// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
@@ -287,45 +395,111 @@ fn last_allowed(forbidden: &[(f32, f32)], until_s: f32) -> f32 {
     time_s
 }
 
-/// What a vehicle that stands at a place may stray from it along its path, metres.
-const STANDING_M: f32 = 0.25;
-
-/// The progress at which a vehicle counts as out of a piece. It may have to wait where the piece ends, for somebody whom it
-/// would block if that still counted as inside. The next piece begins there and is either in conflict too, and then
-/// counts by itself, or clear, and then so is the place between them. Not so where the next keeps a smaller distance: a
-/// vehicle has left its descent when it stands on the ground, at `end_m`, and its pad when it is off it.
-fn left_at_m(q: &Piece, end_m: f32) -> f32 {
-    if q.to_m > q.from_m && q.to_m < end_m { q.to_m - STANDING_M } else { q.to_m + 0.01 }
+/// The progress at which a vehicle counts as out of a timed segment, metres.
+///
+/// It may have to wait where the segment ends, for a vehicle that it would block if that still counted as inside. The next
+/// segment begins there and is either in conflict too, and then counts by itself, or clear, and then so is the place between
+/// them. A vehicle has left its pad when it is off it, however low its climb ends, and its descent when it stands on the ground.
+fn left_at_m<const W: usize>(q: &Piece, flight: &Flight<W>) -> f32 {
+    if q.to_m < flight.path.length_m() + flight.descent_m {
+        fmaxf(q.to_m - PROGRESS_ERROR_M, OFF_PAD_M - flight.climb_m)
+    } else {
+        q.to_m + 0.01
+    }
 }
 
-/// Where `flight` waits for the `others`, in the order along its path. A gate that an earlier one implies is left out.
-pub fn gates<'a, const W: usize, const G: usize>(
+/// Where flight `index` waits for the others, in the order along its path. A gate that an earlier one for the same vehicle
+/// implies is left out.
+///
+/// More than `G` are made fewer: a gate then stands for those that follow within [`MERGED_M`] of it as well. Only gates are
+/// merged that the schedule has open by the time of the first, so the order of labels stays as it is.
+pub fn gates<const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
-    flight: &Flight<W>,
-    others: impl Iterator<Item = &'a Flight<W>>,
+    flights: &[Flight<W>],
+    index: usize,
     ws: &mut ScheduleWorkspace,
     out: &mut Vec<Gate, G>,
 ) -> Result<(), ScheduleError> {
+    let merged_m = merged_m(cfg, flights, index, G, ws)?;
     out.clear();
-    cut(cfg, flight, &mut ws.own)?;
-    for other in others {
+    let mut full = false;
+    each_gate(cfg, flights, index, merged_m, ws, |gate| full |= out.push(gate).is_err())?;
+    out.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
+    if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
+}
+
+/// How far gates of flight `index` have to be merged for no more than `most`, metres.
+pub(crate) fn merged_m<const W: usize>(
+    cfg: &ScheduleConfig,
+    flights: &[Flight<W>],
+    index: usize,
+    most: usize,
+    ws: &mut ScheduleWorkspace,
+) -> Result<f32, ScheduleError> {
+    cut(cfg, &flights[index], &mut ws.own)?;
+    for merged_m in MERGED_M {
+        let mut count = 0;
+        each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
+        if count <= most {
+            return Ok(merged_m);
+        }
+    }
+    Err(ScheduleError::GatesFull)
+}
+
+/// How far along the path gates for one vehicle are merged, metres; the first that leaves few enough.
+const MERGED_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
+
+/// The gates of the flight in `ws.own`, one other vehicle after the other.
+fn each_gate<const W: usize>(
+    cfg: &ScheduleConfig,
+    flights: &[Flight<W>],
+    index: usize,
+    merged_m: f32,
+    ws: &mut ScheduleWorkspace,
+    mut found: impl FnMut(Gate),
+) -> Result<(), ScheduleError> {
+    // The vehicle hovers where the segment before ends and the one after begins, so those conflict wherever a hover does.
+    let moves = |piece: &&Piece| piece.parked || piece.to_m > piece.from_m;
+    let flight = &flights[index];
+    for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
         cut(cfg, other, &mut ws.other)?;
-        let end_m = other.path.length_m() + other.descent_m;
+        // The gate found last, and when it is passed.
+        let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;
-        for p in &ws.own {
+        for p in ws.own.iter().filter(moves) {
             let start_s = flight.depart_s + p.from_s;
             let earlier =
                 |q: &&Piece| other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && conflict(cfg, p, q);
-            let left = |q: &Piece| left_at_m(q, end_m);
-            let until_m = ws.other.iter().filter(earlier).map(left).fold(highest, fmaxf);
-            if until_m > highest {
-                highest = until_m;
-                let gate = Gate { at_m: p.from_m, id: other.id, until_m };
-                out.push(gate).map_err(|_| ScheduleError::GatesFull)?;
+            let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
+            for q in ws.other.iter().filter(moves).filter(earlier) {
+                let left_m = left_at_m(q, other);
+                if left_m > until_m {
+                    (until_m, open_s) = (left_m, other.depart_s + q.to_s);
+                }
+            }
+            if until_m <= highest {
+                continue;
+            }
+            highest = until_m;
+            match &mut last {
+                Some((gate, passed_s))
+                    if p.from_m <= gate.at_m || (p.from_m <= gate.at_m + merged_m && open_s <= *passed_s) =>
+                {
+                    gate.until_m = until_m;
+                }
+                _ => {
+                    let gate = Gate { at_m: p.from_m, id: other.id, until_m };
+                    if let Some((before, _)) = last.replace((gate, start_s)) {
+                        found(before);
+                    }
+                }
             }
         }
+        if let Some((gate, _)) = last {
+            found(gate);
+        }
     }
-    out.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
     Ok(())
 }
 
@@ -349,9 +523,8 @@ pub(crate) mod checker {
         let mut ws = ScheduleWorkspace::new();
         let gates: StdVec<Vec<Gate, 1024>> = (0..flights.len())
             .map(|i| {
-                let others = flights.iter().enumerate().filter(|&(j, _)| j != i).map(|(_, f)| f);
                 let mut out = Vec::new();
-                gates(cfg, &flights[i], others, &mut ws, &mut out).unwrap();
+                gates(cfg, flights, i, &mut ws, &mut out).unwrap();
                 out
             })
             .collect();
@@ -402,7 +575,7 @@ mod tests {
             path.push(Point::new(x, y, 1.5), 1.0).unwrap();
         }
         path.label(1.5 / CFG.vertical_mps, CFG.cruise_mps);
-        Flight { id, goal: Some(0), path, climb_m: 1.5, descent_m: 1.5, depart_s: 0.0 }
+        Flight { id, goal: Some(0), path, climb_m: 1.5, descent_m: 1.5, depart_s: 0.0, piece_m: PIECE_M }
     }
 
     fn schedule(pair: &mut [Flight<8>; 2]) -> Result<(), ScheduleError> {

@@ -12,7 +12,7 @@ use crate::Point;
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, Route};
-use crate::schedule::{self, Flight, ScheduleError};
+use crate::schedule::{self, Flight, PIECE_M, PIECES, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 
 /// Schedules the longest path first; who cannot be fitted in goes first in the next round, or later gets a head start.
@@ -125,7 +125,8 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
         }
         let mut path = path_of(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
         path.label(flight.climb_m / request.schedule.vertical_mps, request.schedule.cruise_mps);
-        let flight = Flight { path, depart_s: 0.0, ..flight.clone() };
+        let mut flight = Flight { path, depart_s: 0.0, ..flight.clone() };
+        flight.fit_pieces();
         let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
         let cfg = &request.schedule;
         match schedule::earliest_departure(cfg, &flight, not_before_s, scheduled, &mut ws.schedule) {
@@ -163,10 +164,16 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
             parked: &parked.pads,
         };
         let mut best: Option<Flight<W>> = None;
+        flight.piece_m = PIECE_M;
         for _ in 0..DEPARTURES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
             match sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight)
             {
+                // Looked for again with the longer segments that it is cut into.
+                Ok(()) if flight.pieces() > PIECES => {
+                    flight.fit_pieces();
+                    continue;
+                }
                 Ok(()) => {}
                 Err(ScheduleError::Blocked) => break,
                 Err(error) => return Err(error),

@@ -69,7 +69,7 @@ fn plan(
     let mut ws = Box::new(PlanWorkspace::<1024, 16, 2048>::new());
     let mut out = SwarmPlan::new();
     let descents = std::vec![HEIGHT_M; goals];
-    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE };
+    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, gates_most: 1024 };
     plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
 }
 
@@ -221,6 +221,9 @@ fn wrong_requests_are_refused_by_name() {
     let bytes = open_roadmap(&spread(4, 7), 2, 50, 7);
     let unlabelled = Mode::Unlabelled(Objective::TotalDistance);
     assert_eq!(plan(&bytes, &tasks(3, false), 2, unlabelled).unwrap_err(), PlanError::Terminals);
+    let mut twice = tasks(2, false);
+    twice[1].id = 1;
+    assert_eq!(plan(&bytes, &twice, 2, unlabelled).unwrap_err(), PlanError::SameId(1));
     let mut labelled = tasks(2, true);
     labelled[1].goal = Some(9);
     assert_eq!(plan(&bytes, &labelled, 2, Mode::Labelled).unwrap_err(), PlanError::BadGoal(2));

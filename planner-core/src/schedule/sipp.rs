@@ -13,8 +13,8 @@ use libm::{fmaxf, fminf};
 
 use super::near::Cells;
 use super::{
-    Flight, Forbidden, Piece, ScheduleConfig, ScheduleError, conflict, cut, first_allowed, forbid,
-    last_allowed, parts,
+    Flight, Forbidden, Leg, OFF_PAD_S, Piece, ScheduleConfig, ScheduleError, Stops, conflict, cut,
+    first_allowed, forbid, last_allowed,
 };
 use crate::Point;
 use crate::path::Path;
@@ -93,13 +93,19 @@ pub struct Route<'a> {
 
 /// The way from the pad up to the first node.
 struct Climb {
-    pad: Point,
-    /// Somebody else needs the pad's place from then on, seconds.
+    up: Leg,
+    /// Latest take-off before another vehicle needs the pad's place, seconds.
     leave_by_s: f32,
-    duration_s: f32,
 }
 
-/// Finds the earliest way for `flight` (its climb and descent are taken, its path and departure are written) that keeps
+/// A leg of the path, flown from time 0.
+fn leg(from: Point, to: Point, duration_s: f32) -> Leg {
+    let length_m = (to - from).norm();
+    Leg { from, to, length_m, from_s: 0.0, to_s: duration_s, stops: Stops::Anywhere }
+}
+
+/// Finds the earliest way for `flight` (its climb, descent and length of timed segments are taken, its path and departure are
+/// written) that keeps
 /// clear of `scheduled`.
 pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     cfg: &ScheduleConfig,
@@ -125,21 +131,27 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     let descent_s = flight.descent_m / cfg.vertical_mps;
     // Held from −∞, so that it is no conflict with another pad.
     let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
-    let leave_by_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
-    let climb = Climb { pad, leave_by_s, duration_s: flight.climb_m / cfg.vertical_mps };
+    let up = Leg::climb(pad, start, flight.climb_m / cfg.vertical_mps);
+    let down = Leg::climb(goal, ground, descent_s);
+    // The pad is held until the first part of the climb is behind the vehicle.
+    let off_pad_s = fmaxf(up.first_part(flight.piece_m).1, OFF_PAD_S);
+    let needed_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+    let climb = Climb { up, leave_by_s: needed_s - off_pad_s };
+    // The landing place is held from the beginning of the descent.
     let land_after_s = ws.near(cfg, &standing(ground, true)).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
     if land_after_s == f32::INFINITY {
         return Err(ScheduleError::Blocked);
     }
+    let piece_m = flight.piece_m;
 
     ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &pad, &start, climb.duration_s, (route.not_before_s, leave_by_s));
-    ws.relax(route.from, None, route.not_before_s, leave_by_s, climb.duration_s, &goal, &start, cfg);
+    ws.forbid_departures(cfg, &up, piece_m, (route.not_before_s, climb.leave_by_s));
+    ws.relax(route.from, None, route.not_before_s, climb.leave_by_s, up.to_s, &goal, &start, cfg);
     while let Some(state) = ws.heap.pop() {
         let reached = ws.states[usize::from(state)];
         if reached.node == route.to {
-            ws.forbid_departures(cfg, &goal, &ground, descent_s, (reached.arrive_s, reached.until_s));
-            let from_s = fmaxf(reached.arrive_s, land_after_s - descent_s);
+            ws.forbid_departures(cfg, &down, piece_m, (reached.arrive_s, reached.until_s));
+            let from_s = fmaxf(reached.arrive_s, land_after_s);
             let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
             if let Some(land_s) = land_s {
                 return write(cfg, view, &climb, ws, state, land_s, flight);
@@ -157,7 +169,7 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
             if !ws.may_improve(edge.target, from_s, until_s, duration_s) {
                 continue;
             }
-            ws.forbid_departures(cfg, &here, &there, duration_s, (from_s, until_s));
+            ws.forbid_departures(cfg, &leg(here, there, duration_s), piece_m, (from_s, until_s));
             ws.relax(edge.target, Some(state), from_s, until_s, duration_s, &goal, &there, cfg);
         }
     }
@@ -251,36 +263,26 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         false
     }
 
-    /// Collects the departures from `a` that would meet somebody on the way to `b`, as far as they matter for leaving
+    /// Collects the departures on which a flight along `leg` would meet a scheduled one, as far as they matter for leaving
     /// between the two times of `leave_s`.
-    fn forbid_departures(
-        &mut self,
-        cfg: &ScheduleConfig,
-        a: &Point,
-        b: &Point,
-        duration_s: f32,
-        leave_s: (f32, f32),
-    ) {
+    fn forbid_departures(&mut self, cfg: &ScheduleConfig, leg: &Leg, piece_m: f32, leave_s: (f32, f32)) {
         self.forbidden.clear();
-        let length_m = (b - a).norm();
-        let stretch = |from: f32, to: f32| Piece {
-            from: a + (b - a) * from,
-            to: a + (b - a) * to,
-            from_m: length_m * from,
-            to_m: length_m * to,
-            from_s: duration_s * from,
-            to_s: duration_s * to,
+        let whole = Piece {
+            from: leg.from,
+            to: leg.to,
+            from_m: 0.0,
+            to_m: leg.length_m,
+            from_s: 0.0,
+            to_s: leg.to_s,
             parked: false,
         };
-        let (whole, parts) = (stretch(0.0, 1.0), parts(length_m));
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
         for q in self.cells.around(&self.pieces, &whole, apart_m) {
             // What ends before or begins after cannot even touch the times asked for.
-            if q.to_s < leave_s.0 || q.from_s - duration_s > leave_s.1 || !conflict(cfg, &whole, q) {
+            if q.to_s < leave_s.0 || q.from_s - leg.to_s > leave_s.1 || !conflict(cfg, &whole, q) {
                 continue;
             }
-            for part in 0..parts {
-                let p = stretch(part as f32 / parts as f32, (part + 1) as f32 / parts as f32);
+            for p in leg.pieces(0.0, leg.length_m, piece_m) {
                 if conflict(cfg, &p, q) {
                     forbid(&mut self.forbidden, q.from_s - p.to_s, q.to_s - p.from_s);
                 }
@@ -342,12 +344,16 @@ fn write<const N: usize, const P: usize, const W: usize>(
         let first = reached.parent == at;
         let before = ws.states[usize::from(reached.parent)];
         let here = view.node(reached.node);
-        let (from, until_s) =
-            if first { (climb.pad, climb.leave_by_s) } else { (view.node(before.node), before.until_s) };
-        let duration_s = if first { climb.duration_s } else { (here - from).norm() / cfg.cruise_mps };
+        let (leg, until_s) = if first {
+            (climb.up, climb.leave_by_s)
+        } else {
+            let from = view.node(before.node);
+            (leg(from, here, (here - from).norm() / cfg.cruise_mps), before.until_s)
+        };
+        let duration_s = leg.to_s;
         let earliest_s = reached.left_parent_s;
         let latest_s = fminf(leave_s - duration_s, until_s);
-        ws.forbid_departures(cfg, &from, &here, duration_s, (earliest_s, latest_s));
+        ws.forbid_departures(cfg, &leg, flight.piece_m, (earliest_s, latest_s));
         // Not before the way was found to be free: intervals that are merged for want of room may swallow that time.
         let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
         way.push((reached.node, left_s + duration_s, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
@@ -365,7 +371,7 @@ fn write<const N: usize, const P: usize, const W: usize>(
         let edge = before.and_then(|before| view.edge_between(before, node));
         let clearance_m = edge.map_or(view.header().max_clearance_m, |edge| edge.clearance_m);
         flight.path.push(view.node(node), clearance_m).map_err(|_| ScheduleError::PiecesFull)?;
-        let at_s = if before.is_none() { climb.duration_s } else { arrive_s - flight.depart_s };
+        let at_s = if before.is_none() { climb.up.to_s } else { arrive_s - flight.depart_s };
         flight.path.label_last(at_s, fmaxf(leave_s - flight.depart_s, at_s));
         before = Some(node);
     }

@@ -208,7 +208,8 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
         way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
         meter.call("path::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
-        let flight = Flight { id, goal: Some(0), path, climb_m: 1.0, descent_m: 1.0, depart_s: 0.0 };
+        let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::PIECE_M);
+        let flight = Flight { id, goal: Some(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
         plan.flights.push(flight).expect("there is room");
     }
     let bytes = size_of::<ScheduleWorkspace>();
@@ -219,7 +220,7 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
             schedule::earliest_departure(cfg, flight, 0.0, others(), &mut ws.schedule)
         });
         let _ = meter.call("schedule::gates, past 31", bytes, || {
-            schedule::gates(cfg, flight, others(), &mut ws.schedule, &mut own.gates)
+            schedule::gates(cfg, &plan.flights, index, &mut ws.schedule, &mut own.gates)
         });
         let _ = meter.call("plan::vehicle_plan, past 31", bytes, || {
             plan::vehicle_plan(plan, index, cfg, &mut ws.schedule, &mut own)
