@@ -67,7 +67,7 @@ fn comes_back_as_written() {
     assert_eq!(view.vehicles().nth(1), Some(vehicle(2, Some(1))));
     assert_eq!(view.goals().nth(1), Some(goal(1)));
     let (mut tasks, mut descents) = (Vec::<_, 3>::new(), Vec::new());
-    let request = view.request(&mut tasks, &mut descents).unwrap();
+    let request = view.request(&mut tasks, &mut descents, 128).unwrap();
     assert_eq!(
         (request.vehicles.len(), request.descents_m, request.mode),
         (3, &[1.5, 1.5][..], header().mode)
@@ -88,7 +88,7 @@ fn a_companion_is_configured_from_it() {
     assert_eq!(config.ground_stations, [255, 0, 245, 9]);
     assert_eq!(view.config::<3>(9), Err(MissionError::NotInRoster(9)));
     assert_eq!(view.config::<2>(2), Err(MissionError::RosterFull));
-    assert!(view.request(&mut Vec::<_, 2>::new(), &mut Vec::new()).is_err());
+    assert!(view.request(&mut Vec::<_, 2>::new(), &mut Vec::new(), 128).is_err());
 }
 
 #[test]

@@ -10,7 +10,7 @@ use companion::store::{Fault, FlashRequest, READ, ReadFlash, Store};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::calls::{Meter, flight};
-use firmware::capacity::VEHICLES;
+use firmware::capacity::{GATES, VEHICLES};
 use firmware::cases;
 use firmware::shell::BoardCompanion;
 use heapless::Vec;
@@ -131,8 +131,9 @@ fn missions(meter: &mut impl Meter) {
         .call("mission_file::MissionView::config, 32", 0, || view.config::<VEHICLES>(VEHICLES as u8))
         .expect("it is there");
     let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
-    let _ =
-        meter.call("mission_file::MissionView::request, 32", 0, || view.request(&mut tasks, &mut descents_m));
+    let _ = meter.call("mission_file::MissionView::request, 32", 0, || {
+        view.request(&mut tasks, &mut descents_m, GATES)
+    });
     let _ = meter.call("config::Config::check, 32", 0, || config.check());
     let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
     meter.call("mission_file::MissionView::fits", 0, || view.fits(&roadmap));
