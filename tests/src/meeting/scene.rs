@@ -292,6 +292,7 @@ fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
         climb_m,
         descent_m,
         depart_s: 0.0,
+        piece_m: schedule::PIECE_M,
     })
 }
 
@@ -403,8 +404,7 @@ fn vehicle(
         plan_crc: if on_plan { 5 } else { 100 + i as u32 },
     };
     if on_plan {
-        let others = flights.iter().enumerate().filter(|(j, _)| *j != i).map(|(_, f)| f);
-        schedule::gates(&SCHEDULE, flight, others, workspace, &mut plan.gates).expect("few gates");
+        schedule::gates(&SCHEDULE, flights, i, workspace, &mut plan.gates).expect("few gates");
     }
     Vehicle {
         id: flight.id,
