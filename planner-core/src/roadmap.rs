@@ -11,12 +11,14 @@
 //! does (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph Theory").
 //!
 //! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards no accessor can meet
-//! an offset or a target out of range, whatever the bytes were.
+//! an offset or a target out of range, and A* finds shortest ways, whatever the bytes were. Whether an edge is as clear as
+//! it says only the map can tell.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 use crate::Point;
 use crate::frames::Geodetic;
+use crate::prm::squared_length;
 
 mod write;
 pub use write::{Edge, encoded_len, write, write_with_landmarks};
@@ -29,9 +31,11 @@ pub const VERSION: u16 = 1;
 pub const HEADER_LEN: usize = 72;
 /// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
 pub const MAX_NODES: usize = u16::MAX as usize;
-/// Largest coordinate magnitude, metres: squared lengths stay far inside f32.
-pub const MAX_COORDINATE_M: f32 = 1.0e6;
-/// Longest way to a landmark, metres.
+/// Largest coordinate magnitude, metres: up to there f32 tells places a millimetre apart.
+pub const MAX_COORDINATE_M: f32 = 16_384.0;
+/// Longest edge a roadmap may have, metres. The schedule looks at each metre of an edge, so this bounds its work.
+pub const MAX_EDGE_M: f32 = 100.0;
+/// Longest way to a landmark, metres: up to there a sum of edges is right to 4 mm an edge.
 pub const MAX_WAY_M: f32 = 4.0 * MAX_COORDINATE_M;
 /// Largest clearance a half-edge can carry, metres.
 pub const MAX_CLEARANCE_M: f32 = 65.535;
@@ -70,7 +74,11 @@ pub enum RoadmapError {
     OneWay(u16),
     /// An edge of this node has no length: its two nodes coincide.
     ZeroLength(u16),
-    /// A way from this node to a landmark is no length or beyond [`MAX_WAY_M`], or is longer by more than an edge than from the edge's other end.
+    /// An edge of this node is shorter or longer than the header says.
+    EdgeLength(u16),
+    /// An edge of this node has less clearance than the header says that it was tested at, or more than can be stored.
+    EdgeClearance(u16),
+    /// A way from this node to a landmark is beyond [`MAX_WAY_M`], or is not the one that a search over all edges finds.
     Landmark(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
@@ -117,10 +125,10 @@ impl RoadmapHeader {
         if !self.origin.is_valid() {
             return refuse("origin");
         }
-        if !(self.edge_min_m >= 0.0 && self.edge_min_m <= MAX_COORDINATE_M) {
+        if !(self.edge_min_m >= 0.0 && self.edge_min_m <= MAX_EDGE_M) {
             return refuse("edge_min_m");
         }
-        if !(self.edge_max_m >= self.edge_min_m && self.edge_max_m <= 4.0 * MAX_COORDINATE_M) {
+        if !(self.edge_max_m >= self.edge_min_m && self.edge_max_m <= MAX_EDGE_M) {
             return refuse("edge_max_m");
         }
         if !(self.tested_clearance_m >= 0.0 && self.tested_clearance_m <= MAX_COORDINATE_M) {
@@ -134,6 +142,25 @@ impl RoadmapHeader {
         }
         Ok(())
     }
+
+    /// Whether an edge may be as long as from `a` to `b`; the builder's own rule, to the bit.
+    fn holds_length(&self, a: &Point, b: &Point) -> bool {
+        let square = squared_length((*a).into(), (*b).into());
+        square >= self.edge_min_m * self.edge_min_m && square <= self.edge_max_m * self.edge_max_m
+    }
+
+    /// Least and greatest clearance of an edge, metres, as a half-edge carries it. A millimetre less than tested is
+    /// rounding: the test is exact, the distance is not.
+    fn clearances(&self) -> (f32, f32) {
+        let metres = |millimetres: u16| f32::from(millimetres) / 1000.0;
+        let most = millimetres_down(self.max_clearance_m);
+        (metres(millimetres_down(self.tested_clearance_m).min(most).saturating_sub(1)), metres(most))
+    }
+}
+
+/// In f64, where the product is exact, so that rounding can only go down. The cast saturates.
+fn millimetres_down(metres: f32) -> u16 {
+    (f64::from(metres) * 1000.0) as u16
 }
 
 /// One direction of an edge.
@@ -236,26 +263,44 @@ impl<'a> RoadmapView<'a> {
         }
     }
 
-    /// The bound that the landmarks give must not jump by more than an edge is long, but for the rounding of the sums:
-    /// then A* finds shortest ways with it, to the same rounding, whatever the bytes were.
+    /// The ways to the landmarks must be, to the bit, those that a search over all edges finds; then their differences
+    /// bound every way from below. Nothing is searched: the ways are right if that to the landmark is zero, no edge
+    /// shortens one, and each other one is the sum of an edge and of a shorter way from the edge's other end. (Along the
+    /// shorter ways one comes to the landmark, so none is too short; along the true shortest way, none is too long.)
     fn check_landmarks(&self) -> Result<(), RoadmapError> {
-        // Each way is the rounded sum of the one before it and an edge: half a unit in the last place, twice for safety.
-        const ROUNDING: f32 = 1.2e-7;
         if self.landmarks.is_empty() {
             return Ok(());
         }
-        for node in 0..self.nodes.len() as u16 {
-            let here = self.ways_to_landmarks_m(node);
-            if !here.iter().all(|way| (0.0..=MAX_WAY_M).contains(way)) {
-                return Err(RoadmapError::Landmark(node));
+        let nodes = 0..self.nodes.len() as u16;
+        let (mut farthest, mut farthest_m) = (0, 0.0);
+        for node in nodes.clone() {
+            let [way_m, _] = self.ways_to_landmarks_m(node);
+            if way_m > farthest_m {
+                (farthest, farthest_m) = (node, way_m);
             }
+        }
+        let landmarks = [0, farthest];
+        for node in nodes {
+            let here = self.ways_to_landmarks_m(node);
+            let (mut sound, mut explained) = (true, [false; LANDMARKS]);
             for edge in self.half_edges(node) {
                 let length = self.distance_m(node, edge.target);
-                let steps = here.iter().zip(self.ways_to_landmarks_m(edge.target));
-                if !steps.into_iter().all(|(a, b)| libm::fabsf(a - b) <= length + ROUNDING * (a + b + length))
-                {
-                    return Err(RoadmapError::Landmark(node));
+                let there = self.ways_to_landmarks_m(edge.target);
+                for i in 0..LANDMARKS {
+                    let reached = there[i] > 0.0 || edge.target == landmarks[i];
+                    let way = there[i] + length;
+                    sound &= !reached || here[i] <= way && (here[i] > 0.0 || node == landmarks[i]);
+                    explained[i] |= reached && here[i] == way && there[i] < here[i];
                 }
+            }
+            for i in 0..LANDMARKS {
+                sound &= match here[i] {
+                    0.0 => true,
+                    way => way > 0.0 && way <= MAX_WAY_M && explained[i] && node != landmarks[i],
+                };
+            }
+            if !sound {
+                return Err(RoadmapError::Landmark(node));
             }
         }
         Ok(())
@@ -288,14 +333,22 @@ impl<'a> RoadmapView<'a> {
                 previous = Some(edge.target);
             }
         }
+        let (least_m, most_m) = self.header.clearances();
         for node in 0..self.nodes.len() as u16 {
             let here = self.node(node);
             for edge in self.half_edges(node) {
                 if self.edge_between(edge.target, node).map(|e| e.clearance_m) != Some(edge.clearance_m) {
                     return Err(RoadmapError::OneWay(node));
                 }
-                if (self.node(edge.target) - here).norm_squared() == 0.0 {
+                if !(least_m..=most_m).contains(&edge.clearance_m) {
+                    return Err(RoadmapError::EdgeClearance(node));
+                }
+                let there = self.node(edge.target);
+                if (there - here).norm_squared() == 0.0 {
                     return Err(RoadmapError::ZeroLength(node));
+                }
+                if !self.header.holds_length(&here, &there) {
+                    return Err(RoadmapError::EdgeLength(node));
                 }
             }
         }

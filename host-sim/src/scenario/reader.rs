@@ -6,6 +6,7 @@
 use std::cell::RefCell;
 use std::ops::{Range, RangeInclusive};
 
+use planner_core::roadmap::MAX_COORDINATE_M;
 use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
@@ -124,7 +125,7 @@ impl<'a> Value<'a> {
                 self.error(&format!("must be three numbers, east, north, up in metres, not {}", items.len()))
             );
         };
-        let range = -1e6..=1e6;
+        let range = -f64::from(MAX_COORDINATE_M)..=f64::from(MAX_COORDINATE_M);
         Ok([x.f64(&range)?, y.f64(&range)?, z.f64(&range)?])
     }
 

@@ -5,6 +5,7 @@ use std::path::Path;
 use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
+use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use toml::de::DeTable;
 
 use super::error::ScenarioError;
@@ -163,8 +164,8 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
     let edge_max = table.get("edge_max_m");
     let roadmap = Roadmap {
         nodes: table.whole("nodes", 2300, 0..=1_000_000)? as u32,
-        edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=10_000.0)?,
-        edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=10_000.0)?,
+        edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
+        edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
         safety_margin_m: table.f32("safety_margin_m", 0.5, 0.0..=100.0)?,
         sampling: table.word(
             "sampling",
@@ -281,7 +282,7 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<Point>> {
         match numbers.as_slice() {
             &[x, y, z]
                 if line.split_whitespace().count() == 3
-                    && numbers.iter().all(|n| n.is_finite() && n.abs() <= 1e6) =>
+                    && numbers.iter().all(|n| n.is_finite() && n.abs() <= MAX_COORDINATE_M) =>
             {
                 goals.push(Point::new(x, y, z));
             }

@@ -98,7 +98,7 @@ fn wrong_scenarios_are_told_where_and_why() {
             "15.0, 1.5]",
             "nan, 1.5]",
             "11:15",
-            "vehicles[1].start[1] must be a number from -1000000 to 1000000",
+            "vehicles[1].start[1] must be a number from -16384 to 16384",
             None,
         ),
         (

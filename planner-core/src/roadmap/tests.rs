@@ -3,15 +3,17 @@ use std::vec;
 use std::vec::Vec;
 
 use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
 use super::*;
-use crate::search::SearchWorkspace;
+use crate::search::{SearchError, SearchWorkspace, astar};
 
 pub(crate) fn header(starts: u16, goals: u16) -> RoadmapHeader {
     RoadmapHeader {
         origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
         edge_min_m: 0.5,
-        edge_max_m: 8.0,
+        edge_max_m: 80.0,
         tested_clearance_m: 0.25,
         max_clearance_m: 10.0,
         starts,
@@ -35,8 +37,8 @@ pub(crate) fn encode_with_landmarks(header: &RoadmapHeader, nodes: &[Point], edg
 /// A roadmap of distinct points with any edges among them.
 fn graphs() -> impl Strategy<Value = (Vec<Point>, Vec<Edge>)> {
     (2usize..24).prop_flat_map(|n| {
-        let heights = proptest::collection::vec(-50.0f32..50.0, n);
-        let clearances = proptest::collection::vec(proptest::option::of(0.0f32..70.0), n * (n - 1) / 2);
+        let heights = proptest::collection::vec(-20.0f32..20.0, n);
+        let clearances = proptest::collection::vec(proptest::option::of(0.25f32..70.0), n * (n - 1) / 2);
         (heights, clearances).prop_map(move |(heights, clearances)| {
             let nodes = heights.iter().enumerate().map(|(i, &z)| Point::new(i as f32, -z, z)).collect();
             let pairs = (0..n as u16).flat_map(|a| (a + 1..n as u16).map(move |b| (a, b)));
@@ -71,7 +73,7 @@ proptest! {
 
 fn small() -> (Vec<Point>, Vec<Edge>) {
     let nodes = vec![Point::new(0.0, 0.0, 1.0), Point::new(3.0, 4.0, 1.0), Point::new(-1.0, 0.0, 2.0)];
-    (nodes, vec![Edge { a: 0, b: 1, clearance_m: 0.7 }, Edge { a: 2, b: 0, clearance_m: 0.0 }])
+    (nodes, vec![Edge { a: 0, b: 1, clearance_m: 0.7 }, Edge { a: 2, b: 0, clearance_m: 0.25 }])
 }
 
 /// Bytes of a file with its CRC made good again: what only the other checks can catch.
@@ -137,9 +139,9 @@ fn the_bytes_are_where_the_readme_says() {
     assert_eq!(bytes[84..88], 3.0f32.to_le_bytes());
     assert_eq!(bytes[108..124], [0, 0, 0, 0, 2, 0, 0, 0, 3, 0, 0, 0, 4, 0, 0, 0]);
     // 0.7 in f32 lies below seven tenths, so 699 mm.
-    assert_eq!(bytes[124..140], [1, 0, 0xbb, 2, 2, 0, 0, 0, 0, 0, 0xbb, 2, 0, 0, 0, 0]);
+    assert_eq!(bytes[124..140], [1, 0, 0xbb, 2, 2, 0, 250, 0, 0, 0, 0xbb, 2, 0, 0, 250, 0]);
     // The CRC-32 that zlib gives for these 140 bytes.
-    assert_eq!(bytes[140..], 0x0853_ae6au32.to_le_bytes());
+    assert_eq!(bytes[140..], 0xe734_f881u32.to_le_bytes());
 }
 
 #[test]
@@ -183,6 +185,10 @@ fn bad_input_is_refused_by_name() {
     assert_eq!(refuse(|_, _, edges| edges[1].b = 2), RoadmapError::SelfLoop(1));
     assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = f32::NAN), RoadmapError::Clearance(0));
     assert_eq!(refuse(|_, _, edges| edges[0].clearance_m = -0.1), RoadmapError::Clearance(0));
+    assert_eq!(refuse(|_, _, edges| edges[1].clearance_m = 0.248), RoadmapError::EdgeClearance(2));
+    assert_eq!(refuse(|_, nodes, _| nodes[1] *= 16.0), RoadmapError::EdgeLength(0));
+    assert_eq!(refuse(|header, _, _| header.edge_min_m = 2.0), RoadmapError::EdgeLength(2));
+    assert_eq!(refuse(|header, _, _| header.edge_max_m = 101.0), RoadmapError::Header("edge_max_m"));
     assert_eq!(
         refuse(|_, _, edges| edges.push(Edge { a: 1, b: 0, clearance_m: 0.7 })),
         RoadmapError::Duplicate(0, 1)
@@ -230,4 +236,183 @@ fn ways_to_landmarks_are_written_and_checked() {
     let small =
         write_with_landmarks(&header(1, 1), &nodes, &edges, &mut SearchWorkspace::<2>::new(), &mut out);
     assert_eq!(small, Err(RoadmapError::WorkspaceTooSmall));
+}
+
+/// A roadmap of random nodes, joined where they are near: some of it may be apart from the rest.
+fn random_roadmap(rng: &mut Pcg32) -> Vec<u8> {
+    let header = RoadmapHeader { edge_max_m: 8.0, ..header(2, 2) };
+    let count = 20 + rng.next_u32() % 281;
+    let side_m = 4.0 * libm::cbrtf(count as f32) * (0.5 + uniform(rng));
+    let mut place = || Point::new(uniform(rng) * side_m, uniform(rng) * side_m, uniform(rng) * side_m);
+    let nodes: Vec<Point> = (0..count).map(|_| place()).collect();
+    let mut edges = Vec::new();
+    for (a, b) in (0..count as u16).flat_map(|a| (a + 1..count as u16).map(move |b| (a, b))) {
+        if header.holds_length(&nodes[usize::from(a)], &nodes[usize::from(b)]) && uniform(rng) < 0.5 {
+            edges.push(Edge { a, b, clearance_m: 0.25 + 3.0 * uniform(rng) });
+        }
+    }
+    let mut out = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).unwrap()];
+    let mut ws = std::boxed::Box::new(SearchWorkspace::<512>::new());
+    assert_eq!(write_with_landmarks(&header, &nodes, &edges, &mut ws, &mut out), Ok(out.len()));
+    out
+}
+
+fn uniform(rng: &mut Pcg32) -> f32 {
+    (rng.next_u32() >> 8) as f32 / (1 << 24) as f32
+}
+
+/// Changes one or a few values of a file: a header field, a node, an offset, a half-edge, a way to a landmark, a count.
+fn mutate(rng: &mut Pcg32, bytes: &mut [u8]) {
+    let at = |bytes: &[u8], at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().unwrap()) as usize;
+    let (nodes, half_edges) = (at(bytes, 60), at(bytes, 64));
+    let ends =
+        [HEADER_LEN, nodes * NODE_LEN, (nodes + 1) * WORD_LEN, half_edges * WORD_LEN, nodes * LANDMARKS_LEN];
+    for _ in 0..1 + rng.next_u32() % 3 {
+        // Half of the changes go to the landmarks, which nothing else in the file explains.
+        let part = (rng.next_u32() % 8).min(4) as usize;
+        let words = (ends[part] / WORD_LEN).max(1) as u32;
+        let word = ends[..part].iter().sum::<usize>() + (rng.next_u32() % words) as usize * WORD_LEN;
+        let old = at(bytes, word) as u32;
+        let new = match rng.next_u32() % 8 {
+            0 => old ^ 1 << (rng.next_u32() % 32),
+            1 => rng.next_u32(),
+            2 => (f32::from_bits(old) * (0.5 + uniform(rng))).to_bits(),
+            3 => (f32::from_bits(old) + 4.0 * uniform(rng) - 2.0).to_bits(),
+            4 => old.wrapping_add(rng.next_u32() % 3).wrapping_sub(1),
+            5 => [f32::NAN, f32::INFINITY, -0.0, 0.0, 1e30, -1.0, 16_384.0, 65_536.0]
+                [(rng.next_u32() % 8) as usize]
+                .to_bits(),
+            6 => at(bytes, HEADER_LEN + WORD_LEN * (rng.next_u32() as usize % (bytes.len() / WORD_LEN - 19)))
+                as u32,
+            // The whole column by a constant, which differences between neighbours do not show.
+            _ => {
+                let column =
+                    bytes.len() - WORD_LEN - nodes * LANDMARKS_LEN + WORD_LEN * (rng.next_u32() % 2) as usize;
+                let shift = 60_000.0 * uniform(rng);
+                for node in 0..nodes {
+                    let place = column + node * LANDMARKS_LEN;
+                    let way = f32::from_bits(at(bytes, place) as u32) + shift;
+                    bytes[place..place + 4].copy_from_slice(&way.to_le_bytes());
+                }
+                continue;
+            }
+        };
+        bytes[word..word + 4].copy_from_slice(&new.to_le_bytes());
+    }
+}
+
+/// Puts the lengths along ways of fewest edges in place of the shortest: each is a sum of edges, and all but some right.
+fn forge_ways(bytes: &mut [u8]) {
+    let view = RoadmapView::parse(bytes).unwrap();
+    let mut ways = vec![[0.0f32; LANDMARKS]; view.node_count()];
+    let mut landmark = 0;
+    for column in 0..LANDMARKS {
+        let (mut seen, mut open) = (vec![false; ways.len()], std::collections::VecDeque::from([landmark]));
+        seen[usize::from(landmark)] = true;
+        while let Some(node) = open.pop_front() {
+            for edge in
+                view.half_edges(node).filter(|e| !std::mem::replace(&mut seen[usize::from(e.target)], true))
+            {
+                ways[usize::from(edge.target)][column] =
+                    ways[usize::from(node)][column] + view.distance_m(node, edge.target);
+                open.push_back(edge.target);
+            }
+        }
+        let farther = |best: u16, node: u16| ways[usize::from(node)][0] > ways[usize::from(best)][0];
+        landmark = (0..ways.len() as u16).fold(0, |best, node| if farther(best, node) { node } else { best });
+    }
+    let end = bytes.len() - WORD_LEN;
+    let column = &mut bytes[end - ways.len() * LANDMARKS_LEN..end];
+    for (stored, way) in column.as_chunks_mut::<4>().0.iter_mut().zip(ways.iter().flatten()) {
+        *stored = way.to_le_bytes();
+    }
+}
+
+/// Lengths of the shortest ways from a node over all edges, in f64, by relaxing until nothing changes.
+fn lengths_from(view: &RoadmapView<'_>, from: u16) -> Vec<f64> {
+    let mut ways = vec![f64::INFINITY; view.node_count()];
+    ways[usize::from(from)] = 0.0;
+    let mut open = vec![from];
+    while let Some(node) = open.pop() {
+        for edge in view.half_edges(node) {
+            let d = (view.node(edge.target) - view.node(node)).cast::<f64>();
+            let way = ways[usize::from(node)] + d.norm();
+            if way < ways[usize::from(edge.target)] {
+                ways[usize::from(edge.target)] = way;
+                open.insert(0, edge.target);
+            }
+        }
+    }
+    ways
+}
+
+/// Every search that an accepted file allows is right, and none takes more than each node and half-edge once.
+fn search_all(view: &RoadmapView<'_>, rng: &mut Pcg32, ws: &mut SearchWorkspace<512>) {
+    if view.node_count() == 0 {
+        return;
+    }
+    if view.has_landmarks() {
+        let from_first = lengths_from(view, 0);
+        for (node, way) in from_first.iter().enumerate() {
+            let stored = f64::from(view.ways_to_landmarks_m(node as u16)[0]);
+            let way = if way.is_finite() { *way } else { 0.0 };
+            assert!((stored - way).abs() <= 1e-5 * (1.0 + way), "node {node}: {stored} {way}");
+        }
+    }
+    let mut node = || (rng.next_u32() as usize % view.node_count()) as u16;
+    for _ in 0..3 {
+        let (from, to) = (node(), node());
+        let ways = lengths_from(view, from);
+        let asked = core::cell::Cell::new(0);
+        let mut path = heapless::Vec::<u16, 512>::new();
+        let any = |_, _: &HalfEdge| {
+            asked.set(asked.get() + 1);
+            true
+        };
+        let found = astar(view, from, to, any, ws, &mut path);
+        assert!(asked.get() <= view.half_edge_count());
+        let way = ways[usize::from(to)];
+        match found {
+            Ok(length) => {
+                let along =
+                    path.windows(2).map(|pair| f64::from(view.distance_m(pair[0], pair[1]))).sum::<f64>();
+                let error = 1e-5 * (1.0 + way);
+                assert!(
+                    (along - way).abs() < error && (f64::from(length) - way).abs() < error,
+                    "{length} {way}"
+                );
+                assert!(path.windows(2).all(|pair| view.edge_between(pair[0], pair[1]).is_some()));
+            }
+            error => assert!(error == Err(SearchError::NoPath) && way.is_infinite(), "{error:?} {way}"),
+        }
+    }
+}
+
+/// Files whose CRC is right and whose contents are not: refused, or every search is right. `FLOCKMATE_FILES` sets how many.
+#[test]
+fn mutated_files_are_refused_or_searched_right() {
+    let files = std::env::var("FLOCKMATE_FILES").map_or(20_000, |count| count.parse().unwrap());
+    let mut rng = Pcg32::seed_from_u64(1);
+    let mut ws = std::boxed::Box::new(SearchWorkspace::<512>::new());
+    let (mut original, mut accepted) = (Vec::new(), 0);
+    for file in 0..files {
+        if file % 50 == 0 {
+            original = random_roadmap(&mut rng);
+            search_all(&RoadmapView::parse(&original).unwrap(), &mut rng, &mut ws);
+        }
+        let mut bytes = original.clone();
+        if rng.next_u32() % 8 == 0 {
+            forge_ways(&mut bytes);
+        } else {
+            mutate(&mut rng, &mut bytes);
+        }
+        let bytes = sealed(bytes);
+        if let Ok(view) = RoadmapView::parse(&bytes) {
+            accepted += 1;
+            read_all(&view);
+            search_all(&view, &mut rng, &mut ws);
+        }
+    }
+    std::println!("{accepted} of {files} mutated files are roadmaps");
+    assert!(accepted > files / 100, "{accepted} of {files}");
 }

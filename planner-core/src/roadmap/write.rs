@@ -2,7 +2,7 @@
 
 use super::{
     CRC, HEADER_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN, RoadmapError,
-    RoadmapHeader, RoadmapView, VERSION, WORD_LEN, in_range, target_of,
+    RoadmapHeader, RoadmapView, VERSION, WORD_LEN, in_range, millimetres_down, target_of,
 };
 use crate::Point;
 use crate::search::{SearchWorkspace, ways_from};
@@ -75,6 +75,9 @@ pub fn write_with_landmarks<const N: usize>(
             }
         }
     }
+    // An edge too short to lengthen a way leaves what no reader can check.
+    let body = &out[HEADER_LEN..out.len() - WORD_LEN];
+    RoadmapView::over(*header, 0, body, nodes.len(), 2 * edges.len()).check_landmarks()?;
     Ok(seal(out))
 }
 
@@ -92,7 +95,7 @@ fn write_graph<'a>(
     let needed = encoded_len(nodes.len(), edges.len(), landmarks).ok_or(RoadmapError::Length)?;
     let out = out.get_mut(..needed).ok_or(RoadmapError::RoadmapFull { needed })?;
     header.check(nodes.len())?;
-    check_edges(nodes, edges)?;
+    check_edges(header, nodes, edges)?;
 
     let (head, rest) = out.split_at_mut(HEADER_LEN);
     write_header(header, [nodes.len(), 2 * edges.len(), landmarks], needed, head);
@@ -113,12 +116,13 @@ fn seal(out: &mut [u8]) -> usize {
     out.len()
 }
 
-fn check_edges(nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
+fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
     for (i, node) in nodes.iter().enumerate() {
         if !in_range(node) {
             return Err(RoadmapError::Node(i as u16));
         }
     }
+    let (least_m, _) = header.clearances();
     for (i, edge) in edges.iter().enumerate() {
         let (Some(a), Some(b)) = (nodes.get(usize::from(edge.a)), nodes.get(usize::from(edge.b))) else {
             return Err(RoadmapError::EdgeNode(i));
@@ -129,8 +133,14 @@ fn check_edges(nodes: &[Point], edges: &[Edge]) -> Result<(), RoadmapError> {
         if !(edge.clearance_m >= 0.0 && edge.clearance_m.is_finite()) {
             return Err(RoadmapError::Clearance(i));
         }
+        if edge.clearance_m < least_m {
+            return Err(RoadmapError::EdgeClearance(edge.a));
+        }
         if (b - a).norm_squared() == 0.0 {
             return Err(RoadmapError::ZeroLength(edge.a));
+        }
+        if !header.holds_length(a, b) {
+            return Err(RoadmapError::EdgeLength(edge.a));
         }
     }
     Ok(())
@@ -199,9 +209,4 @@ fn write_rows(
         }
     }
     Ok(())
-}
-
-/// In f64, where the product is exact, so that rounding can only go down. The cast saturates.
-fn millimetres_down(metres: f32) -> u16 {
-    (f64::from(metres) * 1000.0) as u16
 }
