@@ -7,7 +7,7 @@
 //! components that we do not know is somebody else's and stays unanswered.
 
 use crate::frame::Frame;
-use crate::mission::{Guard, State, awaits};
+use crate::mission::{FRESH, Guard, Inputs, State, awaits};
 use crate::time::{Duration, Instant};
 
 const COMMAND_INT: u32 = 75;
@@ -37,6 +37,11 @@ pub const REQUEST: u16 = 512;
 /// PREFLIGHT_REBOOT_SHUTDOWN.
 pub const RESTART: u16 = 246;
 
+/// `MAV_FRAME_GLOBAL`.
+const GLOBAL: u8 = 0;
+/// `MAV_FRAME_GLOBAL_INT`.
+const GLOBAL_INT: u8 = 5;
+
 /// The same frame within this time is a repetition, not a new command.
 const REPEAT: Duration = Duration::from_secs(5);
 
@@ -49,7 +54,8 @@ pub struct Command {
     pub param1: f32,
     /// Second parameter.
     pub param2: f32,
-    /// COMMAND_INT: latitude and longitude, 1e-7 degrees, and altitude, metres.
+    /// COMMAND_INT in a frame of altitudes above mean sea level: latitude and longitude, 1e-7 degrees, and altitude, metres.
+    /// None in any other frame: where a relative altitude counts from is not known to every vehicle alike.
     pub place: Option<(i32, i32, f32)>,
     /// Sender: system and component.
     pub from: (u8, u8),
@@ -87,62 +93,106 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
         command: u16::from_le_bytes([p[28], p[29]]),
         param1: float(0),
         param2: float(4),
-        place: (frame.message_id == COMMAND_INT).then(|| (whole(16), whole(20), float(24))),
+        place: (frame.message_id == COMMAND_INT && matches!(p[32], GLOBAL | GLOBAL_INT))
+            .then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_us: target_system == system,
         to_component: target_component == crate::COMPONENT,
     })
 }
 
-/// What tells one command frame from another: system, component, sequence, command.
-type Print = (u8, u8, u8, u16);
+/// Bytes of a command that are compared: parameters, command, addressee, and what follows them.
+const COMPARED: usize = 35;
 
-/// Remembers the last few command frames, so that a repeated one acts once.
+/// A command frame and its answer.
+#[derive(Clone, Copy, Debug)]
+struct Answered {
+    from: (u8, u8),
+    sequence: u8,
+    message: u32,
+    payload: [u8; COMPARED],
+    result: Option<u8>,
+    at: Instant,
+}
+
+/// Remembers the last few command frames, so that a repeated one acts once and is answered alike. The same sequence number
+/// with other parameters is another command.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Repeats {
-    seen: [Option<(Print, Instant)>; 4],
+    seen: [Option<Answered>; 4],
     next: usize,
 }
 
 impl Repeats {
-    /// Whether this very frame was seen lately; remembers it.
-    pub fn is_repeat(&mut self, frame: &Frame, command: u16, now: Instant) -> bool {
-        let print = (frame.system, frame.component, frame.sequence, command);
-        if self.seen.iter().flatten().any(|&(seen, at)| seen == print && now - at < REPEAT) {
-            return true;
-        }
-        self.seen[self.next] = Some((print, now));
+    /// What this very frame was answered lately, `Some(None)` if nothing; `None` for a frame not seen.
+    pub fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
+        let same = |seen: &&Answered| {
+            seen.from == (frame.system, frame.component)
+                && (seen.sequence, seen.message) == (frame.sequence, frame.message_id)
+                && seen.payload[..] == frame.padded()[..COMPARED]
+                && now - seen.at < REPEAT
+        };
+        self.seen.iter().flatten().find(same).map(|seen| seen.result)
+    }
+
+    /// Remembers a frame and its answer.
+    pub fn remember(&mut self, frame: &Frame, result: Option<u8>, at: Instant) {
+        let mut payload = [0; COMPARED];
+        payload.copy_from_slice(&frame.padded()[..COMPARED]);
+        let (from, sequence, message) = ((frame.system, frame.component), frame.sequence, frame.message_id);
+        self.seen[self.next] = Some(Answered { from, sequence, message, payload, result, at });
         self.next = (self.next + 1) % self.seen.len();
-        false
     }
 }
 
-/// What the commander wants; each flag holds until a row of the mission table uses it, or the state changes.
+/// What was commanded and is not done yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Wishes {
-    /// MISSION_START.
+pub struct Pending {
+    /// MISSION_START, until the mission ends.
     pub start: bool,
-    /// DO_PAUSE_CONTINUE 0.
+    /// DO_PAUSE_CONTINUE 0, until it is resumed or the vehicle lands: on the pad it holds the take-off back.
     pub pause: bool,
-    /// DO_PAUSE_CONTINUE 1.
+    /// DO_PAUSE_CONTINUE 1, until a row uses it or the state changes.
     pub resume: bool,
-    /// NAV_LAND.
+    /// NAV_LAND, until a row uses it.
     pub land: bool,
-    /// NAV_RETURN_TO_LAUNCH.
+    /// NAV_RETURN_TO_LAUNCH, until a row uses it.
     pub turn_back: bool,
 }
 
+impl Pending {
+    /// Forgets what a row used, and all of it when the mission `ends`.
+    pub(crate) fn state_changed(&mut self, guard: Guard, to: State, ends: bool) {
+        use State::*;
+        self.resume = false;
+        if ends {
+            *self = Self::default();
+        }
+        let lands = matches!(to, Land | Stopping);
+        let resumed = matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != Paused;
+        if lands || resumed || matches!(guard, Guard::ReturnCommanded) {
+            self.pause = false;
+        }
+        if lands || matches!(to, PilotControl | Failsafe) {
+            self.land = false;
+        }
+        if lands || guard == Guard::ReturnCommanded || matches!(to, PilotControl | Failsafe) {
+            self.turn_back = false;
+        }
+    }
+}
+
 /// Takes a mission command in and says the result; `None` for a command that is not one of the mission's.
-pub fn apply(wishes: &mut Wishes, state: State, command: &Command) -> Option<u8> {
+pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Command) -> Option<u8> {
     use State::*;
     let (flag, guard, already): (_, _, &[State]) = match command.command {
         // A start in time for the plan is kept; a repeated one changes nothing.
         START if state == Planning => {
-            wishes.start = true;
+            pending.start = true;
             return Some(ACCEPTED);
         }
         START => (
-            &mut wishes.start,
+            &mut pending.start,
             Guard::StartCommanded,
             &[
                 Scheduled,
@@ -159,17 +209,48 @@ pub fn apply(wishes: &mut Wishes, state: State, command: &Command) -> Option<u8>
                 Replanning,
             ],
         ),
-        PAUSE_CONTINUE if command.param1 == 0.0 => (&mut wishes.pause, Guard::PauseCommanded, &[Paused]),
-        PAUSE_CONTINUE if command.param1 == 1.0 && state == PilotControl => {
-            wishes.resume = true;
-            return Some(ACCEPTED);
+        PAUSE_CONTINUE if command.param1 == 0.0 => {
+            // Before the climb, and while something else interrupts the mission, the pause waits for its row.
+            let waits = matches!(
+                state,
+                Planning
+                    | Ready
+                    | Scheduled
+                    | PadReplanning
+                    | CancelStart
+                    | TakeOff
+                    | AutopilotSilent
+                    | PositionLost
+                    | PilotReturned
+            );
+            if waits && (state != CancelStart || pending.start) {
+                pending.pause = true;
+                return Some(ACCEPTED);
+            }
+            (&mut pending.pause, Guard::PauseCommanded, &[Paused])
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
-            (&mut wishes.resume, Guard::ResumeCommanded, &[Climb, Follow, Blocked, Replanning])
+            // A place to go on from has to be known.
+            if state == PilotReturned && inputs.position_age >= FRESH {
+                return Some(TEMPORARILY_REJECTED);
+            }
+            if pending.pause && !awaits(state, Guard::ResumeCommanded) && state != PilotReturned {
+                pending.pause = false;
+                return Some(ACCEPTED);
+            }
+            let guard = if state == PilotReturned { Guard::ResumedOnPath } else { Guard::ResumeCommanded };
+            (&mut pending.resume, guard, &[Climb, Follow, Blocked, Replanning])
         }
         PAUSE_CONTINUE => return Some(DENIED),
-        LAND => (&mut wishes.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done, Aborted]),
-        RETURN => (&mut wishes.turn_back, Guard::ReturnCommanded, &[Land, Disarm, Done, Aborted]),
+        LAND if matches!(state, Failsafe | Aborted) => {
+            // On the ground there is nothing to do; in the air it acts, or somebody else flies.
+            let acts = inputs.airborne && inputs.offboard;
+            pending.land = acts;
+            let down = state == Aborted && !inputs.airborne;
+            return Some(if acts || down { ACCEPTED } else { TEMPORARILY_REJECTED });
+        }
+        LAND => (&mut pending.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done]),
+        RETURN => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),
         _ => return None,
     };
     if awaits(state, guard) {

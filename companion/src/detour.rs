@@ -134,7 +134,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match self.state {
             State::Done => !self.guidance.at_goal(&self.scene()) || self.around.left,
             State::Aborted => self.telemetry.on_ground == Some(true) || lasted >= SETTLED,
-            State::PilotControl => lasted >= KEPT,
+            State::PilotControl | State::PilotReturned => self.now - self.pilot_since >= KEPT,
             _ => false,
         }
     }

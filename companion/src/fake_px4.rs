@@ -46,9 +46,19 @@ pub struct Bench {
     pub battery: i8,
     /// Commands refused: `MAV_CMD` numbers.
     pub refused: Vec<u16>,
+    /// No command is answered; a refused one is not answered either.
+    pub mute: bool,
+    /// SYS_STATUS does not come.
+    pub no_battery: bool,
+    /// The landing detector says ground, whatever the height.
+    pub false_ground: bool,
+    /// Vertical speed as reported, m/s.
+    pub climbs_mps: f32,
     pub silent: bool,
     pub no_position: bool,
     pub stays_armed: bool,
+    /// Arming is accepted, and undone by the pilot before a HEARTBEAT shows it.
+    pub never_arms: bool,
     /// No setpoint moves it.
     pub stuck: bool,
     pub never_lands: bool,
@@ -114,9 +124,14 @@ impl Bench {
             status: 3,
             battery: 90,
             refused: Vec::new(),
+            mute: false,
+            no_battery: false,
+            false_ground: false,
+            climbs_mps: 0.0,
             silent: false,
             no_position: false,
             stays_armed: false,
+            never_arms: false,
             stuck: false,
             never_lands: false,
             events: Vec::new(),
@@ -251,7 +266,14 @@ impl Bench {
             assert_eq!((c.target_system, c.target_component), (SYSTEM, 1));
             let number = c.command as u16;
             self.commands.push((number, c.param1, c.param2, c.param3));
-            if self.silent || self.refused.contains(&number) {
+            if self.silent {
+                return;
+            }
+            let refused = self.refused.contains(&number);
+            if !self.mute {
+                self.answer(number, if refused { 4 } else { 0 });
+            }
+            if refused {
                 return;
             }
             match c.command {
@@ -261,7 +283,7 @@ impl Bench {
                         Kind::ArduPilot => c.param2 as u32,
                     };
                 }
-                MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0,
+                MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0 && !self.never_arms,
                 MavCmd::MAV_CMD_NAV_TAKEOFF => {
                     assert!(self.kind == Kind::ArduPilot && self.armed);
                     (self.took_off, self.takeoff_m) = (true, c.param7);
@@ -279,6 +301,18 @@ impl Bench {
                 _ => {}
             }
         }
+    }
+
+    /// COMMAND_ACK to the companion.
+    pub fn answer(&mut self, command: u16, result: u8) {
+        let [low, high] = command.to_le_bytes();
+        let payload = [low, high, result, 0, 0, 0, 0, 0, SYSTEM, crate::COMPONENT];
+        let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
+        self.sequence = self.sequence.wrapping_add(1);
+        let mut out = [0; MAX_SENT];
+        let (id, seed) = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
+        let len = frame::encode_raw(header, id, seed, &payload, &mut out);
+        self.companion.handle_bytes(Link::Autopilot, self.now, &out[..len]);
     }
 
     pub fn heartbeat(&mut self) -> Vec<u8> {
@@ -355,13 +389,13 @@ impl Bench {
             let bytes = self.heartbeat();
             self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
             self.drain();
-            if self.says(1) {
+            if self.says(1) && !self.no_battery {
                 let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
                 self.tell(&status);
             }
         }
         if count.is_multiple_of(4) && self.says(245) {
-            let landed_state = if self.on_ground() {
+            let landed_state = if self.on_ground() || self.false_ground {
                 MavLandedState::MAV_LANDED_STATE_ON_GROUND
             } else {
                 MavLandedState::MAV_LANDED_STATE_IN_AIR
@@ -378,6 +412,7 @@ impl Bench {
                 x: ned.x as f32,
                 y: ned.y as f32,
                 z: ned.z as f32,
+                vz: -self.climbs_mps,
                 ..Default::default()
             });
         }

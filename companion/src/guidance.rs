@@ -207,6 +207,30 @@ impl Guidance {
         self.run(now);
     }
 
+    /// Holds a point until the pilot's vehicle is resumed; where the flight was interrupted is kept.
+    pub fn hold_after_pilot(&mut self, point: Point) {
+        self.hold = point;
+    }
+
+    /// Goes on after an interruption: a climb from here upwards, a descent from here downwards, a path from its nearest point.
+    pub fn go_on<const W: usize, const G: usize>(
+        &mut self,
+        plan: &VehiclePlan<W, G>,
+        climbs: bool,
+        position: &Point,
+        now: Instant,
+    ) {
+        let end_z = plan.path.point_at(plan.path.length_m()).map_or(0.0, |p| p.z);
+        if climbs {
+            self.climb_z = position.z;
+        } else if let Some(descended_m) = &mut self.descended_m {
+            *descended_m = (end_z - position.z).max(0.0).min(*descended_m);
+            self.progress_at = now;
+        } else {
+            self.rejoin(&plan.path, position, now);
+        }
+    }
+
     /// Goes on from the nearest point of the path.
     pub fn rejoin<const W: usize>(&mut self, path: &Path<W>, position: &Point, now: Instant) {
         let along_m =
@@ -310,7 +334,10 @@ impl Guidance {
             let rate = self.climb_rate(top);
             self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
         }
-        if self.on_path && setpoints_flow(state) && state != State::PilotControl {
+        if self.on_path
+            && setpoints_flow(state)
+            && !matches!(state, State::PilotControl | State::PilotReturned)
+        {
             let mut advice = if state == State::Follow {
                 self.advice
             } else {
@@ -443,12 +470,22 @@ impl Guidance {
                 return true;
             }
         }
+        if let (Some(_), Some(last)) = (self.descended_m, plan.path.waypoints().last()) {
+            // Below the end of its path, on the way down.
+            let away = position - last.position;
+            if (-plan.descent_m..ARRIVED_M).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+                return true;
+            }
+        }
         if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
             return false;
         }
         let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
         let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
-        (nearest - position).norm() <= leg.clearance_m - self.track.radius_m
+        // The hull is free where it is, and within the leg's clearance of the nearest point: the straight way between is if it
+        // leaves that ball nowhere else.
+        let free_m2 = leg.clearance_m * leg.clearance_m - self.track.radius_m * self.track.radius_m;
+        (nearest - position).norm_squared() <= free_m2
     }
 
     /// The setpoint of this moment.
@@ -466,6 +503,7 @@ impl Guidance {
         }
         match state {
             State::PilotControl => Setpoint::Move(scene.telemetry.position, still, still),
+            State::PilotReturned => Setpoint::Move(self.hold, still, still),
             State::Climb => {
                 let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
                 let rate = if self.filter.is_stopped() { 0.0 } else { self.climb_rate(start.z) };
@@ -503,7 +541,7 @@ pub fn correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> 
     Point::new(off.x * share, off.y * share, 0.0)
 }
 
-/// Whether setpoints go out in this state: from before Offboard until landed, never in a failsafe, nor while an autopilot
+/// Whether setpoints go out in this state: from before Offboard until the motors are off, never in a failsafe, nor while an autopilot
 /// that has to be told takes off.
 pub fn setpoints_flow(state: State) -> bool {
     use State::*;
@@ -523,5 +561,8 @@ pub fn setpoints_flow(state: State) -> bool {
             | PositionLost
             | Land
             | PilotControl
+            | PilotReturned
+            | CancelStart
+            | Disarm
     )
 }

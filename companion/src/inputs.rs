@@ -5,13 +5,18 @@ use planner_core::Point;
 use crate::config::PlanFailure;
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::machine::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
-use crate::mission::{Inputs, State};
+use crate::mission::{FRESH, Inputs, State};
 use crate::time::Duration;
 
 /// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
 const LANDING_DRIFT_M: f32 = 1.0;
 /// The same of a vehicle that stood still.
 const STANDING_DRIFT_M: f32 = 0.3;
+/// A vehicle whose estimate is higher or lower than its pad by more than this does not take off, metres: real estimates on
+/// the ground were seen up to 1.1 m off.
+const START_HEIGHT_M: f32 = 1.5;
+/// A vehicle on the ground moves up or down more slowly, m/s.
+const RESTING_MPS: f32 = 0.5;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
@@ -20,12 +25,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let kind = self.kind();
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.state {
-            State::Streaming | State::Engaging => !offboard && t.custom_mode != self.mode_before,
+            State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
+                !offboard && t.custom_mode != self.mode_before
+            }
             // Disarming after a landing the autopilot chooses a mode of its own.
             State::Land | State::Disarm => !offboard && t.custom_mode != kind.land_mode() && t.armed,
             _ => !offboard,
         };
-        let away = t.position - self.start;
+        let climb_m = self.plan.as_ref().map_or(0.0, |plan| plan.climb_m);
+        let away = t.position - (self.start - Point::new(0.0, 0.0, climb_m));
+        let height_tolerance_m = self.config.start_tolerance_m.min(START_HEIGHT_M);
+        let beneath = self.interrupted.beneath(self.state);
         let follow = self.state == State::Follow;
         let fence = self.config.geofence;
         let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
@@ -49,30 +59,43 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan_failed: self.plan_failure.is_some(),
             roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
             has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
-            at_start: away.xy().norm() <= self.config.start_tolerance_m,
-            start: self.wishes.start,
-            pause: self.wishes.pause,
-            resume: self.wishes.resume,
-            land: self.wishes.land,
-            turn_back: self.wishes.turn_back && !self.guidance.returning,
+            at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
+            start: self.pending.start,
+            pause: self.pending.pause,
+            resume: self.pending.resume,
+            land: self.pending.land,
+            turn_back: self.pending.turn_back && !self.guidance.returning,
+            in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
+            armed_unseen: self.handshake.is_armed_unseen(now),
+            arming_unanswered: self.handshake.is_unanswered(now),
+            disarm_refused: self.handshake.disarm_refused,
+            ours: self.handshake.ours,
+            landing: t.custom_mode == kind.land_mode(),
             offboard,
             mode_foreign,
             critical: t.is_critical(),
             on_ground: t.on_ground == Some(true),
+            flown: self.handshake.flown,
+            vertical: t.position_age(now) < FRESH && t.velocity.z.abs() > RESTING_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05
                 && self.guidance.filter.column_clear()
                 && self.departure_due()
+                && !self.pending.pause
+                && self.battery_reported()
                 && !self.around.blocked
                 && self.neighbours.is_clear_since(self.entered_at)
                 && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
             climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
-            near_path: match self.state {
-                State::PilotControl => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
-                State::PositionLost => self.guidance.near_path(&scene, LOST_WINDOW_M),
+            at_goal: self.guidance.at_goal(&scene),
+            near_path: match (beneath, self.state) {
+                // Those refer to no place on the path.
+                (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
+                (_, State::PilotReturned) => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
+                (_, State::PositionLost) => self.guidance.near_path(&scene, LOST_WINDOW_M),
                 _ => false,
             },
             battery_low: charge_below(self.config.battery_low_percent),

@@ -10,7 +10,7 @@ use planner_core::schedule::VehiclePlan;
 
 use crate::autopilot::Kind;
 use crate::budget::{self, Budget};
-use crate::commands::{self, ACCEPTED, Command, DENIED, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED, Wishes};
+use crate::commands::{self, ACCEPTED, Command, DENIED, Pending, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
@@ -18,10 +18,11 @@ use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
 use crate::guidance::{Guidance, Scene, setpoints_flow};
 use crate::intent::Intent;
-use crate::mission::{self, Action, Guard, Row, State};
+use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
+use crate::requests::Handshake;
 use crate::senders::{Kind as AnswerKind, Rates, Sender};
 use crate::store::{Erasing, Store};
 use crate::telemetry::{Change, Telemetry};
@@ -61,7 +62,11 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) entered_at: Instant,
     /// When MISSION_START was taken: the schedule counts from it.
     started_at: Instant,
-    pub(crate) wishes: Wishes,
+    /// When the pilot took the vehicle.
+    pub(crate) pilot_since: Instant,
+    pub(crate) interrupted: Interrupted,
+    pub(crate) pending: Pending,
+    pub(crate) handshake: Handshake,
     repeats: Repeats,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
@@ -110,7 +115,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             state: State::WaitAutopilot,
             entered_at: Instant::ZERO,
             started_at: Instant::ZERO,
-            wishes: Wishes::default(),
+            pilot_since: Instant::ZERO,
+            interrupted: Interrupted::default(),
+            pending: Pending::default(),
+            handshake: Handshake::default(),
             repeats: Repeats::default(),
             guidance: Guidance::new(&config),
             mode_before: 0,
@@ -283,11 +291,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.deny(link, sender, &command);
                 return false;
             }
-            if !self.repeats.is_repeat(frame, command.command, self.now) {
-                self.handle_command(link, sender, &command);
-                return true;
+            let now = self.now;
+            let (result, relevant) = match self.repeats.answered(frame, now) {
+                Some(result) => (result, false),
+                None => {
+                    let result = self.handle_command(link, sender, &command);
+                    self.repeats.remember(frame, result, now);
+                    (result, true)
+                }
+            };
+            if let Some(result) = result {
+                let ack = Outgoing::Ack { command: command.command, result, to: command.from };
+                self.answer_to(link, sender, AnswerKind::Ack, ack);
             }
-            return false;
+            return relevant;
         }
         if self.serve(link, sender, frame) {
             return false;
@@ -298,6 +315,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     return false;
                 }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
+                if let Some(ack) = self.telemetry.ack.take() {
+                    self.handle_ack(&ack);
+                }
+                self.handshake.watch(self.state, &self.telemetry);
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
                     // It may have been started anew and know nothing of the streams we asked for.
@@ -353,9 +374,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.say_of(sender, true, "Command # denied, not a ground station: #/#", numbers);
     }
 
-    fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) {
-        let (before, known) = (self.wishes, self.obstacles.count());
-        let result = match commands::apply(&mut self.wishes, self.state, command) {
+    /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
+    fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
+        let (before, known) = (self.pending, self.obstacles.count());
+        let inputs = self.inputs();
+        let result = match commands::apply(&mut self.pending, self.state, &inputs, command) {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
             None if command.command == commands::EXCLUDE => self.exclude(command),
@@ -365,17 +388,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.restart(command)
             }
             // To all components: another one's.
-            None if !command.to_component => return,
+            None if !command.to_component => return None,
             None => UNSUPPORTED,
         };
-        if command.to_us {
-            let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-            self.answer_to(link, sender, AnswerKind::Ack, ack);
-        }
         let restarts = command.command == commands::RESTART && result == ACCEPTED;
-        if restarts || self.wishes != before || self.obstacles.count() != known {
+        if restarts || self.pending != before || self.obstacles.count() != known {
             self.log_command(sender, command);
         }
+        command.to_us.then_some(result)
     }
 
     fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
@@ -437,33 +457,44 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn take(&mut self, row: &'static Row) {
         let (from, now) = (self.state, self.now);
-        self.state = row.to;
+        let to = match row.to {
+            To::State(to) => to,
+            To::Interrupted => self.interrupted.target(from),
+        };
+        self.interrupted.note(from, to);
+        self.state = to;
         self.entered_at = now;
         if row.guard == Guard::StartCommanded {
             self.started_at = now;
+            self.mode_before = self.telemetry.custom_mode;
         }
-        self.wishes = Wishes { start: self.wishes.start, ..Wishes::default() };
-        let ended = matches!(row.to, State::Aborted | State::Done);
-        if ended || row.action == Action::ForgetStart {
-            self.wishes.start = false;
+        if to == State::PilotControl && from != State::PilotReturned {
+            self.pilot_since = now;
         }
-        self.act(from, row);
+        let ends = matches!(to, State::Aborted | State::Done)
+            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
+        self.pending.state_changed(row.guard, to, ends);
+        self.handshake.state_changed(from, to);
+        self.act(from, to, row);
         if !row.text.is_empty() {
             let text = Outgoing::Text { warning: row.warning, text: row.text };
             self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
         }
+        if let Some(text) = self.interrupted.text(from, to) {
+            self.say(false, text);
+        }
         // Full only if the shell does not drain: then the newest is lost.
-        let changed = Event::StateChanged { from, to: row.to, text: row.text, warning: row.warning };
+        let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
         let _ = self.events.push_back(changed);
         // The step that the new state needs is due now.
-        if setpoints_flow(row.to) && !setpoints_flow(from) {
+        if setpoints_flow(to) && !setpoints_flow(from) {
             self.next_step = now;
         }
     }
 
-    fn act(&mut self, from: State, row: &Row) {
+    fn act(&mut self, from: State, to: State, row: &Row) {
         let now = self.now;
-        self.mark_place(row.to);
+        self.mark_place(to);
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
@@ -477,22 +508,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
             }
-            Action::HoldHere => {
-                self.mode_before = self.telemetry.custom_mode;
-                self.guidance.hold_at(position);
-            }
+            Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
+            Action::HoldHere => self.guidance.hold_at(position),
             Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
-            Action::AskLand => {
-                self.retry_at = now;
-                // Off the path, or not known to be on it: the reference may be beyond a wall.
-                if matches!(from, State::PilotControl | State::PositionLost | State::AutopilotSilent) {
-                    self.guidance.hold_at(position);
-                } else {
-                    self.guidance.brake(&position);
-                }
-            }
-            Action::AskDisarm if row.to == State::Disarm => self.retry_at = now + DISARM_AFTER,
-            Action::AskDisarm => self.outboxes[Link::Autopilot as usize].push(Outgoing::Arm(false)),
+            Action::AskLand => self.ask_land(from),
+            Action::AskDisarm if to == State::Disarm => self.retry_at = now + DISARM_AFTER,
+            Action::AskDisarm | Action::CancelStart => self.retry_at = now,
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
             Action::RequestDetour => self.request_detour(false),
@@ -506,17 +527,44 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.aside = self.around.aside;
             }
             Action::BrakeOnPath => self.guidance.brake(&position),
-            Action::Rejoin => {
-                if let Some(plan) = &self.plan {
-                    self.guidance.rejoin(&plan.path, &position, now);
-                }
-            }
+            Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
                 if let Some(plan) = &mut self.plan {
                     self.guidance.turn_back(&mut plan.path, now);
                     // Off the shared plan: neighbours keep clear of us as of a stranger.
                     plan.gates.clear();
                     core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
+                }
+            }
+        }
+    }
+
+    fn ask_land(&mut self, from: State) {
+        use State::*;
+        self.retry_at = self.now;
+        let position = self.telemetry.position;
+        match from {
+            Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
+                self.guidance.brake(&position);
+            }
+            // Off the path, or not known to be on it: the reference may be beyond a wall.
+            _ => self.guidance.hold_at(position),
+        }
+    }
+
+    /// Goes on in the state that was interrupted.
+    fn go_on(&mut self, from: State, to: State) {
+        let (now, position) = (self.now, self.telemetry.position);
+        match to {
+            State::TakeOff => self.retry_at = now,
+            State::Land => self.ask_land(from),
+            _ => {
+                let climbs = matches!(self.interrupted.beneath(to), State::TakeOff | State::Climb);
+                if let Some(plan) = &self.plan {
+                    self.guidance.go_on(plan, climbs, &position, now);
+                }
+                if !matches!(to, State::Climb | State::Follow) {
+                    self.guidance.brake(&position);
                 }
             }
         }

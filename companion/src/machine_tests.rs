@@ -63,7 +63,7 @@ fn a_pilot_is_never_fought() {
     // Offboard alone does not resume, nor resume alone.
     bench.mode = px4::OFFBOARD;
     bench.run(3.0);
-    assert_eq!(bench.state(), State::PilotControl);
+    assert_eq!(bench.state(), State::PilotReturned);
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
     assert_eq!(bench.state(), State::Follow);
     bench.until(State::Done, 60.0);
@@ -83,7 +83,7 @@ fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
     bench.run(2.0);
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
     assert_eq!(bench.state(), State::Land);
-    bench.until(State::Done, 30.0);
+    bench.until(State::Aborted, 30.0);
 }
 
 #[test]
@@ -106,7 +106,7 @@ fn a_jump_of_five_metres_is_not_flown_after() {
             }
         }
         assert!(stops >= 18, "{stops}");
-        bench.until(State::Done, 30.0);
+        bench.until(State::Aborted, 30.0);
         assert_no_gap(&bench);
     }
 }
@@ -158,13 +158,13 @@ fn pause_brakes_on_the_path_and_resume_goes_on() {
 fn land_and_return_are_obeyed() {
     let mut bench = Bench::following(config());
     bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
-    bench.until(State::Done, 30.0);
+    bench.until(State::Aborted, 30.0);
     assert!(bench.enu.x > 8.5 && bench.enu.x < 15.0);
     assert_no_gap(&bench);
     let mut bench = Bench::following(config());
     bench.run(2.0);
     bench.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
-    bench.until(State::Done, 60.0);
+    bench.until(State::Aborted, 60.0);
     assert!((bench.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{:?}", bench.enu);
     assert_no_gap(&bench);
 }
@@ -181,7 +181,7 @@ fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
     bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, 1);
     bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM + 1, crate::COMPONENT);
     assert_eq!((bench.acks.len(), bench.state()), (0, State::Ready));
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
     assert_eq!(bench.acks.pop(), Some((193, 1, 255, 190)), "not now");
     bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 7.0, SYSTEM, crate::COMPONENT);
     assert_eq!(bench.acks.pop(), Some((193, 2, 255, 190)));

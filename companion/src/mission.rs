@@ -1,7 +1,7 @@
 //! The mission as an ordered transition table and a pure update function.
 //!
 //! [`update`] goes through [`TABLE`] from the top and takes the first row whose `from` holds the state and whose guard has
-//! held for the row's limit. Order is rank: the pilot and the failsafe come first. `README.md` prints the same table, and
+//! held for the row's limit. Order is rank: the pilot and the failsafe come first. `docs/table.md` prints the same table, and
 //! a test compares the two.
 
 use crate::table::TABLE;
@@ -33,11 +33,11 @@ pub enum State {
     Climb,
     /// Along the path, slowed and stopped by the neighbours.
     Follow,
-    /// Stopped on the path by DO_PAUSE_CONTINUE.
+    /// Stopped by DO_PAUSE_CONTINUE, on the path or in the climb.
     Paused,
     /// Stopped on the path: no neighbour is heard.
     Alone,
-    /// No HEARTBEAT in flight: stopped on the path.
+    /// No HEARTBEAT in flight: stopped.
     AutopilotSilent,
     /// No position in flight.
     PositionLost,
@@ -61,6 +61,127 @@ pub enum State {
     PadReplanning,
     /// Brakes along the path, then lands.
     Stopping,
+    /// Offboard or Guided again after the pilot: holds the point where the mode came back until DO_PAUSE_CONTINUE 1.
+    PilotReturned,
+    /// The start was cancelled or paused after arming was requested: holds on the pad until the motors are surely off.
+    CancelStart,
+}
+
+impl State {
+    /// Every state, in the order of the numbers that HEARTBEAT carries.
+    pub const ALL: &'static [Self] = &[
+        Self::WaitAutopilot,
+        Self::WaitPosition,
+        Self::Planning,
+        Self::Ready,
+        Self::Scheduled,
+        Self::Streaming,
+        Self::Engaging,
+        Self::Arming,
+        Self::TakeOff,
+        Self::Climb,
+        Self::Follow,
+        Self::Paused,
+        Self::Alone,
+        Self::AutopilotSilent,
+        Self::PositionLost,
+        Self::Land,
+        Self::Disarm,
+        Self::PilotControl,
+        Self::Failsafe,
+        Self::Done,
+        Self::Aborted,
+        Self::Blocked,
+        Self::Replanning,
+        Self::PadReplanning,
+        Self::Stopping,
+        Self::PilotReturned,
+        Self::CancelStart,
+    ];
+}
+
+/// Where a row leads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum To {
+    /// To this state.
+    State(State),
+    /// Back to the state that was interrupted.
+    Interrupted,
+}
+
+/// What was interrupted. The states that interrupt are [`State::Paused`] on the one hand, and on the other those in which
+/// autopilot, position or pilot take the vehicle: a pause may itself be interrupted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Interrupted {
+    /// The state that the pause interrupted.
+    pub by_pause: State,
+    /// The state that a silent autopilot, a lost position or the pilot interrupted.
+    pub by_loss: State,
+}
+
+impl Default for Interrupted {
+    fn default() -> Self {
+        Self { by_pause: State::Follow, by_loss: State::Follow }
+    }
+}
+
+impl Interrupted {
+    /// Where [`To::Interrupted`] leads from `state`.
+    pub fn target(&self, state: State) -> State {
+        if state == State::Paused { self.by_pause } else { self.by_loss }
+    }
+
+    /// Remembers what a change of state interrupts.
+    pub(crate) fn note(&mut self, from: State, to: State) {
+        use State::*;
+        // A request to the shell, and a disarming, begin again.
+        let kept = match from {
+            Replanning => Blocked,
+            Disarm => Land,
+            other => other,
+        };
+        if Self::is_loss(to) && !Self::is_loss(from) {
+            self.by_loss = kept;
+        } else if to == Paused && from != Paused && !Self::is_loss(from) {
+            self.by_pause = kept;
+        }
+    }
+
+    /// What a person reads on a change of state that interrupts another.
+    pub(crate) fn text(&self, from: State, to: State) -> Option<&'static str> {
+        use State::*;
+        let kept = match to {
+            Paused if matches!(from, PilotReturned | PositionLost) => return Some("Still paused"),
+            Paused | PilotControl | AutopilotSilent | PositionLost if !Self::is_loss(from) => self.target(to),
+            _ => return None,
+        };
+        Some(match kept {
+            TakeOff => "Interrupted: TakeOff",
+            Climb => "Interrupted: Climb",
+            Follow => "Interrupted: Follow",
+            Paused => "Interrupted: Paused",
+            Alone => "Interrupted: Alone",
+            Blocked => "Interrupted: Blocked",
+            Stopping => "Interrupted: Stopping",
+            Land => "Interrupted: Land",
+            _ => return None,
+        })
+    }
+
+    fn is_loss(state: State) -> bool {
+        use State::*;
+        matches!(state, AutopilotSilent | PositionLost | PilotControl | PilotReturned)
+    }
+
+    /// The state of the flight itself, beneath pause and loss.
+    pub(crate) fn beneath(&self, state: State) -> State {
+        use State::*;
+        let state = match state {
+            AutopilotSilent | PositionLost | PilotControl | PilotReturned => self.by_loss,
+            other => other,
+        };
+        if state == Paused { self.by_pause } else { state }
+    }
 }
 
 /// What must hold for a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
@@ -92,6 +213,16 @@ pub enum Guard {
     StartElsewhere,
     /// MISSION_START, but the motors are armed.
     StartArmed,
+    /// MISSION_START, but the battery charge is below the configured limit.
+    StartBatteryLow,
+    /// MISSION_START, but outside the configured volume.
+    StartOutside,
+    /// A fresh position, away from the start point.
+    AwayFromStart,
+    /// Battery charge below the configured limit.
+    ChargeLow,
+    /// Outside the configured volume.
+    Outside,
     /// The schedule's take-off is due, and the neighbours leave room.
     GatesOpen,
     /// The state has lasted as long as the limit.
@@ -106,6 +237,22 @@ pub enum Guard {
     Armed,
     /// Motors off.
     Disarmed,
+    /// Motors off, at the goal.
+    DisarmedAtGoal,
+    /// Motors off, and the state has lasted as long as the limit.
+    StaysDisarmed,
+    /// The same, and the start is only paused.
+    StaysDisarmedPaused,
+    /// Arming was accepted, but the armed bit did not come.
+    ArmedUnseen,
+    /// Arming was requested and not answered.
+    ArmingUnanswered,
+    /// Motors on, and off the ground or moving up or down.
+    InAir,
+    /// The same, in Offboard or Guided that this companion entered, without setpoints.
+    Unattended,
+    /// Disarming was refused, and no mode lands the vehicle.
+    DisarmRefused,
     /// In the air, or of an autopilot that needs no command to take off.
     LiftedOff,
     /// At the altitude of the start point.
@@ -122,14 +269,20 @@ pub enum Guard {
     BackOnPath,
     /// A fresh position, but elsewhere than where it stopped on the path.
     BackOffPath,
-    /// Offboard or Guided again, DO_PAUSE_CONTINUE 1, and the way back to the path is free.
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, and the way back to the interrupted state is free.
     ResumedOnPath,
-    /// Offboard or Guided again, DO_PAUSE_CONTINUE 1, but too far from the path.
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, but too far from the path.
     ResumedOffPath,
+    /// DO_PAUSE_CONTINUE 0, and the state has lasted as long as the limit.
+    PausedOnPad,
     /// NAV_LAND.
     LandCommanded,
+    /// NAV_LAND, in the air, in Offboard or Guided.
+    LandUnattended,
     /// NAV_RETURN_TO_LAUNCH.
     ReturnCommanded,
+    /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
+    ReturnInClimb,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
     /// Battery charge below the configured limit, and no neighbour below.
@@ -140,7 +293,7 @@ pub enum Guard {
     NeighboursSilent,
     /// A neighbour was heard within the last second.
     NeighbourHeard,
-    /// On the ground.
+    /// On the ground after a flight or in the mode that lands, and at rest.
     OnGround,
     /// Something that left the plan is in the way, or we left it ourselves.
     PathBlocked,
@@ -185,7 +338,7 @@ pub enum Action {
     RunPath,
     /// Brake the reference along the path.
     BrakeOnPath,
-    /// Go on from the nearest point of the path.
+    /// Go on in the interrupted state: from the nearest point of the path, from here in a climb or a descent.
     Rejoin,
     /// Fly the path flown so far back to the start.
     TurnBack,
@@ -201,6 +354,8 @@ pub enum Action {
     FlyDetour,
     /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
     AskDisarm,
+    /// Forget MISSION_START, and ask to disarm, again every second.
+    CancelStart,
 }
 
 /// One row of the table.
@@ -213,7 +368,7 @@ pub struct Row {
     /// How long it must have held; zero: at once.
     pub limit: Duration,
     /// The next state.
-    pub to: State,
+    pub to: To,
     /// What is done.
     pub action: Action,
     /// STATUSTEXT for a person, at most 50 bytes; empty: none.
@@ -247,7 +402,7 @@ pub struct Inputs {
     pub roadmap_bad: bool,
     /// The plan has a goal.
     pub has_goal: bool,
-    /// Horizontally near the start point.
+    /// Near the pad below the start point, in height too.
     pub at_start: bool,
     /// MISSION_START holds.
     pub start: bool,
@@ -259,8 +414,20 @@ pub struct Inputs {
     pub land: bool,
     /// NAV_RETURN_TO_LAUNCH holds.
     pub turn_back: bool,
+    /// The climb is not done: it goes on after the interruption.
+    pub in_climb: bool,
     /// Motors on.
     pub armed: bool,
+    /// Arming was accepted, and the armed bit is overdue.
+    pub armed_unseen: bool,
+    /// Arming was requested as often as allowed, and not answered.
+    pub arming_unanswered: bool,
+    /// Disarming was refused.
+    pub disarm_refused: bool,
+    /// The setpoint mode was entered for this mission and not left since.
+    pub ours: bool,
+    /// The mode is the one that lands.
+    pub landing: bool,
     /// The mode is Offboard or Guided.
     pub offboard: bool,
     /// The mode is neither the one before nor the one asked for.
@@ -269,6 +436,10 @@ pub struct Inputs {
     pub critical: bool,
     /// The landing detector says ground.
     pub on_ground: bool,
+    /// The landing detector said air since the motors were armed.
+    pub flown: bool,
+    /// Moves up or down.
+    pub vertical: bool,
     /// Motors on, and the landing detector says air.
     pub airborne: bool,
     /// The landing detector says air, or nobody waits for that.
@@ -279,6 +450,8 @@ pub struct Inputs {
     pub climb_done: bool,
     /// At the end of the path with room to land.
     pub path_done: bool,
+    /// The path was flown to the goal.
+    pub at_goal: bool,
     /// The way back to the path is free.
     pub near_path: bool,
     /// Battery charge below the configured limit.
@@ -309,7 +482,7 @@ const DETOURS_TRIED: u8 = 4;
 pub(crate) const NOW: Duration = Duration::from_millis(0);
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
 const HEARD: Duration = Duration::from_millis(1500);
-const FRESH: Duration = Duration::from_millis(500);
+pub(crate) const FRESH: Duration = Duration::from_millis(500);
 
 impl Guard {
     /// Whether it holds, and has held for `limit`.
@@ -328,6 +501,11 @@ impl Guard {
             Self::StartWithoutGoal => i.start && !i.has_goal,
             Self::StartElsewhere => i.start && !i.at_start,
             Self::StartArmed => i.start && i.armed,
+            Self::StartBatteryLow => i.start && i.battery_low,
+            Self::StartOutside => i.start && i.outside,
+            Self::AwayFromStart => i.position_age < FRESH && !i.at_start,
+            Self::ChargeLow => i.battery_low,
+            Self::Outside => i.outside,
             Self::GatesOpen => i.gates_open,
             Self::Elapsed => i.in_state >= limit,
             Self::Offboard => i.offboard,
@@ -335,6 +513,14 @@ impl Guard {
             Self::FailsafeActs => i.mode_foreign && i.critical,
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
+            Self::DisarmedAtGoal => !i.armed && i.at_goal,
+            Self::StaysDisarmed => !i.armed && i.in_state >= limit,
+            Self::StaysDisarmedPaused => !i.armed && i.in_state >= limit && i.start && i.pause,
+            Self::ArmedUnseen => i.armed_unseen,
+            Self::ArmingUnanswered => i.arming_unanswered,
+            Self::InAir => i.armed && (i.airborne || i.vertical),
+            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < HEARD,
+            Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
             Self::PathDone => i.path_done,
@@ -345,14 +531,17 @@ impl Guard {
             Self::BackOffPath => i.position_age < FRESH && !i.near_path,
             Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
+            Self::PausedOnPad => i.pause && i.in_state >= limit,
             Self::LandCommanded => i.land,
+            Self::LandUnattended => i.land && i.airborne && i.offboard,
             Self::ReturnCommanded => i.turn_back,
+            Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::NeighbourHeard => i.neighbour_heard,
-            Self::OnGround => i.on_ground,
+            Self::OnGround => i.on_ground && !i.vertical && (i.flown || i.landing),
             Self::PathBlocked => i.blocked,
             Self::PathClear => !i.blocked,
             Self::OurTurn => i.our_turn,

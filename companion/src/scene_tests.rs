@@ -83,7 +83,7 @@ fn every_row_has_its_scene() {
     scene(ready(), &|b| b.silent = true, WaitAutopilot, 5.0);
     scene(to(Streaming), &|b| b.silent = true, Aborted, 5.0);
     scene(flying(), &|b| b.silent = true, AutopilotSilent, 5.0);
-    scene(flying(), &|b| b.silent = true, Aborted, 70.0);
+    scene(flying(), &|b| b.silent = true, Aborted, 125.0);
     scene(
         flying(),
         &|b| {
@@ -94,11 +94,11 @@ fn every_row_has_its_scene() {
         Done,
         60.0,
     );
-    scene(landing(), &|b| b.silent = true, Aborted, 65.0);
+    scene(landing(), &|b| b.silent = true, Aborted, 125.0);
     scene(ready(), &|b| b.no_position = true, WaitPosition, 4.0);
     scene(to(Streaming), &|b| b.no_position = true, Aborted, 4.0);
     scene(flying(), &|b| b.no_position = true, PositionLost, 3.0);
-    scene(flying(), &|b| b.no_position = true, Done, 30.0);
+    scene(flying(), &|b| b.no_position = true, Aborted, 30.0);
     scene(
         flying(),
         &|b| {
@@ -115,7 +115,7 @@ fn every_row_has_its_scene() {
             b.enu.y += 5.0;
             b.until(PositionLost, 0.2);
         },
-        Done,
+        Aborted,
         30.0,
     );
     // Orders and limits.
@@ -126,14 +126,14 @@ fn every_row_has_its_scene() {
             b.run(1.5);
             land(b);
         },
-        Done,
+        Aborted,
         30.0,
     );
-    scene(flying(), &|b| b.battery = 10, Done, 30.0);
-    scene(flying(), &|b| b.battery = 5, Done, 30.0);
+    scene(flying(), &|b| b.battery = 10, Aborted, 30.0);
+    scene(flying(), &|b| b.battery = 5, Aborted, 30.0);
     let mut fenced = config();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));
-    scene(Bench::following(fenced), &|_| {}, Done, 60.0);
+    scene(Bench::following(fenced), &|_| {}, Aborted, 60.0);
     // The same while somebody lies below: it lands where there is room.
     let mut fenced = two_vehicles();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(10.0, 30.0, 10.0)));
@@ -144,11 +144,11 @@ fn every_row_has_its_scene() {
             b.until(Land, 20.0);
             assert!((12.4..14.0).contains(&b.enu.x), "{:?}", b.enu);
         },
-        Done,
+        Aborted,
         60.0,
     );
-    scene(flying(), &|b| back(b), Done, 60.0);
-    scene(to(Climb), &|b| back(b), Done, 60.0);
+    scene(flying(), &|b| back(b), Aborted, 60.0);
+    scene(to(Climb), &|b| back(b), Aborted, 60.0);
     // The mission in order, and where it halts.
     scene(
         ready(),
@@ -176,7 +176,64 @@ fn every_row_has_its_scene() {
     scene(to(Streaming), &|b| land(b), Aborted, 1.0);
     scene(to(Streaming), &|b| back(b), Aborted, 1.0);
     scene(to(Streaming), &|b| b.refused.push(176), Aborted, 8.0);
-    scene(to(Streaming), &|b| b.refused.push(400), Aborted, 16.0);
+    scene(to(Streaming), &|b| b.refused.push(400), Aborted, 30.0);
+    // On the pad: what the pilot, the place, the battery and the fence say until arming.
+    let gated = || {
+        let mut gated = plan();
+        gated.gates.push(planner_core::schedule::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+        let mut bench = Bench::new(two_vehicles());
+        bench.answer_plan = Some(Ok(gated));
+        bench.until(Ready, 6.0);
+        bench.start();
+        bench.run(1.0);
+        assert_eq!(bench.state(), Scheduled);
+        bench
+    };
+    scene(gated(), &|b| b.armed = true, Aborted, 2.0);
+    scene(gated(), &|b| b.battery = 9, Aborted, 2.0);
+    scene(gated(), &|b| (0..3).for_each(|_| (b.enu.x += 1.0, b.run(0.3)).1), Aborted, 2.0);
+    let low = |b: &mut Bench| {
+        b.battery = 9;
+        b.run(1.5);
+        b.start();
+    };
+    scene(ready(), &low, Aborted, 1.0);
+    let mut fenced = config();
+    fenced.geofence = Some((Point::new(0.0, 0.0, 1.0), Point::new(20.0, 30.0, 10.0)));
+    let mut outside = Bench::new(fenced);
+    outside.until(Ready, 6.0);
+    scene(outside, &|b| b.start(), Aborted, 1.0);
+    let mut fenced = two_vehicles();
+    fenced.geofence = Some((Point::new(7.0, 0.0, -1.0), Point::new(20.0, 30.0, 10.0)));
+    let mut outside = Bench::new(fenced);
+    outside.until(Ready, 6.0);
+    outside.start();
+    scene(outside, &|b| (0..3).for_each(|_| (b.enu.x -= 0.4, b.run(0.3)).1), Aborted, 2.0);
+    scene(ready(), &|b| (pause(b), b.start(), b.run(31.0)).2, Scheduled, 1.0);
+    // Arming: paused, cancelled, never answered, disarmed at once, or armed and lifted off all the same.
+    let arming = |script: &dyn Fn(&mut Bench)| {
+        let mut bench = to(Streaming);
+        script(&mut bench);
+        bench.until(Arming, 6.0);
+        bench
+    };
+    let denied = || arming(&|b| b.refused.push(400));
+    scene(denied(), &|b| pause(b), Scheduled, 4.0);
+    scene(denied(), &|b| land(b), Aborted, 4.0);
+    scene(denied(), &|b| back(b), Aborted, 4.0);
+    scene(denied(), &|b| b.battery = 9, Aborted, 5.0);
+    scene(denied(), &|b| b.no_position = true, Aborted, 5.0);
+    scene(denied(), &|b| (0..3).for_each(|_| (b.enu.x += 1.0, b.run(0.3)).1), Aborted, 5.0);
+    scene(arming(&|b| (b.mute, b.refused) = (true, std::vec![400])), &|_| {}, Aborted, 9.0);
+    scene(arming(&|b| b.never_arms = true), &|_| {}, Aborted, 9.0);
+    let armed_late = |b: &mut Bench| {
+        pause(b);
+        b.armed = true;
+        b.run(1.0);
+        assert_eq!(b.state(), CancelStart);
+    };
+    scene(denied(), &armed_late, Disarm, 6.0);
+    scene(denied(), &|b| (armed_late(b), b.enu.z = 1.0).1, Land, 2.0);
     scene(
         to(Climb),
         &|b| {
@@ -184,7 +241,7 @@ fn every_row_has_its_scene() {
             b.run(61.0);
             b.stuck = false;
         },
-        Done,
+        Aborted,
         30.0,
     );
     scene(flying(), &|b| pause(b), Paused, 1.0);
@@ -204,7 +261,7 @@ fn every_row_has_its_scene() {
             pause(b);
             b.run(601.0);
         },
-        Done,
+        Aborted,
         30.0,
     );
     scene(
@@ -214,7 +271,7 @@ fn every_row_has_its_scene() {
             b.run(610.0);
             b.stuck = false;
         },
-        Done,
+        Aborted,
         30.0,
     );
     scene(
@@ -235,7 +292,7 @@ fn every_row_has_its_scene() {
     };
     let accompanied = || with(two_vehicles());
     scene(accompanied(), &|b| b.neighbour = None, Alone, 5.0);
-    scene(accompanied(), &|b| b.neighbour = None, Done, 60.0);
+    scene(accompanied(), &|b| b.neighbour = None, Aborted, 60.0);
     scene(
         accompanied(),
         &|b| {
@@ -279,7 +336,7 @@ fn every_row_has_its_scene() {
             b.answer_detour = no_way;
             lies(b);
         },
-        Done,
+        Aborted,
         120.0,
     );
     // One comes down on the first stretch of the path: there is no place before it, so it goes aside, as often as need be.
@@ -302,7 +359,7 @@ fn every_row_has_its_scene() {
             lies(b);
             b.run(601.0);
         },
-        Done,
+        Aborted,
         60.0,
     );
     // Nobody hears it on the ground.
@@ -375,7 +432,7 @@ fn every_row_has_its_scene() {
     grounded.refused = std::vec![22];
     grounded.until(Ready, 6.0);
     grounded.start();
-    scene(grounded, &|b| b.run(14.0), Done, 30.0);
+    scene(grounded, &|b| b.run(14.0), Aborted, 30.0);
     // After the pilot, after a failsafe.
     let piloted = || {
         let mut bench = flying();
@@ -406,10 +463,54 @@ fn every_row_has_its_scene() {
             b.run(2.0);
             resume(b);
         },
-        Done,
+        Aborted,
         30.0,
     );
     scene(piloted(), &|b| b.run(901.0), PilotControl, 1.0);
+    let returned = || {
+        let mut bench = piloted();
+        bench.mode = px4::OFFBOARD;
+        bench.until(PilotReturned, 2.0);
+        bench
+    };
+    scene(returned(), &|b| b.run(901.0), PilotReturned, 1.0);
+    scene(returned(), &|b| b.mode = px4::HOLD, PilotControl, 2.0);
+    scene(returned(), &|b| land(b), Land, 1.0);
+    scene(returned(), &|b| b.silent = true, Land, 65.0);
+    // Paused in the climb, and called back.
+    scene(to(Climb), &|b| (pause(b), back(b)).1, Land, 1.0);
+    // "On ground" in the air: disarming is refused, and the autopilot does not land.
+    let hovers = || {
+        let mut bench = flying();
+        bench.refused = std::vec![176, 400];
+        bench.false_ground = true;
+        land(&mut bench);
+        bench.until(Disarm, 6.0);
+        bench
+    };
+    scene(hovers(), &|b| b.run(6.0), Disarm, 6.0);
+    scene(hovers(), &|b| b.false_ground = false, Land, 1.0);
+    // Given up in the air: somebody has to land it.
+    let given_up = |b: &mut Bench| {
+        b.armed = false;
+        b.until(Aborted, 2.0);
+        b.armed = true;
+    };
+    scene(flying(), &given_up, Land, 2.0);
+    scene(
+        flying(),
+        &|b| {
+            b.silent = true;
+            b.until(AutopilotSilent, 5.0);
+            b.until(Land, 65.0);
+        },
+        Aborted,
+        130.0,
+    );
+    // A companion that starts in the air lands it when it is commanded to.
+    let mut found = Bench::new(config());
+    (found.armed, found.mode, found.enu.z) = (true, px4::OFFBOARD, 1.5);
+    scene(found, &|b| (b.until(Failsafe, 3.0), land(b)).1, Land, 1.0);
     scene(
         flying(),
         &|b| {

@@ -1,6 +1,6 @@
 //! The rows of the mission's transition table; [`crate::mission`] says what states, guards and actions are.
 
-use crate::mission::{Action, Guard, NOW, Row, State};
+use crate::mission::{Action, Guard, NOW, Row, State, To};
 use crate::time::Duration;
 
 pub(crate) const fn s(secs: u64) -> Duration {
@@ -15,7 +15,7 @@ pub(crate) const fn info(
     action: Action,
     text: &'static str,
 ) -> Row {
-    Row { from, guard, limit, to, action, text, warning: false }
+    Row { from, guard, limit, to: To::State(to), action, text, warning: false }
 }
 
 pub(crate) const fn warn(
@@ -26,8 +26,22 @@ pub(crate) const fn warn(
     action: Action,
     text: &'static str,
 ) -> Row {
-    Row { from, guard, limit, to, action, text, warning: true }
+    Row { from, guard, limit, to: To::State(to), action, text, warning: true }
 }
+
+/// Back to the interrupted state.
+pub(crate) const fn back(
+    from: &'static [State],
+    guard: Guard,
+    limit: Duration,
+    action: Action,
+    text: &'static str,
+) -> Row {
+    Row { from, guard, limit, to: To::Interrupted, action, text, warning: false }
+}
+
+/// Longer than the armed bit lags behind the ack of arming, twice over.
+const MS2500: Duration = Duration::from_millis(2500);
 
 use Action as A;
 use Guard as G;
@@ -35,6 +49,10 @@ use State::*;
 
 /// On the ground before arming.
 pub(crate) const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
+/// Started, on the pad, arming not yet requested.
+pub(crate) const STARTED: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
+/// Started, on the pad.
+pub(crate) const ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
 /// In the air, or about to be, under our setpoints.
 pub(crate) const FLYING: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, AutopilotSilent, PositionLost];
@@ -56,29 +74,42 @@ pub static TABLE: &[Row] = &[
     warn(FLYING,              G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: mission stopped"),
     warn(&[Land, Disarm],     G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe while landing"),
     warn(&[Land, Disarm],     G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
-    warn(&[Streaming, Engaging, Arming], G::FailsafeActs, NOW, Aborted,     A::ForgetStart, "Failsafe before take-off: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::ModeTaken, NOW, Aborted,        A::ForgetStart, "Mode changed by pilot: start cancelled"),
+    warn(ON_PAD,              G::FailsafeActs,     NOW,    Aborted,         A::ForgetStart, "Failsafe before take-off: start cancelled"),
+    warn(ON_PAD,              G::ModeTaken,        NOW,    Aborted,         A::ForgetStart, "Mode changed by pilot: start cancelled"),
     // Started anew in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
     warn(WAITING,             G::FoundFlying,      NOW,    Failsafe,        A::ForgetStart, "Found in flight: no mission"),
     // Links and position.
     warn(WAITING,             G::NoHeartbeat,      s(3),   WaitAutopilot,   A::ForgetStart, "Autopilot silent: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::NoHeartbeat, s(3), Aborted,     A::ForgetStart, "Autopilot silent: start cancelled"),
+    warn(&[Streaming, Engaging, Arming, CancelStart], G::NoHeartbeat, s(3), Aborted,     A::ForgetStart, "Autopilot silent: start cancelled"),
     warn(LINKED,              G::NoHeartbeat,      s(3),   AutopilotSilent, A::BrakeOnPath, "Autopilot silent: stopping"),
-    warn(&[Land, Disarm, PilotControl, Failsafe], G::NoHeartbeat, s(60), Aborted, A::ForgetStart, "Autopilot lost"),
+    warn(&[Disarm, PilotControl, Failsafe], G::NoHeartbeat, s(60), Aborted, A::ForgetStart, "Autopilot lost"),
+    warn(&[Land],             G::NoHeartbeat,      s(120), Aborted,         A::ForgetStart, "Autopilot lost"),
+    warn(&[PilotReturned],    G::NoHeartbeat,      s(60),  Land,            A::AskLand,     "Autopilot still silent: landing"),
     warn(&[Planning, Ready, Scheduled, PadReplanning], G::NoPosition, s(2), WaitPosition,  A::ForgetStart, "Position lost: start cancelled"),
-    warn(&[Streaming, Engaging, Arming], G::NoPosition, s(1), Aborted,      A::ForgetStart, "Position lost: start cancelled"),
+    warn(&[Streaming, Engaging], G::NoPosition,    s(1),   Aborted,         A::ForgetStart, "Position lost: start cancelled"),
+    warn(&[Arming],           G::NoPosition,       s(1),   CancelStart,     A::CancelStart, "Position lost: start cancelled"),
+    // On the pad the pilot wins too, and what was checked at the start is checked until arming.
+    warn(STARTED,             G::Armed,            NOW,    Aborted,         A::ForgetStart, "Armed by someone else: start cancelled"),
+    warn(STARTED,             G::AwayFromStart,    NOW,    Aborted,         A::ForgetStart, "Not at its start: start cancelled"),
+    warn(STARTED,             G::ChargeLow,        NOW,    Aborted,         A::ForgetStart, "Battery low: start cancelled"),
+    warn(STARTED,             G::Outside,          NOW,    Aborted,         A::ForgetStart, "Outside the geofence: start cancelled"),
+    warn(&[Arming],           G::AwayFromStart,    NOW,    CancelStart,     A::CancelStart, "Not at its start: start cancelled"),
+    warn(&[Arming],           G::ChargeLow,        NOW,    CancelStart,     A::CancelStart, "Battery low: start cancelled"),
+    warn(&[Arming],           G::Outside,          NOW,    CancelStart,     A::CancelStart, "Outside the geofence: start cancelled"),
     warn(SOUND,               G::PositionJumped,   NOW,    PositionLost,    A::BrakeOnPath, "Position jumped: stopping"),
     warn(SOUND,               G::NoPosition,       s(1),   PositionLost,    A::BrakeOnPath, "Position lost: stopping"),
     // Orders and limits in flight.
     info(ON_PATH,             G::LandCommanded,    NOW,    Stopping,        A::BrakeOnPath, "Landing as commanded"),
-    info(&[TakeOff, Climb, PositionLost, AutopilotSilent], G::LandCommanded, NOW, Land, A::AskLand, "Landing as commanded"),
+    info(&[TakeOff, Climb, PositionLost, AutopilotSilent, PilotReturned], G::LandCommanded, NOW, Land, A::AskLand, "Landing as commanded"),
+    info(&[Failsafe, Aborted], G::LandUnattended,  NOW,    Land,            A::AskLand,     "Landing as commanded"),
     warn(ON_PATH,             G::BatteryCritical,  NOW,    Stopping,        A::BrakeOnPath, "Battery critical: landing"),
     warn(ON_PATH,             G::BatteryLow,       NOW,    Stopping,        A::BrakeOnPath, "Battery low: landing"),
-    warn(&[TakeOff, Climb],   G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
-    warn(&[TakeOff, Climb],   G::BatteryLow,       NOW,    Land,            A::AskLand,     "Battery low: landing"),
+    warn(&[TakeOff, Climb, PilotReturned], G::BatteryCritical, NOW,    Land,            A::AskLand,     "Battery critical: landing"),
+    warn(&[TakeOff, Climb, PilotReturned], G::BatteryLow, NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
     info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
     info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
+    info(&[Paused],           G::ReturnInClimb,    NOW,    Land,            A::AskLand,     "Landing on the pad"),
     info(ON_PATH,             G::ReturnCommanded,  NOW,    Follow,          A::TurnBack,    "Flying back to the start"),
     info(&[TakeOff, Climb],   G::ReturnCommanded,  NOW,    Land,            A::AskLand,     "Landing on the pad"),
     // The mission in order.
@@ -91,9 +122,16 @@ pub static TABLE: &[Row] = &[
     info(&[Ready],            G::StartWithoutGoal, NOW,    Done,            A::ForgetStart, "No goal for this vehicle: staying"),
     warn(&[Ready],            G::StartElsewhere,   NOW,    Aborted,         A::ForgetStart, "Not at its start: start refused"),
     warn(&[Ready],            G::StartArmed,       NOW,    Aborted,         A::ForgetStart, "Armed by someone else: start refused"),
+    warn(&[Ready],            G::StartBatteryLow,  NOW,    Aborted,         A::ForgetStart, "Battery low: start refused"),
+    warn(&[Ready],            G::StartOutside,     NOW,    Aborted,         A::ForgetStart, "Outside the geofence: start refused"),
     info(&[Ready],            G::StartCommanded,   NOW,    Scheduled,       A::None,        "Started"),
-    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::LandCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
-    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging, Arming], G::ReturnCommanded, NOW, Aborted, A::AskDisarm, "Start cancelled as commanded"),
+    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::LandCommanded, NOW, Aborted, A::ForgetStart, "Start cancelled as commanded"),
+    info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::ReturnCommanded, NOW, Aborted, A::ForgetStart, "Start cancelled as commanded"),
+    info(&[Arming, CancelStart], G::LandCommanded, NOW,    CancelStart,     A::CancelStart, "Start cancelled as commanded"),
+    info(&[Arming, CancelStart], G::ReturnCommanded, NOW,  CancelStart,     A::CancelStart, "Start cancelled as commanded"),
+    info(&[Streaming, Engaging], G::PauseCommanded, NOW,   Scheduled,       A::None,        "Paused on the pad"),
+    info(&[Arming],           G::PauseCommanded,   NOW,    CancelStart,     A::AskDisarm,   "Paused on the pad"),
+    info(&[Scheduled],        G::PausedOnPad,      s(30),  Scheduled,       A::None,        "Paused on the pad: waits for resume"),
     info(&[Scheduled],        G::OurTurn,          NOW,    PadReplanning,   A::RequestDetour, "All others stand: planning around"),
     info(&[PadReplanning],    G::DetourReady,      NOW,    Scheduled,       A::None,        "A way around is found"),
     warn(&[PadReplanning],    G::DetourFailed,     NOW,    Scheduled,       A::None,        "No way around yet"),
@@ -104,7 +142,13 @@ pub static TABLE: &[Row] = &[
     info(&[Engaging],         G::Offboard,         NOW,    Arming,          A::AskArm,      "Setpoints followed: arming"),
     warn(&[Engaging],         G::Elapsed,          s(5),   Aborted,         A::ForgetStart, "Setpoint mode refused: mission aborted"),
     info(&[Arming],           G::Armed,            NOW,    TakeOff,         A::AskTakeOff,  "Taking off"),
-    warn(&[Arming],           G::Elapsed,          s(8),   Aborted,         A::AskDisarm,   "Arming refused: mission aborted"),
+    warn(&[Arming],           G::ArmedUnseen,      NOW,    CancelStart,     A::CancelStart, "Disarmed by someone else: start cancelled"),
+    warn(&[Arming],           G::ArmingUnanswered, NOW,    CancelStart,     A::CancelStart, "Arming not answered: start cancelled"),
+    warn(&[Arming],           G::Elapsed,          s(20),  CancelStart,     A::CancelStart, "Arming refused: mission aborted"),
+    warn(&[CancelStart],      G::InAir,            NOW,    Land,            A::AskLand,     "Lifted off all the same: landing"),
+    info(&[CancelStart],      G::StaysDisarmedPaused, MS2500, Scheduled,    A::None,        ""),
+    info(&[CancelStart],      G::StaysDisarmed,    MS2500, Aborted,         A::ForgetStart, "Start is cancelled"),
+    warn(&[CancelStart],      G::Elapsed,          s(5),   Land,            A::AskLand,     "Still armed on the pad: landing"),
     info(&[TakeOff],          G::LiftedOff,        NOW,    Climb,           A::BeginClimb,  ""),
     warn(&[TakeOff],          G::Elapsed,          s(12),  Land,            A::AskLand,     "Take-off takes too long: landing"),
     info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
@@ -122,27 +166,33 @@ pub static TABLE: &[Row] = &[
     info(&[Replanning],       G::DetourReady,      NOW,    Follow,          A::FlyDetour,   "Flying around"),
     warn(&[Replanning],       G::DetourFailed,     NOW,    Blocked,         A::None,        "No way around yet"),
     warn(&[Replanning],       G::Elapsed,          s(5),   Blocked,         A::MissDetour,  "The way around is late"),
-    info(&[Paused],           G::ResumeCommanded,  NOW,    Follow,          A::RunPath,     "Resumed"),
+    back(&[Paused],           G::ResumeCommanded,  NOW,                     A::Rejoin,      "Resumed"),
     warn(&[Paused],           G::Elapsed,          s(600), Land,            A::AskLand,     "Paused for 10 min: landing"),
     info(&[Alone],            G::NeighbourHeard,   NOW,    Follow,          A::RunPath,     "Neighbours heard again"),
     warn(&[Alone],            G::Elapsed,          s(20),  Land,            A::AskLand,     "Neighbours still silent: landing"),
     info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    PositionLost,    A::BrakeOnPath, "Autopilot heard again"),
-    warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Aborted,         A::ForgetStart, "Autopilot lost"),
-    info(&[PositionLost],     G::BackOnPath,       NOW,    Follow,          A::Rejoin,      "Position known again"),
+    warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Land,            A::AskLand,     "Autopilot still silent: landing"),
+    back(&[PositionLost],     G::BackOnPath,       NOW,                     A::Rejoin,      "Position known again"),
     warn(&[PositionLost],     G::BackOffPath,      NOW,    Land,            A::AskLand,     "Position is elsewhere: landing"),
     warn(&[PositionLost],     G::Elapsed,          s(3),   Land,            A::AskLand,     "Position still lost: landing"),
-    info(&[Land],             G::Disarmed,         NOW,    Done,            A::ForgetStart, "Landed"),
+    info(&[Land, Disarm],     G::DisarmedAtGoal,   NOW,    Done,            A::ForgetStart, "Landed"),
+    warn(&[Land, Disarm],     G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed short of the goal: mission over"),
     info(&[Land],             G::OnGround,         NOW,    Disarm,          A::AskDisarm,   ""),
     warn(&[Land],             G::Elapsed,          s(120), Land,            A::AskLand,     "Landing takes long"),
-    info(&[Disarm],           G::Disarmed,         NOW,    Done,            A::ForgetStart, "Landed"),
+    warn(&[Disarm],           G::InAir,            NOW,    Land,            A::AskLand,     "Still in the air: landing"),
+    warn(&[Disarm],           G::DisarmRefused,    NOW,    Land,            A::AskLand,     "Disarming refused: landing"),
     warn(&[Disarm],           G::Elapsed,          s(30),  Aborted,         A::ForgetStart, "On the ground, still armed"),
     // After the pilot or a failsafe.
-    warn(&[PilotControl],     G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Pilot landed: mission over"),
-    warn(&[PilotControl],     G::FailsafeActs,     NOW,    Failsafe,        A::None,        "Autopilot failsafe: setpoints stopped"),
-    info(&[PilotControl],     G::ResumedOnPath,    NOW,    Follow,          A::Rejoin,      "Resumed after the pilot"),
-    warn(&[PilotControl],     G::ResumedOffPath,   NOW,    Land,            A::AskLand,     "Too far from the path: landing"),
+    warn(&[PilotControl, PilotReturned], G::Disarmed, NOW,    Aborted,         A::ForgetStart, "Pilot landed: mission over"),
+    warn(&[PilotControl, PilotReturned], G::FailsafeActs, NOW,    Failsafe,        A::None,        "Autopilot failsafe: setpoints stopped"),
+    info(&[PilotControl],     G::Offboard,         NOW,    PilotReturned,   A::HoldHere,    "Pilot gives back: holds, waits for resume"),
+    warn(&[PilotReturned],    G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: mission stopped"),
+    back(&[PilotReturned],    G::ResumedOnPath,    NOW,                     A::Rejoin,      "Resumed after the pilot"),
+    warn(&[PilotReturned],    G::ResumedOffPath,   NOW,    Land,            A::AskLand,     "Too far from the path: landing"),
     warn(&[PilotControl],     G::Elapsed,          s(900), PilotControl,    A::None,        "Pilot still has control"),
+    warn(&[PilotReturned],    G::Elapsed,          s(900), PilotReturned,   A::None,        "Still waits for resume"),
     warn(&[Failsafe],         G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed after failsafe: mission over"),
     warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
+    warn(&[Aborted, Done],    G::Unattended,       NOW,    Land,            A::AskLand,     "Still in the air: landing"),
     info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start anew when ready"),
 ];

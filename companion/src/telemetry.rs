@@ -7,8 +7,8 @@
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    EKF_STATUS_REPORT_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA,
-    SYS_STATUS_DATA,
+    COMMAND_ACK_DATA, EKF_STATUS_REPORT_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA,
+    LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
 };
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -36,6 +36,9 @@ pub const SETTLE: Duration = Duration::from_millis(1000);
 /// After this long without a frame the sequence starts afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
+/// Streams whose age is kept: more than any autopilot is asked for.
+const STREAMS: usize = 8;
+
 /// Drops frames that repeat or come late: up to 64 behind the newest of the last second.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SequenceFilter {
@@ -54,6 +57,17 @@ impl SequenceFilter {
         self.last = Some((sequence, now));
         true
     }
+}
+
+/// COMMAND_ACK.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Ack {
+    /// `MAV_CMD`.
+    pub(crate) command: u16,
+    /// `MAV_RESULT`.
+    pub(crate) result: u8,
+    /// Addressee: system and component, 0 where the autopilot names none.
+    pub(crate) to: (u8, u8),
 }
 
 /// What changed by a frame.
@@ -95,6 +109,10 @@ pub struct Telemetry {
     pub position: Point,
     /// Velocity, ENU m/s.
     pub velocity: Point,
+    /// The last answer to a command, until it is taken.
+    pub(crate) ack: Option<Ack>,
+    /// When each stream of [`Kind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
+    streams: [Instant; STREAMS],
     boot_ms: u32,
     /// By the autopilot's clock, of the last position used, milliseconds.
     read_boot_ms: u32,
@@ -137,7 +155,15 @@ impl Telemetry {
         if !self.sequence.accept(frame.sequence, now) {
             return Change::None;
         }
+        self.note_stream(frame.message_id, now);
         match frame.message_id {
+            // By field: a command newer than the crate's may be answered.
+            COMMAND_ACK_DATA::ID => {
+                let p = frame.padded();
+                let command = u16::from_le_bytes([p[0], p[1]]);
+                self.ack = Some(Ack { command, result: p[2], to: (p[8], p[9]) });
+                Change::Updated
+            }
             // By field: a vehicle type newer than the crate must not make the autopilot silent.
             HEARTBEAT => {
                 let p = frame.padded();
@@ -160,7 +186,10 @@ impl Telemetry {
             }
             SYS_STATUS_DATA::ID => match frame.decode::<SYS_STATUS_DATA>() {
                 Some(status) => {
-                    self.battery_percent = status.battery_remaining;
+                    // Unknown (−1) does not hide what was known.
+                    if status.battery_remaining >= 0 {
+                        self.battery_percent = status.battery_remaining;
+                    }
                     Change::Updated
                 }
                 None => Change::None,
@@ -190,6 +219,26 @@ impl Telemetry {
                 None => Change::None,
             },
             _ => Change::None,
+        }
+    }
+
+    /// Time since a stream was last heard; the greatest value if it never was.
+    pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
+        let heard = self.stream(message_id).and_then(|at| self.streams.get(at)).copied();
+        age(heard.filter(|at| *at > Instant::ZERO), now)
+    }
+
+    /// Its index among the streams that are on.
+    fn stream(&self, message_id: u32) -> Option<usize> {
+        let kept = self.kind.unwrap_or_default().streams();
+        let mut on = kept.iter().filter(|(_, interval_us)| *interval_us > 0.0);
+        on.position(|(id, _)| u32::from(*id) == message_id)
+    }
+
+    fn note_stream(&mut self, message_id: u32, now: Instant) {
+        let slot = self.stream(message_id).and_then(|at| self.streams.get_mut(at));
+        if let Some(slot) = slot {
+            *slot = now;
         }
     }
 

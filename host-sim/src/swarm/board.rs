@@ -5,7 +5,6 @@
 
 use companion::frame::{Frame, Framer, MAX_SENT};
 use companion::intent::Intent;
-use companion::table::TABLE;
 use companion::{COMPONENT, Instant, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, STATUSTEXT_DATA, TUNNEL_DATA};
@@ -138,6 +137,5 @@ impl Board {
 /// The state that a companion's HEARTBEAT tells.
 pub fn told_state(frame: &Frame) -> Option<State> {
     let told = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
-    let named = TABLE.iter().flat_map(|row| row.from.iter().chain([&row.to]));
-    named.copied().find(|state| *state as u32 == told)
+    State::ALL.iter().copied().find(|state| *state as u32 == told)
 }

@@ -117,7 +117,7 @@ impl GroundStation {
             if state(member) == State::Ready {
                 frames.push(self.frame(&order(START, id, 0.0)));
             }
-            if state(member) == State::PilotControl && self.resumes.iter().any(|&(of, _)| of == i) {
+            if state(member) == State::PilotReturned && self.resumes.iter().any(|&(of, _)| of == i) {
                 frames.push(self.frame(&order(PAUSE_CONTINUE, id, 1.0)));
             }
         }

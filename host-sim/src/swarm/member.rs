@@ -325,9 +325,11 @@ impl Member {
     fn entry(&self, now_us: u64, from: State, to: State, text: &str) -> report::Event {
         let level = match to {
             State::Aborted | State::Failsafe => Level::Error,
-            State::PilotControl | State::AutopilotSilent | State::PositionLost | State::Alone => {
-                Level::Warning
-            }
+            State::PilotControl
+            | State::PilotReturned
+            | State::AutopilotSilent
+            | State::PositionLost
+            | State::Alone => Level::Warning,
             _ => Level::Info,
         };
         let colon = if text.is_empty() { "" } else { ": " };
@@ -388,7 +390,7 @@ impl Member {
             _ => Phase::TakeOffOrLanding,
         };
         // Who stands by order of a person is in no deadlock.
-        let ordered = matches!(state, State::Paused | State::PilotControl);
+        let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
         let progress_m =
             self.board.as_ref().map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);
         Observation { position: truth.position, phase, ordered, progress_m }
@@ -413,5 +415,6 @@ fn on_path(state: State) -> bool {
             | AutopilotSilent
             | PositionLost
             | PilotControl
+            | PilotReturned
     )
 }

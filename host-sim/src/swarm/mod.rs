@@ -240,7 +240,7 @@ fn simulate(
 
 /// Whether a pilot has the vehicle: nobody knows for how long.
 fn left_to_pilot(member: &Member) -> bool {
-    member.state() == State::PilotControl
+    matches!(member.state(), State::PilotControl | State::PilotReturned)
 }
 
 /// What planning on a roadmap with one bit changed comes to.
