@@ -35,6 +35,15 @@ pub fn estimator_ready(flags: u16) -> bool {
     flags & POSITION_KNOWN == POSITION_KNOWN && flags & UNINITIALISED == 0
 }
 
+/// From this variance ratio on an estimate counts as unsound: EKF_STATUS_REPORT gives innovations as a share of what the filter
+/// takes in, and `FS_EKF_THRESH` is 0.8.
+const RATIO_MOST: f32 = 0.8;
+
+/// Whether a variance ratio is sound; NaN is not.
+pub(crate) fn ratio_is_sound(ratio: f32) -> bool {
+    ratio < RATIO_MOST
+}
+
 /// Streams to ask for: message id and interval in microseconds. Unasked it sends HEARTBEAT alone.
 pub const STREAMS: [(u16, f32); 5] = [
     (32, 33_333.0),   // LOCAL_POSITION_NED

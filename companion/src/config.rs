@@ -5,6 +5,8 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 
+use crate::margins;
+
 /// Most ground stations a mission names.
 pub const GROUND_STATIONS: usize = 4;
 /// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and pymavlink use.
@@ -44,6 +46,8 @@ pub struct Config<const V: usize> {
     pub safety_distance_m: f32,
     /// How vehicles keep apart.
     pub method: Method,
+    /// The least error of the position estimate that is reckoned with, by which the operator vouches for the receiver, metres.
+    pub estimate_m: f32,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.
     pub start_tolerance_m: f32,
     /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
@@ -88,6 +92,7 @@ impl<const V: usize> Config<V> {
             required_clearance_m: 0.8,
             safety_distance_m: 1.5,
             method: Method::Priority,
+            estimate_m: margins::ESTIMATE_M,
             start_tolerance_m: 2.0,
             battery_low_percent: 15,
             swarm_hz: 5,
@@ -118,6 +123,7 @@ impl<const V: usize> Config<V> {
             self.required_clearance_m,
             self.safety_distance_m,
             self.start_tolerance_m,
+            self.estimate_m,
         ];
         let starts = self.roster.iter().flat_map(|e| e.start.iter());
         let bad = positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || self.swarm_hz == 0;

@@ -56,6 +56,10 @@ pub struct Bench {
     pub climbs_mps: f32,
     pub silent: bool,
     pub no_position: bool,
+    /// What ESTIMATOR_STATUS reports, metres; none: it is not sent.
+    pub accuracy_m: Option<f32>,
+    /// ArduCopter: variance ratio of EKF_STATUS_REPORT.
+    pub variance: f32,
     pub stays_armed: bool,
     /// Arming is accepted, and undone by the pilot before a HEARTBEAT shows it.
     pub never_arms: bool,
@@ -130,6 +134,8 @@ impl Bench {
             climbs_mps: 0.0,
             silent: false,
             no_position: false,
+            accuracy_m: Some(0.02),
+            variance: 0.1,
             stays_armed: false,
             never_arms: false,
             stuck: false,
@@ -236,6 +242,15 @@ impl Bench {
         }
     }
 
+    pub fn send_origin(&mut self) {
+        let origin = GPS_GLOBAL_ORIGIN_DATA {
+            latitude: (self.origin.lat_deg * 1e7).round() as i32,
+            longitude: (self.origin.lon_deg * 1e7).round() as i32,
+            altitude: (self.origin.alt_m * 1e3) as i32,
+        };
+        self.tell(&origin);
+    }
+
     fn receive(&mut self, link: Link, frame: Frame) {
         let p = frame.padded();
         if frame.message_id == COMMAND_ACK_DATA::ID {
@@ -291,12 +306,7 @@ impl Bench {
                 }
                 MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL => self.streams.push(c.param1 as u16),
                 MavCmd::MAV_CMD_REQUEST_MESSAGE if c.param1 == 49.0 => {
-                    let origin = GPS_GLOBAL_ORIGIN_DATA {
-                        latitude: (self.origin.lat_deg * 1e7).round() as i32,
-                        longitude: (self.origin.lon_deg * 1e7).round() as i32,
-                        altitude: (self.origin.alt_m * 1e3) as i32,
-                    };
-                    self.tell(&origin);
+                    self.send_origin();
                 }
                 _ => {}
             }
@@ -345,7 +355,8 @@ impl Bench {
     fn tell_ardupilot(&mut self) {
         if self.says(193) {
             let flags = EkfStatusFlags::from_bits_retain(self.ekf_flags);
-            self.tell(&EKF_STATUS_REPORT_DATA { flags, ..Default::default() });
+            let pos_horiz_variance = self.variance;
+            self.tell(&EKF_STATUS_REPORT_DATA { flags, pos_horiz_variance, ..Default::default() });
         }
         if self.says(33) {
             // Home lies two metres below the pad.
@@ -389,6 +400,11 @@ impl Bench {
             let bytes = self.heartbeat();
             self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
             self.drain();
+            if self.kind == Kind::Px4
+                && let Some(pos_horiz_accuracy) = self.accuracy_m
+            {
+                self.tell(&ESTIMATOR_STATUS_DATA { pos_horiz_accuracy, ..Default::default() });
+            }
             if self.says(1) && !self.no_battery {
                 let status = SYS_STATUS_DATA { battery_remaining: self.battery, ..Default::default() };
                 self.tell(&status);

@@ -68,6 +68,8 @@ pub enum Setpoint {
 pub struct Guidance {
     track: TrackConfig,
     deconflict: DeconflictConfig,
+    /// Share of the speed that the estimate allows: 0 stops.
+    pub pace: f32,
     climb_mps: f32,
     tracker: Tracker,
     /// Last advice of the neighbours.
@@ -129,6 +131,7 @@ impl Guidance {
                 cruise_mps: config.cruise_mps,
                 accel_mps2: config.accel_mps2,
             },
+            pace: 1.0,
             climb_mps: config.climb_mps,
             tracker: Tracker::default(),
             advice: NOT_ASKED,
@@ -331,7 +334,7 @@ impl Guidance {
         if state == State::Climb && !self.filter.is_stopped() {
             let top = plan.path.point_at(0.0).map_or(self.climb_z, |p| p.z);
             let lead = position.z + CLIMB_LEAD_M;
-            let rate = self.climb_rate(top);
+            let rate = self.climb_rate(top) * self.pace;
             self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
         }
         if self.on_path
@@ -339,7 +342,7 @@ impl Guidance {
             && !matches!(state, State::PilotControl | State::PilotReturned)
         {
             let mut advice = if state == State::Follow {
-                self.advice
+                Advice { speed_scale: self.advice.speed_scale * self.pace, ..self.advice }
             } else {
                 Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
             };

@@ -8,6 +8,7 @@ use planner_core::Point;
 
 use super::tests::assert_no_gap;
 use super::*;
+use crate::autopilot::Kind;
 use crate::fake_px4::*;
 use crate::intent::Intent;
 use crate::px4;
@@ -281,15 +282,49 @@ fn a_late_frame_does_not_bring_back_an_old_mode() {
 }
 
 #[test]
-fn an_origin_that_moves_is_asked_for_and_at_most_one_setpoint_is_wrong() {
-    let mut bench = Bench::following(config());
-    bench.origin.lat_deg += 0.0005;
-    bench.until(State::Done, 60.0);
-    assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
-    // One setpoint is on its way when the origin moves; from the first position about the new one none is wrong.
-    let wrong =
-        |(_, at, mask): &&(Instant, Point, u16)| *mask != px4::MASK_VELOCITY && (at.y - 12.0).abs() > 0.1;
-    assert!(bench.setpoints.iter().filter(wrong).count() <= 1);
+fn an_origin_that_moves_in_flight_lands_the_vehicle_where_it_is() {
+    for (north_deg, east_deg, up_m) in
+        [(0.0005, 0.0, 0.0), (0.002, 0.0, -30.0), (0.0, 0.000_004, 0.0), (0.0, 0.0, 0.4)]
+    {
+        let mut bench = Bench::following(config());
+        let place = bench.enu;
+        bench.origin.lat_deg += north_deg;
+        bench.origin.lon_deg += east_deg;
+        bench.origin.alt_m += up_m;
+        // PX4 sends an origin that changes without a request.
+        bench.send_origin();
+        bench.until(State::Land, 3.0);
+        assert!(bench.texts.iter().any(|t| t == "EKF origin moved: landing"), "{:?}", bench.texts);
+        bench.until(State::Aborted, 60.0);
+        assert!((bench.enu - place).xy().norm() < 3.0, "{:?} {place:?}", bench.enu);
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(64))]
+    /// GPS_GLOBAL_ORIGIN of the own system and component 1, sent by radio and forwarded by the autopilot to its other port.
+    #[test]
+    fn forged_origins_move_no_vehicle(
+        forged in proptest::collection::vec((0u8..=255, -30_000i32..30_000, -30_000i32..30_000, 0u8..12), 1..40),
+    ) {
+        use mavlink::dialects::ardupilotmega::GPS_GLOBAL_ORIGIN_DATA;
+        let mut bench = Bench::following(config());
+        let (lat, lon) = ((bench.origin.lat_deg * 1e7) as i32, (bench.origin.lon_deg * 1e7) as i32);
+        for (sequence, north, east, ticks) in forged {
+            let data = GPS_GLOBAL_ORIGIN_DATA { latitude: lat + north, longitude: lon + east, altitude: 720_000 };
+            let header = crate::frame::Header { system: SYSTEM, component: 1, sequence };
+            let mut out = [0; crate::frame::MAX_SENT];
+            let len = crate::frame::encode(header, &data, &mut out);
+            bench.companion.handle_bytes(Link::Autopilot, bench.now, &out[..len]);
+            bench.drain();
+            (0..ticks).for_each(|_| bench.tick());
+        }
+        bench.until(State::Done, 60.0);
+        // The path runs along y = 12: setpoints and vehicle stay on it.
+        let wide = |(_, at, mask): &&(Instant, Point, u16)| *mask != px4::MASK_VELOCITY && (at.y - 12.0).abs() > 0.05;
+        proptest::prop_assert_eq!(bench.setpoints.iter().filter(wide).count(), 0);
+        proptest::prop_assert!((bench.enu.y - 12.0).abs() < 0.05, "{:?}", bench.enu);
+    }
 }
 
 #[test]
@@ -335,4 +370,79 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
 fn a_companion_fits_thirty_kilobytes() {
     let bytes = core::mem::size_of::<Companion<32, 64, 64>>();
     assert!(bytes <= 30 * 1024, "{bytes}");
+}
+
+/// An estimate that is worse than the margin leaves: no start; in flight slower, then a stop, and on again.
+#[test]
+fn the_pace_follows_the_estimate() {
+    let fastest = |bench: &mut Bench, seconds: f32| {
+        bench.run(4.0);
+        let begun = bench.setpoints.len();
+        bench.run(seconds);
+        let pairs = bench.setpoints[begun..].windows(2);
+        pairs.map(|p| (p[1].1 - p[0].1).norm() / (p[1].0 - p[0].0).secs_f32()).fold(0.0, f32::max)
+    };
+    // The margin of 0.5 m leaves 0.25 m at cruise and 0.4 m at a crawl.
+    for kind in [Kind::Px4, Kind::ArduPilot] {
+        let mut bench = match kind {
+            Kind::Px4 => Bench::new(config()),
+            Kind::ArduPilot => Bench::ardupilot(config()),
+        };
+        bench.companion.parameters.set(3, 0.26).unwrap();
+        bench.companion.tune();
+        bench.until(State::Ready, 60.0);
+        bench.start();
+        bench.until(State::Aborted, 5.0);
+        assert!(
+            bench.texts.iter().any(|t| t == "Estimate worse than margin: start refused"),
+            "{:?}",
+            bench.texts
+        );
+    }
+    let mut long = plan();
+    long.path = planner_core::path::Path::new();
+    for point in [START, Point::new(80.0, 12.0, 1.5)] {
+        long.path.push(point, 1.2).unwrap();
+    }
+    let mut bench = Bench::new(config());
+    bench.answer_plan = Some(Ok(long));
+    bench.until(State::Ready, 6.0);
+    bench.start();
+    bench.until(State::Follow, 20.0);
+    let full = fastest(&mut bench, 2.0);
+    bench.accuracy_m = Some(0.11);
+    let slower = fastest(&mut bench, 2.0);
+    assert!(full > 1.5 && slower < 0.8 * full && slower > 0.3, "{full} {slower}");
+    assert!(
+        bench.texts.iter().any(|t| t == "Estimate within 33 cm, margin 25 cm: slower"),
+        "{:?}",
+        bench.texts
+    );
+    bench.accuracy_m = Some(0.2);
+    assert!(fastest(&mut bench, 2.0) < 0.05);
+    assert_eq!(bench.state(), State::Follow);
+    bench.accuracy_m = Some(0.02);
+    assert!(fastest(&mut bench, 2.0) > 1.5, "{:?}", bench.texts);
+    // Three seconds without a report are an unknown accuracy.
+    bench.accuracy_m = None;
+    assert!(fastest(&mut bench, 2.0) < 0.05);
+    assert!(bench.texts.iter().any(|t| t == "Estimate of unknown accuracy: stopping"), "{:?}", bench.texts);
+    bench.until(State::Land, 40.0);
+}
+
+#[test]
+fn unsound_variance_ratios_stop_an_arducopter() {
+    for variance in [0.81, f32::NAN, f32::INFINITY] {
+        let mut bench = Bench::ardupilot(config());
+        bench.until(State::Ready, 60.0);
+        bench.start();
+        bench.until(State::Follow, 30.0);
+        bench.variance = variance;
+        bench.until(State::Land, 40.0);
+        assert!(
+            bench.texts.iter().any(|t| t == "Estimate worse than margin for 30 s: landing"),
+            "{:?}",
+            bench.texts
+        );
+    }
 }

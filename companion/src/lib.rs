@@ -32,6 +32,7 @@ mod guidance;
 mod inputs;
 pub mod intent;
 mod machine;
+pub mod margins;
 pub mod mission;
 pub mod mission_file;
 pub mod neighbours;

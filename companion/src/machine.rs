@@ -18,6 +18,7 @@ use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
 use crate::guidance::{Guidance, Scene, setpoints_flow};
 use crate::intent::Intent;
+use crate::margins;
 use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
 use crate::neighbours::Neighbours;
 use crate::outbox::{Outbox, Outgoing};
@@ -36,6 +37,8 @@ const IDLE_EVERY: Duration = Duration::from_millis(200);
 pub(crate) const STANDING_MPS: f32 = 0.3;
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
+/// While another EKF origin is in doubt the autopilot is asked this often.
+pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
 const EVENTS: usize = 16;
@@ -46,6 +49,8 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
     /// Cruise and climb of the mission, which parameters may limit.
     pub(crate) nominal_mps: [f32; 2],
+    /// Since when the estimate is worse than the margin leaves at a crawl.
+    pub(crate) vague_since: Option<Instant>,
     /// A parameter was set that is not in use yet.
     pub(crate) untuned: bool,
     pub(crate) rank: u16,
@@ -101,6 +106,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let start = own.start;
         Ok(Self {
             nominal_mps: [config.cruise_mps, config.climb_mps],
+            vague_since: None,
             untuned: false,
             rank,
             start,
@@ -319,6 +325,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.handle_ack(&ack);
                 }
                 self.handshake.watch(self.state, &self.telemetry);
+                if change == Change::OriginDoubted {
+                    self.origin_at = self.origin_at.min(self.now + ORIGIN_AGAIN);
+                    return self.telemetry.origin_moved;
+                }
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
                     // It may have been started anew and know nothing of the streams we asked for.
@@ -426,6 +436,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.untuned && self.erasing() == Erasing::Allowed {
             self.tune();
         }
+        self.watch_estimate();
         let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
         self.stepped_at = now;
         let scene = Scene {
@@ -445,6 +456,30 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // Steps keep their rhythm; after a long gap the rhythm starts anew instead of catching up.
         let due = self.next_step + every;
         self.next_step = if due > now { due } else { now + every };
+    }
+
+    /// Compares the estimate's bound with what the margin leaves, and sets the pace.
+    fn watch_estimate(&mut self) {
+        let (now, config) = (self.now, &self.config);
+        let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
+        let pace = margins::pace(bound_m, config.required_clearance_m, config.radius_m);
+        let before = core::mem::replace(&mut self.guidance.pace, pace);
+        self.vague_since = if pace > 0.0 { None } else { self.vague_since.or(Some(now)) };
+        let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
+        if kind(before) == kind(pace) || !setpoints_flow(self.state) {
+            return;
+        }
+        // Whole centimetres, rounded up; more than a hundred metres is not known.
+        let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
+        let room_m = margins::room_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
+        let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
+        let (warning, text) = match kind(pace) {
+            2 => (false, "Estimate within # cm again"),
+            1 => (true, "Estimate within # cm, margin # cm: slower"),
+            _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
+            _ => (true, "Estimate within # cm, margin # cm: stopping"),
+        };
+        self.say_count(warning, text, [cm, room_cm]);
     }
 
     fn run_table(&mut self) {

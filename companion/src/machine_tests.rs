@@ -112,20 +112,6 @@ fn a_jump_of_five_metres_is_not_flown_after() {
 }
 
 #[test]
-fn an_origin_that_moves_in_flight_stops_it_for_a_second() {
-    let mut bench = Bench::following(config());
-    bench.origin.lat_deg += 0.002;
-    bench.origin.alt_m -= 30.0;
-    let moved_at = bench.now;
-    bench.until(State::PositionLost, 0.2);
-    bench.until(State::Follow, 2.0);
-    assert!(bench.now - moved_at >= crate::telemetry::SETTLE);
-    bench.until(State::Done, 60.0);
-    assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.2, "{:?}", bench.enu);
-    assert_no_gap(&bench);
-}
-
-#[test]
 fn a_failsafe_gets_no_setpoints() {
     let mut bench = Bench::following(config());
     (bench.mode, bench.status) = (px4::RTL, 5);

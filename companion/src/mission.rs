@@ -205,7 +205,7 @@ pub enum Guard {
     PlanFailed,
     /// There will be no plan, for want of the mission's roadmap.
     RoadmapBad,
-    /// MISSION_START was commanded.
+    /// MISSION_START was commanded, and the estimate's bound fits into the margin.
     StartCommanded,
     /// MISSION_START, and no goal is left for this vehicle.
     StartWithoutGoal,
@@ -223,6 +223,12 @@ pub enum Guard {
     ChargeLow,
     /// Outside the configured volume.
     Outside,
+    /// MISSION_START, and for the limit, in which it may first be reported, the estimate's bound is worse than the margin leaves.
+    StartVague,
+    /// The estimate's bound has been worse than the margin leaves at a crawl for the limit.
+    EstimateVague,
+    /// The EKF origin moved while armed.
+    OriginMoved,
     /// The schedule's take-off is due, and the neighbours leave room.
     GatesOpen,
     /// The state has lasted as long as the limit.
@@ -404,6 +410,12 @@ pub struct Inputs {
     pub has_goal: bool,
     /// Near the pad below the start point, in height too.
     pub at_start: bool,
+    /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
+    pub imprecise: bool,
+    /// Time for which it has not even fitted at a crawl.
+    pub vague: Duration,
+    /// The EKF origin moved while armed.
+    pub origin_moved: bool,
     /// MISSION_START holds.
     pub start: bool,
     /// DO_PAUSE_CONTINUE 0 holds.
@@ -497,7 +509,7 @@ impl Guard {
             Self::PlanReady => i.plan_ready,
             Self::PlanFailed => i.plan_failed,
             Self::RoadmapBad => i.roadmap_bad,
-            Self::StartCommanded => i.start,
+            Self::StartCommanded => i.start && !i.imprecise,
             Self::StartWithoutGoal => i.start && !i.has_goal,
             Self::StartElsewhere => i.start && !i.at_start,
             Self::StartArmed => i.start && i.armed,
@@ -506,6 +518,9 @@ impl Guard {
             Self::AwayFromStart => i.position_age < FRESH && !i.at_start,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
+            Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
+            Self::EstimateVague => i.vague > limit,
+            Self::OriginMoved => i.origin_moved,
             Self::GatesOpen => i.gates_open,
             Self::Elapsed => i.in_state >= limit,
             Self::Offboard => i.offboard,

@@ -156,6 +156,12 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::StartWithoutGoal => (i.start, i.at_start, i.armed) = (true, true, false),
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
+        G::StartVague => {
+            (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false);
+            (i.imprecise, i.in_state) = (true, long);
+        }
+        G::EstimateVague => i.vague = long,
+        G::OriginMoved => i.origin_moved = true,
         G::GatesOpen => i.gates_open = true,
         G::StartBatteryLow => {
             (i.start, i.has_goal, i.at_start, i.armed, i.battery_low) = (true, true, true, false, true);

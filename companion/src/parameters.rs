@@ -35,7 +35,7 @@ const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Param
 }
 
 /// How many there are.
-pub const COUNT: usize = 7;
+pub const COUNT: usize = 8;
 /// Bytes they take in flash.
 pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
 
@@ -44,6 +44,7 @@ pub const TABLE: [Parameter; COUNT] = [
     real("FLK_ACCEL", 0.2, 5.0, 1.5),
     whole("FLK_BATT_LOW", 0.0, 100.0, 15.0),
     real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
+    real("FLK_EST_M", 0.05, 10.0, 0.1),
     real("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
     real("FLK_START_TOL", 0.2, 20.0, 2.0),
     whole("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
@@ -53,10 +54,11 @@ pub const TABLE: [Parameter; COUNT] = [
 const ACCEL: usize = 0;
 const BATT_LOW: usize = 1;
 const CLIMB_MAX: usize = 2;
-const SPEED_MAX: usize = 3;
-const START_TOL: usize = 4;
-const SWARM_HZ: usize = 5;
-const SYS_ID: usize = 6;
+const EST_M: usize = 3;
+const SPEED_MAX: usize = 4;
+const START_TOL: usize = 5;
+const SWARM_HZ: usize = 6;
+const SYS_ID: usize = 7;
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,6 +118,7 @@ impl Parameters {
         config.battery_low_percent = self.values[BATT_LOW] as i8;
         config.climb_mps = libm::fminf(config.climb_mps, self.values[CLIMB_MAX]);
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
+        config.estimate_m = self.values[EST_M];
         config.start_tolerance_m = self.values[START_TOL];
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }

@@ -24,25 +24,25 @@ pub fn mode_params(custom_mode: u32) -> (f32, f32) {
 /// Streams to set on connecting: message id and interval in microseconds, −1 off. PX4 floods about 18 kB/s unasked;
 /// these leave about 3 kB/s.
 pub const STREAMS: [(u16, f32); 19] = [
-    (32, 33_333.0),   // LOCAL_POSITION_NED
-    (245, 200_000.0), // EXTENDED_SYS_STATE
-    (1, 1_000_000.0), // SYS_STATUS, with the battery
-    (30, -1.0),       // ATTITUDE
-    (31, -1.0),       // ATTITUDE_QUATERNION
-    (105, -1.0),      // HIGHRES_IMU
-    (331, -1.0),      // ODOMETRY
-    (33, -1.0),       // GLOBAL_POSITION_INT
-    (36, -1.0),       // SERVO_OUTPUT_RAW
-    (65, -1.0),       // RC_CHANNELS
-    (74, -1.0),       // VFR_HUD
-    (83, -1.0),       // ATTITUDE_TARGET
-    (85, -1.0),       // POSITION_TARGET_LOCAL_NED
-    (87, -1.0),       // POSITION_TARGET_GLOBAL_INT
-    (141, -1.0),      // ALTITUDE
-    (230, -1.0),      // ESTIMATOR_STATUS
-    (241, -1.0),      // VIBRATION
-    (24, -1.0),       // GPS_RAW_INT
-    (4, -1.0),        // PING
+    (32, 33_333.0),     // LOCAL_POSITION_NED
+    (245, 200_000.0),   // EXTENDED_SYS_STATE
+    (1, 1_000_000.0),   // SYS_STATUS, with the battery
+    (30, -1.0),         // ATTITUDE
+    (31, -1.0),         // ATTITUDE_QUATERNION
+    (105, -1.0),        // HIGHRES_IMU
+    (331, -1.0),        // ODOMETRY
+    (33, -1.0),         // GLOBAL_POSITION_INT
+    (36, -1.0),         // SERVO_OUTPUT_RAW
+    (65, -1.0),         // RC_CHANNELS
+    (74, -1.0),         // VFR_HUD
+    (83, -1.0),         // ATTITUDE_TARGET
+    (85, -1.0),         // POSITION_TARGET_LOCAL_NED
+    (87, -1.0),         // POSITION_TARGET_GLOBAL_INT
+    (141, -1.0),        // ALTITUDE
+    (230, 1_000_000.0), // ESTIMATOR_STATUS, with the accuracy of the position
+    (241, -1.0),        // VIBRATION
+    (24, -1.0),         // GPS_RAW_INT
+    (4, -1.0),          // PING
 ];
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
 
 use crate::autopilot::Kind;
 use crate::events::Link;
-use crate::machine::{Companion, DISARM_AFTER};
+use crate::machine::{Companion, DISARM_AFTER, ORIGIN_AGAIN};
 use crate::mission::State;
 use crate::outbox::Outgoing;
 use crate::telemetry::{Ack, Telemetry};
@@ -143,8 +143,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.ask_for_streams();
         }
         let autopilot = &mut self.outboxes[Link::Autopilot as usize];
-        if heard && self.telemetry.ekf_origin.is_none() && now >= self.origin_at {
-            self.origin_at = now + RETRY_EVERY;
+        let doubts = self.telemetry.doubts_origin();
+        if heard && (doubts || self.telemetry.ekf_origin.is_none()) && now >= self.origin_at {
+            self.origin_at = now + if doubts { ORIGIN_AGAIN } else { RETRY_EVERY };
             autopilot.push(Outgoing::Request(GPS_GLOBAL_ORIGIN));
         }
         for _ in 0..SETUP_BURST {

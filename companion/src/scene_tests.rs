@@ -79,6 +79,27 @@ fn every_row_has_its_scene() {
         Aborted,
         5.0,
     );
+    // The estimate.
+    scene(
+        ready(),
+        &|b| {
+            b.accuracy_m = Some(0.2);
+            b.run(2.0);
+            b.start();
+        },
+        Aborted,
+        3.0,
+    );
+    scene(flying(), &|b| b.accuracy_m = Some(0.3), Aborted, 60.0);
+    scene(
+        flying(),
+        &|b| {
+            b.origin.lat_deg += 1e-6;
+            b.send_origin();
+        },
+        Land,
+        3.0,
+    );
     // Links and position.
     scene(ready(), &|b| b.silent = true, WaitAutopilot, 5.0);
     scene(to(Streaming), &|b| b.silent = true, Aborted, 5.0);

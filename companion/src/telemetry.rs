@@ -4,11 +4,15 @@
 //! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
 //! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
 //! anew and [`SETTLE`] has passed without another jump.
+//!
+//! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
+//! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
+//! named no other for [`DOUBT`]; then it has moved, and the mission lands.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, EKF_STATUS_REPORT_DATA, GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA,
-    LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
+    COMMAND_ACK_DATA, EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
 };
 use nalgebra::Vector3;
 use planner_core::Point;
@@ -17,6 +21,7 @@ use planner_core::frames::{self, Geodetic};
 use crate::ardupilot;
 use crate::autopilot::Kind;
 use crate::frame::Frame;
+use crate::margins;
 use crate::time::{Duration, Instant};
 
 const HEARTBEAT: u32 = 0;
@@ -33,6 +38,8 @@ const GAP_MOST_S: f32 = 60.0;
 /// After a jump, or so long without one, the position is not used for this long; another one starts it anew. What comes first
 /// after a silence may have waited on the way.
 pub const SETTLE: Duration = Duration::from_millis(1000);
+/// Another EKF origin is believed after this long without the known one: the autopilot is asked several times meanwhile.
+const DOUBT: Duration = Duration::from_millis(800);
 /// After this long without a frame the sequence starts afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
@@ -79,6 +86,8 @@ pub enum Change {
     Updated,
     /// The EKF origin is no longer known: ask for it.
     OriginLost,
+    /// Another EKF origin was heard while armed: ask for it.
+    OriginDoubted,
 }
 
 /// The autopilot as last heard.
@@ -103,6 +112,14 @@ pub struct Telemetry {
     pub above_home_m: f32,
     /// EKF origin, once heard.
     pub ekf_origin: Option<Geodetic>,
+    /// The origin that was last used while armed.
+    flown_origin: Option<Geodetic>,
+    /// Since when only other origins are heard.
+    doubted_at: Option<Instant>,
+    /// The EKF origin moved while armed.
+    pub(crate) origin_moved: bool,
+    /// What the estimator last reported of its error, metres, and when; infinite for one that is not sound.
+    accuracy: Option<(f32, Instant)>,
     /// When the position below was heard; `None` while it is unknown.
     pub position_at: Option<Instant>,
     /// Place, ENU metres.
@@ -145,6 +162,23 @@ impl Telemetry {
         age(self.position_at, now)
     }
 
+    /// How far the estimate may be off, metres, by what the autopilot reports and by what the operator vouches for
+    /// (`FLK_EST_M`); infinite while that is not known.
+    pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
+        match self.accuracy {
+            Some((accuracy_m, at)) if now - at <= margins::ACCURACY_AGE => {
+                libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)
+            }
+            Some(_) => f32::INFINITY,
+            None => vouched_m,
+        }
+    }
+
+    /// Whether another EKF origin is in doubt, so that the autopilot is to be asked.
+    pub(crate) fn doubts_origin(&self) -> bool {
+        self.doubted_at.is_some()
+    }
+
     /// Whether the position jumped lately.
     pub fn is_settling(&self, now: Instant) -> bool {
         now < self.settled_at
@@ -152,7 +186,9 @@ impl Telemetry {
 
     /// Takes a frame of the autopilot link in.
     pub fn handle(&mut self, now: Instant, mission_origin: &Geodetic, frame: &Frame) -> Change {
-        if !self.sequence.accept(frame.sequence, now) {
+        // An origin is confirmed while armed, so a forwarded one needs no place in the sequence, and takes none from the true ones.
+        let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
+        if !confirmed && !self.sequence.accept(frame.sequence, now) {
             return Change::None;
         }
         self.note_stream(frame.message_id, now);
@@ -173,6 +209,7 @@ impl Telemetry {
                 }
                 self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
                 self.armed = p[6] & ARMED != 0;
+                self.watch_origin();
                 self.system_status = p[7];
                 self.heartbeat_at = Some(now);
                 Change::Updated
@@ -202,9 +239,25 @@ impl Telemetry {
                 // By field: flags newer than the crate's must not hide the others.
                 let p = frame.padded();
                 self.estimator_ready = ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
+                let ratio = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                // Velocity, horizontal and vertical position, compass. It reports no metres: 0 leaves what is vouched for.
+                let sound = self.estimator_ready
+                    && [0, 4, 8, 12].into_iter().all(|at| ardupilot::ratio_is_sound(ratio(at)));
+                self.accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
                 if !self.estimator_ready && self.kind == Some(Kind::ArduPilot) {
                     self.position_at = None;
                 }
+                Change::Updated
+            }
+            ESTIMATOR_STATUS_DATA::ID if self.kind == Some(Kind::Px4) => {
+                // By field: flags newer than the crate's must not hide the accuracy.
+                let p = frame.padded();
+                let metres = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                let (across_m, height_m) = (metres(32), metres(36));
+                // NaN, and what is less than nothing, is not known.
+                let known = across_m >= 0.0 && height_m >= 0.0;
+                let worst_m = if known { libm::fmaxf(across_m, height_m) } else { f32::INFINITY };
+                self.accuracy = Some((worst_m, now));
                 Change::Updated
             }
             GLOBAL_POSITION_INT_DATA::ID => match frame.decode::<GLOBAL_POSITION_INT_DATA>() {
@@ -251,6 +304,16 @@ impl Telemetry {
         if !origin.is_valid() {
             return Change::None;
         }
+        if self.armed
+            && let Some(flown) = self.flown_origin
+        {
+            if flown != origin {
+                let since = *self.doubted_at.get_or_insert(now);
+                self.origin_moved |= now - since >= DOUBT;
+                return Change::OriginDoubted;
+            }
+            self.doubted_at = None;
+        }
         if self.ekf_origin.is_some_and(|known| known != origin) {
             // A position on its way may still be about the old one.
             self.settled_at = now + SETTLE;
@@ -261,7 +324,20 @@ impl Telemetry {
             self.position_at = None;
             self.read_at = None;
         }
+        self.watch_origin();
         Change::Updated
+    }
+
+    /// Armed, the origin stays; disarmed, one in doubt is asked for.
+    fn watch_origin(&mut self) {
+        if self.armed {
+            self.flown_origin = self.flown_origin.or(self.ekf_origin);
+            return;
+        }
+        if self.origin_moved {
+            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+        }
+        (self.flown_origin, self.doubted_at, self.origin_moved) = (None, None, false);
     }
 
     fn handle_position(

@@ -94,7 +94,12 @@ struct Onboard {
 impl Onboard {
     fn new(port: u16) -> Self {
         let files = tempfile::tempdir().expect("a directory");
-        let lobby = workspace().join("host-sim/scenarios/lobby.toml");
+        // MAVSDK is system 245 unless set otherwise.
+        let text = std::fs::read_to_string(workspace().join("host-sim/scenarios/lobby.toml"));
+        let text = text.expect("it is there").replace("[mission]", "[mission]\nground_stations = [255, 245]");
+        assert!(text.contains("245"));
+        let lobby = files.path().join("lobby.toml");
+        std::fs::write(&lobby, text).expect("a scenario");
         let program = host_sim(Profile::Debug);
         let plan = Command::new(&program).arg("plan").arg(&lobby).arg("--out").arg(files.path()).status();
         assert!(plan.expect("host-sim starts").success());

@@ -67,7 +67,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'serial-corrupt'", then: GoesOn, says: &[AT_GOAL] },
     Case { script: "kind = 'position-jump'", then: Out, says: &["Position is elsewhere: landing"] },
     Case { script: "kind = 'position-jump'\noffset_m = [0, 0, -5]", then: Out, says: &["Position is elsewhere: landing"] },
-    Case { script: "kind = 'origin-change'", then: GoesOn, says: &["Position jumped: stopping"] },
+    Case { script: "kind = 'origin-change'", then: Out, says: &["EKF origin moved: landing"] },
     Case { script: "kind = 'gps-loss'", then: Out, says: &[STOPPED, "Position still lost: landing"] },
     Case { script: "kind = 'gps-loss'\nduration_s = 0.5", then: Out, says: &[STOPPED, AT_GOAL] },
     Case { script: "kind = 'battery-low'", then: Out, says: &["Battery low: landing", "Battery critical: landing", AT_GOAL] },
