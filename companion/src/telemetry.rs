@@ -169,8 +169,7 @@ impl Telemetry {
             Some((accuracy_m, at)) if now - at <= margins::ACCURACY_AGE => {
                 libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)
             }
-            Some(_) => f32::INFINITY,
-            None => vouched_m,
+            _ => f32::INFINITY,
         }
     }
 

@@ -45,6 +45,7 @@ const TAKE_OFF: usize = 400;
 
 const HEARTBEAT: u32 = 0;
 const SYS_STATUS: u32 = 1;
+const ESTIMATOR_STATUS: u32 = 230;
 const LOCAL_POSITION_NED: u32 = 32;
 const GLOBAL_POSITION_INT: u32 = 33;
 const GPS_GLOBAL_ORIGIN: u32 = 49;
@@ -259,6 +260,8 @@ impl<M: Meter> Flight<'_, M> {
             let mut status = [0; 31];
             status[30] = 90;
             self.hear(Link::Autopilot, (SYSTEM, 1), SYS_STATUS, &status);
+            // An accuracy of 0.
+            self.hear(Link::Autopilot, (SYSTEM, 1), ESTIMATOR_STATUS, &[0; 42]);
         }
         let ned = swap_enu_ned(&self.place);
         let mut position = [0; 28];
