@@ -18,13 +18,13 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or one of the
-    /// suites: deconfliction, meetings.
+    /// suites: deconfliction, meetings, hostile.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// Seeds of each case of the deconfliction suite.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
-    /// How many of a suite that has a number: meetings.
+    /// How many meetings, or forged frames of the hostile suite.
     #[arg(long, value_name = "N")]
     n: Option<u64>,
 }
@@ -44,8 +44,8 @@ pub fn run_bench(args: &Args) -> Result<()> {
         }
         return run(&mut bench);
     }
-    if args.only.as_deref() == Some("meetings") {
-        bench.args(["meetings", "--"]);
+    if let Some(suite @ ("meetings" | "hostile")) = args.only.as_deref() {
+        bench.args([suite, "--"]);
         if let Some(n) = args.n {
             bench.arg("--n").arg(n.to_string());
         }

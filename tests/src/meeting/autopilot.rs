@@ -55,7 +55,7 @@ struct Target {
 }
 
 /// One autopilot with its vehicle.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct Autopilot {
     /// Which it is.
     pub kind: Kind,

@@ -1,0 +1,4 @@
+//! Forged frames for a companion in flight, chosen by the fuzzer.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| flockmate_tests::hostile::attack(data));

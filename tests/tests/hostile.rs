@@ -1,0 +1,18 @@
+//! Forged frames for companions in flight; `cargo xtask bench --only hostile --n 1000000000` gives more.
+
+use flockmate_tests::hostile;
+
+/// Forged frames.
+const FRAMES: u64 = 1_000_000;
+
+#[test]
+fn forged_frames_break_no_rule() {
+    let report = hostile::attacks(1, FRAMES);
+    println!("{}", report.setpoints);
+    println!("{} frames, most sent in a second: {:?}", report.frames, report.most_sent);
+    assert!(report.frames >= FRAMES);
+    assert!(report.broken.is_empty(), "{:#?}", report.broken);
+    assert_eq!(report.setpoints.not_finite, 0);
+    let seen = report.states.iter().filter(|steps| **steps > 0).count();
+    assert!(seen >= 12, "only {seen} states were attacked");
+}
