@@ -9,6 +9,7 @@
 //! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than [`NEAR_MOST`] of those is a stop.
 
 use planner_core::Point;
+use planner_core::deconflict::Method;
 use planner_core::path::Path;
 use planner_core::safety::{self, Bounds, Braking, REACTION_S, Set};
 
@@ -148,9 +149,9 @@ impl Guidance {
         neighbours: &Neighbours<V>,
         now: Instant,
     ) {
-        let Some(plan) = scene.plan else { return };
-        let position = &scene.telemetry.position;
         self.filter.column_clear = true;
+        let Some(plan) = scene.plan.filter(|_| self.deconflict.method == Method::Priority) else { return };
+        let position = &scene.telemetry.position;
         let ground_m = self.ground_m(plan).min(position.z);
         let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
