@@ -86,6 +86,8 @@ pub struct Guidance {
     /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
     linked_m: f32,
     shelter: Search,
+    /// Whether it is to fly back along its path from under a vehicle that comes down.
+    steps_back: bool,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
@@ -145,6 +147,7 @@ impl Guidance {
             returning: false,
             linked_m: f32::INFINITY,
             shelter: Search::default(),
+            steps_back: false,
             retreating: false,
             trapped_since: None,
             aside: false,

@@ -77,7 +77,10 @@ impl Guidance {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
         let back = to_m.filter(|to_m| *to_m < along_m);
-        let step = back.and_then(|to_m| {
+        self.steps_back = back.is_some();
+        // The filter has looked that way since the step before.
+        let free = self.filter.looks_back() && !self.filter.is_stopped();
+        let step = back.filter(|_| free).and_then(|to_m| {
             retreat::step(path, &mut self.tracker, to_m, neighbours.at(now), safety_m, dt_s)
         });
         if nowhere || (back.is_some() && step.is_none()) {

@@ -56,6 +56,8 @@ pub(crate) struct Filter {
     /// Whether this vehicle is the one that yields.
     yields: bool,
     stranger: bool,
+    /// Whether it looked back along the path.
+    back: bool,
     /// Whether the way to the ground is free.
     column_clear: bool,
     /// How often it stopped the vehicle.
@@ -94,6 +96,11 @@ impl Filter {
     /// For how long it has made the vehicle yield.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
         if self.yields { self.stopped_for(now) } else { Duration::default() }
+    }
+
+    /// Whether it looked back along the path in this step.
+    pub(super) fn looks_back(&self) -> bool {
+        self.back
     }
 
     /// For which vehicle it stops; 0 for none.
@@ -169,7 +176,7 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                Way::Path { back: self.tracker.speed_mps < 0.0 || self.retreating }
+                Way::Path { back: self.tracker.speed_mps < 0.0 || self.steps_back }
             }
             _ => Way::Stands,
         };
@@ -178,6 +185,11 @@ impl Guidance {
             return;
         }
         let whole_column = matches!(state, State::Scheduled | State::Land);
+        let back = matches!(way, Way::Path { back: true });
+        if back != self.filter.back {
+            self.filter.reset_stop();
+            self.filter.back = back;
+        }
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_M } else { 0.0 };
         let bounds = self.bounds();
@@ -208,10 +220,12 @@ impl Guidance {
         }
         match found {
             Some(found) => {
+                let speed_mps = self.tracker.speed_mps;
+                let braking_m = speed_mps * speed_mps / (2.0 * self.track.accel_mps2);
+                let stop_at_m = self.tracker.along_m + braking_m;
+                self.filter.stop_at_m =
+                    if stopped { self.filter.stop_at_m.min(stop_at_m) } else { stop_at_m };
                 if !stopped {
-                    let speed_mps = self.tracker.speed_mps;
-                    let braking_m = speed_mps * speed_mps / (2.0 * self.track.accel_mps2);
-                    self.filter.stop_at_m = self.tracker.along_m + braking_m;
                     self.filter.stopped_since = Some(now);
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
