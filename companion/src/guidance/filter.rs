@@ -31,6 +31,8 @@ const CLEAR: Duration = Duration::from_millis(300);
 const AHEAD_S: f32 = 3.0;
 /// More neighbours than this are not compared in one step: with more nearby the vehicle stops.
 const NEAR_MOST: usize = 6;
+/// What two vehicles in the air overshoot their stops together, metres; the schedule leaves 0.5 m for it and for the rest.
+const STRAY_M: f32 = 0.25;
 /// Before a vehicle that the roster does not name it stands no longer than this; then it goes on slowly.
 const STRANGER: Duration = Duration::from_secs(10);
 /// How fast.
@@ -199,14 +201,13 @@ impl Guidance {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
                 let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
                 let down = to_m < position.z;
-                // The reference leads the vehicle, and the vehicle flies on to it.
                 let reference_m = self.vertical_reference_m(state, position);
                 let end_m = if down {
-                    (reference_m.min(position.z) - fly_m).max(to_m)
+                    (reference_m - fly_m).max(to_m).min(reference_m)
                 } else {
-                    (reference_m.max(position.z) + fly_m).min(to_m.max(position.z))
+                    (reference_m + fly_m).min(to_m).max(reference_m)
                 };
-                Set::vertical(*position, end_m)
+                Set::vertical(Point::new(position.x, position.y, reference_m), end_m)
             }
             Way::Path { back } => self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back),
             Way::Stands => return,
@@ -257,7 +258,8 @@ impl Guidance {
         }
     }
 
-    /// What the vehicle can no longer take back on its path, and `extra_m`.
+    /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the reference, which is all that a
+    /// stop can hold back: the vehicle flies on to it in any case.
     fn own_set<const W: usize>(
         &self,
         path: &Path<W>,
@@ -275,13 +277,13 @@ impl Guidance {
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
-            return Set::along(*position, core::iter::once(here).chain(behind), fly_m);
+            return Set::along(here, core::iter::once(here).chain(behind), fly_m);
         }
         // It stops for its gates in any case.
         let fly_m = fly_m.min((self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
         let ahead = points[next..].iter().map(|w| w.position);
-        Set::along(*position, core::iter::once(here).chain(ahead), fly_m)
+        Set::along(here, core::iter::once(here).chain(ahead), fly_m)
     }
 
     /// The first neighbour whose set meets `own`.
@@ -308,8 +310,10 @@ impl Guidance {
             let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
             let apart_m = if met.stranger && self.filter.passes_stranger(now) {
                 2.0 * self.track.radius_m + HULLS_M
-            } else {
+            } else if met.heard.grounded {
                 safety_m
+            } else {
+                safety_m + STRAY_M
             };
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
             let away = met.heard.position - place;
