@@ -27,7 +27,23 @@ struct Args {
 fn main() {
     let args = Args::parse();
     if args.trace {
-        let outcome = meeting::fly(&scene::scene(args.seed), true);
+        let scene = scene::scene(args.seed);
+        let scene::Scene { kind, delay_s, loss, liar, .. } = &scene;
+        println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
+        for vehicle in &scene.vehicles {
+            let plan = &vehicle.plan;
+            let points: Vec<_> =
+                plan.path.waypoints().iter().map(|w| w.position.as_slice().to_vec()).collect();
+            println!(
+                "{}: {:?}, pad {:.2?}, departs {:.1} s, path {points:.1?}, gates {:.1?}",
+                vehicle.id,
+                vehicle.kind,
+                vehicle.pad.as_slice(),
+                plan.depart_s,
+                plan.gates
+            );
+        }
+        let outcome = meeting::fly(&scene, true);
         outcome.trace.iter().for_each(|line| println!("{line}"));
         println!("{}", meeting::line(&outcome));
         outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
