@@ -18,10 +18,10 @@ pub struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or one of the
-    /// suites: deconfliction, meetings, hostile.
+    /// suites: deconfliction, meetings, hostile, range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
-    /// Seeds of each case of the deconfliction suite.
+    /// Seeds of each case of the deconfliction suite, or of each range.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
     /// How many meetings, or forged frames of the hostile suite.
@@ -34,12 +34,12 @@ pub fn run_bench(args: &Args) -> Result<()> {
     let run_release = ["run", "--release", "--quiet", "--package", "flockmate-tests", "--bin"];
     let mut bench = cargo();
     bench.args(run_release);
-    if args.only.as_deref() == Some("deconfliction") {
-        bench.args(["deconfliction", "--"]);
+    if let Some(suite @ ("deconfliction" | "range")) = args.only.as_deref() {
+        bench.args([suite, "--"]);
         if let Some(seeds) = args.seeds {
             bench.arg("--seeds").arg(seeds.to_string());
         }
-        if let Some(out) = &args.out {
+        if let Some(out) = args.out.as_ref().filter(|_| suite == "deconfliction") {
             bench.arg("--out").arg(std::path::absolute(out)?);
         }
         return run(&mut bench);
