@@ -244,6 +244,54 @@ proptest::proptest! {
     }
 }
 
+proptest::proptest! {
+    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(32))]
+    /// Positions of ids that the roster does not name, anywhere, the goal included, for as long as they like: the vehicle comes
+    /// to the ground all the same, and where the strangers leave a hull's room beside the path, at its goal.
+    #[test]
+    fn strangers_deny_no_goal(
+        places in proptest::collection::vec((5f32..19.0, 0f32..4.0, 0f32..5.0, 1u8..=255), 1..7),
+        lasts_s in 5u32..120,
+    ) {
+        let mut bench = Bench::following(config());
+        let beside = places.iter().all(|(_, off_m, _, _)| *off_m > 1.2);
+        for tick in 0..240 * 20u32 {
+            if tick % 4 == 0 && tick < lasts_s * 20 {
+                for (i, (x, off_m, z, id)) in places.iter().enumerate() {
+                    let place = Point::new(*x, 12.0 + off_m, *z);
+                    let bytes = stranger(bench.now, *id, (tick as u8).wrapping_add(i as u8), place);
+                    bench.companion.handle_bytes(Link::Swarm, bench.now, &bytes);
+                }
+            }
+            bench.tick();
+            if matches!(bench.state(), State::Done | State::Aborted) {
+                break;
+            }
+        }
+        proptest::prop_assert!(
+            bench.state() == State::Done || (!beside && bench.state() == State::Aborted),
+            "{:?} at {:?}: {:?}", bench.state(), bench.enu, bench.texts
+        );
+        proptest::prop_assert!(bench.on_ground());
+    }
+}
+
+/// A position report of a vehicle that stands.
+fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
+    let at = planner_core::frames::enu_to_geodetic(&ORIGIN, &place);
+    let data = GLOBAL_POSITION_INT_DATA {
+        time_boot_ms: now.boot_ms(),
+        lat: (at.lat_deg * 1e7) as i32,
+        lon: (at.lon_deg * 1e7) as i32,
+        alt: (at.alt_m * 1e3) as i32,
+        ..Default::default()
+    };
+    let mut out = [0; crate::frame::MAX_SENT];
+    let header = crate::frame::Header { system, component: crate::COMPONENT, sequence };
+    let len = crate::frame::encode(header, &data, &mut out);
+    out[..len].to_vec()
+}
+
 #[test]
 fn a_command_is_logged_with_its_sender_and_a_foreign_one_denied() {
     let mut bench = Bench::new(config());
