@@ -1,45 +1,64 @@
-//! Where to be now: the setpoint of each state, made from the path, the neighbours and the autopilot's position.
+//! Where to go now: the raw point of each state, made from the path, the neighbours and the autopilot's position. The door
+//! makes the setpoint of it.
+//!
+//! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
+//! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it goes on
+//! where it was. A stop slows the door's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
+//! is taken back to it, and going on begins with a straight way back to where the phase was left.
 
 mod brakes;
+mod door;
 mod filter;
 
-use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
 use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
+use self::door::{Door, Pace, TICK_S};
+use self::filter::Filter;
+use crate::autopilot::Kind;
 use crate::config::Config;
-use crate::guidance::filter::Filter;
+use crate::limits::{AutopilotLimits, Limits};
 use crate::mission::State;
 use crate::neighbours::Neighbours;
-use crate::retreat::Search;
+use crate::retreat::{self, Search};
 use crate::telemetry::Telemetry;
 use crate::time::Instant;
+
+pub use self::door::{SMOOTH_MOST_S, Stats};
 
 /// This near the end of the climb or of the path counts as there, metres.
 const ARRIVED_M: f32 = 0.35;
 /// Slower than this counts as standing at the end of the path, m/s.
 const STANDING_MPS: f32 = 0.5;
-/// A reference slower than this stands, m/s.
-const STANDING_REFERENCE_MPS: f32 = 0.05;
+/// A setpoint slower than this stands, m/s.
+const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// This near its top the climb is done, metres.
 const CLIMBED_M: f32 = 0.12;
 /// This near the lower end of the guided descent it is done, metres.
 const DESCENDED_M: f32 = 0.2;
-/// The climb ends no slower than this, m/s.
-const CREEP_MPS: f32 = 0.05;
-/// The climb's reference is at most this far above the vehicle, metres.
-const CLIMB_LEAD_M: f32 = 1.5;
+/// In a climb, a descent or a join the setpoint is at most this far ahead of the vehicle, metres.
+const LEG_LEAD_M: f32 = 1.5;
+/// Speed of the join to the path, m/s.
+const JOIN_MPS: f32 = 1.0;
+/// Before the take-off the setpoint follows the estimate of a vehicle that stands no faster than this, m/s.
+const DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
 /// The same after the position was lost, metres: the vehicle stopped within its braking distance of the reference, so a
 /// position further along is not to be believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
+/// The same once the setpoint stands, metres: the raw point may be as far ahead as a second is flown.
+const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this near the end of the window lies beyond it, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Less than this is no progress, metres.
 const PROGRESS_M: f32 = 0.25;
+/// A setpoint that stands this near the end of the path has flown it, metres.
+const AT_END_M: f32 = 0.02;
+/// Shorter than this a leg need not be flown, metres.
+const LEG_LEAST_M: f32 = 1e-3;
 
 /// Acceleration for each metre off the reference, 1/s²: with what PX4's cascade asks for by itself (`MPC_XY_P` 0.95 ·
 /// `MPC_XY_VEL_P_ACC` 1.8) it makes the loop 2.8 times as stiff, and a gust carries the vehicle less than half as far.
@@ -49,7 +68,7 @@ const DAMP_PER_S: f32 = 1.5;
 /// Bound on both together, m/s²: a position that jumps must not throw the vehicle about.
 const HOLD_MOST_MPS2: f32 = 1.5;
 
-/// Before anyone was asked: wait.
+/// Before the neighbours were asked: wait.
 const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// What the autopilot is sent.
@@ -59,49 +78,81 @@ pub enum Setpoint {
     None,
     /// Be there, with this velocity and acceleration: ENU metres, m/s, m/s².
     Move(Point, Point, Point),
-    /// Stand still wherever that is: no position is known to refer to.
-    Stop,
+    /// Brake with this velocity, wherever that is: no position is known to refer to.
+    Stop(Point),
 }
 
-/// The reference and what moves it.
+/// Part of the flight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// Before the climb.
+    Hold,
+    /// Straight up to the height of the path's start.
+    Climb,
+    /// Straight to where the path goes on.
+    Join,
+    /// Along the path.
+    Path,
+    /// Straight down from its end.
+    Descent,
+}
+
+/// The raw point's course, and the door that makes setpoints of it.
 #[derive(Clone, Debug)]
 pub struct Guidance {
     track: TrackConfig,
+    /// The same for climb, join and descent.
+    leg_track: TrackConfig,
     deconflict: DeconflictConfig,
     /// Share of the speed that the estimate allows: 0 stops.
     pub pace: f32,
-    climb_mps: f32,
+    /// The door for setpoints.
+    pub door: Door,
+    phase: Phase,
     tracker: Tracker,
+    /// The straight way of a climb, a join or a descent; none while it is to be made from where the setpoint stands.
+    leg: Option<Path<2>>,
+    leg_tracker: Tracker,
+    /// Whether the raw point is where the setpoint stands.
+    settled: bool,
+    /// The position was unknown: no place was sent.
+    lost: bool,
     /// Last advice of the neighbours.
     pub advice: Advice,
-    reference: Option<Reference>,
     on_path: bool,
-    brake_at_m: f32,
-    hold: Point,
-    climb_z: f32,
+    lead_m: f32,
+    /// Where along the path the setpoint is, metres.
+    pub(crate) setpoint_m: f32,
+    /// Where along the path it will stop for now, whatever the safety filter does, metres.
+    pub(crate) stops_at_m: f32,
+    /// The safety filter.
+    pub(crate) filter: Filter,
+    /// Whether a descent goes back up its column.
+    up: bool,
+    /// Its path leads out of the geofence from here.
+    fenced: bool,
     progress_m: f32,
     progress_at: Instant,
+    reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
     /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
     linked_m: f32,
     shelter: Search,
-    /// Whether it is to fly back along its path from under a vehicle that comes down.
-    steps_back: bool,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
+    /// Where it goes back to.
+    back_to_m: Option<f32>,
+    /// No place along its path is better.
+    nowhere: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
     pub trapped_since: Option<Instant>,
     /// Whether its path leads aside only: it does not land at its end.
     pub aside: bool,
-    /// How far the reference has gone down below the end of the path, metres; none before the descent.
-    descended_m: Option<f32>,
     /// Height over the ground at which the autopilot lands by itself, metres.
     low_m: f32,
-    /// Where along the path it will stop for now, whatever the safety filter does, metres.
-    pub(crate) stops_at_m: f32,
-    /// The safety filter.
-    pub(crate) filter: Filter,
+    /// Acceleration sent last, with what holds the vehicle on the reference.
+    sent_acceleration: Point,
 }
 
 /// What guidance reads beside its own state.
@@ -119,14 +170,26 @@ pub struct Scene<'a, const W: usize, const G: usize> {
 }
 
 impl Guidance {
-    pub fn new<const V: usize>(config: &Config<V>) -> Self {
+    pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
+        let limits = Limits::new(config, autopilot);
+        let door = Door::new(limits, config.geofence);
+        let track = TrackConfig {
+            cruise_mps: limits.speed_mps,
+            climb_mps: autopilot.climb_mps,
+            descend_mps: autopilot.descend_mps,
+            accel_mps2: limits.accel_mps2,
+            accel_z_mps2: limits.accel_z_mps2,
+            radius_m: config.radius_m,
+            ..TrackConfig::default()
+        };
         Self {
-            track: TrackConfig {
-                cruise_mps: config.cruise_mps,
-                accel_mps2: config.accel_mps2,
-                radius_m: config.radius_m,
-                ..TrackConfig::default()
+            leg_track: TrackConfig {
+                cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
+                climb_mps: limits.climb_mps,
+                descend_mps: limits.descend_mps,
+                ..track
             },
+            track,
             deconflict: DeconflictConfig {
                 method: config.method,
                 safety_distance_m: config.safety_distance_m,
@@ -134,62 +197,84 @@ impl Guidance {
                 accel_mps2: config.accel_mps2,
             },
             pace: 1.0,
-            climb_mps: config.climb_mps,
+            door,
+            phase: Phase::Hold,
             tracker: Tracker::default(),
+            leg: None,
+            leg_tracker: Tracker::default(),
+            settled: true,
+            lost: false,
             advice: NOT_ASKED,
-            reference: None,
             on_path: false,
-            brake_at_m: f32::INFINITY,
-            hold: Point::zeros(),
-            climb_z: 0.0,
+            lead_m: LEG_LEAD_M,
+            setpoint_m: 0.0,
+            stops_at_m: f32::NEG_INFINITY,
+            filter: Filter::default(),
+            up: false,
+            fenced: false,
             progress_m: 0.0,
             progress_at: Instant::ZERO,
+            reported_m: f32::NEG_INFINITY,
             returning: false,
             linked_m: f32::INFINITY,
             shelter: Search::default(),
-            steps_back: false,
             retreating: false,
+            back_to_m: None,
+            nowhere: false,
             trapped_since: None,
             aside: false,
-            descended_m: None,
             low_m: config.required_clearance_m - config.radius_m,
-            stops_at_m: f32::NEG_INFINITY,
-            filter: Filter::default(),
+            sent_acceleration: Point::zeros(),
         }
     }
 
-    /// Takes other speeds.
-    pub fn tune<const V: usize>(&mut self, config: &Config<V>) {
-        let Self { track, deconflict, climb_mps, .. } = Self::new(config);
-        (self.track, self.deconflict, self.climb_mps) = (track, deconflict, climb_mps);
+    /// Takes other limits.
+    pub fn tune<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
+        let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
+        (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
+        self.door.tune(Limits::new(config, autopilot), config.geofence);
     }
 
     /// Forgets a former flight.
     pub fn reset(&mut self) {
         self.tracker = Tracker::default();
-        self.reference = None;
+        self.phase = Phase::Hold;
+        self.leg = None;
         self.on_path = false;
         self.returning = false;
         self.aside = false;
-        self.descended_m = None;
+        self.reported_m = f32::NEG_INFINITY;
         self.advice = NOT_ASKED;
         self.filter.reset();
     }
 
+    /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
     pub fn hold_at(&mut self, point: Point) {
-        self.hold = point;
-        self.on_path = false;
+        if core::mem::take(&mut self.lost) || !self.door.is_live() {
+            self.door.reset(point);
+            self.settle();
+        }
     }
 
+    /// Holds a point until the pilot's vehicle is resumed; where the flight was interrupted is kept.
+    pub fn hold_after_pilot(&mut self, point: Point) {
+        self.door.reset(point);
+        self.settle();
+    }
+
+    /// Begins the climb, straight up from where the setpoint is, or from `position` where nothing was sent.
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
-        self.climb_z = position.z;
+        self.phase = Phase::Climb;
+        if !self.door.is_live() {
+            self.door.reset(*position);
+        }
     }
 
+    /// Goes on where the flight was interrupted.
     pub fn run(&mut self, now: Instant) {
         self.on_path = true;
         self.shelter.reset();
-        self.brake_at_m = f32::INFINITY;
         self.linked_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
@@ -200,25 +285,29 @@ impl Guidance {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
 
-    /// Whether the reference stands, and is not on its way down.
+    /// Whether the setpoint stands, and is not on its way down.
     pub fn stands(&self) -> bool {
-        self.tracker.speed_mps < STANDING_REFERENCE_MPS && self.descended_m.is_none()
+        let limit = STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS;
+        self.door.velocity().norm_squared() < limit && self.phase != Phase::Descent
     }
 
-    /// Begins another path.
+    /// Whether it stands where its path leaves the geofence.
+    pub fn stands_at_fence(&self) -> bool {
+        self.fenced && self.stands()
+    }
+
+    /// Begins another path, from where the setpoint stands.
     pub fn begin_path(&mut self, now: Instant) {
         self.tracker = Tracker::default();
-        self.descended_m = None;
+        self.phase = Phase::Path;
+        self.leg = None;
         self.aside = false;
+        self.reported_m = f32::NEG_INFINITY;
         self.run(now);
     }
 
-    /// Holds a point until the pilot's vehicle is resumed; where the flight was interrupted is kept.
-    pub fn hold_after_pilot(&mut self, point: Point) {
-        self.hold = point;
-    }
-
-    /// Goes on after an interruption: a climb from here upwards, a descent from here downwards, a path from its nearest point.
+    /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
+    /// its descent, or by the nearest point of the path.
     pub fn go_on<const W: usize, const G: usize>(
         &mut self,
         plan: &VehiclePlan<W, G>,
@@ -226,62 +315,92 @@ impl Guidance {
         position: &Point,
         now: Instant,
     ) {
-        let end_z = plan.path.point_at(plan.path.length_m()).map_or(0.0, |p| p.z);
+        self.hold_at(*position);
         if climbs {
-            self.climb_z = position.z;
-        } else if let Some(descended_m) = &mut self.descended_m {
-            *descended_m = (end_z - position.z).max(0.0).min(*descended_m);
-            self.progress_at = now;
-        } else {
-            self.rejoin(&plan.path, position, now);
+            self.phase = Phase::Climb;
+            return;
         }
-    }
-
-    /// Goes on from the nearest point of the path.
-    pub fn rejoin<const W: usize>(&mut self, path: &Path<W>, position: &Point, now: Instant) {
-        let along_m =
-            path.project(position, self.tracker.along_m, REJOIN_WINDOW_M).clamp(0.0, path.length_m());
-        self.tracker = Tracker { along_m, speed_mps: 0.0 };
-        self.descended_m = None;
+        let (path, place) = (&plan.path, self.door.position());
+        let below = path
+            .point_at(path.length_m())
+            .is_some_and(|end| end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M);
+        if self.settled && self.phase != Phase::Climb && !(self.phase == Phase::Descent && below) {
+            self.phase = Phase::Path;
+            self.tracker.along_m = nearest_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+        }
         self.run(now);
     }
 
-    /// Replaces the path by the way back to its first point. The clearance of each leg goes with it.
+    /// Replaces the path by the way back to its first point. The clearance of each leg goes with it. The raw point may still
+    /// move on: the new path begins where it can have braked, and it begins on it backwards.
     pub fn turn_back<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
-        let along_m = self.tracker.along_m;
+        let speed = self.tracker.speed_mps.max(0.0);
+        let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
+        let braking_m = speed * speed / (2.0 * accel) + speed * TICK_S;
+        let from_m = (self.tracker.along_m + braking_m).min(path.length_m());
         let mut back = Path::new();
-        let ahead = path.waypoints().iter().find(|w| w.along_m >= along_m);
+        let ahead = path.waypoints().iter().find(|w| w.along_m >= from_m);
         let mut clearance_m = ahead.map_or(0.0, |w| w.clearance_m);
-        if let Some(here) = path.point_at(along_m) {
+        if let Some(turn) = path.point_at(from_m) {
             // No more points than the path has: those behind, and this one for at least one ahead.
-            let _ = back.push(here, clearance_m);
+            let _ = back.push(turn, clearance_m);
         }
-        for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < along_m) {
+        for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < from_m) {
             let _ = back.push(waypoint.position, clearance_m);
             clearance_m = waypoint.clearance_m;
         }
+        let tracker = Tracker {
+            along_m: from_m - self.tracker.along_m,
+            speed_mps: -self.tracker.speed_mps,
+            ..Tracker::default()
+        };
+        let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
-        self.returning = true;
         self.begin_path(now);
+        self.tracker = tracker;
+        self.returning = true;
+        match phase {
+            Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
+            Phase::Descent => {
+                // Back up: what is still sunk while it brakes is flown backwards.
+                if let (Some(leg), false) = (leg, self.settled) {
+                    let mut up = Path::new();
+                    let ends = (leg.waypoints().last(), leg.waypoints().first());
+                    for end in [ends.0, ends.1].into_iter().flatten() {
+                        let _ = up.push(end.position, end.clearance_m);
+                    }
+                    self.leg_tracker.along_m = leg.length_m() - self.leg_tracker.along_m;
+                    self.leg_tracker.speed_mps = -self.leg_tracker.speed_mps;
+                    (self.phase, self.leg) = (Phase::Join, Some(up));
+                }
+            }
+            Phase::Hold | Phase::Path => {}
+        }
     }
 
-    /// Arc length told to neighbours and gates: negative before and in the climb, beyond the path's length in the
-    /// descent.
+    /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the
+    /// descent. It never falls on one path.
     pub fn progress_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {
+        self.flown_m(state, scene).max(self.reported_m)
+    }
+
+    fn flown_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {
         let Some(plan) = scene.plan else { return 0.0 };
         let (path, z) = (&plan.path, scene.telemetry.position.z);
         let length_m = path.length_m();
         let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
         let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
-        match state {
-            State::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
-            State::Follow | State::Land
-                if self.reached_end(path) && (state == State::Land || self.descended_m.is_some()) =>
+        if matches!(state, State::Disarm | State::Done) && self.reached_end(path) {
+            // A metre beyond the ground, so that every gate on this flight opens.
+            return length_m + plan.descent_m + 1.0;
+        }
+        match self.phase {
+            Phase::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
+            Phase::Path | Phase::Descent
+                if self.reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
             {
                 length_m + (end_z - z).clamp(0.0, plan.descent_m)
             }
-            // A metre beyond the ground, so that every gate on this flight opens.
-            State::Disarm | State::Done if self.reached_end(path) => length_m + plan.descent_m + 1.0,
             _ if self.on_path => {
                 let behind = self.track.lead_max_m * 2.0;
                 let seen =
@@ -306,7 +425,8 @@ impl Guidance {
         self.on_path && self.tracker.along_m >= path.length_m()
     }
 
-    /// One step of `dt_s`: new advice, new reference.
+    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one asked for; if not, the door held
+    /// the last one.
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -314,60 +434,220 @@ impl Guidance {
         neighbours: &mut Neighbours<V>,
         now: Instant,
         dt_s: f32,
-    ) {
-        let Some(plan) = scene.plan else { return };
-        let position = &scene.telemetry.position;
-        let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
-        if matches!(state, State::Scheduled | State::Follow) {
-            let own = Own {
-                rank: scene.rank,
-                position: *position,
-                along_m,
-                path: &plan.path,
-                detours: scene.detours,
-            };
+    ) -> bool {
+        let position = scene.telemetry.position;
+        if let (Some(plan), State::Scheduled | State::Follow) = (scene.plan, state) {
+            let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
+            let own = Own { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
         }
-        let stop_m = match state {
-            State::Follow => self.advice.stop_within_m,
-            _ => self.brake_at_m - along_m,
-        };
-        self.stops_at_m = along_m + stop_m.max(0.0);
-        self.filter(state, scene, neighbours, now);
-        if state == State::Climb && !self.filter.is_stopped() {
-            let top = plan.path.point_at(0.0).map_or(self.climb_z, |p| p.z);
-            let lead = position.z + CLIMB_LEAD_M;
-            let rate = self.climb_rate(top) * self.pace;
-            self.climb_z = (self.climb_z + rate * dt_s).min(lead.max(self.climb_z)).min(top);
-        }
-        if self.on_path
-            && setpoints_flow(state)
-            && !matches!(state, State::PilotControl | State::PilotReturned)
-        {
-            let mut advice = if state == State::Follow {
-                Advice { speed_scale: self.advice.speed_scale * self.pace, ..self.advice }
-            } else {
-                Advice { stop_within_m: self.brake_at_m - self.tracker.along_m, ..Advice::FREE }
+        if let Some(plan) = scene.plan {
+            let place = self.door.position();
+            let along_m = self.tracker.along_m;
+            self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
+            let along_m = if self.on_path { along_m } else { -plan.climb_m };
+            self.stops_at_m = match state {
+                State::Follow => along_m + self.advice.stop_within_m.max(0.0),
+                _ => self.setpoint_m + self.door.braking_m(false),
             };
-            advice.stop_within_m = advice.stop_within_m.min(self.filter.leaves_m(self.tracker.along_m));
-            advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
-            self.reference =
-                self.retreat(state, &plan.path, &mut advice, neighbours, now, dt_s).or_else(|| {
-                    path::advance(&self.track, &plan.path, &mut self.tracker, position, &advice, dt_s)
-                });
-            if state == State::Follow {
-                self.descend(scene, plan.descent_m, now, dt_s);
+        }
+        self.filter(state, scene, neighbours, now);
+        let urgent = self.filter.stops(now);
+        let known = scene.telemetry.position_at.is_some();
+        if !setpoints_flow(state) {
+            self.door.close();
+            return true;
+        }
+        let kind = scene.telemetry.kind.unwrap_or_default();
+        let taken = matches!(state, State::PilotControl | State::Land | State::Disarm)
+            && scene.telemetry.custom_mode != kind.setpoint_mode();
+        self.lost |= !known || state == State::PositionLost;
+        if known && (taken || !self.door.is_live()) {
+            // The autopilot does not follow, or nothing was sent: begin where the vehicle is.
+            self.door.reset(position);
+            self.settle();
+            self.lost = false;
+        }
+        if !self.door.is_live() || taken {
+            self.sent_acceleration = Point::zeros();
+            return true;
+        }
+        let up = state == State::Follow && self.phase == Phase::Descent && self.filter.backs_up(now);
+        let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.up;
+        let goes = known && !turns && matches!(state, State::Climb | State::Follow) && (!urgent || up);
+        let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
+        advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
+        let path = scene.plan.map(|plan| &plan.path);
+        if let (Some(path), true) = (path, known && self.on_path) {
+            self.retreat(state, path, &mut advice, neighbours, now);
+        }
+        if self.leg.is_none() {
+            self.up = up;
+        }
+        let moves = goes || (self.back_to_m.is_some() && !urgent);
+        if !moves && self.door.stands() && !self.settled {
+            if let (Some(path), Phase::Path) = (path, self.phase) {
+                let near_m = self.tracker.along_m;
+                self.tracker.along_m = nearest_m(path, &self.door.position(), near_m, SETTLE_WINDOW_M);
             }
-            if self.tracker.along_m > self.progress_m + PROGRESS_M {
-                self.progress_m = self.tracker.along_m;
-                self.progress_at = now;
+            self.door.rest();
+            self.settle();
+        }
+        let lead_m = (position - self.door.position()).norm();
+        let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
+        let flies = scene.telemetry.on_ground == Some(false);
+        let share = match moves {
+            true if flies || state == State::Climb => share.min(self.pace),
+            true => self.pace,
+            // Settled it holds; before the take-off it follows the estimate.
+            false if self.settled => 1.0,
+            false => 0.0,
+        };
+        let mut blocked = false;
+        self.fenced &= !moves;
+        for _ in 0..self.door.begin(Pace { share, urgent }, dt_s) {
+            let raw = match scene.plan {
+                Some(plan) if moves => {
+                    self.next_raw(state, scene, plan, &advice, neighbours, now, &mut blocked)
+                }
+                _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
+                    let away = position - self.door.raw();
+                    let most = DRIFT_MPS * TICK_S;
+                    let share = most / away.norm().max(most);
+                    self.door.raw() + away * share
+                }
+                _ => self.door.raw(),
+            };
+            self.door.push(raw);
+        }
+        self.mark_trapped(blocked, now);
+        let sound = self.door.finish();
+        let correction = if flies && state != State::PilotControl && known {
+            correction(&self.door.position(), &self.door.velocity(), scene.telemetry)
+        } else {
+            Point::zeros()
+        };
+        let change = self.door.acceleration() + correction - self.sent_acceleration;
+        let most = self.door.jerk_mps3(urgent) * dt_s;
+        self.sent_acceleration += change * (most / change.norm().max(most).max(1e-6));
+        if self.tracker.along_m > self.progress_m + PROGRESS_M {
+            self.progress_m = self.tracker.along_m;
+            self.progress_at = now;
+        }
+        if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
+            self.reported_m = self.progress_m(state, scene);
+        }
+        sound
+    }
+
+    /// The raw point is where the setpoint stands: going on begins with a way from there.
+    fn settle(&mut self) {
+        self.settled = true;
+        self.leg = None;
+        self.leg_tracker = Tracker::default();
+        self.tracker.speed_mps = 0.0;
+    }
+
+    /// The next raw point.
+    #[expect(clippy::too_many_arguments, reason = "what a step knows")]
+    fn next_raw<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        plan: &VehiclePlan<W, G>,
+        advice: &Advice,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        blocked: &mut bool,
+    ) -> Point {
+        let path = &plan.path;
+        let raw = self.door.raw();
+        if core::mem::replace(&mut self.settled, false) && self.phase == Phase::Path {
+            (self.phase, self.leg) = (Phase::Join, None);
+        }
+        if self.phase == Phase::Climb && state != State::Climb && self.leg_done() {
+            (self.phase, self.leg) = (Phase::Join, None);
+        }
+        if self.phase == Phase::Path && state == State::Follow && self.stands_at_end(scene) {
+            (self.phase, self.leg) = (Phase::Descent, None);
+            self.progress_at = now;
+        }
+        let target = match self.phase {
+            Phase::Hold => return raw,
+            Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
+            Phase::Join => path.point_at(self.tracker.along_m),
+            Phase::Descent => path.point_at(path.length_m()).map(|end| {
+                Point::new(raw.x, raw.y, if self.up { end.z } else { end.z - self.guided_m(plan.descent_m) })
+            }),
+            Phase::Path => return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw),
+        };
+        let Some(target) = target else { return raw };
+        if self.leg.is_none() {
+            let mut leg = Path::new();
+            // Room for both.
+            let _ = leg.push(raw, f32::INFINITY.min(self.track.lead_max_m));
+            let _ = leg.push(target, f32::INFINITY.min(self.track.lead_max_m));
+            (self.leg, self.leg_tracker) = (Some(leg), Tracker::default());
+        }
+        let Some(leg) = &self.leg else { return raw };
+        let advice = Advice::FREE;
+        let reference = path::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
+        self.lead_m = LEG_LEAD_M;
+        if self.phase == Phase::Descent && self.leg_tracker.speed_mps > 0.0 {
+            self.progress_at = now;
+        }
+        if self.phase == Phase::Join && (leg.length_m() < LEG_LEAST_M || self.leg_done()) {
+            (self.phase, self.leg) = (Phase::Path, None);
+        }
+        reference.map_or(raw, |reference| reference.position)
+    }
+
+    /// The next raw point on the path, back from below a vehicle that comes down where it has to.
+    fn next_on_path<const V: usize, const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        advice: &Advice,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        blocked: &mut bool,
+    ) -> Option<Point> {
+        let mut advice = *advice;
+        if let Some(to_m) = self.back_to_m {
+            let safety_m = self.deconflict.safety_distance_m;
+            let near = neighbours.at(now);
+            // The filter has looked that way since the step before.
+            let free = self.filter.looks_back() && !self.filter.is_stopped();
+            if !free {
+                advice.stop_within_m = 0.0;
+            } else if let Some(place) = retreat::step(path, &mut self.tracker, to_m, near, safety_m, TICK_S) {
+                return Some(place);
+            } else {
+                *blocked = true;
+                advice.stop_within_m = 0.0;
             }
         }
+        // Where the path leaves the geofence, it stops before it.
+        let speed = self.tracker.speed_mps.max(0.0);
+        let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
+        let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + LEG_LEAST_M;
+        if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+            advice.stop_within_m = advice.stop_within_m.min(braking_m);
+            self.fenced = true;
+        }
+        let Reference { position, lead_m, .. } =
+            path::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
+        self.lead_m = lead_m;
+        Some(position)
+    }
+
+    /// Whether the straight way is flown by the raw point.
+    fn leg_done(&self) -> bool {
+        self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }
 
     /// Whether it leads the vehicle down.
     pub(crate) fn descends(&self) -> bool {
-        self.descended_m.is_some()
+        self.phase == Phase::Descent
     }
 
     /// Height of the ground below the vehicle, as far as the plan tells, metres.
@@ -386,79 +666,47 @@ impl Guidance {
         self.progress_at
     }
 
-    /// At the end of the path and free to land the reference goes straight down, not lower than the margin kept to
-    /// obstacles: only from there the autopilot lands by itself, which the wind may carry off.
-    fn descend<const W: usize, const G: usize>(
-        &mut self,
-        scene: &Scene<'_, W, G>,
-        descent_m: f32,
-        now: Instant,
-        dt_s: f32,
-    ) {
-        let descended_m = match self.descended_m {
-            Some(descended_m) => descended_m,
-            None if self.stands_at_end(scene) => 0.0,
-            None => return,
-        };
-        if self.filter.is_stopped() {
-            // Back up its own column, if it yields.
-            let up_m = if self.filter.backs_up(now) { self.climb_mps * dt_s } else { 0.0 };
-            self.descended_m = Some(descended_m - up_m).filter(|m| *m > 0.0);
-            return;
-        }
-        let rate = self.vertical_rate(self.guided_m(descent_m) - descended_m);
-        self.descended_m = Some(descended_m + rate * dt_s);
-        if rate > 0.0 {
-            self.progress_at = now;
-        }
-    }
-
-    /// How far down the reference leads, metres.
+    /// How far down the setpoint leads, metres. At the end of the path and free to land it goes straight down, not lower than
+    /// the margin kept to obstacles: only from there the autopilot lands by itself, which the wind may carry off.
     fn guided_m(&self, descent_m: f32) -> f32 {
         libm::fmaxf(descent_m - self.low_m, 0.0)
     }
 
-    /// Speed of the climb's reference.
-    fn climb_rate(&self, top: f32) -> f32 {
-        self.vertical_rate(top - self.climb_z)
-    }
-
-    /// Speed of a vertical reference with this way left: it brakes at half the acceleration, so that a low ceiling is not
-    /// overshot into.
-    fn vertical_rate(&self, left: f32) -> f32 {
-        if left <= 0.0 {
-            return 0.0;
-        }
-        libm::fminf(self.climb_mps, libm::fmaxf(libm::sqrtf(self.track.accel_mps2 * left), CREEP_MPS))
-    }
-
     pub fn climb_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        let start = scene.plan.and_then(|plan| plan.path.point_at(0.0));
-        start.is_some_and(|start| {
-            let apart = start - scene.telemetry.position;
-            // Both reference and vehicle at the top: a low climb must not count as done on the pad.
-            self.climb_z >= start.z && apart.norm() < 2.0 * ARRIVED_M && apart.z.abs() < CLIMBED_M
-        })
+        let top = self.leg.as_ref().and_then(|leg| leg.waypoints().last());
+        self.phase == Phase::Climb
+            && self.leg_done()
+            && top.is_some_and(|top| {
+                let apart = self.door.position() - scene.telemetry.position;
+                // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
+                (self.door.position().z - top.position.z).abs() < CLIMBED_M
+                    && self.stands()
+                    && apart.norm() < 2.0 * ARRIVED_M
+                    && apart.z.abs() < CLIMBED_M
+            })
     }
 
     /// Whether the path and the guided descent are flown.
     pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        let (Some(plan), Some(reference), Some(descended_m)) = (scene.plan, self.reference, self.descended_m)
-        else {
-            return false;
-        };
-        let guided_m = self.guided_m(plan.descent_m);
-        let low_z = reference.position.z - guided_m;
-        descended_m >= guided_m && (scene.telemetry.position.z - low_z < DESCENDED_M || guided_m == 0.0)
+        let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
+        let Some(low) = leg.waypoints().last() else { return false };
+        self.phase == Phase::Descent
+            && !self.up
+            && self.leg_done()
+            && (scene.telemetry.position.z - low.position.z < DESCENDED_M
+                || self.guided_m(plan.descent_m) == 0.0)
     }
 
     /// Whether it stands at the end of the path and nobody keeps it from landing.
     fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
-        let (Some(plan), Some(reference)) = (scene.plan, self.reference) else { return false };
-        self.on_path
+        let Some(plan) = scene.plan else { return false };
+        self.reached_end(&plan.path)
             && !self.aside
-            && reference.finished
-            && (reference.position - scene.telemetry.position).norm() < ARRIVED_M
+            && self.stands()
+            && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
+                (end - scene.telemetry.position).norm() < ARRIVED_M
+                    && (end - self.door.position()).norm() < ARRIVED_M
+            })
             && scene.telemetry.velocity.norm() < STANDING_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
@@ -476,10 +724,9 @@ impl Guidance {
                 return true;
             }
         }
-        if let (Some(_), Some(last)) = (self.descended_m, plan.path.waypoints().last()) {
-            // Below the end of its path, on the way down.
+        if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
             let away = position - last.position;
-            if (-plan.descent_m..ARRIVED_M).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z) && away.xy().norm() < ARRIVED_M {
                 return true;
             }
         }
@@ -503,44 +750,32 @@ impl Guidance {
         if !setpoints_flow(state) {
             return Setpoint::None;
         }
-        let still = Vector3::zeros();
+        let door = &self.door;
+        let still = Point::zeros();
         if scene.telemetry.position_at.is_none() || state == State::PositionLost {
-            return Setpoint::Stop;
+            return Setpoint::Stop(if door.is_live() { door.velocity() } else { still });
         }
-        match state {
-            State::PilotControl => Setpoint::Move(scene.telemetry.position, still, still),
-            State::PilotReturned => Setpoint::Move(self.hold, still, still),
-            State::Climb => {
-                let start = scene.plan.and_then(|plan| plan.path.point_at(0.0)).unwrap_or(self.hold);
-                let rate = if self.filter.is_stopped() { 0.0 } else { self.climb_rate(start.z) };
-                let place = Point::new(start.x, start.y, self.climb_z);
-                Setpoint::Move(place, Point::new(0.0, 0.0, rate), still)
-            }
-            _ => match self.reference {
-                Some(r) if self.on_path => {
-                    let down_m = self.descended_m.unwrap_or(0.0);
-                    let rate = match scene.plan {
-                        Some(plan)
-                            if state == State::Follow
-                                && self.descended_m.is_some()
-                                && !self.filter.is_stopped() =>
-                        {
-                            self.vertical_rate(self.guided_m(plan.descent_m) - down_m)
-                        }
-                        _ => 0.0,
-                    };
-                    let down = |length: f32| Point::new(0.0, 0.0, length);
-                    Setpoint::Move(r.position - down(down_m), r.velocity - down(rate), r.acceleration)
-                }
-                _ => Setpoint::Move(self.hold, still, still),
-            },
+        if !door.is_live() {
+            return Setpoint::Move(door.inside(scene.telemetry.position), still, still);
         }
+        // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
+        let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);
+        let velocity = door.velocity() + door.acceleration() * lead_s;
+        let most = door.velocity().norm().max(door.raw_speed_mps());
+        let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
+        Setpoint::Move(door.position(), velocity, self.sent_acceleration)
     }
+}
+
+/// Arc length of the nearest point of the path; its end, if that is as near as counts as there.
+fn nearest_m<const W: usize>(path: &Path<W>, place: &Point, near_m: f32, window_m: f32) -> f32 {
+    let (along_m, length_m) = (path.project(place, near_m, window_m), path.length_m());
+    if length_m - along_m < AT_END_M { length_m } else { along_m.max(0.0) }
 }
 
 /// Horizontal acceleration back to the reference, for an autopilot that adds it to what its own loops ask for. Upwards its
 /// loops are stiff enough.
-pub fn correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> Point {
+fn correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> Point {
     let off = (position - telemetry.position) * HOLD_PER_S2 + (velocity - telemetry.velocity) * DAMP_PER_S;
     let across = libm::hypotf(off.x, off.y);
     let share = if across > HOLD_MOST_MPS2 { HOLD_MOST_MPS2 / across } else { 1.0 };

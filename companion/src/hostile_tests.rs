@@ -467,12 +467,14 @@ fn the_pace_follows_the_estimate() {
         bench.texts
     );
     bench.accuracy_m = Some(0.2);
+    bench.run(3.0);
     assert!(fastest(&mut bench, 2.0) < 0.05);
     assert_eq!(bench.state(), State::Follow);
     bench.accuracy_m = Some(0.02);
     assert!(fastest(&mut bench, 2.0) > 1.5, "{:?}", bench.texts);
     // Three seconds without a report are an unknown accuracy.
     bench.accuracy_m = None;
+    bench.run(3.0);
     assert!(fastest(&mut bench, 2.0) < 0.05);
     assert!(bench.texts.iter().any(|t| t == "Estimate of unknown accuracy: stopping"), "{:?}", bench.texts);
     bench.until(State::Land, 40.0);

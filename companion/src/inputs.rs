@@ -104,7 +104,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             battery_low: charge_below(self.config.battery_low_percent),
             battery_critical: charge_below(self.config.battery_low_percent / 2),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
-            outside: fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
+            outside: self.guidance.stands_at_fence()
+                || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             blocked: self.around.blocked,
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,

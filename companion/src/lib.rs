@@ -31,6 +31,7 @@ pub mod ftp;
 mod guidance;
 mod inputs;
 pub mod intent;
+mod limits;
 mod machine;
 pub mod margins;
 pub mod mission;

@@ -16,8 +16,9 @@ use crate::detour::{Around, Obstacles};
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
-use crate::guidance::{Guidance, Scene, setpoints_flow};
+use crate::guidance::{Guidance, Scene, Stats, setpoints_flow};
 use crate::intent::Intent;
+use crate::limits::AutopilotLimits;
 use crate::margins;
 use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
 use crate::neighbours::Neighbours;
@@ -31,6 +32,8 @@ use crate::time::{Duration, Instant};
 
 /// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
+/// A setpoint that is held is reported no more often.
+const HELD_EVERY: Duration = Duration::from_secs(5);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// A hovering vehicle sways more slowly, m/s.
@@ -73,9 +76,13 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) pending: Pending,
     pub(crate) handshake: Handshake,
     repeats: Repeats,
+    /// What the autopilot's parameters allow.
+    pub(crate) autopilot_limits: AutopilotLimits,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
     pub(crate) now: Instant,
+    /// When a setpoint that was held may be reported again.
+    held_at: Instant,
     stepped_at: Instant,
     next_step: Instant,
     next_heartbeat: Instant,
@@ -126,9 +133,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             pending: Pending::default(),
             handshake: Handshake::default(),
             repeats: Repeats::default(),
-            guidance: Guidance::new(&config),
+            autopilot_limits: AutopilotLimits::default_of(Kind::Px4),
+            guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
             mode_before: 0,
             now: Instant::ZERO,
+            held_at: Instant::ZERO,
             stepped_at: Instant::ZERO,
             next_step: Instant::ZERO,
             next_heartbeat: Instant::ZERO,
@@ -190,6 +199,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // What is flown around comes on top of where the plan was left.
         let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
         self.guidance.progress_m(self.state, &self.scene()) + left_at_m.max(0.0)
+    }
+
+    /// What the setpoints came to since the start.
+    pub fn setpoint_stats(&self) -> Stats {
+        self.guidance.door.stats
     }
 
     /// What a link's framer counted.
@@ -446,7 +460,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             id: self.config.system_id,
             detours: self.around.flying,
         };
-        self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s);
+        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s) && now >= self.held_at {
+            self.held_at = now + HELD_EVERY;
+            self.say(true, "Setpoint out of limits: holding");
+        }
         self.look_around();
         self.run_table();
         self.repeat_requests();
@@ -553,7 +570,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RunPath => self.guidance.run(now),
             Action::RequestDetour => self.request_detour(false),
             Action::RequestAside => {
-                self.guidance.brake(&position);
+                self.guidance.brake();
                 self.request_detour(true);
             }
             Action::MissDetour => self.miss_detour(PlanFailure::Late),
@@ -561,7 +578,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.begin_path(now);
                 self.guidance.aside = self.around.aside;
             }
-            Action::BrakeOnPath => self.guidance.brake(&position),
+            Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
                 if let Some(plan) = &mut self.plan {
@@ -580,7 +597,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let position = self.telemetry.position;
         match from {
             Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
-                self.guidance.brake(&position);
+                self.guidance.brake();
             }
             // Off the path, or not known to be on it: the reference may be beyond a wall.
             _ => self.guidance.hold_at(position),
@@ -599,7 +616,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.guidance.go_on(plan, climbs, &position, now);
                 }
                 if !matches!(to, State::Climb | State::Follow) {
-                    self.guidance.brake(&position);
+                    self.guidance.brake();
                 }
             }
         }

@@ -11,7 +11,7 @@
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOff;
-use planner_core::path::{Path, Reference, Tracker};
+use planner_core::path::{Path, Tracker};
 
 use crate::sweep::Sweep;
 
@@ -30,6 +30,8 @@ const FAST_MPS: f32 = 1.5;
 const CORNER_MPS: f32 = 0.6;
 /// Acceleration, m/s².
 const ACCEL_MPS2: f32 = 1.0;
+/// Braking of a vehicle that flies on, m/s².
+const BRAKES_MPS2: f32 = 1.5;
 
 /// Where to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -100,9 +102,15 @@ pub fn step<const W: usize>(
     neighbours: &[Neighbour],
     safety_m: f32,
     dt_s: f32,
-) -> Option<Reference> {
+) -> Option<Point> {
     let here = path.point_at(tracker.along_m)?;
     let back = path.point_at(tracker.along_m - STEP_M)?;
+    if tracker.speed_mps > 0.0 {
+        // It flies on, and brakes first.
+        tracker.speed_mps = (tracker.speed_mps - BRAKES_MPS2 * dt_s).max(0.0);
+        tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
+        return at(path, tracker);
+    }
     let follows = |n: &&Neighbour| {
         let apart = |p: &Point| (n.position - p).norm();
         !n.grounded && n.progress_m.is_some() && apart(&back) < (safety_m + FOLLOWER_M).min(apart(&here))
@@ -117,10 +125,11 @@ pub fn step<const W: usize>(
     let speed = ahead.min(FAST_MPS).min(ACCEL_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
-    let position = path.point_at(tracker.along_m)?;
-    let velocity = (back - here).try_normalize(1e-6).unwrap_or_else(Point::zeros) * speed;
-    let acceleration = Point::zeros();
-    Some(Reference { position, velocity, acceleration, along_m: tracker.along_m, finished: false })
+    at(path, tracker)
+}
+
+fn at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
+    path.point_at(tracker.along_m)
 }
 
 #[cfg(test)]
@@ -199,7 +208,7 @@ mod tests {
     #[test]
     fn it_goes_back_slowly_round_the_corner_and_not_into_who_follows() {
         let path = path();
-        let mut tracker = Tracker { along_m: 9.0, speed_mps: 0.0 };
+        let mut tracker = Tracker { along_m: 9.0, ..Tracker::default() };
         let mut follower = above(0.0, 0.0, 1.0);
         follower.progress_m = Some(0.0);
         let mut steps = 0;
@@ -210,7 +219,7 @@ mod tests {
             steps += 1;
         }
         assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");
-        let mut near = Tracker { along_m: 2.0, speed_mps: 0.0 };
+        let mut near = Tracker { along_m: 2.0, ..Tracker::default() };
         while step(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
         assert!(near.along_m > 1.5, "{near:?}");
     }

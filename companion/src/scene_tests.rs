@@ -155,15 +155,17 @@ fn every_row_has_its_scene() {
     let mut fenced = config();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(12.0, 30.0, 10.0)));
     scene(Bench::following(fenced), &|_| {}, Aborted, 60.0);
-    // The same while somebody lies below: it lands where there is room.
+    // The same while another vehicle lies below: it waits inside until there is room.
     let mut fenced = two_vehicles();
     fenced.geofence = Some((Point::new(0.0, 0.0, -1.0), Point::new(10.0, 30.0, 10.0)));
     scene(
         Bench::accompanied(fenced),
         &|b| {
             b.neighbour = Some((Point::new(11.0, 12.0, 0.0), GROUNDED | LANDED | ON_PLAN, 99.0, 5));
-            b.until(Land, 20.0);
-            assert!((12.4..14.0).contains(&b.enu.x), "{:?}", b.enu);
+            b.run(20.0);
+            assert!(b.state() == Follow && (9.8..10.05).contains(&b.enu.x), "{:?}", b.enu);
+            b.neighbour = Some((Point::new(8.0, 20.0, 0.0), GROUNDED | LANDED | ON_PLAN, 99.0, 5));
+            b.until(Land, 5.0);
         },
         Aborted,
         60.0,

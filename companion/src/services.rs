@@ -39,7 +39,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         [self.config.cruise_mps, self.config.climb_mps] = self.nominal_mps;
         let parameters = *self.parameters();
         parameters.apply(&mut self.config);
-        self.guidance.tune(&self.config);
+        self.guidance.tune(&self.config, &self.autopilot_limits);
     }
 
     /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the

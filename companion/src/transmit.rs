@@ -9,7 +9,7 @@ use planner_core::{Point, frames};
 
 use crate::events::Link;
 use crate::frame;
-use crate::guidance::{self, Setpoint};
+use crate::guidance::Setpoint;
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
@@ -83,24 +83,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.kind();
-        let stop = (still, still, still, kind.stop_mask());
+        let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, kind.stop_mask());
         let (position, velocity, acceleration, mask) = match self.guidance.setpoint(self.state, &self.scene())
         {
             Setpoint::None => return None,
-            Setpoint::Stop => stop,
+            Setpoint::Stop(velocity) => stop(&velocity),
             Setpoint::Move(position, velocity, acceleration) => {
-                self.telemetry.to_ned(&self.config.origin, &position).map_or(stop, |ned| {
-                    let lead = acceleration * kind.velocity_lead_s();
-                    let flies = self.telemetry.on_ground == Some(false);
-                    let acceleration = if flies && self.state != State::PilotControl {
-                        acceleration + guidance::correction(&position, &velocity, &self.telemetry)
-                    } else {
-                        acceleration
-                    };
-                    let velocity = velocity + lead;
-                    let (velocity, acceleration) =
-                        (frames::swap_enu_ned(&velocity), frames::swap_enu_ned(&acceleration));
-                    (ned, velocity, acceleration, kind.move_mask())
+                self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
+                    let velocity = frames::swap_enu_ned(&velocity);
+                    (ned, velocity, frames::swap_enu_ned(&acceleration), kind.move_mask())
                 })
             }
         };
@@ -241,7 +232,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Follow | Paused | Alone | Blocked | Replanning | Stopping => {
                 column = false;
                 add(setpoint);
-                let (from_m, to_m) = (self.guidance.along_m(), self.guidance.stops_at_m);
+                let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);
                 let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));
                 path.point_at(to_m).filter(|_| to_m > from_m).into_iter().for_each(add);

@@ -8,7 +8,7 @@
 //! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
 
 use heapless::Vec;
-use libm::{fmaxf, fminf, sqrtf};
+use libm::{fabsf, fmaxf, fminf, sqrtf};
 
 use crate::Point;
 use crate::deconflict::Advice;
@@ -160,8 +160,14 @@ impl<const W: usize> Path<W> {
 pub struct TrackConfig {
     /// Nominal speed, m/s.
     pub cruise_mps: f32,
-    /// Acceleration and braking along the path, m/s².
+    /// Greatest speed upwards on a slanted leg, m/s.
+    pub climb_mps: f32,
+    /// The same downwards, m/s.
+    pub descend_mps: f32,
+    /// Acceleration and braking across, m/s².
     pub accel_mps2: f32,
+    /// The same upwards and downwards, m/s².
+    pub accel_z_mps2: f32,
     /// Time in which the autopilot answers to a sudden change of velocity, seconds: PX4's velocity loop with its default
     /// gain `MPC_XY_VEL_P_ACC` = 1.8 1/s.
     pub response_s: f32,
@@ -171,7 +177,7 @@ pub struct TrackConfig {
     pub deviation_min_m: f32,
     /// Largest deviation to allow for in the open, metres.
     pub deviation_max_m: f32,
-    /// The reference slows from half this distance ahead of the vehicle and stops at it, metres; between walls it is
+    /// The reference is to slow from half this distance ahead of the vehicle and stop at it, metres; between walls it is
     /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner.
     pub lead_max_m: f32,
 }
@@ -181,7 +187,10 @@ impl Default for TrackConfig {
     fn default() -> Self {
         Self {
             cruise_mps: 2.0,
+            climb_mps: 2.0,
+            descend_mps: 2.0,
             accel_mps2: 1.5,
+            accel_z_mps2: 1.5,
             response_s: 0.55,
             radius_m: 0.3,
             deviation_min_m: 0.03,
@@ -196,7 +205,7 @@ impl Default for TrackConfig {
 pub struct Tracker {
     /// Arc length of the reference, metres.
     pub along_m: f32,
-    /// Speed of the reference along the path, m/s.
+    /// Speed of the reference along the path, m/s; below zero it flies back.
     pub speed_mps: f32,
 }
 
@@ -205,94 +214,135 @@ pub struct Tracker {
 pub struct Reference {
     /// Place, ENU metres.
     pub position: Point,
-    /// Velocity, ENU m/s.
-    pub velocity: Point,
-    /// Acceleration along the path, ENU m/s².
-    pub acceleration: Point,
     /// Arc length, metres.
     pub along_m: f32,
+    /// The vehicle may be this far behind, metres.
+    pub lead_m: f32,
     /// Whether the end of the path is reached.
     pub finished: bool,
 }
 
 /// The reference may always be this far ahead: what an autopilot lags at walking speed, metres.
 const LEAD_LEAST_M: f32 = 0.4;
+/// This near its end the path is flown, metres.
+const END_M: f32 = 0.01;
 
 /// Half of the clearance a leg leaves beyond the body, within the configured bounds.
 fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
     fminf(fmaxf((clearance_m - cfg.radius_m) * 0.5, cfg.deviation_min_m), cfg.deviation_max_m)
 }
 
-/// Square of the greatest speed through waypoint `i`. Squares, and the legs' lengths from their arc lengths: a board takes its
+/// The way from one waypoint to the next, as a unit vector.
+fn direction(from: &Waypoint, to: &Waypoint) -> Point {
+    (to.position - from.position) / (to.along_m - from.along_m)
+}
+
+/// Greatest speed and acceleration along a direction: neither axis exceeds its own.
+fn limits_along(cfg: &TrackConfig, direction: &Point) -> (f32, f32) {
+    let up = direction.z;
+    if fabsf(up) < 1e-3 {
+        return (cfg.cruise_mps, cfg.accel_mps2);
+    }
+    let across = sqrtf(fmaxf(1.0 - up * up, 0.0));
+    let z_mps = if up > 0.0 { cfg.climb_mps } else { cfg.descend_mps };
+    let speed = fminf(cfg.cruise_mps, z_mps / fabsf(up));
+    let accel = fminf(cfg.accel_mps2 / fmaxf(across, 1e-3), cfg.accel_z_mps2 / fabsf(up));
+    (speed, fminf(accel, fmaxf(cfg.accel_mps2, cfg.accel_z_mps2)))
+}
+
+/// Square of the greatest speed through waypoint `i`, at which `before` and `after` meet. Squares: a board takes its
 /// square roots by software.
-fn corner_speed_sq<const W: usize>(cfg: &TrackConfig, path: &Path<W>, i: usize) -> f32 {
-    let points = path.waypoints();
-    let (Some(before), Some(after)) = (i.checked_sub(1).and_then(|b| points.get(b)), points.get(i + 1))
-    else {
-        return 0.0;
-    };
-    let direction =
-        |from: &Waypoint, to: &Waypoint| (to.position - from.position) / (to.along_m - from.along_m);
-    let change_sq = (direction(&points[i], after) - direction(before, &points[i])).norm_squared();
-    let sweep = deviation(cfg, fminf(points[i].clearance_m, after.clearance_m)) / cfg.response_s;
+fn corner_speed_sq(cfg: &TrackConfig, clearance_m: f32, before: &Point, after: &Point) -> f32 {
+    let change_sq = (after - before).norm_squared();
+    let sweep = deviation(cfg, clearance_m) / cfg.response_s;
     fminf(cfg.cruise_mps * cfg.cruise_mps, sweep * sweep / fmaxf(change_sq, 1e-6))
+}
+
+/// The speed from which a way of `2 · accel · way = room` is enough to brake, if braking begins after `later_s`.
+fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
+    let lost = accel * later_s;
+    sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
 }
 
 /// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
 ///
-/// `vehicle` is where the vehicle was last seen, `advice` what the neighbours leave. Work: one pass over the waypoints.
+/// `advice` is what the neighbours leave. The speed changes by no more than the acceleration of the leg: a stop that is
+/// advised too late is overrun. Work: one pass over the waypoints.
 pub fn advance<const W: usize>(
     cfg: &TrackConfig,
     path: &Path<W>,
     tracker: &mut Tracker,
-    vehicle: &Point,
     advice: &Advice,
     dt_s: f32,
 ) -> Option<Reference> {
     let points = path.waypoints();
-    let here = path.point_at(tracker.along_m)?;
+    path.point_at(tracker.along_m)?;
     let length_m = path.length_m();
-    let lead = (vehicle - here).norm();
-    let leg = points.iter().find(|w| w.along_m > 0.0 && w.along_m >= tracker.along_m);
-    let allowed = leg.map_or(cfg.deviation_max_m, |w| deviation(cfg, w.clearance_m));
-    let lead_max = fminf(cfg.lead_max_m, fmaxf(4.0 * allowed, LEAD_LEAST_M));
-    let waiting = fminf(fmaxf((lead_max - lead) / (0.5 * lead_max), 0.0), 1.0);
-    let speed = cfg.cruise_mps * fminf(advice.speed_scale, waiting);
-    // Squares of what can be braked from.
-    let room = |distance: f32| 2.0 * cfg.accel_mps2 * fmaxf(distance, 0.0);
-    let mut speed_sq = fminf(speed * speed, room(advice.stop_within_m));
     let next = points.partition_point(|w| w.along_m <= tracker.along_m);
+    let leg = next.clamp(1, fmaxi(points.len(), 2) - 1);
+    let along_leg = |i: usize| match (points.get(i.wrapping_sub(1)), points.get(i)) {
+        (Some(from), Some(to)) => direction(from, to),
+        _ => Point::zeros(),
+    };
+    let mut before = along_leg(leg);
+    let (top_mps, accel) = limits_along(cfg, &before);
+    let top_mps = top_mps * fminf(fmaxf(advice.speed_scale, 0.0), 1.0);
+    // Squares of what can be braked from, summed up leg by leg: each has its acceleration.
+    let stop_m = fmaxf(advice.stop_within_m, 0.0);
+    let mut braking_sq = f32::INFINITY;
+    let (mut room, mut from_m, mut leg_accel) = (0.0, tracker.along_m, accel);
+    let enough = 4.0 * (cfg.cruise_mps * cfg.cruise_mps + accel * accel);
     for (i, waypoint) in points.iter().enumerate().skip(next) {
-        let room = room(waypoint.along_m - tracker.along_m);
-        if room >= speed_sq {
+        let stops_at = tracker.along_m + stop_m;
+        if stops_at <= waypoint.along_m {
+            braking_sq = fminf(braking_sq, room + 2.0 * leg_accel * (stops_at - from_m));
+            break;
+        }
+        room += 2.0 * leg_accel * (waypoint.along_m - from_m);
+        if room >= enough {
             // From here on there is room to stop before any corner.
             break;
         }
-        speed_sq = fminf(speed_sq, corner_speed_sq(cfg, path, i) + room);
+        let corner_sq = match points.get(i + 1) {
+            Some(end) => {
+                let after = direction(waypoint, end);
+                let clearance_m = fminf(waypoint.clearance_m, end.clearance_m);
+                let (fastest, after_accel) = limits_along(cfg, &after);
+                let corner_sq = corner_speed_sq(cfg, clearance_m, &before, &after);
+                (before, leg_accel) = (after, after_accel);
+                fminf(corner_sq, fastest * fastest)
+            }
+            None => 0.0,
+        };
+        braking_sq = fminf(braking_sq, corner_sq + room);
+        from_m = waypoint.along_m;
     }
-    let speed = sqrtf(speed_sq);
-    let step = cfg.accel_mps2 * dt_s;
     let speed_before = tracker.speed_mps;
-    // Speeding up is limited; a bound from ahead is met at once, it already holds the braking distance.
-    tracker.speed_mps = fminf(speed, tracker.speed_mps + step);
-    let move_m = fminf(tracker.speed_mps * dt_s, fmaxf(advice.stop_within_m, 0.0));
-    tracker.along_m = fminf(tracker.along_m + move_m, length_m);
+    // Such that braking within the leg's acceleration is enough from the next step on.
+    let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));
+    let change = accel * dt_s;
+    tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
+    let crawls = most < CRAWLS_MPS && tracker.speed_mps >= 0.0;
+    tracker.along_m = fminf(fmaxf(tracker.along_m + tracker.speed_mps * dt_s, 0.0), length_m);
     // The last centimetres of braking take many steps; within one the end counts as reached.
-    if length_m - tracker.along_m < 0.01 && advice.stop_within_m >= length_m - tracker.along_m {
+    if crawls && length_m - tracker.along_m < END_M && stop_m >= length_m - tracker.along_m {
         tracker.along_m = length_m;
         tracker.speed_mps = 0.0;
     }
-    let position = path.point_at(tracker.along_m)?;
-    let ahead = path.point_at(tracker.along_m + 0.01)?;
-    let direction = (ahead - position).try_normalize(1e-6).unwrap_or_else(Point::zeros);
-    let change = ((tracker.speed_mps - speed_before) / dt_s).clamp(-2.0 * cfg.accel_mps2, cfg.accel_mps2);
+    let clearance_m = points.get(leg).map_or(f32::INFINITY, |w| w.clearance_m);
     Some(Reference {
-        position,
-        velocity: direction * tracker.speed_mps,
-        acceleration: direction * change,
+        position: path.point_at(tracker.along_m)?,
         along_m: tracker.along_m,
+        lead_m: fminf(cfg.lead_max_m, fmaxf(4.0 * deviation(cfg, clearance_m), LEAD_LEAST_M)),
         finished: tracker.along_m >= length_m,
     })
+}
+
+/// Slower than this the reference is about to stop, m/s.
+const CRAWLS_MPS: f32 = 0.05;
+
+fn fmaxi(a: usize, b: usize) -> usize {
+    if a > b { a } else { b }
 }
 
 #[cfg(test)]
@@ -323,20 +373,18 @@ mod tests {
     fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
         let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
         let mut tracker = Tracker::default();
-        let mut vehicle = Point::new(0.0, 0.0, 1.0);
         let (mut at_corner, mut fastest, mut steps) = (f32::INFINITY, 0.0_f32, 0);
-        loop {
-            let reference = advance(&cfg, &path, &mut tracker, &vehicle, &Advice::FREE, 0.05).unwrap();
-            vehicle = reference.position;
+        let vehicle = loop {
+            let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
             fastest = fastest.max(tracker.speed_mps);
             if (tracker.along_m - 6.0).abs() < 0.1 {
                 at_corner = at_corner.min(tracker.speed_mps);
             }
             steps += 1;
             if reference.finished || steps > 1000 {
-                break;
+                break reference.position;
             }
-        }
+        };
         assert_eq!(vehicle, Point::new(6.0, 6.0, 1.0));
         assert!(fastest > 1.9 && at_corner < 0.75, "fastest {fastest}, corner {at_corner}");
     }
@@ -347,21 +395,41 @@ mod tests {
         let mut tracker = Tracker::default();
         for _ in 0..400 {
             let advice = Advice { stop_within_m: 4.0 - tracker.along_m, ..Advice::FREE };
-            let vehicle = path.point_at(tracker.along_m).unwrap();
-            advance(&cfg, &path, &mut tracker, &vehicle, &advice, 0.05).unwrap();
-            assert!(tracker.along_m <= 4.0);
+            advance(&cfg, &path, &mut tracker, &advice, 0.05).unwrap();
+            assert!(tracker.along_m <= 4.0 + 1e-4, "{}", tracker.along_m);
         }
         assert!(tracker.along_m > 3.9, "{}", tracker.along_m);
     }
 
     #[test]
-    fn waits_for_a_vehicle_that_lags() {
-        let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
-        let mut tracker = Tracker::default();
-        for _ in 0..200 {
-            advance(&cfg, &path, &mut tracker, &Point::new(0.0, 0.0, 1.0), &Advice::FREE, 0.05);
+    fn speed_changes_by_no_more_than_each_axis_allows() {
+        let cfg =
+            TrackConfig { accel_z_mps2: 1.0, climb_mps: 1.0, descend_mps: 0.7, ..TrackConfig::default() };
+        let mut path = Path::<8>::new();
+        for (x, z) in [(0.0, 0.0), (3.0, 0.0), (3.0, 4.0), (6.0, 1.0), (9.0, 1.2)] {
+            path.push(Point::new(x, 0.0, z), 0.8).unwrap();
         }
-        assert!(tracker.along_m <= cfg.lead_max_m + 0.1, "{}", tracker.along_m);
+        let mut tracker = Tracker::default();
+        let (mut last, mut steps) = (Point::zeros(), 0);
+        loop {
+            let before = tracker;
+            let reference = advance(&cfg, &path, &mut tracker, &Advice::FREE, 0.05).unwrap();
+            let leg = path.waypoints().iter().filter(|w| w.along_m <= before.along_m).count();
+            let same = path.waypoints().iter().filter(|w| w.along_m <= tracker.along_m).count() == leg;
+            let velocity = (reference.position - last) / 0.05;
+            let change = (tracker.speed_mps - before.speed_mps).abs() / 0.05;
+            if same && !reference.finished {
+                assert!((-0.71..1.01).contains(&velocity.z), "{velocity:?}");
+                let ahead = path.point_at(tracker.along_m + 1e-2).unwrap() - reference.position;
+                let up = (ahead.z / 1e-2).abs().min(1.0);
+                assert!(change * up < 1.0 + 0.02 && change * (1.0 - up * up).sqrt() < 1.52, "{tracker:?}");
+            }
+            (last, steps) = (reference.position, steps + 1);
+            if reference.finished || steps > 1000 {
+                break;
+            }
+        }
+        assert!(steps < 400, "{steps}");
     }
 
     #[test]

@@ -1,10 +1,9 @@
 //! Where the reference stops on its path, and when it steps back from there.
 
-use planner_core::Point;
 use planner_core::deconflict::Advice;
-use planner_core::path::{Path, Reference};
+use planner_core::path::Path;
 
-use super::Guidance;
+use super::{Guidance, Phase};
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat::{self, Shelter};
@@ -18,18 +17,12 @@ const LINKED: Duration = Duration::from_millis(800);
 const ALONE_BESIDE_M: f32 = 0.5;
 
 impl Guidance {
-    /// Stops the reference within its braking distance; off the path, where the vehicle is.
-    pub fn brake(&mut self, position: &Point) {
+    /// Stops the setpoint where it is: the state that follows does not go.
+    pub fn brake(&mut self) {
         self.shelter.reset();
-        if self.on_path {
-            let braking = self.tracker.speed_mps * self.tracker.speed_mps / (2.0 * self.track.accel_mps2);
-            self.brake_at_m = self.tracker.along_m + braking;
-        } else {
-            self.hold = *position;
-        }
     }
 
-    /// A step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. Who is
+    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. Who is
     /// alone steps back from above one that lies below, to land beside it, but not beyond where others last heard it to be:
     /// they look for it from there on.
     pub(super) fn retreat<const V: usize, const W: usize>(
@@ -39,8 +32,7 @@ impl Guidance {
         advice: &mut Advice,
         neighbours: &mut Neighbours<V>,
         now: Instant,
-        dt_s: f32,
-    ) -> Option<Reference> {
+    ) {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
         if neighbours.linked_within(now, LINKED) {
@@ -49,7 +41,7 @@ impl Guidance {
         let alone = state == State::Alone;
         // On its way down it goes on, and on its way aside.
         let waits = matches!(state, State::Follow | State::Blocked | State::Replanning | State::Alone)
-            && self.descended_m.is_none()
+            && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + retreat::BESIDE_M;
@@ -76,23 +68,16 @@ impl Guidance {
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
-        let back = to_m.filter(|to_m| *to_m < along_m);
-        self.steps_back = back.is_some();
-        // The filter has looked that way since the step before.
-        let free = self.filter.looks_back() && !self.filter.is_stopped();
-        let step = back.filter(|_| free).and_then(|to_m| {
-            retreat::step(path, &mut self.tracker, to_m, neighbours.at(now), safety_m, dt_s)
-        });
-        if nowhere || (back.is_some() && step.is_none()) {
+        self.back_to_m = to_m.filter(|to_m| *to_m < along_m);
+        self.nowhere = nowhere;
+    }
+
+    /// After the raw points of a step; `blocked` if one of them could not go back.
+    pub(super) fn mark_trapped(&mut self, blocked: bool, now: Instant) {
+        if self.nowhere || (self.back_to_m.is_some() && blocked) {
             self.trapped_since.get_or_insert(now);
         } else {
             self.trapped_since = None;
         }
-        if step.is_some() {
-            self.brake_at_m = self.brake_at_m.min(self.tracker.along_m);
-        } else {
-            self.tracker.speed_mps = self.tracker.speed_mps.max(0.0);
-        }
-        step
     }
 }

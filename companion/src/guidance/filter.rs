@@ -51,8 +51,6 @@ pub(crate) struct Filter {
     stopped_since: Option<Instant>,
     /// Since when the way has been free again.
     clear_since: Option<Instant>,
-    /// Where along the path the reference stops, metres.
-    stop_at_m: f32,
     /// For which vehicle.
     blocker: u8,
     /// Whether this vehicle is the one that yields.
@@ -124,9 +122,9 @@ impl Filter {
         *self = Self { activations: self.activations, ..Self::default() };
     }
 
-    /// Distance along the path that it leaves from `along_m`, metres.
-    pub(super) fn leaves_m(&self, along_m: f32) -> f32 {
-        if self.is_stopped() { (self.stop_at_m - along_m).max(0.0) } else { f32::INFINITY }
+    /// Whether it stops the vehicle now.
+    pub(super) fn stops(&self, now: Instant) -> bool {
+        self.is_stopped() && !self.passes_stranger(now)
     }
 
     /// Share of the nominal speed that it leaves.
@@ -166,9 +164,9 @@ impl Guidance {
         let way = match state {
             State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
             State::Land => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
-            State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.climb_rate(top_m) },
-            State::Follow if self.descended_m.is_some() => {
-                Way::Vertical { to_m: ground_m, speed_mps: self.climb_mps }
+            State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.door.velocity().z.max(0.0) },
+            State::Follow if self.descends() => {
+                Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) }
             }
             State::Follow
             | State::Paused
@@ -178,7 +176,7 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                Way::Path { back: self.tracker.speed_mps < 0.0 || self.steps_back }
+                Way::Path { back: self.tracker.speed_mps < 0.0 || self.back_to_m.is_some() }
             }
             _ => Way::Stands,
         };
@@ -201,7 +199,7 @@ impl Guidance {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
                 let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
                 let down = to_m < position.z;
-                let reference_m = self.vertical_reference_m(state, position);
+                let reference_m = self.door.position().z;
                 let end_m = if down {
                     (reference_m - fly_m).max(to_m).min(reference_m)
                 } else {
@@ -221,11 +219,6 @@ impl Guidance {
         }
         match found {
             Some(found) => {
-                let speed_mps = self.tracker.speed_mps;
-                let braking_m = speed_mps * speed_mps / (2.0 * self.track.accel_mps2);
-                let stop_at_m = self.tracker.along_m + braking_m;
-                self.filter.stop_at_m =
-                    if stopped { self.filter.stop_at_m.min(stop_at_m) } else { stop_at_m };
                 if !stopped {
                     self.filter.stopped_since = Some(now);
                     self.filter.activations = self.filter.activations.wrapping_add(1);
@@ -239,26 +232,15 @@ impl Guidance {
                 // Past a stranger it goes on in the same stop, slowly.
                 if now - since >= CLEAR && !self.filter.passes_stranger(now) {
                     self.filter.reset_stop();
-                } else if self.filter.passes_stranger(now) {
-                    self.filter.stop_at_m = f32::INFINITY;
-                    if now - since >= STRANGER {
-                        self.filter.reset_stop();
-                    }
+                } else if self.filter.passes_stranger(now) && now - since >= STRANGER {
+                    self.filter.reset_stop();
                 }
             }
             None => {}
         }
     }
 
-    fn vertical_reference_m(&self, state: State, position: &Point) -> f32 {
-        match (state, self.reference) {
-            (State::Climb, _) => self.climb_z,
-            (_, Some(reference)) => reference.position.z - self.descended_m.unwrap_or(0.0),
-            _ => position.z,
-        }
-    }
-
-    /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the reference, which is all that a
+    /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the setpoint, which is all that a
     /// stop can hold back: the vehicle flies on to it in any case.
     fn own_set<const W: usize>(
         &self,
@@ -268,11 +250,13 @@ impl Guidance {
         extra_m: f32,
         back: bool,
     ) -> Set {
-        let (position, velocity_mps) = (&telemetry.position, telemetry.velocity.norm());
-        let along_m = self.tracker.along_m;
-        let speed_mps = self.tracker.speed_mps.abs().max(velocity_mps - SWAY_MPS);
-        let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
-        let here = path.point_at(along_m).unwrap_or(*position);
+        let velocity_mps = telemetry.velocity.norm();
+        let along_m = self.setpoint_m;
+        let reference_mps = self.door.velocity().norm();
+        let speed_mps = reference_mps.max(velocity_mps - SWAY_MPS);
+        let braking_m = bounds.braking.stop_m(speed_mps).max(self.door.braking_m(true));
+        let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
+        let here = self.door.position();
         let points = path.waypoints();
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);

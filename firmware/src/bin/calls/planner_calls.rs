@@ -278,10 +278,9 @@ fn paths(meter: &mut impl Meter) {
         meter.call("path::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
         meter.call("path::Path::project", 0, || path.project(&near, along_m, length_m));
         let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
-        let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps };
-        let here = path.point_at(along_m).expect("it is on the path");
+        let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps, ..Tracker::default() };
         meter.call("path::advance", size_of::<Tracker>(), || {
-            path::advance(&track, &path, &mut tracker, &here, &Advice::FREE, 0.05)
+            path::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
         });
         let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
         meter.call("detour::is_blocked", 0, || {

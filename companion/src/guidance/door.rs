@@ -1,0 +1,356 @@
+//! The one door for setpoints: every setpoint with a position or a velocity is made here.
+//!
+//! Guidance moves a *raw* point within limits of speed and acceleration, one step each [`TICK_S`]. The raw point changes
+//! its velocity at once in a corner and its acceleration at once where it begins to brake. The door makes a setpoint of it
+//! that the vehicle can fly:
+//!
+//! - Two moving averages over T = `n` · [`TICK_S`] each, then a uniform cubic B-spline through the averages. Position,
+//!   velocity and acceleration are derivatives of one curve. The curve stays in the convex hull of the raw points: a
+//!   straight leg stays exact, a stop is not overshot, a corner is rounded by at most Δv·T/6, and points inside the
+//!   geofence (a box) give setpoints inside it.
+//! - Its jerk is the second difference of the raw velocity over T, divided by T²: Δv / T² for a sudden change of
+//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that: 0.75 s for 1.5 m/s² and 4 m/s³.
+//! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
+//!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
+//!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
+//!
+//! ENU metres, seconds. Work: 2·[`MOST_N`] vector sums for each tick, at most [`TICKS`] ticks a step.
+
+use libm::{fabsf, fmaxf, fminf, sqrtf};
+use planner_core::Point;
+
+use crate::limits::Limits;
+
+/// Time between two raw points, seconds: the rate of the setpoints.
+pub const TICK_S: f32 = 0.05;
+/// Raw points taken in one call at most: a step that is later moves the setpoint no further.
+pub const TICKS: u8 = 4;
+/// Longest average, in ticks: lower limits of jerk lower the acceleration ([`Limits`]).
+const MOST_N: usize = 24;
+/// The same in seconds.
+pub const SMOOTH_MOST_S: f32 = MOST_N as f32 * TICK_S;
+/// Shortest.
+const LEAST_N: usize = 8;
+/// Raw velocities that count for one value of both averages.
+const LEN: usize = 2 * MOST_N - 1;
+/// The clock takes this share of the jerk that the curve leaves: its own steps are 50 ms long.
+const CLOCK_SHARE: f32 = 0.7;
+/// Least jerk left to the clock, m/s³.
+const CLOCK_JERK_LEAST: f32 = 0.5;
+/// Below this speed of the curve the clock's acceleration is that of this speed, m/s.
+const SLOW_MPS: f32 = 0.2;
+/// Slower than this stands, m/s.
+const STANDS_MPS: f32 = 0.01;
+/// The end of a stop: speed falls by this share of itself each second.
+const TAIL_PER_S: f32 = 6.0;
+/// A raw point this little outside the fence is put inside without a word, metres.
+const FENCE_SLACK_M: f32 = 0.01;
+/// A step may exceed the speed limit by this much, metres: rounding at a kilometre from the origin.
+const STEP_SLACK_M: f32 = 2e-3;
+
+/// How fast the clock is to run.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// 1 runs, 0 stops.
+    pub share: f32,
+    /// Whether the safety filter stops it: braking is as hard as that allows.
+    pub urgent: bool,
+}
+
+/// What setpoints came to since the start: greatest values, and how often the door had to hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Stats {
+    /// Setpoints made.
+    pub made: u32,
+    /// Greatest distance between two setpoints over the time between them, m/s.
+    pub speed_mps: f32,
+    /// Greatest acceleration, m/s².
+    pub accel_mps2: f32,
+    /// Greatest jerk without a stop by the safety filter, m/s³.
+    pub jerk_mps3: f32,
+    /// Greatest jerk in a stop by the safety filter, m/s³.
+    pub urgent_jerk_mps3: f32,
+    /// Setpoints that were not finite, outside the geofence or too far: the last one was held instead.
+    pub held: u32,
+}
+
+/// The last setpoint, and the curve it moves along.
+#[derive(Clone, Debug)]
+pub struct Door {
+    limits: Limits,
+    fence: Option<(Point, Point)>,
+    n: usize,
+    /// Newest raw point.
+    raw: Point,
+    /// Raw steps, a ring; `at` is the newest.
+    steps: [Point; LEN],
+    at: usize,
+    /// Newest average, and its last three steps, oldest first.
+    mean: Point,
+    slopes: [Point; 3],
+    /// Part of the tick that has passed.
+    share: f32,
+    /// Speed of the clock, and its change each second.
+    clock: f32,
+    clock_rate: f32,
+    /// Whether there is a setpoint to go on from.
+    live: bool,
+    /// Of the step that is being made: its length, whether the safety filter stops, whether its raw points are sound.
+    dt_s: f32,
+    stopping: bool,
+    sound: bool,
+    position: Point,
+    velocity: Point,
+    acceleration: Point,
+    /// Statistics since the companion's start.
+    pub stats: Stats,
+}
+
+impl Door {
+    pub fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
+        Self {
+            limits,
+            fence,
+            n: average(&limits),
+            raw: Point::zeros(),
+            steps: [Point::zeros(); LEN],
+            at: 0,
+            mean: Point::zeros(),
+            slopes: [Point::zeros(); 3],
+            share: 0.0,
+            clock: 1.0,
+            clock_rate: 0.0,
+            live: false,
+            dt_s: 0.0,
+            stopping: false,
+            sound: true,
+            position: Point::zeros(),
+            velocity: Point::zeros(),
+            acceleration: Point::zeros(),
+            stats: Stats::default(),
+        }
+    }
+
+    /// Takes other limits; from a standstill only.
+    pub fn tune(&mut self, limits: Limits, fence: Option<(Point, Point)>) {
+        (self.limits, self.fence, self.n) = (limits, fence, average(&limits));
+        self.rest();
+    }
+
+    /// Whether there is a last setpoint.
+    pub fn is_live(&self) -> bool {
+        self.live
+    }
+
+    /// Nothing is sent any more.
+    pub fn close(&mut self) {
+        self.live = false;
+    }
+
+    /// Place of the last setpoint.
+    pub fn position(&self) -> Point {
+        self.position
+    }
+
+    /// Its velocity.
+    pub fn velocity(&self) -> Point {
+        self.velocity
+    }
+
+    /// Its acceleration.
+    pub fn acceleration(&self) -> Point {
+        self.acceleration
+    }
+
+    /// Where the raw point is: ahead of the setpoint by what the averages hold.
+    pub fn raw(&self) -> Point {
+        self.raw
+    }
+
+    /// Speed that the raw point had last, m/s: that of the setpoint T later, if the clock runs.
+    pub fn raw_speed_mps(&self) -> f32 {
+        self.steps[self.at].norm() / TICK_S * self.clock
+    }
+
+    /// Greatest jerk, m/s³.
+    pub fn jerk_mps3(&self, urgent: bool) -> f32 {
+        self.limits.jerk(urgent)
+    }
+
+    /// Whether the setpoint stands.
+    pub fn stands(&self) -> bool {
+        self.velocity.norm_squared() < STANDS_MPS * STANDS_MPS
+    }
+
+    /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
+    pub fn braking_m(&self, urgent: bool) -> f32 {
+        let speed = self.velocity.norm();
+        if speed < STANDS_MPS {
+            return 0.0;
+        }
+        let (accel, jerk) = (self.limits.accel_mps2, CLOCK_SHARE * self.limits.jerk(urgent));
+        let ahead = fmaxf(self.acceleration.dot(&self.velocity) / speed, 0.0);
+        let build_up_s = (accel + ahead) / jerk + TICK_S;
+        speed * speed / (2.0 * accel) + speed * (0.5 * accel / jerk + build_up_s) + 0.02
+    }
+
+    /// Begins at a place, at rest: only where nothing was sent, where nobody flies by it, or where it stands.
+    pub fn reset(&mut self, place: Point) {
+        let place = if place.iter().all(|c| c.is_finite()) { place } else { self.position };
+        self.position = self.inside(place);
+        self.live = true;
+        self.rest();
+    }
+
+    /// Forgets the curve ahead; from a standstill only.
+    pub fn rest(&mut self) {
+        self.steps = [Point::zeros(); LEN];
+        self.slopes = [Point::zeros(); 3];
+        (self.raw, self.mean) = (self.position, self.position);
+        (self.share, self.clock, self.clock_rate) = (0.0, 1.0, 0.0);
+        (self.velocity, self.acceleration) = (Point::zeros(), Point::zeros());
+    }
+
+    /// The nearest place inside the fence.
+    pub fn inside(&self, mut place: Point) -> Point {
+        if let Some((low, high)) = self.fence {
+            for axis in 0..3 {
+                place[axis] = fmaxf(fminf(place[axis], high[axis]), low[axis]);
+            }
+        }
+        place
+    }
+
+    /// Whether a place may be sent.
+    pub fn allows(&self, place: &Point) -> bool {
+        self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
+    }
+
+    /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push`] takes them, then [`Self::finish`] makes the
+    /// setpoint.
+    pub fn begin(&mut self, pace: Pace, dt_s: f32) -> u8 {
+        if !(self.live && dt_s > 0.0) {
+            self.dt_s = 0.0;
+            return 0;
+        }
+        self.dt_s = fminf(dt_s, f32::from(TICKS) * TICK_S);
+        self.stopping = pace.urgent;
+        let clock_before = self.clock;
+        self.run_clock(pace, self.dt_s);
+        self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
+        let due = (self.share as u8).min(TICKS);
+        self.share = fmaxf(self.share - f32::from(due), 0.0);
+        due
+    }
+
+    /// Takes the next raw point. One that is not finite, too far, or outside the fence is not followed.
+    pub fn push(&mut self, next: Point) {
+        let step = self.inside(next) - self.raw;
+        let furthest = self.limits.fastest_mps() * TICK_S + STEP_SLACK_M;
+        // NaN is not near.
+        let near = step.norm_squared() <= furthest * furthest;
+        self.sound &= near && (self.inside(next) - next).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M;
+        self.take(if near { step } else { Point::zeros() });
+    }
+
+    /// Makes the setpoint; whether it is the one that was asked for. If not, it holds.
+    pub fn finish(&mut self) -> bool {
+        let dt_s = self.dt_s;
+        let sound = core::mem::replace(&mut self.sound, true);
+        if dt_s <= 0.0 {
+            return sound;
+        }
+        let (place, slope, bend) = self.curve();
+        let velocity = slope * self.clock;
+        let acceleration = bend * (self.clock * self.clock) + slope * self.clock_rate;
+        let finite = [place, velocity, acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()));
+        let step_m = (place - self.position).norm();
+        let reachable = step_m <= self.limits.fastest_mps() * dt_s + STEP_SLACK_M;
+        self.stats.made = self.stats.made.saturating_add(1);
+        if !(sound && finite && reachable) {
+            self.stats.held = self.stats.held.saturating_add(1);
+        }
+        if !(finite && reachable) {
+            self.rest();
+            return false;
+        }
+        let jerk_mps3 = (acceleration - self.acceleration).norm() / fmaxf(dt_s, 0.02);
+        let worst = if self.stopping { &mut self.stats.urgent_jerk_mps3 } else { &mut self.stats.jerk_mps3 };
+        *worst = fmaxf(*worst, jerk_mps3);
+        self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / fmaxf(dt_s, 0.02));
+        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, acceleration.norm());
+        (self.position, self.velocity, self.acceleration) = (place, velocity, acceleration);
+        sound
+    }
+
+    /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s the curve's speed, f its
+    /// acceleration along it and σ the clock, the setpoint's speed is s·σ, its acceleration f·σ² + s·σ̇, and the clock's
+    /// part of its jerk 3·f·σ·σ̇ + s·σ̈.
+    fn run_clock(&mut self, pace: Pace, dt_s: f32) {
+        let limits = &self.limits;
+        let (_, slope, bend) = self.curve();
+        let true_speed = slope.norm();
+        let speed = fmaxf(true_speed, SLOW_MPS);
+        let along = bend.dot(&slope) / speed;
+        let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
+        let clock = self.clock;
+        let left = limits.jerk(pace.urgent) - third.norm() * clock * clock * clock;
+        let jerk = CLOCK_SHARE * fmaxf(left, CLOCK_JERK_LEAST);
+        let accel = limits.accel_mps2;
+        // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
+        let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
+        let size = fabsf(lack);
+        let rate = fminf(fminf(accel, sqrtf(1.6 * jerk * size)), TAIL_PER_S * size);
+        let wanted = if lack < 0.0 { -rate } else { rate };
+        let own = along * clock * clock;
+        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - own, 0.0)) / speed;
+        let bent = 3.0 * along * clock * self.clock_rate;
+        let (least, most) = ((-jerk - bent) / speed * dt_s, (jerk - bent) / speed * dt_s);
+        let change = (wanted - self.clock_rate).clamp(fminf(least, 0.0), fmaxf(most, 0.0));
+        let rate = self.clock_rate + change;
+        let next = (clock + rate * dt_s).clamp(0.0, 1.0);
+        let done = fabsf(lack) < 1e-3 * speed && fabsf(rate) < 0.02;
+        self.clock = if done { pace.share.clamp(0.0, 1.0) } else { next };
+        self.clock_rate = if done { 0.0 } else { (next - clock) / dt_s };
+    }
+
+    /// Takes a raw step in.
+    fn take(&mut self, step: Point) {
+        self.raw += step;
+        self.at = if self.at == 0 { LEN - 1 } else { self.at - 1 };
+        self.steps[self.at] = step;
+        // Both averages at once: a triangle of 2n − 1 weights.
+        let n = self.n;
+        let scale = 1.0 / (n * n) as f32;
+        let (mut slope, mut behind) = (Point::zeros(), Point::zeros());
+        let mut tail = 1.0;
+        for i in 0..2 * n - 1 {
+            let at = if self.at + i < LEN { self.at + i } else { self.at + i - LEN };
+            let weight = (if i < n { i + 1 } else { 2 * n - 1 - i }) as f32 * scale;
+            slope += self.steps[at] * weight;
+            tail -= weight;
+            behind += self.steps[at] * tail;
+        }
+        self.slopes = [self.slopes[1], self.slopes[2], slope];
+        self.mean = self.raw - behind;
+    }
+
+    /// Place, velocity and acceleration of the curve where the clock is.
+    fn curve(&self) -> (Point, Point, Point) {
+        let [e0, e1, e2] = &self.slopes;
+        let (x, y) = (self.share, 1.0 - self.share);
+        let second = self.mean - e2 - e1;
+        let place = second
+            + (e1 * (1.0 + 3.0 * x + 3.0 * x * x - 2.0 * x * x * x) + e2 * (x * x * x) - e0 * (y * y * y))
+                / 6.0;
+        let slope = (e0 * (y * y) + e1 * (1.0 + 2.0 * x - 2.0 * x * x) + e2 * (x * x)) * 0.5;
+        let bend = (e1 - e0) * y + (e2 - e1) * x;
+        (place, slope / TICK_S, bend / (TICK_S * TICK_S))
+    }
+}
+
+/// Ticks of each average: long enough for the autopilot's jerk.
+fn average(limits: &Limits) -> usize {
+    let n = libm::ceilf(2.0 * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
+    n.clamp(LEAST_N, MOST_N)
+}
