@@ -8,6 +8,7 @@
 //! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A*, up to a dozen searches
 //! of the schedule (one for each departure looked at) and one pass over all scheduled pieces per vehicle.
 
+mod departures;
 mod order;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
@@ -261,6 +262,7 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     order::schedule_all(view, request, ws, out)?;
+    departures::improve(request, ws, out)?;
     for (index, flight) in out.flights.iter().enumerate() {
         schedule::merged_m(&request.schedule, &out.flights, index, request.gates_most, &mut ws.schedule)
             .map_err(|e| PlanError::Schedule(flight.id, e))?;

@@ -84,6 +84,12 @@ impl<const W: usize> Flight<W> {
         }
     }
 
+    /// From take-off to landing, seconds; nothing for a vehicle that stays on its pad.
+    pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
+        let landed_s = |w: &crate::path::Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
+        self.path.waypoints().last().filter(|_| self.goal.is_some()).map_or(0.0, landed_s)
+    }
+
     /// Timed segments that [`cut`] makes of it.
     pub(crate) fn pieces(&self) -> usize {
         let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
@@ -367,6 +373,29 @@ pub fn earliest_departure<'a, const W: usize>(
         }
     }
     first_allowed(&ws.forbidden, not_before_s).ok_or(ScheduleError::Blocked)
+}
+
+/// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one interval, seconds; the
+/// first end is the greater one where they never meet.
+pub(crate) fn forbidden_differences<const W: usize>(
+    cfg: &ScheduleConfig,
+    a: &Flight<W>,
+    b: &Flight<W>,
+    ws: &mut ScheduleWorkspace,
+) -> Result<(f32, f32), ScheduleError> {
+    cut(cfg, a, &mut ws.own)?;
+    cut(cfg, b, &mut ws.other)?;
+    let (mut from_s, mut to_s) = (f32::INFINITY, f32::NEG_INFINITY);
+    for q in &ws.other {
+        for p in &ws.own {
+            // What widens nothing need not be looked at.
+            let (low, high) = (q.from_s - p.to_s, q.to_s - p.from_s);
+            if (low < from_s || high > to_s) && conflict(cfg, p, q) {
+                (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
+            }
+        }
+    }
+    Ok((from_s, to_s))
 }
 
 /// The smallest time ≥ `from_s` outside all of the intervals; `None` if there is none.

@@ -7,6 +7,7 @@ pub mod hostile;
 pub mod logs;
 pub mod meeting;
 pub mod setpoints;
+pub mod swarms;
 pub mod vehicle;
 
 use std::io::{BufRead, BufReader};

@@ -5,201 +5,17 @@
 //! vehicles with the capacities of a board. Delays, speeds, pauses and the error of the reported progress are random.
 //! `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`], `FLOCKMATE_SCHEDULES_FROM=SEED` begins at another seed.
 
-use heapless::Vec as Bounded;
-use planner_core::Point;
-use planner_core::frames::Geodetic;
-use planner_core::plan::{
-    self, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
-};
-use planner_core::roadmap::{self, Edge, RoadmapHeader, RoadmapView};
-use planner_core::schedule::{Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
-use rand_core::{Rng, SeedableRng};
-use rand_pcg::Pcg32;
+use std::collections::BTreeMap;
+
+use flockmate_tests::swarms::{self, Own, Plan, Random, SAFETY_M, Swarm, WAYPOINTS, end_m, place};
+use planner_core::plan::PlanError;
+use planner_core::schedule::{Flight, PROGRESS_ERROR_M, ScheduleError};
 use rayon::prelude::*;
 
 /// Swarms flown where nothing else is asked for.
-const SWARMS: u64 = 1500;
-/// A board's capacities.
-const NODES: usize = 4096;
-const VEHICLES: usize = 32;
-const WAYPOINTS: usize = 64;
-const GATES: usize = 128;
-const PIECES: usize = 2048;
-/// What is kept between centres, metres; the schedule keeps [`STRAY_M`] more.
-const SAFETY_M: f32 = 1.5;
-const STRAY_M: f32 = 0.5;
-/// What a reported progress may be wrong by, metres.
-const PROGRESS_ERROR_M: f32 = 0.25;
+const SWARMS: u64 = 1200;
 /// One step of the flight, seconds.
 const STEP_S: f32 = 0.1;
-
-type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
-type Own = VehiclePlan<WAYPOINTS, GATES>;
-
-struct Random(Pcg32);
-
-impl Random {
-    fn uniform(&mut self, low: f32, high: f32) -> f32 {
-        low + (high - low) * (self.0.next_u32() as f32 / u32::MAX as f32)
-    }
-
-    fn below(&mut self, bound: usize) -> usize {
-        (self.0.next_u32() as usize) % bound
-    }
-
-    fn one_in(&mut self, count: usize) -> bool {
-        self.below(count) == 0
-    }
-}
-
-/// Boxes of free space that overlap.
-struct Space(Vec<(Point, Point)>);
-
-impl Space {
-    fn random(rng: &mut Random) -> Self {
-        let height = rng.uniform(1.0, 3.0);
-        match rng.below(3) {
-            // A room, every other one high.
-            0 => {
-                let height = if rng.one_in(2) { rng.uniform(3.0, 32.0) } else { height };
-                let size = Point::new(rng.uniform(8.0, 35.0), rng.uniform(8.0, 35.0), height);
-                Self(vec![(Point::zeros(), size)])
-            }
-            1 => {
-                let (length, width) = (rng.uniform(15.0, 45.0), rng.uniform(0.5, 3.5));
-                let mut boxes = vec![(Point::zeros(), Point::new(length, width, height))];
-                for _ in 0..rng.below(3) {
-                    let (at, wide) = (rng.uniform(2.0, length - 6.0), rng.uniform(1.5, 4.0));
-                    boxes.push((Point::new(at, 0.0, 0.0), Point::new(at + wide, width + 5.0, height)));
-                }
-                Self(boxes)
-            }
-            _ => {
-                let size = Point::new(rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0), rng.uniform(8.0, 35.0));
-                // Rooms beside it at the bottom and at the top.
-                let (low, high) = (Point::new(-10.0, -4.0, 0.0), Point::new(10.0, 8.0, 2.0));
-                let lift = Point::new(0.0, 0.0, size.z - 2.0);
-                Self(vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)])
-            }
-        }
-    }
-
-    fn point(&self, rng: &mut Random) -> Point {
-        let (low, high) = self.0[rng.below(self.0.len())];
-        Point::new(rng.uniform(low.x, high.x), rng.uniform(low.y, high.y), rng.uniform(low.z, high.z))
-    }
-
-    fn holds(&self, p: &Point) -> bool {
-        let inside = |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
-        self.0.iter().any(inside)
-    }
-
-    fn sees(&self, a: &Point, b: &Point) -> bool {
-        let steps = ((b - a).norm() / 0.5).ceil() as usize;
-        (1..steps).all(|i| self.holds(&(a + (b - a) * (i as f32 / steps as f32))))
-    }
-}
-
-/// A swarm and the roadmap it is planned on.
-struct Swarm {
-    roadmap: Vec<u8>,
-    tasks: Vec<VehicleTask>,
-    descents_m: Vec<f32>,
-    mode: Mode,
-    schedule: ScheduleConfig,
-}
-
-impl Swarm {
-    fn random(rng: &mut Random) -> Self {
-        let space = Space::random(rng);
-        let wanted = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
-        let parked_separation_m = [1.7, 1.75, 1.9, 2.3][rng.below(4)];
-        // Between centres that stand: mostly such that a plan can be expected.
-        let apart_m = [0.6, 1.8, 2.05, 2.35, 2.6, 3.0][rng.below(6)];
-        let highest_m = [1.5, 8.0, 30.0][rng.below(3)];
-        let one_floor = rng.one_in(2);
-        let mut places = || {
-            let (mut places, mut heights): (Vec<Point>, Vec<f32>) = Default::default();
-            for _ in 0..40 * wanted {
-                let place = space.point(rng);
-                let height = 0.5 + rng.uniform(0.0, 1.0) * (highest_m - 0.5);
-                let height = if one_floor { place.z + 0.5 } else { height };
-                let ground = place - Point::new(0.0, 0.0, height);
-                let apart =
-                    |(p, h): (&Point, &f32)| (p - Point::new(0.0, 0.0, *h) - ground).norm() >= apart_m;
-                if height <= 30.0 && places.iter().zip(&heights).all(apart) {
-                    places.push(place);
-                    heights.push(height);
-                }
-                if places.len() == wanted {
-                    break;
-                }
-            }
-            (places, heights)
-        };
-        let ((mut nodes, mut climbs_m), (mut goals, mut descents_m)) = (places(), places());
-        let count = nodes.len().min(goals.len());
-        nodes.truncate(count);
-        climbs_m.truncate(count);
-        goals.truncate(count);
-        descents_m.truncate(count);
-        nodes.append(&mut goals);
-        nodes.extend((0..40 + rng.below(80)).map(|_| space.point(rng)));
-        let mut edges = Vec::new();
-        for a in 0..nodes.len() {
-            for b in a + 1..nodes.len() {
-                let length = (nodes[a] - nodes[b]).norm();
-                if (0.1..8.0).contains(&length) && space.sees(&nodes[a], &nodes[b]) {
-                    edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
-                }
-            }
-        }
-        let header = RoadmapHeader {
-            origin: Geodetic::default(),
-            edge_min_m: 0.1,
-            edge_max_m: 8.0,
-            tested_clearance_m: 0.0,
-            max_clearance_m: 4.0,
-            starts: count as u16,
-            goals: count as u16,
-        };
-        let mut bytes = vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
-        roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
-        let labelled = rng.one_in(2);
-        let task = |(i, &climb_m): (usize, &f32)| VehicleTask {
-            id: 1 + i as u8,
-            required_clearance_m: 0.8,
-            climb_m,
-            goal: labelled.then_some(i as u16),
-        };
-        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
-        let schedule = ScheduleConfig {
-            separation_m: SAFETY_M + STRAY_M,
-            parked_separation_m,
-            cruise_mps: rng.uniform(0.5, 5.0),
-            vertical_mps: rng.uniform(0.5, 2.0),
-        };
-        Self {
-            roadmap: bytes,
-            tasks: climbs_m.iter().enumerate().map(task).collect(),
-            descents_m,
-            mode,
-            schedule,
-        }
-    }
-
-    fn plan(&self, ws: &mut PlanWorkspace<NODES, VEHICLES, PIECES>, out: &mut Plan) -> Result<(), PlanError> {
-        let view = RoadmapView::parse(&self.roadmap).expect("written above");
-        let request = PlanRequest {
-            vehicles: &self.tasks,
-            descents_m: &self.descents_m,
-            mode: self.mode,
-            schedule: self.schedule,
-            gates_most: GATES,
-        };
-        plan::plan_swarm(&view, &request, ws, out)
-    }
-}
 
 /// How one vehicle disturbs the schedule.
 struct Manner {
@@ -207,16 +23,6 @@ struct Manner {
     speed_mps: f32,
     /// It stands for this long whenever it has flown as far as the second number, metres.
     pause: (f32, f32),
-}
-
-/// Where a vehicle is at an arc length.
-fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
-    let below_m = (-along_m).max(along_m - flight.path.length_m()).max(0.0);
-    flight.path.point_at(along_m).unwrap() - Point::new(0.0, 0.0, below_m)
-}
-
-fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
-    if flight.goal.is_some() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
 }
 
 /// Flies a plan by progress; the error says which vehicles came too near, or are stuck.
@@ -244,7 +50,7 @@ fn fly(plan: &Plan, owns: &[Own], rng: &mut Random) -> Result<f32, String> {
             .map(|i| match along[i] {
                 m if m <= -flights[i].climb_m => m,
                 m if flights[i].goal.is_some() && m >= end_m(&flights[i]) => m + 1.0,
-                m => m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M,
+                m => (m + rng.uniform(-1.0, 1.0).signum() * PROGRESS_ERROR_M).min(end_m(&flights[i])),
             })
             .collect();
         let mut moved = false;
@@ -307,35 +113,30 @@ struct Sum {
     flights: u64,
     /// `Ok`, but a vehicle's part did not fit.
     unfit: u64,
-    refused: std::collections::BTreeMap<String, u64>,
+    refused: BTreeMap<String, u64>,
     failures: Vec<String>,
     makespan_s: f64,
 }
 
 fn one(seed: u64) -> Sum {
-    let mut rng = Random(Pcg32::seed_from_u64(seed));
+    let mut rng = Random::new(seed);
     let swarm = Swarm::random(&mut rng);
     let mut sum = Sum { swarms: 1, ..Sum::default() };
     if swarm.tasks.len() < 2 {
         return sum;
     }
-    let mut ws = host_sim::capacity::on_heap(PlanWorkspace::<NODES, VEHICLES, PIECES>::new);
-    let mut plan = Box::new(Plan::new());
-    if let Err(error) = swarm.plan(&mut ws, &mut plan) {
-        let name = match error {
-            PlanError::Schedule(_, error) => format!("{error:?}"),
-            error => format!("{error:?}").split('(').next().unwrap_or_default().to_owned(),
-        };
-        sum.refused.insert(name, 1);
-        return sum;
-    }
-    let mut workspace = ScheduleWorkspace::default();
-    let owns: Result<Vec<Own>, ScheduleError> = (0..plan.flights.len())
-        .map(|index| {
-            let mut own = Own { gates: Bounded::new(), ..Own::default() };
-            plan::vehicle_plan(&plan, index, &swarm.schedule, &mut workspace, &mut own).map(|()| own)
-        })
-        .collect();
+    let plan = match swarm.plan() {
+        Ok(plan) => plan,
+        Err(error) => {
+            let name = match error {
+                PlanError::Schedule(_, error) => format!("{error:?}"),
+                error => format!("{error:?}").split('(').next().unwrap_or_default().to_owned(),
+            };
+            sum.refused.insert(name, 1);
+            return sum;
+        }
+    };
+    let owns: Result<Vec<Own>, ScheduleError> = swarm.owns(&plan);
     let owns = match owns {
         Ok(owns) => owns,
         Err(error) => {
@@ -360,13 +161,10 @@ fn one(seed: u64) -> Sum {
     sum
 }
 
-fn number(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
-}
-
 #[test]
 fn random_swarms_stay_apart_and_arrive_by_gates_alone() {
-    let (first, count) = (number("FLOCKMATE_SCHEDULES_FROM", 1), number("FLOCKMATE_SCHEDULES", SWARMS));
+    let (first, count) =
+        (swarms::number("FLOCKMATE_SCHEDULES_FROM", 1), swarms::number("FLOCKMATE_SCHEDULES", SWARMS));
     let sums: Vec<Sum> = (first..first + count).into_par_iter().map(one).collect();
     let mut all = Sum::default();
     for sum in sums {

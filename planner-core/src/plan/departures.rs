@@ -1,0 +1,160 @@
+//! Earlier landings: the order in which vehicles are taken decides how long all of them wait.
+//!
+//! The paths stay as they are. For each pair of flights the differences of their take-off times that bring both near each
+//! other are covered by one interval. With these, an order gives take-off times in a few comparisons a pair, so many orders
+//! are tried: a local search that moves one vehicle to another place in the order. The best order is then scheduled exactly,
+//! and kept if the last vehicle lands earlier.
+//!
+//! Cost: the timed segments of each pair of flights, then [`LOOKS`] comparisons.
+
+use heapless::Vec;
+use libm::fmaxf;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
+use crate::schedule::{self, ScheduleError};
+
+/// Comparisons of a take-off time with a scheduled flight: a third of a second on a board.
+const LOOKS: u32 = 150_000;
+/// The same for each pair of more vehicles than boards have room for.
+const LOOKS_A_PAIR: u32 = 200;
+/// Share of the mean landing time beside the last one: of two orders that end together the one with less waiting counts.
+const MEAN_SHARE: f32 = 0.02;
+
+/// The differences of take-off times, of flight `i` after flight `j`, that are forbidden.
+struct Differences<'a> {
+    /// For each pair the lower end at `[i][j]` with i < j, the upper one at `[j][i]`.
+    ends: &'a [f32],
+    count: usize,
+}
+
+impl Differences<'_> {
+    fn between(&self, i: usize, j: usize) -> (f32, f32) {
+        let (low, high) = (i.min(j), i.max(j));
+        let (from, to) = (self.ends[low * self.count + high], self.ends[high * self.count + low]);
+        if i < j { (from, to) } else { (-to, -from) }
+    }
+
+    /// Take-off times of vehicles taken in this `order`, and how good they are: smaller is better, infinite is no schedule.
+    fn depart(&self, order: &[u16], lasts_s: &[f32], departs_s: &mut [f32], looks: &mut u32) -> f32 {
+        let (mut makespan_s, mut sum_s) = (0.0, 0.0);
+        for (place, &i) in order.iter().enumerate() {
+            let i = usize::from(i);
+            let mut depart_s = 0.0;
+            // Each pass takes it past the interval of one vehicle at least.
+            for _ in 0..=place {
+                let before_s = depart_s;
+                for &j in &order[..place] {
+                    let (from, to) = self.between(i, usize::from(j));
+                    let after_s = depart_s - departs_s[usize::from(j)];
+                    if from < after_s && after_s < to {
+                        depart_s = departs_s[usize::from(j)] + to;
+                    }
+                }
+                *looks = looks.saturating_sub(place as u32);
+                if depart_s == before_s {
+                    break;
+                }
+            }
+            departs_s[i] = depart_s;
+            makespan_s = fmaxf(makespan_s, depart_s + lasts_s[i]);
+            sum_s += depart_s + lasts_s[i];
+        }
+        makespan_s + MEAN_SHARE * sum_s / order.len() as f32
+    }
+}
+
+/// Takes the vehicles in the order that ends the mission earliest, of those that are tried.
+pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: usize>(
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    let cfg = &request.schedule;
+    let count = out.flights.len();
+    let mut order: Vec<u16, V> = Vec::new();
+    let mut lasts_s: Vec<f32, V> = Vec::new();
+    let mut found_s: Vec<f32, V> = Vec::new();
+    for (i, flight) in out.flights.iter().enumerate() {
+        if flight.goal.is_some() {
+            // Cannot overflow: one entry a flight, as below.
+            let _ = order.push(i as u16);
+        }
+        let _ = (lasts_s.push(flight.lasts_s(cfg)), found_s.push(flight.depart_s));
+    }
+    if order.len() < 2 {
+        return Ok(());
+    }
+    let ends = &mut ws.costs.as_flattened_mut()[..count * count];
+    for (i, a) in out.flights.iter().enumerate() {
+        for (j, b) in out.flights.iter().enumerate().skip(i + 1) {
+            let differences = schedule::forbidden_differences(cfg, a, b, &mut ws.schedule);
+            let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
+            (ends[i * count + j], ends[j * count + i]) = (from, to);
+        }
+    }
+    let differences = Differences { ends: &ws.costs.as_flattened()[..count * count], count };
+    let by_departure =
+        |a: &u16, b: &u16| found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b));
+    order.sort_unstable_by(by_departure);
+    let pairs = (order.len() * order.len()) as u32;
+    let mut looks = if count <= BOARD_VEHICLES { LOOKS } else { LOOKS.max(LOOKS_A_PAIR * pairs) };
+    let mut departs_s = lasts_s.clone();
+    let mut best = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
+    let mut rng = Pcg32::seed_from_u64(order.len() as u64);
+    let mut below = |bound: usize| (u64::from(rng.next_u32()) * bound as u64 >> 32) as usize;
+    while looks > 0 {
+        let (from, to) = (below(order.len()), below(order.len()));
+        move_to(&mut order, from, to);
+        let cost = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
+        if cost <= best {
+            best = cost;
+        } else {
+            move_to(&mut order, to, from);
+        }
+        // Even a move to the same place ends the search some time.
+        looks = looks.saturating_sub(1);
+    }
+    let makespan_s = |flights: &[schedule::Flight<W>]| {
+        flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)
+    };
+    let before_s = makespan_s(&out.flights);
+    if depart_in(&order, request, ws, out).is_err() || makespan_s(&out.flights) >= before_s {
+        out.flights.iter_mut().zip(&found_s).for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
+    }
+    Ok(())
+}
+
+/// Swarms of no more vehicles are planned on boards.
+const BOARD_VEHICLES: usize = 32;
+
+/// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad comes before all.
+fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
+    order: &[u16],
+    request: &PlanRequest<'_>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), ScheduleError> {
+    for (place, &i) in order.iter().enumerate() {
+        let scheduled = out
+            .flights
+            .iter()
+            .enumerate()
+            .filter(|&(j, flight)| flight.goal.is_none() || order[..place].contains(&(j as u16)));
+        let (flight, scheduled) = (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
+        let departure =
+            schedule::earliest_departure(&request.schedule, flight, 0.0, scheduled, &mut ws.schedule);
+        out.flights[usize::from(i)].depart_s = departure?;
+    }
+    Ok(())
+}
+
+/// Takes one element out and puts it in again.
+fn move_to(order: &mut [u16], from: usize, to: usize) {
+    if from < to {
+        order[from..=to].rotate_left(1);
+    } else {
+        order[to..=from].rotate_right(1);
+    }
+}

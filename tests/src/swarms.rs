@@ -1,0 +1,268 @@
+//! Random swarms, each with a roadmap of its own, for tests of schedules.
+
+use host_sim::capacity::on_heap;
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use planner_core::plan::{
+    self, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
+};
+use planner_core::roadmap::{self, Edge, RoadmapHeader, RoadmapView};
+use planner_core::schedule::{Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// A board's capacities.
+const NODES: usize = 4096;
+const VEHICLES: usize = 32;
+/// Waypoints of a path.
+pub const WAYPOINTS: usize = 64;
+const GATES: usize = 128;
+const PIECES: usize = 2048;
+/// What is kept between centres, metres; the schedule keeps [`STRAY_M`] more.
+pub const SAFETY_M: f32 = 1.5;
+const STRAY_M: f32 = 0.5;
+
+/// The plan of a swarm with a board's capacities.
+pub type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
+/// A vehicle's part of it.
+pub type Own = VehiclePlan<WAYPOINTS, GATES>;
+
+/// Seeded random numbers.
+#[derive(Debug)]
+pub struct Random(Pcg32);
+
+impl Random {
+    /// From a seed.
+    pub fn new(seed: u64) -> Self {
+        Self(Pcg32::seed_from_u64(seed))
+    }
+
+    /// A number between two.
+    pub fn uniform(&mut self, low: f32, high: f32) -> f32 {
+        low + (high - low) * (self.0.next_u32() as f32 / u32::MAX as f32)
+    }
+
+    /// A number below a bound.
+    pub fn below(&mut self, bound: usize) -> usize {
+        (self.0.next_u32() as usize) % bound
+    }
+
+    /// True once in so many times.
+    pub fn one_in(&mut self, count: usize) -> bool {
+        self.below(count) == 0
+    }
+}
+
+/// Boxes of free space that overlap.
+#[derive(Debug)]
+struct Space(Vec<(Point, Point)>);
+
+impl Space {
+    fn random(rng: &mut Random) -> Self {
+        let height = rng.uniform(1.0, 3.0);
+        match rng.below(3) {
+            // A room, every other one high.
+            0 => {
+                let height = if rng.one_in(2) { rng.uniform(3.0, 32.0) } else { height };
+                let size = Point::new(rng.uniform(8.0, 35.0), rng.uniform(8.0, 35.0), height);
+                Self(vec![(Point::zeros(), size)])
+            }
+            1 => {
+                let (length, width) = (rng.uniform(15.0, 45.0), rng.uniform(0.5, 3.5));
+                let mut boxes = vec![(Point::zeros(), Point::new(length, width, height))];
+                for _ in 0..rng.below(3) {
+                    let (at, wide) = (rng.uniform(2.0, length - 6.0), rng.uniform(1.5, 4.0));
+                    boxes.push((Point::new(at, 0.0, 0.0), Point::new(at + wide, width + 5.0, height)));
+                }
+                Self(boxes)
+            }
+            _ => {
+                let size = Point::new(rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0), rng.uniform(8.0, 35.0));
+                // Rooms beside it at the bottom and at the top.
+                let (low, high) = (Point::new(-10.0, -4.0, 0.0), Point::new(10.0, 8.0, 2.0));
+                let lift = Point::new(0.0, 0.0, size.z - 2.0);
+                Self(vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)])
+            }
+        }
+    }
+
+    fn small(rng: &mut Random) -> Self {
+        let height = rng.uniform(0.2, 2.0);
+        if rng.one_in(2) {
+            return Self(vec![(
+                Point::zeros(),
+                Point::new(rng.uniform(4.0, 9.0), rng.uniform(4.0, 9.0), height),
+            )]);
+        }
+        let (length, width) = (rng.uniform(6.0, 11.0), rng.uniform(0.3, 2.5));
+        let at = rng.uniform(0.0, length - 3.0);
+        let room = (Point::new(at, 0.0, 0.0), Point::new(at + 3.0, width + 4.0, height));
+        Self(vec![(Point::zeros(), Point::new(length, width, height)), room])
+    }
+
+    fn point(&self, rng: &mut Random) -> Point {
+        let (low, high) = self.0[rng.below(self.0.len())];
+        Point::new(rng.uniform(low.x, high.x), rng.uniform(low.y, high.y), rng.uniform(low.z, high.z))
+    }
+
+    fn holds(&self, p: &Point) -> bool {
+        let inside = |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
+        self.0.iter().any(inside)
+    }
+
+    fn sees(&self, a: &Point, b: &Point) -> bool {
+        let steps = ((b - a).norm() / 0.5).ceil() as usize;
+        (1..steps).all(|i| self.holds(&(a + (b - a) * (i as f32 / steps as f32))))
+    }
+}
+
+/// A swarm and the roadmap it is planned on.
+#[derive(Debug)]
+pub struct Swarm {
+    roadmap: Vec<u8>,
+    /// Its vehicles.
+    pub tasks: Vec<VehicleTask>,
+    descents_m: Vec<f32>,
+    mode: Mode,
+    /// Separation and speeds.
+    pub schedule: ScheduleConfig,
+}
+
+impl Swarm {
+    /// Any: rooms, corridors with side rooms, shafts.
+    pub fn random(rng: &mut Random) -> Self {
+        let space = Space::random(rng);
+        let wanted = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
+        let highest_m = [1.5, 8.0, 30.0][rng.below(3)];
+        Self::within(&space, wanted, highest_m, rng)
+    }
+
+    /// A small one where vehicles often meet.
+    pub fn small(count: usize, rng: &mut Random) -> Self {
+        let space = Space::small(rng);
+        let highest_m = [1.5, 3.0][rng.below(2)];
+        Self::within(&space, count, highest_m, rng)
+    }
+
+    fn within(space: &Space, wanted: usize, highest_m: f32, rng: &mut Random) -> Self {
+        let parked_separation_m = [1.7, 1.75, 1.9, 2.3][rng.below(4)];
+        // Between centres that stand: mostly such that a plan can be expected.
+        let apart_m = [0.6, 1.8, 2.05, 2.35, 2.6, 3.0][rng.below(6)];
+        let one_floor = rng.one_in(2);
+        let mut places = || {
+            let (mut places, mut heights): (Vec<Point>, Vec<f32>) = Default::default();
+            for _ in 0..40 * wanted {
+                let place = space.point(rng);
+                let height = 0.5 + rng.uniform(0.0, 1.0) * (highest_m - 0.5);
+                let height = if one_floor { place.z + 0.5 } else { height };
+                let ground = place - Point::new(0.0, 0.0, height);
+                let apart =
+                    |(p, h): (&Point, &f32)| (p - Point::new(0.0, 0.0, *h) - ground).norm() >= apart_m;
+                if height <= 30.0 && places.iter().zip(&heights).all(apart) {
+                    places.push(place);
+                    heights.push(height);
+                }
+                if places.len() == wanted {
+                    break;
+                }
+            }
+            (places, heights)
+        };
+        let ((mut nodes, mut climbs_m), (mut goals, mut descents_m)) = (places(), places());
+        let count = nodes.len().min(goals.len());
+        nodes.truncate(count);
+        climbs_m.truncate(count);
+        goals.truncate(count);
+        descents_m.truncate(count);
+        nodes.append(&mut goals);
+        nodes.extend((0..40 + rng.below(80)).map(|_| space.point(rng)));
+        let mut edges = Vec::new();
+        for a in 0..nodes.len() {
+            for b in a + 1..nodes.len() {
+                let length = (nodes[a] - nodes[b]).norm();
+                if (0.1..8.0).contains(&length) && space.sees(&nodes[a], &nodes[b]) {
+                    edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
+                }
+            }
+        }
+        let header = RoadmapHeader {
+            origin: Geodetic::default(),
+            edge_min_m: 0.1,
+            edge_max_m: 8.0,
+            tested_clearance_m: 0.0,
+            max_clearance_m: 4.0,
+            starts: count as u16,
+            goals: count as u16,
+        };
+        let mut bytes = vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
+        roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
+        let labelled = rng.one_in(2);
+        let task = |(i, &climb_m): (usize, &f32)| VehicleTask {
+            id: 1 + i as u8,
+            required_clearance_m: 0.8,
+            climb_m,
+            goal: labelled.then_some(i as u16),
+        };
+        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
+        let schedule = ScheduleConfig {
+            separation_m: SAFETY_M + STRAY_M,
+            parked_separation_m,
+            cruise_mps: rng.uniform(0.5, 5.0),
+            vertical_mps: rng.uniform(0.5, 2.0),
+        };
+        Self {
+            roadmap: bytes,
+            tasks: climbs_m.iter().enumerate().map(task).collect(),
+            descents_m,
+            mode,
+            schedule,
+        }
+    }
+
+    /// Its plan.
+    ///
+    /// # Errors
+    /// As the planner has them.
+    pub fn plan(&self) -> Result<Box<Plan>, PlanError> {
+        let view = RoadmapView::parse(&self.roadmap).expect("written here");
+        let request = PlanRequest {
+            vehicles: &self.tasks,
+            descents_m: &self.descents_m,
+            mode: self.mode,
+            schedule: self.schedule,
+            gates_most: GATES,
+        };
+        let mut ws = on_heap(PlanWorkspace::<NODES, VEHICLES, PIECES>::new);
+        let mut out = Box::new(Plan::new());
+        plan::plan_swarm(&view, &request, &mut ws, &mut out).map(|()| out)
+    }
+
+    /// Each vehicle's part of it.
+    ///
+    /// # Errors
+    /// A part that does not fit.
+    pub fn owns(&self, plan: &Plan) -> Result<Vec<Own>, ScheduleError> {
+        let mut ws = ScheduleWorkspace::default();
+        let own = |index: usize| {
+            let mut own = Own::default();
+            plan::vehicle_plan(plan, index, &self.schedule, &mut ws, &mut own).map(|()| own)
+        };
+        (0..plan.flights.len()).map(own).collect()
+    }
+}
+
+/// Where a vehicle is at an arc length.
+pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
+    let below_m = (-along_m).max(along_m - flight.path.length_m()).max(0.0);
+    flight.path.point_at(along_m).unwrap() - Point::new(0.0, 0.0, below_m)
+}
+
+/// Where its flight ends, metres along its path.
+pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
+    if flight.goal.is_some() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
+}
+
+/// A number from the environment.
+pub fn number(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|v| v.parse().ok()).unwrap_or(default)
+}

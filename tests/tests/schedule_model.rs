@@ -1,0 +1,263 @@
+//! Every way in which small swarms can fly their plans, searched breadth first.
+//!
+//! Plans and gates come from the planner as vehicles get them; the model knows nothing else of the schedule. The state is the
+//! progress of each vehicle: the stretch between two marks that it is on. Marks are its own gates, its waypoints, and
+//! where a report, wrong by as much as may be, opens a gate of another vehicle. Actions: each vehicle advances by a stretch, or
+//! stops where it is; what it reports is wrong by up to 0.25 m either way; it leaves the plan, and its gates open.
+//! A message that is heard late is a step of the other vehicle that is not taken yet: the search takes the steps in every order.
+//!
+//! - No conflict: where two vehicles that fly the plan can be at the same time, they are no nearer than the safety distance.
+//!   A gate counts as open as soon as some report may open it.
+//! - No deadlock: some vehicle can go on until all have landed. A gate counts as open only if every report opens it.
+//!
+//! `FLOCKMATE_MODELS=N` searches N plans each in place of [`PLANS`].
+
+use std::collections::{HashSet, VecDeque};
+
+use flockmate_tests::swarms::{self, Plan, Random, SAFETY_M, Swarm, end_m, place};
+use planner_core::Point;
+use planner_core::schedule::{Gate, PROGRESS_ERROR_M};
+use rayon::prelude::*;
+
+/// Plans searched of each number of vehicles.
+const PLANS: u64 = 1000;
+/// Longest flight from the pad to the ground, metres: ten timed segments.
+const LONGEST_M: f32 = 15.0;
+/// Rounding of sums of lengths, metres.
+const ROUNDING_M: f32 = 1e-4;
+/// The stretch of a vehicle that has left the plan.
+const OUT: u8 = u8::MAX;
+
+type State = [u8; 4];
+
+/// One vehicle's flight in stretches: the first is its pad, the last the ground below its goal.
+struct Course {
+    marks: Vec<f32>,
+    /// For each stretch: the gates passed where it begins.
+    gates: Vec<Vec<(usize, f32)>>,
+    /// Points of each stretch, near each other.
+    points: Vec<Vec<Point>>,
+}
+
+impl Course {
+    fn last(&self) -> u8 {
+        (self.marks.len() - 1) as u8
+    }
+}
+
+/// Which comparison opens a gate.
+#[derive(Clone, Copy, PartialEq)]
+enum Opens {
+    At,
+    /// The planted error.
+    Beyond,
+}
+
+struct Model {
+    courses: Vec<Course>,
+    opens: Opens,
+    /// Stretches of each pair of vehicles that come too near.
+    near: Vec<Vec<HashSet<(u8, u8)>>>,
+}
+
+#[derive(Debug, PartialEq)]
+enum Outcome {
+    Good(usize),
+    Conflict,
+    Deadlock,
+}
+
+impl Model {
+    fn new(plan: &Plan, gates: &[Vec<Gate>], opens: Opens) -> Self {
+        let flights = &plan.flights;
+        let index = |id: u8| flights.iter().position(|f| f.id == id).unwrap();
+        let mut courses = Vec::new();
+        for (i, flight) in flights.iter().enumerate() {
+            let (pad_m, end) = (-flight.climb_m, end_m(flight));
+            let waypoints = flight.path.waypoints().iter().map(|w| w.along_m);
+            let waits = gates[i].iter().map(|g| g.at_m);
+            let heard = gates.iter().flatten().filter(|g| g.id == flight.id);
+            let reports = heard.flat_map(|g| [g.until_m - PROGRESS_ERROR_M, g.until_m + PROGRESS_ERROR_M]);
+            let all = waypoints.chain(waits).chain(reports).chain([end]);
+            let mut marks: Vec<f32> = all.filter(|&m| m > pad_m + ROUNDING_M && m <= end).collect();
+            // On the pad from mark 0 to mark 1, which is the same place.
+            marks.extend([pad_m, pad_m]);
+            marks.sort_by(f32::total_cmp);
+            let (pad, mut flown) = (marks[0], marks.split_off(1));
+            flown.dedup_by(|b, a| *b - *a < ROUNDING_M);
+            let marks: Vec<f32> = std::iter::once(pad).chain(flown).collect();
+            let begins = |at_m: f32| -> usize {
+                // The stretch that begins at this mark; of the pad that is the second one.
+                (1..marks.len()).rfind(|&k| marks[k] <= at_m + ROUNDING_M).unwrap()
+            };
+            let mut at: Vec<Vec<(usize, f32)>> = vec![Vec::new(); marks.len()];
+            gates[i].iter().for_each(|g| at[begins(g.at_m)].push((index(g.id), g.until_m)));
+            let stretch = |k: usize| {
+                let (from, to) = (marks[k], marks.get(k + 1).copied().unwrap_or(marks[k]));
+                let steps = ((to - from) / 0.1).ceil().max(1.0) as usize;
+                (0..=steps).map(|s| place(flight, from + (to - from) * s as f32 / steps as f32)).collect()
+            };
+            let points = (0..marks.len()).map(stretch).collect();
+            courses.push(Course { marks, gates: at, points });
+        }
+        let near = |i: usize, j: usize| {
+            let (a, b) = (&courses[i], &courses[j]);
+            let mut pairs = HashSet::new();
+            for (k, points) in a.points.iter().enumerate() {
+                for (l, others) in b.points.iter().enumerate() {
+                    let moves = |k: usize, c: &Course| k > 0 && k + 1 < c.marks.len();
+                    let meets = |p: &Point| others.iter().any(|q| (p - q).norm() < SAFETY_M - 0.01);
+                    if (moves(k, a) || moves(l, b)) && points.iter().any(meets) {
+                        pairs.insert((k as u8, l as u8));
+                    }
+                }
+            }
+            pairs
+        };
+        let count = courses.len();
+        let near = (0..count).map(|i| (0..i).map(|j| near(i, j)).collect()).collect();
+        Self { courses, opens, near }
+    }
+
+    /// Whether vehicle `i` may go on from its stretch; `wrong_m` is what reports are wrong by.
+    fn goes_on(&self, state: &State, i: usize, most: bool) -> bool {
+        let course = &self.courses[i];
+        if state[i] >= course.last() {
+            return false;
+        }
+        course.gates[usize::from(state[i]) + 1].iter().all(|&(other, until_m)| {
+            let (at, other) = (state[other], &self.courses[other]);
+            if at == OUT {
+                return true;
+            }
+            let (k, landed) = (usize::from(at), at == other.last());
+            let reported_m = match (k, most) {
+                (0, _) => other.marks[0],
+                _ if landed => other.marks[k] + 1.0,
+                // It may be anywhere on its stretch: some report is this high, but none is beyond the ground ...
+                (_, true) => (other.marks[k] + PROGRESS_ERROR_M).min(other.marks[usize::from(other.last())]),
+                // ... and once it stands at the end of it, none is lower than this.
+                (_, false) => other.marks[k + 1] - PROGRESS_ERROR_M,
+            };
+            match self.opens {
+                Opens::At => reported_m >= until_m - ROUNDING_M,
+                Opens::Beyond => reported_m > until_m + ROUNDING_M,
+            }
+        })
+    }
+
+    fn search(&self) -> Outcome {
+        let count = self.courses.len();
+        let begin = [0; 4];
+        let (mut seen, mut open) = (HashSet::from([begin]), VecDeque::from([begin]));
+        while let Some(state) = open.pop_front() {
+            let (mut ends, mut moves) = (true, false);
+            for i in 0..count {
+                for j in (0..i).filter(|&j| state[i] != OUT && state[j] != OUT) {
+                    if self.near[i][j].contains(&(state[i], state[j])) {
+                        return Outcome::Conflict;
+                    }
+                }
+                ends &= state[i] >= self.courses[i].last();
+                moves |= self.goes_on(&state, i, false);
+            }
+            if !ends && !moves {
+                return Outcome::Deadlock;
+            }
+            for i in 0..count {
+                let mut reach = |to: u8| {
+                    let mut next = state;
+                    next[i] = to;
+                    if seen.insert(next) {
+                        open.push_back(next);
+                    }
+                };
+                if self.goes_on(&state, i, true) {
+                    reach(state[i] + 1);
+                }
+                if state[i] < self.courses[i].last() {
+                    reach(OUT);
+                }
+            }
+        }
+        Outcome::Good(seen.len())
+    }
+}
+
+#[derive(Default, Debug)]
+struct Sum {
+    plans: u64,
+    states: usize,
+    largest: usize,
+    wrong: Vec<String>,
+    /// Plans in which some gate is needed, and those in which dropping a gate was found.
+    gated: u64,
+    dropped: u64,
+    beyond: u64,
+}
+
+/// The plan of one seed, if there is one that is short enough.
+fn one(seed: u64, count: usize) -> Option<Sum> {
+    let mut rng = Random::new(seed);
+    let swarm = Swarm::small(count, &mut rng);
+    let plan = if swarm.tasks.len() == count { swarm.plan().ok()? } else { return None };
+    if plan.flights.iter().any(|f| f.goal.is_none() || end_m(f) + f.climb_m > LONGEST_M) {
+        return None;
+    }
+    let owns = swarm.owns(&plan).expect("an Ok plan has all parts");
+    let gates: Vec<Vec<Gate>> = owns.iter().map(|own| own.gates.to_vec()).collect();
+    let mut sum = Sum { plans: 1, ..Sum::default() };
+    match Model::new(&plan, &gates, Opens::At).search() {
+        Outcome::Good(states) => (sum.states, sum.largest) = (states, states),
+        wrong => sum.wrong.push(format!("seed {seed}, {count} vehicles: {wrong:?}")),
+    }
+    if gates.iter().all(Vec::is_empty) {
+        return Some(sum);
+    }
+    sum.gated = 1;
+    let dropped = |vehicle: usize, gate: usize| {
+        let mut gates = gates.clone();
+        gates[vehicle].remove(gate);
+        Model::new(&plan, &gates, Opens::At).search() == Outcome::Conflict
+    };
+    let mut each = gates.iter().enumerate().flat_map(|(i, gates)| (0..gates.len()).map(move |g| (i, g)));
+    sum.dropped = u64::from(each.any(|(i, g)| dropped(i, g)));
+    sum.beyond = u64::from(Model::new(&plan, &gates, Opens::Beyond).search() == Outcome::Deadlock);
+    Some(sum)
+}
+
+fn search(count: usize) {
+    let wanted = swarms::number("FLOCKMATE_MODELS", PLANS);
+    let mut all = Sum::default();
+    let mut seed = 0;
+    while all.plans < wanted {
+        let sums: Vec<Sum> = (seed..seed + 256).into_par_iter().filter_map(|s| one(s, count)).collect();
+        seed += 256;
+        for sum in sums {
+            all.plans += sum.plans;
+            all.states += sum.states;
+            all.largest = all.largest.max(sum.largest);
+            all.gated += sum.gated;
+            all.dropped += sum.dropped;
+            all.beyond += sum.beyond;
+            all.wrong.extend(sum.wrong);
+        }
+    }
+    println!(
+        "{count} vehicles: {} plans, {} states, {} of the largest; of {} with gates a dropped one is found in {}, `<` for `≤` in {}",
+        all.plans, all.states, all.largest, all.gated, all.dropped, all.beyond
+    );
+    assert!(all.wrong.is_empty(), "{} wrong: {:#?}", all.wrong.len(), &all.wrong[..all.wrong.len().min(10)]);
+    assert!(all.dropped * 10 >= all.gated * 6, "dropped gates are not found");
+    assert!(all.beyond > 0, "a gate that opens too late is not found");
+}
+
+#[test]
+fn three_vehicles_never_meet_and_never_stand_for_ever() {
+    search(3);
+}
+
+#[test]
+fn four_vehicles_never_meet_and_never_stand_for_ever() {
+    search(4);
+}
