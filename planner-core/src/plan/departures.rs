@@ -103,7 +103,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     let mut departs_s = lasts_s.clone();
     let mut best = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
     let mut rng = Pcg32::seed_from_u64(order.len() as u64);
-    let mut below = |bound: usize| (u64::from(rng.next_u32()) * bound as u64 >> 32) as usize;
+    let mut below = |bound: usize| ((u64::from(rng.next_u32()) * bound as u64) >> 32) as usize;
     while looks > 0 {
         let (from, to) = (below(order.len()), below(order.len()));
         move_to(&mut order, from, to);
