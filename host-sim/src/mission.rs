@@ -17,6 +17,7 @@ use planner_core::search::SearchWorkspace;
 use planner_core::segment::segment_is_clear;
 
 use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
+use crate::map::column::{ColumnError, column, nearest_column};
 use crate::map::{self, ClearanceField, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
@@ -97,7 +98,7 @@ impl Mission {
         };
         let goals = goals(&scenario, &map, &schedule)?;
         let tasks = tasks(&scenario, &map)?;
-        let largest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
+        let largest_m = scenario.largest_radius_m();
         let descents_m = goals
             .iter()
             .enumerate()
@@ -307,7 +308,7 @@ fn planner_mode(mission: &scenario::Mission) -> Mode {
     }
 }
 
-/// Height of a start or goal over where a vehicle of this radius stands below it.
+/// Height of a start or goal over where a vehicle of this radius stands below it; its column has the required clearance.
 fn height_over_ground(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -315,26 +316,45 @@ fn height_over_ground(
     point: &Point,
     radius_m: f32,
 ) -> anyhow::Result<f32> {
-    let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
-    if map.never_sample().is_blocked_at(point) {
-        bail!(
-            "{what} is not free: {at} lies in an obstacle, in unknown space or outside the map\n\
-             hint: `host-sim map info` tells the map's extent"
-        );
-    }
-    let Some(ground_m) = map.ground_below(point) else {
-        bail!("{what} has no ground below it: {at} is over nothing\nhint: choose a place over a floor");
+    let required_m = radius_m + scenario.roadmap.safety_margin_m;
+    let error = match column(map, point, radius_m, required_m) {
+        Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
+        Err(error) => error,
     };
-    let height_m = point.z - ground_m - radius_m;
-    if height_m < 0.0 {
-        bail!(
+    let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
+    let why = match error {
+        ColumnError::NotFree => {
+            format!("{what} is not free: {at} lies in an obstacle, in unknown space or outside the map")
+        }
+        ColumnError::NoGround => format!("{what} has no ground below it: {at} is over nothing"),
+        ColumnError::UnknownBelow { top_m } => {
+            format!(
+                "{what} has no ground below it: {at} is over unknown space, which reaches up to {top_m:.2} m"
+            )
+        }
+        ColumnError::TooLow { ground_m } => bail!(
             "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n\
              hint: give it a height of at least {:.2} m",
             point.z - ground_m,
             ground_m + radius_m
-        );
+        ),
+        ColumnError::TooNear { place, distance_m, unknown } => {
+            let obstacle = if unknown { "unknown space" } else { "an obstacle" };
+            format!(
+                "{what} has too little room between it and the ground: {at} needs {required_m:.2} m around its column, \
+                 and {obstacle} at [{:.2}, {:.2}, {:.2}] is {distance_m:.2} m from it",
+                place.x, place.y, place.z
+            )
+        }
+    };
+    match nearest_column(map, point, radius_m, required_m) {
+        Some(place) => {
+            bail!("{why}\nhint: the nearest place that would do is [{}, {}, {}]", place.x, place.y, place.z)
+        }
+        None => {
+            bail!("{why}\nhint: no place within 5 m would do; `host-sim map info` tells the map's extent")
+        }
     }
-    Ok(height_m)
 }
 
 fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
@@ -357,7 +377,7 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
         return Ok(given.clone());
     }
     let (goal, wanted) = (given[0], scenario.vehicles.len());
-    let required_m = scenario.required_clearance_m();
+    let (largest_m, required_m) = (scenario.largest_radius_m(), scenario.required_clearance_m());
     // Vehicles that stand on two of them must not keep each other from landing.
     let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
     // As many discs of half the spacing as fit a circle, with room to spare for walls.
@@ -370,7 +390,10 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
     for (i, j) in offsets {
         let slot = goal + Point::new(i as f32, j as f32, 0.0) * SLOT_GRID_M;
         let apart = slots.iter().all(|s| (s - slot).norm() >= apart_m);
-        if apart && segment_is_clear(&map.grid(), &goal, &slot, required_m) {
+        if apart
+            && segment_is_clear(&map.grid(), &goal, &slot, required_m)
+            && column(map, &slot, largest_m, required_m).is_ok()
+        {
             slots.push(slot);
             if slots.len() == wanted {
                 return Ok(slots);

@@ -2,6 +2,7 @@
 
 pub mod bt;
 pub mod building;
+pub mod column;
 pub mod command;
 pub mod edt;
 mod error;

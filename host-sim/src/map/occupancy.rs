@@ -188,11 +188,12 @@ impl OccupancyMap {
     pub fn voxel_map(&self, unknown: Unknown) -> VoxelMap {
         let inside = self.inside();
         let not_free: Vec<u64> = self.free.iter().zip(&inside).map(|(free, inside)| !free & inside).collect();
-        let (words, never_sample, outside) = match unknown {
-            Unknown::Blocked => (not_free, None, Outside::Blocked),
-            Unknown::Free => (self.occupied.clone(), Some(not_free), Outside::Free),
+        let occupied = self.occupied.clone();
+        let (words, seen, never_sample, outside) = match unknown {
+            Unknown::Blocked => (not_free, Some(occupied), None, Outside::Blocked),
+            Unknown::Free => (occupied, None, Some(not_free), Outside::Free),
         };
-        VoxelMap { shape: self.shape, words, never_sample, outside }
+        VoxelMap { shape: self.shape, words, seen, never_sample, outside }
     }
 
     /// Bits of the cells inside the dimensions; the last brick of a row may be wider.
@@ -227,6 +228,8 @@ pub struct VoxelMap {
     pub shape: GridShape,
     /// Obstacles.
     pub words: Vec<u64>,
+    /// Obstacles that were seen, if those are fewer: without unknown space.
+    pub seen: Option<Vec<u64>>,
     /// Where nothing is sampled, if that is more than the obstacles.
     pub never_sample: Option<Vec<u64>>,
     /// What lies beyond the faces.
@@ -243,6 +246,12 @@ impl VoxelMap {
     pub fn never_sample(&self) -> VoxelGrid<'_> {
         let words = self.never_sample.as_deref().unwrap_or(&self.words);
         VoxelGrid::new(self.shape, Outside::Blocked, words).expect("the words were made for the shape")
+    }
+
+    /// Whether a cell is an obstacle only because nobody has seen it. Panics outside the grid.
+    pub fn is_unknown(&self, cell: [u32; 3]) -> bool {
+        let (word, mask) = self.shape.address(cell);
+        self.seen.as_ref().is_some_and(|seen| self.words[word] & !seen[word] & mask != 0)
     }
 
     /// Height of the top of the first obstacle below `point`, metres: where a vehicle sinking from there comes to

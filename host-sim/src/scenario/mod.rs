@@ -271,7 +271,12 @@ impl Scenario {
 
     /// The largest clearance any vehicle needs: its radius and the safety margin.
     pub fn required_clearance_m(&self) -> f32 {
-        self.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max) + self.roadmap.safety_margin_m
+        self.largest_radius_m() + self.roadmap.safety_margin_m
+    }
+
+    /// The largest vehicle's radius.
+    pub fn largest_radius_m(&self) -> f32 {
+        self.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max)
     }
 }
 

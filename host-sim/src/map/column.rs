@@ -1,0 +1,141 @@
+//! The vertical flight between the ground and a start or goal: has it the clearance that every edge has?
+//!
+//! The ground is the top of the first seen obstacle below the point; unknown space and the map's bottom are none. A
+//! vehicle stands there with its centre a radius above. From that place up to the point, every cell that rises above the
+//! ground must be farther than the required clearance: obstacles, unknown space where that is blocked, and the map's
+//! faces. The segment is vertical and cells are boxes, so distances are exact but for rounding in f64. Metres, mission frame.
+//! Cost: the cells within the required clearance.
+
+use planner_core::Point;
+use planner_core::voxel::Outside;
+
+use super::VoxelMap;
+
+/// How far [`nearest_column`] looks, metres.
+const NEAREST_M: f32 = 5.0;
+/// Spacing of the places it tries, metres.
+const NEAREST_STEP_M: f32 = 0.1;
+
+/// Why a vehicle cannot fly straight up or down between the ground and a point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ColumnError {
+    /// The point lies in an obstacle, in unknown space or outside the map.
+    NotFree,
+    /// Nothing is below the point.
+    NoGround,
+    /// Unknown space below the point, up to this height: what is below it nobody has seen.
+    UnknownBelow {
+        /// Its top, metres.
+        top_m: f32,
+    },
+    /// The point is nearer to the ground than the vehicle's radius.
+    TooLow {
+        /// Height of the ground, metres.
+        ground_m: f32,
+    },
+    /// Something that rises above the ground is too near.
+    TooNear {
+        /// The nearest place of it, metres.
+        place: Point,
+        /// Its distance from the vehicle's centre on its way, metres.
+        distance_m: f32,
+        /// Whether it is unknown space or lies beyond the map, rather than an obstacle.
+        unknown: bool,
+    },
+}
+
+/// Height of the ground below `point`, if a vehicle that needs `required_m` may fly straight between the two.
+///
+/// # Errors
+/// The first thing that is wrong; of all that is too near, the nearest.
+pub fn column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Result<f32, ColumnError> {
+    let shape = &map.shape;
+    if map.never_sample().is_blocked_at(point) {
+        return Err(ColumnError::NotFree);
+    }
+    let [i, j, top] = shape.cell_of(point).ok_or(ColumnError::NotFree)?;
+    let grid = map.grid();
+    let below = (0..=top).rev().find(|&k| grid.is_occupied([i, j, k])).ok_or(ColumnError::NoGround)?;
+    let ground_m = shape.min.z + (below + 1) as f32 * shape.resolution_m;
+    if map.is_unknown([i, j, below]) {
+        return Err(ColumnError::UnknownBelow { top_m: ground_m });
+    }
+    if point.z - ground_m < radius_m {
+        return Err(ColumnError::TooLow { ground_m });
+    }
+    let (place, distance_m, unknown) = nearest_above(map, point, below, ground_m + radius_m, required_m);
+    if f64::from(required_m) < distance_m {
+        return Ok(ground_m);
+    }
+    Err(ColumnError::TooNear { place, distance_m: distance_m as f32, unknown })
+}
+
+/// What comes nearest to the segment from the height `low_m` up to `point`, of all cells above layer `ground` and the
+/// faces of the map but the lowest: its place, its distance, and whether it is unknown. Beyond `reach_m` it is not looked for.
+fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m: f32) -> (Point, f64, bool) {
+    let shape = &map.shape;
+    let (min, max, cell_m) =
+        (shape.min.cast::<f64>(), shape.max().cast::<f64>(), f64::from(shape.resolution_m));
+    let (at, low_m, reach_m) = (point.cast::<f64>(), f64::from(low_m), f64::from(reach_m));
+    let mut nearest = (Point::zeros(), f64::INFINITY, false);
+    let mut consider = |place: [f64; 3], unknown: bool| {
+        let along = place[2].clamp(low_m, at.z);
+        let distance = (place[0] - at.x).hypot(place[1] - at.y).hypot(place[2] - along);
+        if distance < nearest.1 {
+            nearest = (Point::from(place.map(|x| x as f32)), distance, unknown);
+        }
+    };
+    if map.outside == Outside::Blocked {
+        for (axis, end) in [(0, min.x), (0, max.x), (1, min.y), (1, max.y), (2, max.z)] {
+            let mut place = [at.x, at.y, at.z];
+            place[axis] = end;
+            consider(place, true);
+        }
+    }
+    // One cell more on either side than the reach, so that rounding loses none.
+    let range = |axis: usize, from: f64, to: f64| {
+        let first = ((from - reach_m - min[axis]) / cell_m).floor() - 1.0;
+        let last = ((to + reach_m - min[axis]) / cell_m).floor() + 1.0;
+        let end = f64::from(shape.dims[axis]);
+        first.clamp(0.0, end) as u32..(last + 1.0).clamp(0.0, end) as u32
+    };
+    let grid = map.grid();
+    for k in range(2, low_m, at.z).start.max(ground + 1)..range(2, low_m, at.z).end {
+        for j in range(1, at.y, at.y) {
+            for i in range(0, at.x, at.x) {
+                if !grid.is_occupied([i, j, k]) {
+                    continue;
+                }
+                // The place of the box that is nearest to the segment: each axis by itself.
+                let span = |axis: usize, cell: u32| {
+                    let from = min[axis] + f64::from(cell) * cell_m;
+                    (from, from + cell_m)
+                };
+                let (x, y, z) = (span(0, i), span(1, j), span(2, k));
+                let height = if z.0 > at.z { z.0 } else { z.1.min(at.z).max(z.0) };
+                let place = [at.x.clamp(x.0, x.1), at.y.clamp(y.0, y.1), height];
+                consider(place, map.is_unknown([i, j, k]));
+            }
+        }
+    }
+    nearest
+}
+
+/// The nearest place at the same height whose column is clear, within 5 m.
+pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Option<Point> {
+    let steps = (NEAREST_M / NEAREST_STEP_M) as i32;
+    let mut offsets: Vec<(i32, i32)> =
+        (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
+    offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
+    // Only what two decimals can say, so that what is printed is what was tried.
+    let round = |x: f32| (f64::from(x) * 100.0).round() as f32 / 100.0;
+    offsets.into_iter().find_map(|(i, j)| {
+        let (x, y) = (point.x + i as f32 * NEAREST_STEP_M, point.y + j as f32 * NEAREST_STEP_M);
+        let place = Point::new(round(x), round(y), point.z);
+        column(map, &place, radius_m, required_m).is_ok().then_some(place)
+    })
+}
+
+#[cfg(test)]
+#[path = "column_tests.rs"]
+mod tests;
