@@ -12,7 +12,7 @@ pub const BRICK_CELLS: u32 = 4;
 /// Why a grid was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GridError {
-    /// A dimension is zero or beyond [`MAX_DIM`].
+    /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can index.
     Dimensions,
     /// The word slice is not [`brick_count`] long.
     WordCount,
@@ -41,9 +41,9 @@ impl GridShape {
         self.dims.map(|d| d.div_ceil(BRICK_CELLS))
     }
 
-    /// Words the grid needs.
+    /// Words the grid needs; `usize::MAX` where they cannot be counted.
     pub fn brick_count(&self) -> usize {
-        self.bricks().iter().map(|&b| b as usize).product()
+        self.bricks().iter().fold(1, |count: usize, &b| count.saturating_mul(b as usize))
     }
 
     /// Maximum corner, metres.
@@ -80,7 +80,9 @@ impl GridShape {
     }
 
     fn check(&self) -> Result<(), GridError> {
-        if self.dims.iter().any(|&d| d == 0 || d > MAX_DIM) {
+        // Words are indexed in 32 bits, on a board as on the desk.
+        let countable = self.brick_count() < u32::MAX as usize;
+        if self.dims.iter().any(|&d| d == 0 || d > MAX_DIM) || !countable {
             return Err(GridError::Dimensions);
         }
         let finite = self.min.iter().all(|c| c.is_finite()) && self.resolution_m.is_finite();
@@ -146,5 +148,21 @@ impl<'a> VoxelGrid<'a> {
             Some(cell) => self.is_occupied(cell),
             None => self.outside == Outside::Blocked,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_grid_that_32_bits_cannot_index_is_refused() {
+        let shape = |dims| GridShape { dims, min: Point::zeros(), resolution_m: 0.1 };
+        // Products of 2^32 and 2^33 words, which are 0 in 32 bits.
+        for dims in [[1 << 15, 1 << 15, 1 << 8], [1 << 15, 1 << 15, 1 << 9], [MAX_DIM; 3]] {
+            let refused = VoxelGrid::new(shape(dims), Outside::Free, &[]).map(|_| ());
+            assert_eq!(refused, Err(GridError::Dimensions), "{dims:?}");
+        }
+        assert!(VoxelGrid::new(shape([4, 5, 1]), Outside::Free, &[0; 2]).is_ok());
     }
 }

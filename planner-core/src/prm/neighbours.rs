@@ -110,7 +110,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         self.cube_m = edge.max(longest / CUBES as f32).max(1e-6);
         loop {
             self.dims = size.map(|s| (s / self.cube_m) as usize + 1);
-            if self.dims.iter().product::<usize>() < CUBES {
+            if self.dims.iter().fold(1, |count: usize, &dim| count.saturating_mul(dim)) < CUBES {
                 return;
             }
             self.cube_m *= 1.25;
