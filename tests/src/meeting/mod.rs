@@ -39,6 +39,8 @@ const STEP_MS: u64 = 25;
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
 /// Jerk of a setpoint, m/s³: the filter's stop, and what the differences of rounded positions add.
 const JERK_MPS3: f32 = 9.0;
+/// A vehicle that is faster is not stopped, m/s.
+const MOVES_MPS: f32 = 0.7;
 /// Speed of a setpoint, m/s.
 const SPEED_MPS: f32 = 3.5;
 
@@ -73,6 +75,10 @@ pub struct Outcome {
     pub unfit: Vec<(usize, f64, String)>,
     /// Vehicles that landed at their goals.
     pub arrived: usize,
+    /// How often the safety filter stopped one.
+    pub filter_stops: u32,
+    /// For how long at most, seconds.
+    pub longest_stop_s: f32,
     /// What happened, if that was asked for.
     pub trace: Vec<String>,
 }
@@ -116,6 +122,10 @@ struct Member {
     hears: bool,
     bytes: Vec<u8>,
     commands: u8,
+    /// Stops by the safety filter so far, and since when the last one lasts.
+    stops: u32,
+    stopped_since: Option<Instant>,
+    longest_stop_s: f32,
 }
 
 struct World<'a> {
@@ -215,6 +225,22 @@ impl Member {
             hears: true,
             bytes: Vec::new(),
             commands: 0,
+            stops: 0,
+            stopped_since: None,
+            longest_stop_s: 0.0,
+        }
+    }
+
+    /// A stop by the filter lasts until nobody is waited for, or the vehicle flies.
+    fn note_stops(&mut self, now: Instant) {
+        let stops = self.companion.filter_stops();
+        if core::mem::replace(&mut self.stops, stops) != stops {
+            self.stopped_since.get_or_insert(now);
+        } else if self.companion.waiting_for() == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
+            self.stopped_since = None;
+        }
+        if let Some(since) = self.stopped_since {
+            self.longest_stop_s = self.longest_stop_s.max((now - since).secs_f32());
         }
     }
 
@@ -376,6 +402,7 @@ impl<'a> World<'a> {
             }
             if member.companion.poll_timeout().is_some_and(|due| due <= now) {
                 member.companion.handle_timeout(now);
+                member.note_stops(now);
             }
             self.drain(i);
         }
@@ -495,6 +522,8 @@ impl<'a> World<'a> {
             setpoints,
             unfit,
             arrived,
+            filter_stops: self.members.iter().map(|member| member.stops).sum(),
+            longest_stop_s: self.members.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
             trace: self.trace.unwrap_or_default(),
         }
     }

@@ -19,6 +19,9 @@ struct Args {
     /// Print what happens in one meeting.
     #[arg(long)]
     trace: bool,
+    /// Two vehicles that pass at exactly the scheduled separation, instead: nobody is to be stopped.
+    #[arg(long)]
+    passing: bool,
     /// Only meetings of this geometry.
     #[arg(long, value_name = "KIND")]
     kind: Option<String>,
@@ -26,8 +29,9 @@ struct Args {
 
 fn main() {
     let args = Args::parse();
+    let draw = if args.passing { scene::passing } else { scene::scene };
     if args.trace {
-        let scene = scene::scene(args.seed);
+        let scene = draw(args.seed);
         let scene::Scene { kind, delay_s, loss, liar, .. } = &scene;
         println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
         for vehicle in &scene.vehicles {
@@ -52,7 +56,7 @@ fn main() {
     let began = Instant::now();
     let outcomes: Vec<Outcome> = (args.seed..args.seed + args.n)
         .into_par_iter()
-        .map(scene::scene)
+        .map(draw)
         .filter(|scene| args.kind.as_deref().is_none_or(|kind| scene.kind == kind))
         .map(|scene| meeting::fly(&scene, false))
         .collect();
@@ -62,6 +66,21 @@ fn main() {
     }
     let sum = meeting::summary(&outcomes);
     println!("{sum}");
+    let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
+    let longest_s = outcomes.iter().map(|outcome| outcome.longest_stop_s).fold(0.0, f32::max);
+    println!("{stops} stops by the safety filter, the longest {longest_s:.2} s");
+    if args.passing {
+        for kind in scene::PASSINGS {
+            let of = || outcomes.iter().filter(|outcome| outcome.kind == kind);
+            let stops: u32 = of().map(|outcome| outcome.filter_stops).sum();
+            let longest = of().max_by(|a, b| a.longest_stop_s.total_cmp(&b.longest_stop_s));
+            let (seed, longest_s) = longest.map_or((0, 0.0), |o| (o.seed, o.longest_stop_s));
+            println!(
+                "  {kind}: {} passed, {stops} stops, the longest {longest_s:.2} s (seed {seed})",
+                of().count()
+            );
+        }
+    }
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
