@@ -333,6 +333,9 @@ impl Flight {
                 (data.x, data.y, data.z) = (enu.x, enu.y, enu.z);
                 (data.vx, data.vy, data.vz) = (velocity.x, velocity.y, velocity.z);
             }
+            if self.autopilot.mode != self.autopilot.kind.setpoint_mode() {
+                self.check.restart();
+            }
             self.check.take(self.now.micros() as f64 * 1e-6, &data);
         }
     }

@@ -1,7 +1,8 @@
 //! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to be flown.
 //!
 //! Speed, acceleration and jerk are differences of the positions that were sent, in the autopilot's frame, so they hold
-//! whatever feed-forward goes along. A gap longer than [`GAP_S`] begins another stream.
+//! whatever feed-forward goes along. A gap longer than [`GAP_S`] begins another stream, and so does a setpoint that an
+//! autopilot in another mode did not follow: it has to be finite and inside the fence all the same.
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;
@@ -119,6 +120,11 @@ impl SetpointCheck {
         if self.faults.len() < 8 {
             self.faults.push((at_s, what));
         }
+    }
+
+    /// The next setpoint is the first of another stream: the last was not followed.
+    pub fn restart(&mut self) {
+        self.last = None;
     }
 
     /// Takes a setpoint in.

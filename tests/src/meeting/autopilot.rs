@@ -280,6 +280,9 @@ impl Autopilot {
     }
 
     fn handle_setpoint(&mut self, now: Instant, data: &SET_POSITION_TARGET_LOCAL_NED_DATA) {
+        if self.mode != self.kind.setpoint_mode() {
+            self.check.restart();
+        }
         self.check.take(now.micros() as f64 * 1e-6, data);
         let enu = |x: f32, y: f32, z: f32| frames::swap_enu_ned(&Vector3::new(x, y, z));
         let mask = data.type_mask.bits();

@@ -7,6 +7,9 @@ use flockmate_tests::meeting::{self, Outcome, scene};
 use flockmate_tests::setpoints::SetpointStats;
 use rayon::prelude::*;
 
+/// So many meetings with setpoints that are not fit are named.
+const UNFIT: usize = 10;
+
 #[derive(Parser)]
 #[command(about = "Random meetings of whole companions")]
 struct Args {
@@ -84,6 +87,10 @@ fn main() {
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
+    for outcome in outcomes.iter().filter(|outcome| !outcome.unfit.is_empty()).take(UNFIT) {
+        let (vehicle, at_s, what) = &outcome.unfit[0];
+        println!("  seed {}, vehicle {}, {at_s:.2} s: {what}", outcome.seed, vehicle + 1);
+    }
     println!("{took_s:.0} s, {:.1} meetings/s", outcomes.len() as f64 / took_s);
     if sum.is_bad() {
         std::process::exit(1);
