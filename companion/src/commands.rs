@@ -234,7 +234,8 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
             if state == PilotReturned && inputs.position_age >= FRESH {
                 return Some(TEMPORARILY_REJECTED);
             }
-            if pending.pause && !awaits(state, Guard::ResumeCommanded) && state != PilotReturned {
+            let taken = matches!(state, PilotControl | PilotReturned | Failsafe);
+            if pending.pause && !taken && !awaits(state, Guard::ResumeCommanded) {
                 pending.pause = false;
                 return Some(ACCEPTED);
             }
@@ -243,11 +244,10 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {
-            // On the ground there is nothing to do; in the air it acts, or somebody else flies.
-            let acts = inputs.airborne && inputs.offboard;
+            // Motors off there is nothing to do; else it acts, or somebody else flies.
+            let acts = inputs.armed && inputs.offboard;
             pending.land = acts;
-            let down = state == Aborted && !inputs.airborne;
-            return Some(if acts || down { ACCEPTED } else { TEMPORARILY_REJECTED });
+            return Some(if acts || !inputs.armed { ACCEPTED } else { TEMPORARILY_REJECTED });
         }
         LAND => (&mut pending.land, Guard::LandCommanded, &[Stopping, Land, Disarm, Done]),
         RETURN => (&mut pending.turn_back, Guard::ReturnCommanded, &[Done]),

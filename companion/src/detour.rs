@@ -71,6 +71,8 @@ const SAME_M: f32 = 0.1;
 pub(crate) struct Obstacles {
     known: Vec<KeepOff, OBSTACLES>,
     pub(crate) avoided: usize,
+    /// How many were known when a way around was last requested: those that came later it does not avoid.
+    requested: usize,
 }
 
 impl Obstacles {
@@ -83,6 +85,7 @@ impl Obstacles {
         while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_M) {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
+            self.requested -= usize::from(at < self.requested);
         }
     }
 }
@@ -308,6 +311,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Asks the shell for a way around, or just aside.
     pub(crate) fn request_detour(&mut self, aside: bool) {
         self.around.aside = aside;
+        self.obstacles.requested = self.obstacles.known.len();
         self.guidance.trapped_since = None;
         self.plan_failure = None;
         self.around.ready = false;
@@ -363,7 +367,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Around { aside, left_at_m, .. } = self.around;
         self.around = Around { left: true, flying: true, ready: true, aside, left_at_m, ..Around::default() };
         self.neighbours.avoid(self.now);
-        self.obstacles.avoided = self.obstacles.known.len();
+        self.obstacles.avoided = self.obstacles.requested;
     }
 
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {

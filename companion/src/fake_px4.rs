@@ -36,6 +36,9 @@ pub struct Bench {
     pub ekf_flags: u16,
     /// ArduCopter: NAV_TAKEOFF lifted it off.
     pub took_off: bool,
+    /// ArduCopter: how long the motors take to lift it off.
+    pub spool: Duration,
+    lifts_at: Instant,
     pub timesyncs: Vec<(i64, i64)>,
     pub companion: Small,
     pub now: Instant,
@@ -79,6 +82,7 @@ pub struct Bench {
     sequence: u8,
     gcs_sequence: u8,
     landed_at: Option<Instant>,
+    idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
     /// Whether there is a way around: by y = 16.
@@ -119,6 +123,8 @@ impl Bench {
             streams: Vec::new(),
             ekf_flags: 0x33F,
             took_off: false,
+            spool: Duration::default(),
+            lifts_at: Instant::ZERO,
             timesyncs: Vec::new(),
             companion: Companion::new(config).unwrap(),
             now: Instant::ZERO,
@@ -152,6 +158,7 @@ impl Bench {
             sequence: 0,
             gcs_sequence: 0,
             landed_at: None,
+            idle_since: None,
             origin: EKF_ORIGIN,
             answer_plan: Some(Ok(plan())),
             answer_detour: Some(Ok(())),
@@ -271,6 +278,7 @@ impl Bench {
             let enu = frames::geodetic_to_enu(&ORIGIN, &place);
             // ArduCopter gives a take-off up for a setpoint that comes before the lift-off.
             self.took_off &= !self.on_ground();
+            assert!(enu.iter().all(|c| c.is_finite()));
             self.target = (s.type_mask.bits() == self.kind.move_mask()).then_some(enu);
             self.setpoints.push((self.now, enu, s.type_mask.bits()));
         }
@@ -284,7 +292,10 @@ impl Bench {
             if self.silent {
                 return;
             }
-            let refused = self.refused.contains(&number);
+            // Neither autopilot disarms in the air, where it knows that it is there.
+            let disarms_in_air = number == 400 && c.param1 == 0.0 && !self.on_ground() && self.armed;
+            let takes_off_disarmed = number == 22 && !self.armed;
+            let refused = self.refused.contains(&number) || disarms_in_air || takes_off_disarmed;
             if !self.mute {
                 self.answer(number, if refused { 4 } else { 0 });
             }
@@ -301,6 +312,9 @@ impl Bench {
                 MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => self.armed = c.param1 == 1.0 && !self.never_arms,
                 MavCmd::MAV_CMD_NAV_TAKEOFF => {
                     assert!(self.kind == Kind::ArduPilot && self.armed);
+                    if !self.took_off {
+                        self.lifts_at = self.now + self.spool;
+                    }
                     (self.took_off, self.takeoff_m) = (true, c.param7);
                     self.target = Some(self.enu + Point::new(0.0, 0.0, c.param7 - 2.0));
                 }
@@ -344,7 +358,7 @@ impl Bench {
 
     /// Whether it lifts off, or has.
     fn lifts(&self) -> bool {
-        self.kind == Kind::Px4 || self.took_off
+        self.kind == Kind::Px4 || self.took_off && self.now >= self.lifts_at
     }
 
     /// PX4 says all unasked, ArduCopter nothing.
@@ -392,6 +406,7 @@ impl Bench {
         if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200)) && !self.stays_armed {
             self.armed = false;
         }
+        self.disarm_by_itself();
         if self.silent {
             return;
         }
@@ -431,6 +446,20 @@ impl Bench {
                 vz: -self.climbs_mps,
                 ..Default::default()
             });
+        }
+    }
+
+    /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`, `DISARM_DELAY`).
+    fn disarm_by_itself(&mut self) {
+        let streamed = self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
+        let takes_off = match self.kind {
+            Kind::Px4 => streamed && self.mode == self.kind.setpoint_mode(),
+            Kind::ArduPilot => self.took_off,
+        };
+        let idle = self.armed && self.on_ground() && !takes_off && !self.stays_armed;
+        self.idle_since = if idle { self.idle_since.or(Some(self.now)) } else { None };
+        if self.idle_since.is_some_and(|at| self.now - at > Duration::from_secs(10)) {
+            self.armed = false;
         }
     }
 

@@ -615,6 +615,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if let Some(plan) = &self.plan {
                     self.guidance.go_on(plan, climbs, &position, now);
                 }
+                if to == State::Blocked {
+                    // Until it was looked at again.
+                    (self.around.blocked, self.around.in_the_way) = (true, true);
+                }
                 if !matches!(to, State::Climb | State::Follow) {
                     self.guidance.brake();
                 }
@@ -638,3 +642,7 @@ mod scene_tests;
 #[cfg(test)]
 #[path = "hostile_tests.rs"]
 mod hostile_tests;
+
+#[cfg(test)]
+#[path = "interruption_tests.rs"]
+mod interruption_tests;

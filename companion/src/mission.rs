@@ -245,7 +245,9 @@ pub enum Guard {
     Disarmed,
     /// Motors off, at the goal.
     DisarmedAtGoal,
-    /// Motors off, and the state has lasted as long as the limit.
+    /// Motors on, and the state has lasted as long as the limit.
+    StaysArmed,
+    /// Motors off, the autopilot is heard, and the state has lasted as long as the limit.
     StaysDisarmed,
     /// The same, and the start is only paused.
     StaysDisarmedPaused,
@@ -283,7 +285,7 @@ pub enum Guard {
     PausedOnPad,
     /// NAV_LAND.
     LandCommanded,
-    /// NAV_LAND, in the air, in Offboard or Guided.
+    /// NAV_LAND, motors on, in Offboard or Guided.
     LandUnattended,
     /// NAV_RETURN_TO_LAUNCH.
     ReturnCommanded,
@@ -529,8 +531,11 @@ impl Guard {
             Self::Armed => i.armed,
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
-            Self::StaysDisarmed => !i.armed && i.in_state >= limit,
-            Self::StaysDisarmedPaused => !i.armed && i.in_state >= limit && i.start && i.pause,
+            Self::StaysArmed => i.armed && i.in_state >= limit,
+            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD,
+            Self::StaysDisarmedPaused => {
+                !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD && i.start && i.pause
+            }
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
@@ -548,7 +553,7 @@ impl Guard {
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
             Self::PausedOnPad => i.pause && i.in_state >= limit,
             Self::LandCommanded => i.land,
-            Self::LandUnattended => i.land && i.airborne && i.offboard,
+            Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::BatteryCritical => i.battery_critical,

@@ -173,6 +173,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::ChargeLow => (i.armed, i.battery_low) = (false, true),
         G::Outside => (i.armed, i.outside) = (false, true),
         G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
+        G::StaysArmed => i.in_state = long,
         G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
         G::StaysDisarmedPaused => (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true),
         G::ArmedUnseen => i.armed_unseen = true,

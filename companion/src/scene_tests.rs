@@ -455,7 +455,8 @@ fn every_row_has_its_scene() {
     grounded.refused = std::vec![22];
     grounded.until(Ready, 6.0);
     grounded.start();
-    scene(grounded, &|b| b.run(14.0), Aborted, 30.0);
+    grounded.stays_armed = true;
+    scene(grounded, &|b| (b.run(14.0), b.stays_armed = false).1, Aborted, 30.0);
     // After the pilot, after a failsafe.
     let piloted = || {
         let mut bench = flying();

@@ -236,7 +236,7 @@ fn a_hold_px4s_pilot_chose_stays_until_offboard_and_a_word() {
     assert!(pair.count(since_us, SETPOINT) > 40, "the place it is at, so that Offboard can be entered");
     pair.autopilot.pilot_returns();
     pair.run(5.0);
-    assert_eq!(pair.companion.state(), State::PilotControl, "Offboard without a resume");
+    assert_eq!(pair.companion.state(), State::PilotReturned, "Offboard without a resume");
     assert!(pair.asked(since_us, SET_MODE).is_empty());
     pair.command(191, 193, [1.0, 0.0]);
     pair.until(State::Done);
@@ -304,7 +304,7 @@ fn a_stream_that_still_runs_when_arducopters_pilot_returns_holds_the_place() {
     pair.autopilot.pilot_returns();
     pair.run(5.0);
     assert!((pair.at() - at).norm() < 0.2, "moved from {at} to {}", pair.at());
-    assert_eq!(pair.companion.state(), State::PilotControl);
+    assert_eq!(pair.companion.state(), State::PilotReturned);
     pair.command(191, 193, [1.0, 0.0]);
     pair.until(State::Done);
     pair.assert_at_goal();
