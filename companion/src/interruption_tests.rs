@@ -79,7 +79,7 @@ fn reach(kind: Kind, state: State, paused_in: Option<State>) -> Option<Bench> {
         }
         Follow => {
             b.until(Follow, 20.0);
-            b.run(2.0);
+            b.run(0.5);
         }
         Paused => {
             b.until(paused_in?, 20.0);
@@ -107,7 +107,8 @@ fn reach(kind: Kind, state: State, paused_in: Option<State>) -> Option<Bench> {
         }
         _ => return None,
     }
-    b.stuck = true;
+    // On its path a vehicle that does not follow is elsewhere.
+    b.stuck = state != Follow;
     if state == TakeOff {
         b.spool = Duration::from_secs(1000);
     }
