@@ -32,8 +32,11 @@ fn printed() -> String {
     out
 }
 
-/// What may interrupt a state, and how its inputs show it.
-const INTERRUPTIONS: &[(&str, fn(&mut Inputs))] = &[
+/// How the inputs show an interruption.
+type Shows = fn(&mut Inputs);
+
+/// What may interrupt a state.
+const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("pause", |i| i.pause = true),
     ("resume", |i| i.resume = true),
     ("land", |i| (i.land, i.offboard) = (true, !i.mode_foreign)),
