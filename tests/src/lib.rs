@@ -3,6 +3,7 @@
 pub mod board;
 pub mod bounds;
 pub mod debugger;
+pub mod fidelity;
 pub mod hostile;
 pub mod logs;
 pub mod meeting;

@@ -29,6 +29,10 @@ pub struct Sense {
     pub position: Point,
     /// Estimated velocity, ENU m/s.
     pub velocity: Point,
+    /// Change of the estimated height, m/s.
+    pub height_rate: f32,
+    /// Measured acceleration, ENU m/s².
+    pub acceleration: Point,
     /// Heading, radians clockwise from north.
     pub heading: f32,
     /// The body touches the ground.
@@ -46,10 +50,21 @@ pub struct Sense {
 pub struct Order {
     /// Motors carry weight.
     pub lift: bool,
-    /// The controller forgets its integral.
-    pub reset: bool,
+    /// What becomes of the controller's integral.
+    pub integral: Integral,
     /// What the mode asks for.
     pub demand: Demand,
+}
+
+/// What becomes of the velocity controller's integral in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integral {
+    /// It goes on.
+    Keep,
+    /// It is zero, as on the ground.
+    Clear,
+    /// It is what was asked of the airframe beyond what that does, as where ArduCopter initialises its controller in flight.
+    Match,
 }
 
 /// Airframe, estimator, ports, home and stored missions.
@@ -61,6 +76,10 @@ pub struct Body {
     pub(super) vehicle: Vehicle,
     pub(super) disturbance: Disturbance,
     pub(super) jump: Point,
+    /// Estimated minus true velocity that a replay imposes, ENU m/s.
+    pub(super) velocity_bias: Point,
+    /// Change of the estimate's error in height, m/s.
+    pub(super) height_error_rate: f32,
     pub(super) gps_ok: bool,
     pub(super) frame: LocalFrame,
     pub(super) home: Geodetic,
@@ -78,6 +97,7 @@ impl Body {
     pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
         let mut limits = config.vehicle;
         limits.drag_per_s *= config.personality.drag_share();
+        limits.wind_per_s *= config.personality.wind_share();
         let mut vehicle = Vehicle::new(limits, config.start);
         vehicle.set_heading(config.heading_rad);
         let start = config.start.cast::<f64>();
@@ -96,6 +116,8 @@ impl Body {
                 config.seed ^ (u64::from(config.system_id) << 32),
             ),
             jump: Point::zeros(),
+            velocity_bias: Point::zeros(),
+            height_error_rate: 0.0,
             gps_ok: true,
             home,
             home_enu: frames::geodetic_to_enu(&config.world_origin, &home),
@@ -126,7 +148,9 @@ impl Body {
         Sense {
             now_us: self.time_us,
             position: state.position + self.disturbance.position_error + self.jump,
-            velocity: state.velocity + self.disturbance.velocity_error,
+            velocity: state.velocity + self.disturbance.velocity_error + self.velocity_bias,
+            height_rate: state.velocity.z + self.height_error_rate,
+            acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
             height: self.height,

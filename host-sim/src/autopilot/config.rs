@@ -16,9 +16,16 @@ pub enum Personality {
 }
 
 impl Personality {
-    /// Share of the airframe's drag: PX4's simulated quadrotor was flown 10 to 20 % slower than asked, ArduCopter's held
-    /// 3 m/s to 2 %.
+    /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its recorded flights.
     pub(super) fn drag_share(self) -> f32 {
+        match self {
+            Self::Px4 => 1.0,
+            Self::Ardupilot => 0.4,
+        }
+    }
+
+    /// Share of the push of wind.
+    pub(super) fn wind_share(self) -> f32 {
         match self {
             Self::Px4 => 1.0,
             Self::Ardupilot => 0.2,
@@ -146,6 +153,7 @@ pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
         v.tilt_max_deg,
         v.lag_s,
         v.drag_per_s,
+        v.wind_per_s,
         v.endurance_s,
         config.gust_mps,
         config.position_noise_m,

@@ -51,7 +51,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use self::body::Body;
+use self::body::{Body, Integral};
 pub use self::config::{Config, ConfigError, Personality};
 use self::firmware::Firmware;
 use self::port::Port;
@@ -180,12 +180,19 @@ impl Autopilot {
         let (armed, landed) = (self.firmware.armed(), self.firmware.landed());
         let body = &mut self.body;
         body.vehicle.set_flags(armed, landed);
-        if order.reset {
-            body.vehicle.reset_integral();
+        match order.integral {
+            Integral::Keep => {}
+            Integral::Clear => body.vehicle.reset_integral(),
+            Integral::Match => body.vehicle.match_integral(),
         }
         if order.lift {
             let gains = self.firmware.gains();
-            body.vehicle.control(&order.demand, gains, &sense.position, &sense.velocity, dt_s);
+            let mut velocity = sense.velocity;
+            if order.demand.position.z.is_nan() {
+                // PX4 controls a rate of climb by the change of its height, which has less bias (`z_deriv`).
+                velocity.z = sense.height_rate;
+            }
+            body.vehicle.control(&order.demand, gains, &sense.position, &velocity, dt_s);
         }
         body.demand = armed.then_some(order.demand);
         body.vehicle.advance(order.lift, &body.disturbance.wind, ground_up_m, dt_s);
@@ -335,6 +342,18 @@ impl Autopilot {
     /// Shifts the position estimate by ENU metres from now on.
     pub fn jump_position(&mut self, offset: &Point) {
         self.body.jump += offset;
+    }
+
+    /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that of the height changes: a
+    /// replay imposes those that were recorded.
+    pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
+        (self.body.jump, self.body.velocity_bias) = (*position, *velocity);
+        self.body.height_error_rate = height_rate;
+    }
+
+    /// Where it believes to be, ENU metres.
+    pub fn estimate(&self) -> Point {
+        self.body.sense().position
     }
 
     /// Moves the EKF origin and says so, as an estimator that resets does.

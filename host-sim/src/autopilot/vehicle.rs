@@ -15,8 +15,8 @@ pub const GRAVITY: f32 = 9.806_65;
 /// Below this height over its resting place a vehicle touches the ground, metres.
 const TOUCH_M: f32 = 0.002;
 
-/// Vertical drag as a share of the horizontal: rotors meet the air edge-on when it comes from the side.
-const VERTICAL_DRAG: f32 = 0.2;
+/// Vertical push of wind as a share of the horizontal: rotors meet the air edge-on when it comes from the side.
+const VERTICAL_PUSH: f32 = 0.2;
 
 /// What the airframe can do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,15 +37,17 @@ pub struct VehicleLimits {
     pub tilt_max_deg: f32,
     /// Time constant of attitude and motors, seconds.
     pub lag_s: f32,
-    /// Drag: acceleration for each m/s of airspeed, 1/s.
+    /// Drag: acceleration for each m/s flown in still air, 1/s.
     pub drag_per_s: f32,
+    /// Acceleration for each m/s of wind, 1/s.
+    pub wind_per_s: f32,
     /// Time in the hover from full to empty, seconds.
     pub endurance_s: f32,
 }
 
 impl Default for VehicleLimits {
-    /// PX4's quadrotor defaults, and a drag that makes it track velocity as its SITL was seen to. That is at the upper end of
-    /// real ones, so wind moves it rather too much: PX4's estimator assumes 0.17 1/s at 3 m/s (`EKF2_MCOEF` 0.15 1/s beside
+    /// PX4's quadrotor defaults, and the drag of its SIH (`SIH_KDV` 1 N s/m at `SIH_MASS` 1 kg), with which the recorded flights are
+    /// flown again to 0.2 m. No real vehicle has that much, so wind moves it half as much, and still rather too much: PX4's estimator assumes 0.17 1/s at 3 m/s (`EKF2_MCOEF` 0.15 1/s beside
     /// `EKF2_BCOEF_X` 100 kg/m²); a light racer was measured at 0.39 and 0.54 1/s (Faessler, Franchi and Scaramuzza 2018).
     fn default() -> Self {
         Self {
@@ -56,8 +58,9 @@ impl Default for VehicleLimits {
             acceleration_max_mps2: 9.0,
             jerk_max_mps3: 60.0,
             tilt_max_deg: 45.0,
-            lag_s: 0.1,
-            drag_per_s: 0.5,
+            lag_s: 0.15,
+            drag_per_s: 1.0,
+            wind_per_s: 0.5,
             endurance_s: 1200.0,
         }
     }
@@ -106,6 +109,10 @@ pub struct Demand {
     pub climb_max: f32,
     /// Bound on sinking, m/s.
     pub descend_max: f32,
+    /// Acceleration up that is flown whatever else is asked for, m/s²; NaN leaves height to the cascade.
+    pub lift_off: f32,
+    /// Least thrust as a share of the weight.
+    pub thrust_min: f32,
 }
 
 /// Gains and bounds, from the parameters of the same name.
@@ -205,6 +212,11 @@ impl Vehicle {
         self.integral = Point::zeros();
     }
 
+    /// Sets the integral to what was asked of the airframe beyond what it does.
+    pub fn match_integral(&mut self) {
+        self.integral = self.acceleration_setpoint - self.state.acceleration;
+    }
+
     /// Runs the cascade for one step from the *estimated* position and velocity.
     pub fn control(&mut self, demand: &Demand, gains: &Gains, position: &Point, velocity: &Point, dt: f32) {
         let mut wanted = Point::zeros();
@@ -233,8 +245,13 @@ impl Vehicle {
                 - gains.velocity_d[k] * self.state.acceleration[axis]
                 + if feed.is_nan() { 0.0 } else { feed };
         }
+        if demand.lift_off.is_finite() {
+            asked.z = demand.lift_off;
+            self.integral.z = 0.0;
+            error.z = 0.0;
+        }
         // Thrust never reverses and gives at most twice the weight (hover at half throttle).
-        let bounded_z = asked.z.clamp(-0.85 * GRAVITY, GRAVITY);
+        let bounded_z = asked.z.clamp((demand.thrust_min - 1.0) * GRAVITY, GRAVITY);
         let across = libm::sqrtf(asked.x * asked.x + asked.y * asked.y);
         let across_max = ((bounded_z + GRAVITY) * gains.tilt_tan).min(self.limits.acceleration_max_mps2);
         let saturated_z = bounded_z != asked.z;
@@ -281,9 +298,8 @@ impl Vehicle {
         let norm = step.norm_squared();
         self.thrust += if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
 
-        let airspeed = self.state.velocity - wind;
-        let mut acceleration = self.thrust - airspeed * self.limits.drag_per_s;
-        acceleration.z += (1.0 - VERTICAL_DRAG) * airspeed.z * self.limits.drag_per_s;
+        let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_PUSH)) * self.limits.wind_per_s;
+        let mut acceleration = self.thrust + push - self.state.velocity * self.limits.drag_per_s;
         if clearance <= TOUCH_M && acceleration.z <= 0.0 {
             // The ground carries what thrust does not, and friction holds the feet.
             acceleration = Point::zeros();
@@ -353,6 +369,8 @@ mod tests {
             speed_max: 12.0,
             climb_max: 3.0,
             descend_max: 1.5,
+            lift_off: f32::NAN,
+            thrust_min: 0.15,
         }
     }
 
@@ -388,7 +406,7 @@ mod tests {
     fn velocity_is_tracked_loosely() {
         let mut v = airborne();
         let d = Demand { velocity: Point::new(0.0, 2.0, 0.0), ..demand() };
-        fly(&mut v, &d, Point::zeros(), 3.0);
+        fly(&mut v, &d, Point::zeros(), 4.0);
         let flown = v.state().velocity.y;
         assert!((1.6..1.95).contains(&flown), "2 m/s asked, {flown} flown");
     }

@@ -3,7 +3,7 @@
 use planner_core::Point;
 
 use super::params::Tuning;
-use super::reference::Reference;
+use super::reference::{Reference, approach};
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, micros};
 use crate::autopilot::body::Sense;
@@ -12,8 +12,12 @@ use crate::autopilot::vehicle::Demand;
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 /// The take-off is done this near its height, metres: landed_state 2 came 9.3 s after the command to 10 m.
 const TAKEN_OFF_M: f32 = 0.12;
-/// Climb with which it leaves the ground, m/s: then 9.5 m are reached when they were seen to be.
-const LIFT_OFF_MPS: f32 = 0.3;
+/// How it leaves the ground, as seen: seconds since it lifted, and the acceleration up until then, m/s². First the throttle
+/// creeps past hover; the controllers wind up meanwhile and then kick.
+const LIFT_OFF: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
+/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts: the speed decays with
+/// 7.5 / 5 s.
+const BRAKE_MPS2: f32 = 7.5;
 /// A leg of the return is at its end within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
 
@@ -29,6 +33,8 @@ pub(super) fn nothing(tuning: &Tuning) -> Demand {
         speed_max: 1.5 * tuning.speed,
         climb_max: 1.5 * tuning.speed_up,
         descend_max: 1.5 * tuning.speed_down.max(tuning.stick_sink),
+        lift_off: f32::NAN,
+        thrust_min: 0.15,
     }
 }
 
@@ -40,7 +46,10 @@ impl Copter {
         let goal = match self.mode {
             Mode::Guided if self.takeoff.is_some() => self.take_off_goal(),
             Mode::Guided => self.guided_goal(sense.now_us, dt),
-            Mode::Brake => Goal::STOP,
+            Mode::Brake => {
+                tuning.acceleration = BRAKE_MPS2;
+                Goal::STOP
+            }
             Mode::Stabilize | Mode::AltHold | Mode::Loiter => {
                 tuning.speed_down = tuning.stick_sink;
                 Goal { velocity: Point::new(0.0, 0.0, -tuning.stick_sink), ..Goal::STOP }
@@ -54,6 +63,8 @@ impl Copter {
         let (p, v, a) = (self.reference.position, self.reference.velocity, self.reference.acceleration);
         let position =
             Point::new(if across { p.x } else { f32::NAN }, if across { p.y } else { f32::NAN }, p.z);
+        // ArduPilot's derivative acts on the error, not on what is measured: what the reference shall do is added back.
+        let d = 1.0 + tuning.gains.velocity_d[0];
         if sense.touching && v.z < 0.0 {
             // The ground is in the way: the reference does not run on below it.
             self.reference.position.z = sense.position.z;
@@ -61,11 +72,18 @@ impl Copter {
         Demand {
             position,
             velocity: v,
-            acceleration: a,
+            acceleration: Point::new(a.x * d, a.y * d, a.z),
             heading: goal.heading,
             heading_rate: goal.heading_rate,
+            lift_off: self.lift_off(sense.now_us),
             ..nothing(&tuning)
         }
+    }
+
+    /// Acceleration up while it leaves the ground; NaN once it has.
+    fn lift_off(&self, now_us: u64) -> f32 {
+        let since_s = now_us.saturating_sub(self.lifted_us) as f32 * 1e-6;
+        LIFT_OFF.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
     }
 
     fn take_off_goal(&mut self) -> Goal {
@@ -75,8 +93,6 @@ impl Copter {
         if takeoff.up - at.z < TAKEN_OFF_M {
             self.takeoff = None;
             self.goal = goal;
-        } else if self.reference.velocity == Point::zeros() {
-            self.reference.velocity.z = LIFT_OFF_MPS;
         }
         goal
     }
@@ -94,12 +110,13 @@ impl Copter {
         self.goal
     }
 
-    /// Sinks at `WPNAV_SPEED_DN`, and at `LAND_SPEED` below `LAND_ALT_LOW` above home: without a rangefinder it knows no
-    /// other ground.
+    /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and `WPNAV_SPEED_DN` at most
+    /// (`Mode::land_run_vertical_control`): without a rangefinder it knows no other ground.
     fn landing_goal(&self, sense: &Sense) -> Goal {
-        let above_home = sense.position.z - sense.home.z;
-        let slow = above_home < self.tuning.land_slow_below;
-        let sink = if slow { self.tuning.land_speed } else { self.tuning.speed_down };
+        let tuning = &self.tuning;
+        let above_low = sense.position.z - sense.home.z - tuning.land_slow_below.max(1.0);
+        let rate = approach(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
+        let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
         Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
     }
 

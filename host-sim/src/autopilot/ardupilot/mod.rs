@@ -25,7 +25,7 @@ use planner_core::Point;
 use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
-use super::body::{Body, Order, Sense};
+use super::body::{Body, Integral, Order, Sense};
 use super::config::Personality;
 use super::firmware::Status;
 use super::inbox::Sender;
@@ -33,8 +33,11 @@ use super::params::Params;
 use super::vehicle::VehicleLimits;
 use super::wire::Fields;
 
-/// From NAV_TAKEOFF until it is in the air: landed_state changed 2.3 s after the command.
-const SPOOL_UP_S: f32 = 2.3;
+/// From arming until it lifts, where NAV_TAKEOFF comes at once: `MOT` arming delay 2 s, spool-up 0.5 s, and the throttle's
+/// slew to hover.
+const ARM_TO_LIFT_S: f32 = 3.05;
+/// The same from a later NAV_TAKEOFF.
+const SPOOL_UP_S: f32 = 2.07;
 /// `LAND_DETECTOR_TRIGGER_SEC` and its filters: 1.68 s seen.
 const LAND_DETECTOR_S: f32 = 1.6;
 /// Landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
@@ -163,6 +166,10 @@ pub struct Copter {
     told: [bool; 2],
     runtime_us: u64,
     armed: bool,
+    armed_us: u64,
+    lifted_us: u64,
+    /// The position controller starts in this step.
+    starts: bool,
     landed: bool,
     mode: Mode,
     failsafe: Option<Failsafe>,
@@ -191,6 +198,9 @@ impl Copter {
             told: [false; 2],
             runtime_us: 0,
             armed: false,
+            armed_us: 0,
+            lifted_us: 0,
+            starts: false,
             landed: true,
             mode: Mode::Stabilize,
             failsafe: None,
@@ -328,6 +338,7 @@ impl Copter {
             return false;
         }
         self.armed = true;
+        self.armed_us = sense.now_us;
         self.idle_us = sense.now_us;
         self.goal = Goal::STOP;
         body.announce_origin();
@@ -365,10 +376,16 @@ impl Copter {
         if mode == self.mode {
             return;
         }
+        // Land goes on with the reference of a controller that was running, the others start theirs.
+        let runs = self.mode.needs_position() && !self.landed;
+        if mode != Mode::Land || !runs {
+            self.reference = Reference::new(sense.position, sense.velocity);
+            self.reference.acceleration = if self.landed { Point::zeros() } else { sense.acceleration };
+            self.starts = !self.landed;
+        }
         self.mode = mode;
         self.takeoff = None;
         self.goal = Goal::STOP;
-        self.reference = Reference::new(sense.position, sense.velocity);
         self.leg = ReturnLeg::Climb { up: f32::NAN };
     }
 
@@ -393,23 +410,30 @@ impl Copter {
         if !self.armed {
             // A vehicle disarmed in the air falls, and has landed when it lies still.
             self.landed |= sense.touching;
-            return Order { lift: false, reset: true, demand: flight::nothing(&self.tuning) };
+            return self.rest();
         }
         if self.landed
             && let Some(takeoff) = self.takeoff
-            && now_us >= takeoff.since_us + micros(SPOOL_UP_S)
+            && now_us >= (takeoff.since_us + micros(SPOOL_UP_S)).max(self.armed_us + micros(ARM_TO_LIFT_S))
         {
             self.landed = false;
             self.touching_us = None;
+            self.lifted_us = now_us;
             self.reference = Reference::new(sense.position, Point::zeros());
         }
         if self.landed {
-            return Order { lift: false, reset: true, demand: flight::nothing(&self.tuning) };
+            return self.rest();
         }
         let demand = self.demand(sense, dt_s);
         let climbing = demand.velocity.z > 0.05;
         self.detect_landing(sense, climbing);
-        Order { lift: true, reset: false, demand }
+        let integral = if core::mem::take(&mut self.starts) { Integral::Match } else { Integral::Keep };
+        Order { lift: true, integral, demand }
+    }
+
+    /// Motors off or idle.
+    fn rest(&self) -> Order {
+        Order { lift: false, integral: Integral::Clear, demand: flight::nothing(&self.tuning) }
     }
 
     /// Origin and position, each once.

@@ -35,8 +35,8 @@ impl Reference {
         // Across: a vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
         let mut wanted = scaled(error.x, error.y, |e| approach(e, 0.5 * jerk / limit, CORRECTION * limit));
-        wanted = (wanted.0 + goal.velocity.x, wanted.1 + goal.velocity.y);
         wanted = scaled(wanted.0, wanted.1, |speed| speed.min(tuning.speed));
+        wanted = (wanted.0 + goal.velocity.x, wanted.1 + goal.velocity.y);
         let lack = (wanted.0 - self.velocity.x, wanted.1 - self.velocity.y);
         let push = scaled(lack.0, lack.1, |e| approach(e, jerk / limit, jerk).min(limit));
         let step = (
@@ -48,8 +48,8 @@ impl Reference {
         self.acceleration.y += step.1;
         // Up.
         let (limit, jerk) = (tuning.acceleration_z, tuning.jerk_z);
-        let rate = approach(error.z, 0.5 * jerk / limit, CORRECTION * limit) + goal.velocity.z;
-        let rate = rate.max(-tuning.speed_down).min(tuning.speed_up);
+        let rate = approach(error.z, 0.5 * jerk / limit, CORRECTION * limit);
+        let rate = rate.max(-tuning.speed_down).min(tuning.speed_up) + goal.velocity.z;
         let push = approach(rate - self.velocity.z, jerk / limit, jerk).max(-limit).min(limit);
         let step = push + goal.acceleration.z - self.acceleration.z;
         self.acceleration.z += step.max(-jerk * dt).min(jerk * dt);
@@ -69,7 +69,7 @@ fn scaled(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
 }
 
 /// Rate at which an error is closed: proportional near zero, and no faster than can be stopped (`sqrt_controller`).
-fn approach(error: f32, gain: f32, limit: f32) -> f32 {
+pub(super) fn approach(error: f32, gain: f32, limit: f32) -> f32 {
     let linear = limit / (gain * gain);
     if error.abs() <= linear {
         return error * gain;

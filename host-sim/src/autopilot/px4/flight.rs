@@ -12,6 +12,9 @@ const CLIMB_M: f32 = 0.15;
 const CLIMB_MPS: f32 = 0.05;
 /// An automatic mode is at its target within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
+/// Faster than this it was not seen to sink in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its height, which
+/// is also what it controls there; the velocity it reported meanwhile went up to 1.6.
+const LAND_MPS: f32 = 1.25;
 /// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
 const BRAKE_MPS2: f32 = 3.0;
 
@@ -28,6 +31,9 @@ pub(super) fn nothing(tuning: &Tuning) -> Demand {
         speed_max: tuning.speed_max,
         climb_max: tuning.climb_max,
         descend_max: tuning.descend_max,
+        lift_off: f32::NAN,
+        // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
+        thrust_min: 0.245,
     }
 }
 
@@ -99,11 +105,14 @@ impl Commander {
         }
     }
 
-    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`.
+    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`; heights
+    /// are above home, as it has no rangefinder.
     fn landing(&self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
         let [high, low] = tuning.land_slow_below;
-        let share = ((sense.height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
+        let height = sense.position.z - sense.home.z;
+        let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
         let sink = tuning.land_speed + share * (tuning.auto_down - tuning.land_speed);
+        let sink = sink.min(LAND_MPS);
         let position = Point::new(self.hold.x, self.hold.y, f32::NAN);
         let velocity = Point::new(f32::NAN, f32::NAN, -sink);
         Demand { position, velocity, descend_max: sink.max(0.0), ..held }

@@ -4,8 +4,8 @@
 //! |---|---|
 //! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
 //! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
-//! | ramp | thrust rises over `MPC_TKO_RAMP_T`; it counts as in the air once it carries the weight |
-//! | flying | `LNDMC_TRIG_TIME` on the ground without a demand to climb lands it |
+//! | ramp | thrust rises over `MPC_TKO_RAMP_T`, whatever is asked for meanwhile; it counts as in the air before it lifts |
+//! | flying | `LNDMC_TRIG_TIME` on the ground with a demand to sink lands it |
 //! | landed | a demand to climb; `COM_DISARM_LAND` disarms |
 //!
 //! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the first setpoint after that
@@ -23,10 +23,16 @@ use planner_core::Point;
 pub use self::firmware::Px4;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
-use super::body::{Order, Sense};
+use super::body::{Integral, Order, Sense};
+use super::vehicle::Demand;
 
 /// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
 const LOSS_REACTION_S: f32 = 0.15;
+/// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3 s seen, before it lifts.
+const IN_AIR_SHARE: f32 = 0.31;
+/// It lands only while it is to sink at this rate or faster, m/s, whatever flies it: at a demand to stay it reports itself in
+/// the air, on the ground too.
+const LAND_RATE_MPS: f32 = 0.2;
 /// The land detector's own filters beyond `LNDMC_TRIG_TIME`.
 const LAND_FILTER_S: f32 = 0.5;
 /// Disarmed 2.2 to 2.4 s after ON_GROUND with `COM_DISARM_LAND` 2.0.
@@ -361,14 +367,15 @@ impl Commander {
                 self.landed = true;
                 self.landed_us = now;
             }
-            return Order { lift: false, reset: true, demand: flight::nothing(tuning) };
+            let demand = flight::nothing(tuning);
+            return Order { lift: false, integral: Integral::Clear, demand };
         }
         let mut demand = self.demand(sense, tuning);
         let wants_up = self.wants_up(sense, &demand);
-        let mut reset = false;
+        let mut integral = Integral::Keep;
         match self.phase {
             Phase::Ground => {
-                reset = true;
+                integral = Integral::Clear;
                 if wants_up && now.saturating_sub(self.armed_us) >= seconds(tuning.spool_up_s) {
                     self.phase = Phase::Ramp { since_us: now };
                 }
@@ -378,24 +385,24 @@ impl Commander {
                 // The climb limit starts where it cancels hover thrust (`TakeoffHandling::updateRamp`).
                 let floor = -crate::autopilot::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
                 let limit = floor + progress * (demand.climb_max - floor);
-                if limit >= 0.0 {
+                if self.landed && progress >= IN_AIR_SHARE {
                     self.landed = false;
                     self.flown = true;
-                } else {
-                    // Pressed to the ground the integral would only wind down.
-                    reset = true;
                 }
                 if progress >= 1.0 {
                     self.phase = Phase::Flying;
-                } else if !wants_up && self.landed {
-                    self.phase = Phase::Ground;
                 } else {
                     demand.climb_max = limit;
+                    demand.thrust_min = 0.0;
+                    demand.acceleration.z = f32::NAN;
                 }
             }
-            Phase::Flying => self.detect_landing(sense, wants_up, tuning),
+            Phase::Flying => {
+                let rate = descent(&demand, sense, tuning);
+                self.detect_landing(sense, rate > LAND_RATE_MPS, tuning);
+            }
         }
-        Order { lift: self.phase != Phase::Ground, reset, demand }
+        Order { lift: self.phase != Phase::Ground, integral, demand }
     }
 
     fn update_failsafe(&mut self, sense: &Sense, tuning: &Tuning) {
@@ -446,8 +453,8 @@ impl Commander {
         }
     }
 
-    fn detect_landing(&mut self, sense: &Sense, wants_up: bool, tuning: &Tuning) {
-        if !sense.touching || wants_up {
+    fn detect_landing(&mut self, sense: &Sense, wants_down: bool, tuning: &Tuning) {
+        if !sense.touching || !wants_down {
             self.touching_us = None;
             return;
         }
@@ -459,6 +466,13 @@ impl Commander {
             self.phase = Phase::Ground;
         }
     }
+}
+
+/// Rate of sinking that a demand comes to, m/s.
+fn descent(demand: &Demand, sense: &Sense, tuning: &Tuning) -> f32 {
+    let error = (demand.position.z - sense.position.z) * tuning.gains.position[1];
+    let feed = demand.velocity.z;
+    -(if error.is_nan() { 0.0 } else { error } + if feed.is_nan() { 0.0 } else { feed })
 }
 
 /// Microseconds of a time in seconds; what is negative or not a number is none.

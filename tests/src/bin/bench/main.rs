@@ -4,6 +4,7 @@
 //! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.
 
 mod assignment;
+mod fidelity;
 mod roadmap;
 mod steps;
 mod swarm;
@@ -40,7 +41,7 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case.
+    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case, fidelity.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
@@ -75,6 +76,9 @@ fn main() -> Result<()> {
     }
     if "worst-case".contains(&args.only) {
         rows.extend(worst_case::rows()?);
+    }
+    if "fidelity".contains(&args.only) {
+        rows.extend(fidelity::rows());
     }
     println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
     for Row { name, ours, theirs, ratio, required, unit, n } in &rows {
