@@ -7,6 +7,7 @@ pub mod commands;
 pub mod flash;
 pub mod link;
 pub mod map;
+pub mod margins;
 pub mod mission;
 pub mod output;
 pub mod progress;

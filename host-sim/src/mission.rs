@@ -19,6 +19,7 @@ use planner_core::segment::segment_is_clear;
 use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::column::{ColumnError, column, nearest_column};
 use crate::map::{self, ClearanceField, VoxelMap};
+use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
@@ -37,15 +38,8 @@ pub const ACCEL_MPS2: f32 = 1.5;
 pub const VERTICAL_MPS: f32 = 1.0;
 /// Share of the cruise speed that corners, braking and gusts leave over a flight.
 const PACE: f32 = 0.9;
-/// What two vehicles together may stray from their paths, beyond the safety distance, metres.
-const STRAY_M: f32 = 0.5;
 /// Spacing of the places tried as slots around a single goal, metres.
 const SLOT_GRID_M: f32 = 0.25;
-/// What one vehicle may stray beside another that stands on the ground, metres.
-const STRAY_BESIDE_PARKED_M: f32 = 0.25;
-/// How much further gusts carry one vehicle, for each m/s of their peak, seconds. Two are not carried towards each other
-/// at once, so this is for one beside another that stands.
-const STRAY_PER_GUST_S: f32 = 0.05;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
@@ -89,10 +83,12 @@ impl Mission {
         let stage = progress.stage("roadmap");
         let safety_m = scenario.deconfliction.safety_distance_m;
         let schedule = ScheduleConfig {
-            separation_m: safety_m + STRAY_M,
-            parked_separation_m: safety_m
-                + STRAY_BESIDE_PARKED_M
-                + STRAY_PER_GUST_S * scenario.simulation.gust_mps,
+            separation_m: scenario.deconfliction.separation_m,
+            parked_separation_m: margins::parked_separation_m(
+                &scenario.simulation,
+                safety_m,
+                &scenario.vehicles,
+            ),
             cruise_mps: PACE * scenario.mission.cruise_mps,
             vertical_mps: VERTICAL_MPS,
         };

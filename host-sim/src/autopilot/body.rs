@@ -5,6 +5,7 @@ use planner_core::frames::{self, Geodetic};
 
 use super::command::{ACCEPTED, Command, message_id};
 use super::config::Config;
+use super::estimator::Errors;
 use super::geodesy::LocalFrame;
 use super::inbox::Sender;
 use super::mission::Missions;
@@ -75,6 +76,7 @@ pub struct Body {
     slot_us: u64,
     pub(super) vehicle: Vehicle,
     pub(super) disturbance: Disturbance,
+    pub(super) errors: Errors,
     pub(super) jump: Point,
     /// Estimated minus true velocity that a replay imposes, ENU m/s.
     pub(super) velocity_bias: Point,
@@ -106,15 +108,12 @@ impl Body {
         let ports = (0..config.ports.max(1)).map(|_| Port::new(config.system_id, streams));
         let ground = config.ground_port.then(|| Port::for_ground(config.system_id, streams));
         let home = config.home.unwrap_or_else(|| frame.geodetic(&start));
+        let seed = config.vehicle_seed();
         Self {
             time_us: 0,
             slot_us: 0,
-            disturbance: Disturbance::new(
-                config.wind,
-                config.gust_mps,
-                config.position_noise_m,
-                config.seed ^ (u64::from(config.system_id) << 32),
-            ),
+            disturbance: Disturbance::new(config.wind, config.gust_mps, config.position_noise_m, seed),
+            errors: Errors::new(config.estimator, config.personality, seed),
             jump: Point::zeros(),
             velocity_bias: Point::zeros(),
             height_error_rate: 0.0,
@@ -139,6 +138,7 @@ impl Body {
         if self.time_us >= self.slot_us {
             self.slot_us += (noise::SLOT_S * 1e6) as u64;
             self.disturbance.advance();
+            self.errors.advance();
         }
         self.height = self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
     }
@@ -147,9 +147,12 @@ impl Body {
         let state = self.vehicle.state();
         Sense {
             now_us: self.time_us,
-            position: state.position + self.disturbance.position_error + self.jump,
-            velocity: state.velocity + self.disturbance.velocity_error + self.velocity_bias,
-            height_rate: state.velocity.z + self.height_error_rate,
+            position: state.position + self.position_error(),
+            velocity: state.velocity
+                + self.disturbance.velocity_error
+                + self.velocity_bias
+                + self.errors.velocity,
+            height_rate: state.velocity.z + self.height_error_rate + self.errors.rate.z,
             acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
@@ -157,6 +160,11 @@ impl Body {
             home: self.home_enu,
             battery: state.battery,
         }
+    }
+
+    /// Estimated minus true position, ENU metres.
+    pub(super) fn position_error(&self) -> Point {
+        self.disturbance.position_error + self.errors.position + self.jump
     }
 
     pub(super) fn set_fixed_home(&mut self, home: Geodetic) {

@@ -3,6 +3,7 @@
 use planner_core::Point;
 use planner_core::frames::{Geodetic, Projection};
 
+use super::estimator::{Errors, Estimator};
 use super::vehicle::VehicleLimits;
 
 /// Which autopilot is simulated.
@@ -66,6 +67,8 @@ pub struct Config {
     pub gust_mps: f32,
     /// Standard deviation of the position estimate, metres.
     pub position_noise_m: f32,
+    /// How good its estimate is.
+    pub estimator: Estimator,
     /// Seed of gusts and noise.
     pub seed: u64,
     /// UTC at boot, microseconds since 1970.
@@ -97,6 +100,7 @@ impl Default for Config {
             wind: Point::zeros(),
             gust_mps: 0.0,
             position_noise_m: 0.0,
+            estimator: Estimator::Perfect,
             seed: 1,
             boot_unix_us: 1_767_225_600_000_000,
             estimator_ready_s: 40.0,
@@ -104,6 +108,19 @@ impl Default for Config {
             ground_port: false,
             routes: false,
         }
+    }
+}
+
+impl Config {
+    /// What everything random about this vehicle is drawn from.
+    pub(super) fn vehicle_seed(&self) -> u64 {
+        self.seed ^ (u64::from(self.system_id) << 32)
+    }
+
+    /// What its estimate of the height is wrong by for the whole flight, metres: so much its EKF origin is off as well, if the receiver
+    /// set it.
+    pub fn height_error_m(&self) -> f32 {
+        Errors::new(self.estimator, self.personality, self.vehicle_seed()).height_m()
     }
 }
 

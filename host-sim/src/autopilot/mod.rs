@@ -30,6 +30,7 @@ pub mod ardupilot;
 mod body;
 mod command;
 mod config;
+pub mod estimator;
 mod firmware;
 pub mod geodesy;
 mod inbox;
@@ -53,6 +54,7 @@ use planner_core::frames::{self, Geodetic};
 
 use self::body::{Body, Integral};
 pub use self::config::{Config, ConfigError, Personality};
+pub use self::estimator::Estimator;
 use self::firmware::Firmware;
 use self::port::Port;
 pub use self::px4::Mode;
@@ -248,7 +250,7 @@ impl Autopilot {
         let status = self.firmware.status(&self.body, &sense);
         let armed = self.firmware.armed();
         let body = &mut self.body;
-        let error = (body.disturbance.position_error + body.jump).cast::<f64>();
+        let error = body.position_error().cast::<f64>();
         let position = *body.vehicle.position() + error;
         let truth = body.vehicle.state();
         let force = body.vehicle.specific_force();
@@ -285,6 +287,7 @@ impl Autopilot {
             heading: (sense.heading, heading_rate),
             target,
             height: body.height,
+            accuracy: body.config.estimator.accuracy_m(),
             battery: sense.battery,
             attitude: OnceCell::new(),
         }

@@ -84,6 +84,8 @@ pub struct Snapshot {
     pub target: [Vector3<f64>; 3],
     /// Height over ground, metres.
     pub height: f32,
+    /// Accuracy that the estimator reports, across and in height, metres.
+    pub accuracy: [f32; 2],
     /// Charge left, 0 to 1.
     pub battery: f32,
     /// Filled by the first message that needs it.
@@ -260,9 +262,8 @@ impl Snapshot {
                 mag_ratio: 0.07,
                 hagl_ratio: 0.004,
                 tas_ratio: f32::NAN,
-                // A receiver with fixed RTK; SIH's reports 0.285 and 0.3.
-                pos_horiz_accuracy: 0.02,
-                pos_vert_accuracy: 0.03,
+                pos_horiz_accuracy: self.accuracy[0],
+                pos_vert_accuracy: self.accuracy[1],
             }),
             241 => port.send(&dialect::VIBRATION_DATA {
                 time_usec: self.time_us,

@@ -17,7 +17,7 @@ use companion::config::GROUND_STATIONS;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-pub use crate::autopilot::Personality;
+pub use crate::autopilot::{Estimator, Personality};
 use crate::link::LinkUrl;
 use crate::map::Unknown;
 pub use error::{Place, ScenarioError};
@@ -190,6 +190,8 @@ pub struct Deconfliction {
     pub method: Method,
     /// What they keep, centre to centre.
     pub safety_distance_m: f32,
+    /// What the schedule plans between their paths, centre to centre.
+    pub separation_m: f32,
 }
 
 /// `[simulation]`
@@ -201,6 +203,8 @@ pub struct Simulation {
     pub gust_mps: f32,
     /// Standard deviation of the reported position.
     pub position_noise_m: f32,
+    /// How good the autopilots' estimates are.
+    pub estimator: Estimator,
     /// Serial links, bits a second.
     pub serial_baud: u32,
     /// Share of bytes corrupted.

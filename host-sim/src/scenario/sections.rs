@@ -11,11 +11,12 @@ use toml::de::DeTable;
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::{
-    Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission, Mode,
-    Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Unbuilt, Vehicle,
+    Companion, Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission,
+    Mode, Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Unbuilt, Vehicle,
 };
 use crate::link::LinkUrl;
 use crate::map::{Source, Unknown};
+use crate::margins;
 
 /// Most vehicles of a swarm: the system ids there are.
 const MAX_ID: u64 = 250;
@@ -61,6 +62,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = self::deconfliction(&deconfliction.unwrap_or_else(|| empty(text, "deconfliction")))?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
+    let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
     let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")))?;
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let faults_value = root.get("faults");
@@ -79,7 +81,10 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m)?;
     check_goals(text, &vehicles, &mission)?;
-    let vehicles = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    if let Some(span) = &estimator_span {
+        check_margins(text, span, &roadmap, &deconfliction, &simulation, &vehicles)?;
+    }
     let path = file.to_owned();
     Ok(Scenario {
         path,
@@ -392,10 +397,14 @@ fn link(value: &Value<'_>) -> Result<LinkUrl> {
 
 fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
-    let deconfliction = Deconfliction {
-        method: table.word("method", Method::Priority, &methods)?,
-        safety_distance_m: table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?,
-    };
+    let method = table.word("method", Method::Priority, &methods)?;
+    let safety_distance_m = table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?;
+    let separation_m = table.f32(
+        "separation_m",
+        safety_distance_m + margins::STRAY_M,
+        f64::from(safety_distance_m)..=1000.0,
+    )?;
+    let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
     table.finish()?;
     Ok(deconfliction)
 }
@@ -405,6 +414,11 @@ fn simulation(table: &Table<'_>) -> Result<Simulation> {
         wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
         gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
         position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
+        estimator: table.word(
+            "estimator",
+            Estimator::Rtk,
+            &[("rtk", Estimator::Rtk), ("recorded", Estimator::Recorded)],
+        )?,
         serial_baud: table.whole("serial_baud", 921_600, 1200..=100_000_000)? as u32,
         serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
         radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
@@ -446,6 +460,37 @@ fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
             .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));
     }
     Ok(fault)
+}
+
+/// Where estimates err as recorded, margin and separation must leave room for it.
+fn check_margins(
+    text: Text<'_>,
+    span: &Span,
+    roadmap: &Roadmap,
+    deconfliction: &Deconfliction,
+    simulation: &Simulation,
+    vehicles: &[Vehicle],
+) -> Result<()> {
+    if simulation.estimator != Estimator::Recorded {
+        return Ok(());
+    }
+    let need = margins::needed(simulation, deconfliction.safety_distance_m, vehicles);
+    let missing = [
+        ("roadmap.safety_margin_m", roadmap.safety_margin_m, need.margin_m),
+        ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m),
+    ];
+    let short = missing.iter().filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
+    let lacks: Vec<String> = short
+        .map(|(key, has_m, need_m)| {
+            format!("{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes", need_m - has_m)
+        })
+        .collect();
+    if lacks.is_empty() {
+        return Ok(());
+    }
+    let hint = "docs/simulating.md adds up margin and separation; \"rtk\" errs by 0.1 m";
+    let why = format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
+    Err(text.with_hint(span, why, hint))
 }
 
 fn check_apart(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], safety_distance_m: f32) -> Result<()> {

@@ -27,7 +27,10 @@ fn a_short_scenario_has_the_defaults() {
         (scenario.vehicles.len(), scenario.vehicles[1].id, scenario.vehicles[1].radius_m),
         (2, 2, 0.3)
     );
-    assert_eq!(scenario.deconfliction, Deconfliction { method: Method::Priority, safety_distance_m: 1.5 });
+    assert_eq!(
+        scenario.deconfliction,
+        Deconfliction { method: Method::Priority, safety_distance_m: 1.5, separation_m: 2.0 }
+    );
     assert_eq!((scenario.simulation.serial_baud, scenario.simulation.time_limit_s), (921_600, 600.0));
     assert!((scenario.required_clearance_m() - 0.8).abs() < 1e-6);
 }

@@ -299,7 +299,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 speed_max_mps: vehicle.speed_max_mps,
                 ..autopilot::VehicleLimits::default()
             };
-            let config = autopilot::Config {
+            let mut config = autopilot::Config {
                 system_id: vehicle.id,
                 personality: vehicle.personality,
                 world_origin: scenario.map.origin,
@@ -311,9 +311,14 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 wind: Point::new(settings.wind_mps, 0.0, 0.0),
                 gust_mps: settings.gust_mps,
                 position_noise_m: settings.position_noise_m,
+                estimator: settings.estimator,
                 seed: scenario.seed,
                 ..autopilot::Config::default()
             };
+            if vehicle.ekf_origin.is_none() {
+                // The receiver set it, with the error that its heights have.
+                config.ekf_origin.alt_m += f64::from(config.height_error_m());
+            }
             let mut member =
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
