@@ -1,19 +1,18 @@
-//! Conflict-free schedules: who passes first where two paths come close.
+//! Conflict-free schedules: which vehicle passes first where two paths come close.
 //!
-//! Paths are cut into pieces of at most [`PIECE_M`] metres, from the pad over the path to the ground below the goal.
+//! A flight is cut into timed segments of at most [`PIECE_M`] metres, from the pad over the path to the ground below the goal.
 //! Vehicles are scheduled one after the other (prioritised planning, Erdmann and Lozano-Pérez 1987); each waits on its pad
-//! for the smallest delay that keeps every piece out of reach of every piece already scheduled at that time. Waiting on
+//! for the smallest delay that keeps its segments out of reach of those already scheduled at that time. Waiting on
 //! the pad always suffices when each path avoids the pads and landing places of the others (a "well-formed" problem,
 //! Čáp et al. 2015).
 //!
-//! In flight only the *order* of the schedule counts. For each pair of conflicting pieces the later vehicle gets a
-//! [`Gate`]: it enters its piece once the earlier one has come to the end of its own. So two vehicles are never in
-//! conflicting pieces at once, however late either runs; and nobody waits for ever, since every wait is for a vehicle with
-//! an earlier label, and the vehicle with the earliest label waits for none (the whole argument: ARCHITECTURE.md).
+//! In flight only the *order* of the schedule counts. For each pair of conflicting segments the later vehicle gets a
+//! [`Gate`]: it enters its segment once the earlier one has left its own. Why this keeps vehicles apart and lets all of them
+//! arrive is in `docs/schedule.md`, claim by claim.
 //!
 //! Where no delay on the pad helps, as head-on in a corridor, [`sipp`] lets the vehicle wait or step aside on its way.
 //!
-//! Cost: pieces of one path × pieces of all others, each a distance between two segments behind a cheap bound.
+//! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
 
 mod near;
 pub mod sipp;

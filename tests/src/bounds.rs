@@ -48,7 +48,10 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("assignment::bottleneck, 32 × 32", "v³"),
     ("plan::costs, 10 × 10", "one cost matrix, or v rows"),
     ("plan::assign, 10 × 10", "one assignment"),
-    ("plan::schedule, 10", "73 rounds of v vehicles, each 3 A* and `sipp::route` a few times"),
+    (
+        "plan::schedule, 10",
+        "73 rounds of v vehicles, each 3 A* and `sipp::route` a few times; 150 000 comparisons; v `gates`",
+    ),
     ("plan::plan_swarm, 10", "the three above"),
     ("plan::vehicle_plan, past 31", "one `gates`"),
     ("schedule::sipp::route, past 9", "n states, each with its half-edges × the pieces near"),

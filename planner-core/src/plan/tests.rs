@@ -228,3 +228,82 @@ fn wrong_requests_are_refused_by_name() {
     labelled[1].goal = Some(9);
     assert_eq!(plan(&bytes, &labelled, 2, Mode::Labelled).unwrap_err(), PlanError::BadGoal(2));
 }
+
+/// A corridor along x that vehicles cross one behind the other, starts on its left and goals on its right.
+fn queue(length_m: f32, vehicles: usize, edge_m: f32, seed: u64) -> (StdVec<u8>, StdVec<VehicleTask>) {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut uniform = |low: f32, high: f32| low + (high - low) * (rng.next_u32() as f32 / u32::MAX as f32);
+    let mut nodes = StdVec::new();
+    for side in [0.0, length_m] {
+        for i in 0..vehicles {
+            let away = 3.0 * (1 + i / 2) as f32 * if side == 0.0 { -1.0 } else { 1.0 };
+            nodes.push(Point::new(side + away, 5.0 * (i % 2) as f32 - 2.5, HEIGHT_M));
+        }
+    }
+    // Two steps of the corridor are an edge.
+    let step_m = 0.49 * edge_m;
+    let steps = (length_m / step_m) as usize;
+    nodes.extend((0..=steps).map(|i| Point::new(i as f32 * step_m, uniform(-0.4, 0.4), HEIGHT_M)));
+    let mut edges = StdVec::new();
+    for a in 0..nodes.len() {
+        for b in a + 1..nodes.len() {
+            if (0.1..edge_m).contains(&(nodes[a] - nodes[b]).norm()) {
+                edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
+            }
+        }
+    }
+    let header = RoadmapHeader {
+        origin: Geodetic::default(),
+        edge_min_m: 0.1,
+        edge_max_m: edge_m,
+        tested_clearance_m: 0.0,
+        max_clearance_m: 4.0,
+        starts: vehicles as u16,
+        goals: vehicles as u16,
+    };
+    let mut bytes = std::vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
+    roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
+    (bytes, tasks(vehicles, true))
+}
+
+/// Whether every vehicle's part fits that many gates, and what the plan says of it.
+fn fits<const G: usize>(bytes: &[u8], vehicles: &[VehicleTask]) -> (bool, Result<(), PlanError>) {
+    let view = RoadmapView::parse(bytes).unwrap();
+    let mut ws = Box::new(PlanWorkspace::<1024, 16, 4096>::new());
+    let mut out = SwarmPlan::<16, 64>::new();
+    let descents = std::vec![HEIGHT_M; vehicles.len()];
+    let mode = Mode::Labelled;
+    let request = PlanRequest { vehicles, descents_m: &descents, mode, schedule: SCHEDULE, gates_most: G };
+    let planned = plan_swarm(&view, &request, &mut ws, &mut out);
+    let mut own = VehiclePlan::<64, G>::default();
+    let all =
+        (0..vehicles.len()).all(|i| vehicle_plan(&out, i, &SCHEDULE, &mut ws.schedule, &mut own).is_ok());
+    (all, planned)
+}
+
+#[test]
+fn eight_through_a_corridor_fit_the_gates_of_a_board_or_are_refused() {
+    let mut flyable = 0;
+    for seed in 0..12 {
+        let (bytes, vehicles) = queue(26.0, 8, 8.0, seed);
+        let (all, planned) = fits::<128>(&bytes, &vehicles);
+        assert_eq!(all, planned.is_ok(), "seed {seed}: {planned:?}");
+        flyable += usize::from(all);
+        let (all, planned) = fits::<12>(&bytes, &vehicles);
+        assert_eq!(all, planned.is_ok(), "seed {seed}, few gates: {planned:?}");
+    }
+    assert!(flyable >= 9, "{flyable} of 12");
+}
+
+#[test]
+fn flights_of_four_kilometres_are_scheduled_and_flown() {
+    let (bytes, vehicles) = queue(4000.0, 3, 99.0, 1);
+    let plan = plan(&bytes, &vehicles, 3, Mode::Labelled).unwrap();
+    for flight in &plan.flights {
+        assert!(flight.path.length_m() > 4000.0 && flight.piece_m > schedule::PIECE_M);
+    }
+    for speeds in [[10.0, 10.0, 10.0], [4.0, 10.0, 7.0]] {
+        let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 100_000);
+        assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 0.3), "{apart:?}");
+    }
+}
