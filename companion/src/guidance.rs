@@ -30,6 +30,9 @@ pub use self::door::{SMOOTH_MOST_S, Stats};
 
 /// This near the end of the climb or of the path counts as there, metres.
 const ARRIVED_M: f32 = 0.35;
+/// So near its reference a vehicle reports no less than this short of it, metres: 0.05 m less than what gates allow
+/// (`PROGRESS_ERROR_M`), since it stops short of a gate by a little.
+const REPORTED_SHORT_M: f32 = planner_core::schedule::PROGRESS_ERROR_M - 0.05;
 /// Slower than this counts as standing at the end of the path, m/s.
 const STANDING_MPS: f32 = 0.5;
 /// A setpoint slower than this stands, m/s.
@@ -405,7 +408,11 @@ impl Guidance {
                 let behind = self.track.lead_max_m * 2.0;
                 let seen =
                     path.project(&scene.telemetry.position, self.tracker.along_m - behind * 0.5, behind);
-                seen.min(self.tracker.along_m)
+                // Off its reference by less than counts as arrived, it has come as far as gates ask of one that waits.
+                let at = path.point_at(self.tracker.along_m);
+                let arrived = at.is_some_and(|at| (at - scene.telemetry.position).norm() < ARRIVED_M);
+                let least = if arrived { self.tracker.along_m - REPORTED_SHORT_M } else { f32::NEG_INFINITY };
+                seen.max(least).min(self.tracker.along_m)
             }
             _ => -plan.climb_m,
         }
