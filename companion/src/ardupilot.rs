@@ -1,6 +1,8 @@
 //! ArduCopter's numbers: flight modes, setpoint masks, the estimator's flags and the streams a companion needs. Source:
 //! ArduCopter 4.6 `mode.h`, `GCS_MAVLink_Copter.cpp` and what its recording shows. The shape is that of `px4`.
 
+use crate::limits::{Limit, LimitParameter};
+
 /// GUIDED, `custom_mode` of HEARTBEAT.
 pub const GUIDED: u32 = 4;
 /// LAND.
@@ -16,6 +18,18 @@ pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
 /// How far ahead the velocity of a setpoint looks, seconds: Guided closes an error of velocity with `WPNAV_ACCEL` /
 /// `PSC_JERK_XY`, and the recording's circle is flown 0.6 s behind. Acceleration for so long replaces the one left out.
 pub const VELOCITY_LEAD_S: f32 = 0.5;
+
+/// Parameters that limit what it flies, with 4.6's defaults; centimetres but for the jerk.
+pub const LIMITS: [LimitParameter; 8] = [
+    LimitParameter { name: "WPNAV_SPEED", limit: Limit::Speed, unit: 0.01, default: 1000.0 },
+    LimitParameter { name: "WPNAV_SPEED_UP", limit: Limit::Climb, unit: 0.01, default: 250.0 },
+    LimitParameter { name: "WPNAV_SPEED_DN", limit: Limit::Descend, unit: 0.01, default: 150.0 },
+    LimitParameter { name: "WPNAV_ACCEL", limit: Limit::Accel, unit: 0.01, default: 250.0 },
+    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelUp, unit: 0.01, default: 100.0 },
+    LimitParameter { name: "WPNAV_ACCEL_Z", limit: Limit::AccelDown, unit: 0.01, default: 100.0 },
+    LimitParameter { name: "PSC_JERK_XY", limit: Limit::Jerk, unit: 1.0, default: 5.0 },
+    LimitParameter { name: "PSC_JERK_Z", limit: Limit::JerkZ, unit: 1.0, default: 5.0 },
+];
 
 /// Velocity alone: with zero, stop wherever that is.
 pub const MASK_VELOCITY: u16 = 0xDC7;

@@ -2,6 +2,7 @@
 
 use planner_core::frames::Projection;
 
+use crate::limits::LimitParameter;
 use crate::{ardupilot, px4};
 
 /// An autopilot the companion can fly.
@@ -77,6 +78,14 @@ impl Kind {
         match self {
             Self::Px4 => px4::MASK_VELOCITY,
             Self::ArduPilot => ardupilot::MASK_VELOCITY,
+        }
+    }
+
+    /// Its parameters that limit what it flies.
+    pub fn limits(self) -> &'static [LimitParameter] {
+        match self {
+            Self::Px4 => &px4::LIMITS,
+            Self::ArduPilot => &ardupilot::LIMITS,
         }
     }
 

@@ -19,7 +19,7 @@ use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
 use crate::autopilot::Kind;
 use crate::config::Config;
-use crate::limits::{AutopilotLimits, Limits};
+use crate::limits::{AutopilotLimits, Limit, Limits};
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat::{self, Search};
@@ -178,8 +178,8 @@ impl Guidance {
         let door = Door::new(limits, config.geofence);
         let track = TrackConfig {
             cruise_mps: limits.speed_mps,
-            climb_mps: autopilot.climb_mps,
-            descend_mps: autopilot.descend_mps,
+            climb_mps: autopilot.get(Limit::Climb),
+            descend_mps: autopilot.get(Limit::Descend),
             accel_mps2: limits.accel_mps2,
             accel_z_mps2: limits.accel_z_mps2,
             radius_m: config.radius_m,

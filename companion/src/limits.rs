@@ -14,41 +14,82 @@ pub const JERK_MPS3: f32 = 4.0;
 /// The same while the safety filter stops a vehicle, m/s³.
 pub const URGENT_JERK_MPS3: f32 = 8.0;
 
-/// Up and down no vehicle is accelerated more than ArduCopter manages by default, m/s²: 1.03 m wide of a corner with 1.5.
-const VERTICAL_MPS2: f32 = 1.0;
+/// What an autopilot's parameter limits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Limit {
+    /// Speed across, m/s.
+    Speed,
+    /// Speed upwards, m/s.
+    Climb,
+    /// Speed downwards, m/s.
+    Descend,
+    /// Acceleration across, m/s².
+    Accel,
+    /// Acceleration upwards, m/s².
+    AccelUp,
+    /// Acceleration downwards, m/s².
+    AccelDown,
+    /// Jerk across, m/s³.
+    Jerk,
+    /// Jerk upwards and downwards, m/s³.
+    JerkZ,
+}
 
-/// What the autopilot's parameters allow. Names as in [`Limits`].
+/// Kinds of limits.
+const LIMITS: usize = 8;
+
+impl Limit {
+    /// What a vehicle may have: a value outside is no limit but a switch (0, −1) or a mistake.
+    fn range(self) -> (f32, f32) {
+        match self {
+            Self::Speed | Self::Climb | Self::Descend => (0.1, 50.0),
+            Self::Accel | Self::AccelUp | Self::AccelDown => (0.2, 20.0),
+            Self::Jerk | Self::JerkZ => (1.0, 100.0),
+        }
+    }
+}
+
+/// A parameter of an autopilot that limits what it flies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LimitParameter {
+    /// Its name, at most 16 bytes.
+    pub name: &'static str,
+    /// What it limits.
+    pub limit: Limit,
+    /// Its unit, in metres and seconds.
+    pub unit: f32,
+    /// Its default, in its own unit.
+    pub default: f32,
+}
+
+/// What the autopilot's parameters allow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutopilotLimits {
-    pub speed_mps: f32,
-    pub climb_mps: f32,
-    pub descend_mps: f32,
-    pub accel_mps2: f32,
-    pub accel_z_mps2: f32,
-    pub jerk_mps3: f32,
+    values: [f32; LIMITS],
 }
 
 impl AutopilotLimits {
     /// The defaults of a kind.
     pub fn default_of(kind: Kind) -> Self {
-        match kind {
-            Kind::Px4 => Self {
-                speed_mps: 12.0,
-                climb_mps: 3.0,
-                descend_mps: 1.5,
-                accel_mps2: 3.0,
-                accel_z_mps2: 3.0,
-                jerk_mps3: 4.0,
-            },
-            Kind::ArduPilot => Self {
-                speed_mps: 10.0,
-                climb_mps: 2.5,
-                descend_mps: 1.5,
-                accel_mps2: 2.5,
-                accel_z_mps2: 1.0,
-                jerk_mps3: 5.0,
-            },
+        let mut limits = Self { values: [f32::INFINITY; LIMITS] };
+        for parameter in kind.limits() {
+            limits.values[parameter.limit as usize] = parameter.default * parameter.unit;
         }
+        limits
+    }
+
+    /// A limit.
+    pub fn get(&self, limit: Limit) -> f32 {
+        self.values[limit as usize]
+    }
+
+    /// Takes a value as it was read; whether a limit changed. One that no vehicle has is ignored.
+    pub fn set(&mut self, parameter: &LimitParameter, value: f32) -> bool {
+        let (value, (least, most)) = (value * parameter.unit, parameter.limit.range());
+        if !(least..=most).contains(&value) {
+            return false;
+        }
+        core::mem::replace(&mut self.values[parameter.limit as usize], value) != value
     }
 }
 
@@ -72,16 +113,18 @@ pub struct Limits {
 impl Limits {
     /// The mission's limits, lowered to what the autopilot flies.
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let a = autopilot;
-        let jerk_mps3 = fminf(JERK_MPS3, a.jerk_mps3);
+        let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
+        let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
         // What the door's longest average smooths to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
+        let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
+        let vertical_mps2 = least(&[Limit::AccelUp, Limit::AccelDown]);
         Self {
-            speed_mps: fminf(config.cruise_mps, a.speed_mps),
-            climb_mps: fminf(config.climb_mps, a.climb_mps),
-            descend_mps: fminf(config.climb_mps, a.descend_mps),
-            accel_mps2: fminf(fminf(config.accel_mps2, a.accel_mps2), smooth_mps2),
-            accel_z_mps2: fminf(fminf(config.accel_mps2, VERTICAL_MPS2), fminf(a.accel_z_mps2, smooth_mps2)),
+            speed_mps: fminf(config.cruise_mps, least(&[Limit::Speed])),
+            climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
+            descend_mps: fminf(config.climb_mps, least(&[Limit::Descend])),
+            accel_mps2: fminf(accel_mps2, least(&[Limit::Accel])),
+            accel_z_mps2: fminf(accel_mps2, vertical_mps2),
             jerk_mps3,
         }
     }
@@ -94,5 +137,59 @@ impl Limits {
     /// No setpoint moves faster, m/s.
     pub fn fastest_mps(&self) -> f32 {
         libm::fmaxf(self.speed_mps, libm::fmaxf(self.climb_mps, self.descend_mps))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use planner_core::Point;
+    use planner_core::frames::Geodetic;
+
+    use super::*;
+
+    fn config() -> Config<1> {
+        Config::new(1, Point::zeros(), Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 })
+    }
+
+    #[test]
+    fn defaults_leave_the_missions_limits_but_brake_vertically_as_arducopter_can() {
+        for kind in [Kind::Px4, Kind::ArduPilot] {
+            let limits = Limits::new(&config(), &AutopilotLimits::default_of(kind));
+            assert_eq!((limits.speed_mps, limits.climb_mps, limits.descend_mps), (2.0, 1.0, 1.0));
+            // ArduCopter ran 1.03 m wide of vertical corners with 1.5.
+            let accel_z_mps2 = if kind == Kind::Px4 { 1.5 } else { 1.0 };
+            assert_eq!((limits.accel_mps2, limits.accel_z_mps2, limits.jerk_mps3), (1.5, accel_z_mps2, 4.0));
+        }
+    }
+
+    proptest::proptest! {
+        /// Whatever is read, limits stay between those of a slow vehicle and those of the mission.
+        #[test]
+        fn no_value_makes_a_limit_senseless(
+            read in proptest::collection::vec((0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0), 0..40),
+            px4 in proptest::prelude::any::<bool>(),
+        ) {
+            let kind = if px4 { Kind::Px4 } else { Kind::ArduPilot };
+            let mut autopilot = AutopilotLimits::default_of(kind);
+            for (index, bits, near) in read {
+                let Some(parameter) = kind.limits().get(index) else { continue };
+                // Bits of an integer, NaN and infinities among them.
+                autopilot.set(parameter, f32::from_bits(bits));
+                autopilot.set(parameter, near);
+            }
+            let l = Limits::new(&config(), &autopilot);
+            for (value, least, most) in [
+                (l.speed_mps, 0.1, 2.0),
+                (l.climb_mps, 0.1, 1.0),
+                (l.descend_mps, 0.1, 1.0),
+                (l.accel_mps2, 0.2, 1.5),
+                (l.accel_z_mps2, 0.2, 1.5),
+                (l.jerk_mps3, 1.0, 4.0),
+            ] {
+                proptest::prop_assert!((least..=most).contains(&value), "{l:?}");
+            }
+        }
     }
 }

@@ -3,7 +3,8 @@
 use heapless::Deque;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA, TUNNEL_DATA,
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
+    PARAM_VALUE_DATA, TUNNEL_DATA,
 };
 use planner_core::Point;
 use planner_core::schedule::VehiclePlan;
@@ -78,6 +79,10 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     repeats: Repeats,
     /// What the autopilot's parameters allow.
     pub(crate) autopilot_limits: AutopilotLimits,
+    /// Which of them were read, by bits, and how often they may still be requested.
+    pub(crate) limits_read: u16,
+    pub(crate) limits_tries: u8,
+    pub(crate) limits_at: Instant,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
     pub(crate) now: Instant,
@@ -134,6 +139,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             handshake: Handshake::default(),
             repeats: Repeats::default(),
             autopilot_limits: AutopilotLimits::default_of(Kind::Px4),
+            limits_read: 0,
+            limits_tries: 0,
+            limits_at: Instant::ZERO,
             guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
             mode_before: 0,
             now: Instant::ZERO,
@@ -332,6 +340,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         match link {
             Link::Autopilot => {
                 if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
+                    return false;
+                }
+                if frame.message_id == PARAM_VALUE_DATA::ID {
+                    self.handle_limit(frame);
                     return false;
                 }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);

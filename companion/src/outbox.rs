@@ -6,8 +6,8 @@ use core::fmt::Write as _;
 use heapless::{Deque, String};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
-    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_ERROR_DATA, PARAM_SET_DATA,
-    PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_ERROR_DATA,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
 };
 
 use crate::frame::{self, Header};
@@ -27,6 +27,8 @@ pub enum Outgoing {
     Mode(f32, f32),
     /// NAV_TAKEOFF to a height above home, metres.
     TakeOff(f32),
+    /// PARAM_REQUEST_READ by name.
+    ReadParameter(&'static str),
     /// PARAM_SET of a REAL32.
     Parameter(&'static str, f32),
     /// The answer to a TIMESYNC.
@@ -142,6 +144,15 @@ impl Outbox {
             Outgoing::Mode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
             Outgoing::TakeOff(height_m) => {
                 COMMAND_LONG_DATA { param7: height_m, ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0) }
+            }
+            Outgoing::ReadParameter(name) => {
+                let read = PARAM_REQUEST_READ_DATA {
+                    param_index: -1,
+                    target_system: system,
+                    target_component: crate::AUTOPILOT,
+                    param_id: name.into(),
+                };
+                return frame::encode(header, &read, out);
             }
             Outgoing::Parameter(name, param_value) => {
                 let set = PARAM_SET_DATA {

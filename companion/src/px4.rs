@@ -1,6 +1,8 @@
 //! PX4's numbers: flight modes, the setpoint mask, and the streams a companion needs. Source: PX4 1.17
 //! `px4_custom_mode.h` and what AUTOPILOTS recordings show. Another autopilot gets a module of the same shape.
 
+use crate::limits::{Limit, LimitParameter};
+
 /// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
 pub const OFFBOARD: u32 = 0x0006_0000;
 /// AUTO.LAND.
@@ -12,6 +14,17 @@ pub const RTL: u32 = 0x0504_0000;
 
 /// Position, with velocity and acceleration as feed-forward; yaw and yaw rate ignored (the heading stays as it is).
 pub const MASK_POSITION_VELOCITY_ACCELERATION: u16 = 0xC00;
+
+/// Parameters that limit what it flies, with 1.17's defaults; all are floats.
+pub const LIMITS: [LimitParameter; 7] = [
+    LimitParameter { name: "MPC_XY_VEL_MAX", limit: Limit::Speed, unit: 1.0, default: 12.0 },
+    LimitParameter { name: "MPC_Z_VEL_MAX_UP", limit: Limit::Climb, unit: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_Z_VEL_MAX_DN", limit: Limit::Descend, unit: 1.0, default: 1.5 },
+    LimitParameter { name: "MPC_ACC_HOR", limit: Limit::Accel, unit: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_ACC_UP_MAX", limit: Limit::AccelUp, unit: 1.0, default: 4.0 },
+    LimitParameter { name: "MPC_ACC_DOWN_MAX", limit: Limit::AccelDown, unit: 1.0, default: 3.0 },
+    LimitParameter { name: "MPC_JERK_AUTO", limit: Limit::Jerk, unit: 1.0, default: 4.0 },
+];
 
 /// Velocity alone: with zero, stop wherever that is.
 pub const MASK_VELOCITY: u16 = 0xDC7;

@@ -5,6 +5,9 @@ use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
 
 use crate::autopilot::Kind;
 use crate::events::Link;
+use crate::frame::Frame;
+use crate::guidance::setpoints_flow;
+use crate::limits::AutopilotLimits;
 use crate::machine::{Companion, DISARM_AFTER, ORIGIN_AGAIN};
 use crate::mission::State;
 use crate::outbox::Outgoing;
@@ -23,9 +26,14 @@ const HEARD: Duration = Duration::from_millis(1500);
 /// Streams asked for at each step while connecting.
 const SETUP_BURST: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
-/// After so long without setpoints Guided stops, seconds. ArduCopter's own 3 s would fly the last velocity on through
-/// walls while a link stalls.
-const GUID_TIMEOUT_S: f32 = 0.5;
+/// After so long without setpoints Guided stops, seconds: between these, the time in which cruise speed flies the margin.
+/// ArduCopter's own 3 s would fly the last velocity on through walls while a link stalls; the shortest are four setpoints.
+const GUID_TIMEOUT_S: (f32, f32) = (0.2, 0.5);
+/// Requests for limits, all together, and the time from one to the next.
+const LIMIT_TRIES: u8 = 80;
+const LIMIT_EVERY: Duration = Duration::from_millis(150);
+/// `MAV_PARAM_TYPE_REAL32`.
+const REAL32: u8 = 9;
 
 /// The armed bit of HEARTBEAT (1 Hz) comes this long after the ack at most.
 const ARMED_BIT: Duration = Duration::from_millis(2500);
@@ -127,10 +135,64 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Starts asking for the streams from the first.
     pub(crate) fn ask_for_streams(&mut self) {
         self.setup = 0;
+        self.ask_for_limits();
         self.streams_at = self.now + STREAMS_EVERY;
         if self.kind() == Kind::ArduPilot {
-            let timeout = Outgoing::Parameter("GUID_TIMEOUT", GUID_TIMEOUT_S);
+            let timeout = Outgoing::Parameter("GUID_TIMEOUT", self.guided_timeout_s());
             self.outboxes[Link::Autopilot as usize].push(timeout);
+        }
+    }
+
+    /// How long Guided keeps the last velocity.
+    fn guided_timeout_s(&self) -> f32 {
+        let margin_m = self.config.required_clearance_m - self.config.radius_m;
+        (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_S.0, GUID_TIMEOUT_S.1)
+    }
+
+    /// Begins to read what the autopilot's parameters allow. In flight the limits stay as they are.
+    fn ask_for_limits(&mut self) {
+        if setpoints_flow(self.state) || self.telemetry.armed {
+            return;
+        }
+        self.autopilot_limits = AutopilotLimits::default_of(self.kind());
+        self.guidance.tune(&self.config, &self.autopilot_limits);
+        (self.limits_read, self.limits_tries, self.limits_at) = (0, LIMIT_TRIES, self.now);
+    }
+
+    /// Requests the next limit that was not read.
+    fn repeat_limits(&mut self) {
+        if self.limits_tries == 0 || self.now < self.limits_at {
+            return;
+        }
+        let all = self.kind().limits();
+        let from = usize::from(self.limits_tries);
+        // In turn, so that one that does not exist holds back none.
+        let missing =
+            (from..from + all.len()).map(|i| i % all.len()).find(|i| self.limits_read & 1 << i == 0);
+        let Some(limit) = missing.and_then(|i| all.get(i)) else {
+            self.limits_tries = 0;
+            return;
+        };
+        self.limits_tries -= 1;
+        self.limits_at = self.now + LIMIT_EVERY;
+        self.outboxes[Link::Autopilot as usize].push(Outgoing::ReadParameter(limit.name));
+    }
+
+    /// PARAM_VALUE of the autopilot. Read by field: a type newer than the crate's must not hide the value.
+    pub(crate) fn handle_limit(&mut self, frame: &Frame) {
+        const ID: core::ops::Range<usize> = 8..24;
+        let p = frame.padded();
+        let value = f32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+        let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
+        let mut changed = false;
+        for (i, limit) in self.kind().limits().iter().enumerate() {
+            if limit.name.as_bytes() == name && p[24] == REAL32 && !self.telemetry.armed {
+                self.limits_read |= 1 << i;
+                changed |= self.autopilot_limits.set(limit, value);
+            }
+        }
+        if changed && !setpoints_flow(self.state) {
+            self.guidance.tune(&self.config, &self.autopilot_limits);
         }
     }
 
@@ -138,6 +200,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn repeat_requests(&mut self) {
         let (now, kind) = (self.now, self.kind());
         let heard = self.telemetry.heartbeat_at.is_some();
+        if heard {
+            self.repeat_limits();
+        }
         let silent = self.telemetry.heartbeat_age(now) > HEARD;
         if !silent && self.telemetry.position_age(now) > STREAMS_LOST && now >= self.streams_at {
             self.ask_for_streams();

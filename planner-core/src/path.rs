@@ -168,8 +168,8 @@ pub struct TrackConfig {
     pub accel_mps2: f32,
     /// The same upwards and downwards, m/s².
     pub accel_z_mps2: f32,
-    /// Time in which the autopilot answers to a sudden change of velocity, seconds: PX4's velocity loop with its default
-    /// gain `MPC_XY_VEL_P_ACC` = 1.8 1/s.
+    /// Time in which the autopilot answers to a change of velocity in a corner, seconds. PX4's velocity loop takes 0.55 s
+    /// (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden one; sent smoothly, with its acceleration, it leaves less to make up for.
     pub response_s: f32,
     /// Body radius, metres: what of an edge's clearance is already taken.
     pub radius_m: f32,
@@ -191,7 +191,7 @@ impl Default for TrackConfig {
             descend_mps: 2.0,
             accel_mps2: 1.5,
             accel_z_mps2: 1.5,
-            response_s: 0.55,
+            response_s: 0.35,
             radius_m: 0.3,
             deviation_min_m: 0.03,
             deviation_max_m: 0.25,
