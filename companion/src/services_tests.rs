@@ -173,6 +173,8 @@ fn time_and_version_are_told_on_either_link() {
         let heard = ground.ask(link, &TIMESYNC_DATA { tc1: 0, ts1: 42 });
         let answer = heard.iter().find_map(Frame::decode::<TIMESYNC_DATA>).expect("answered");
         assert_eq!((answer.tc1, answer.ts1), (ground.bench.now.micros() as i64 * 1000, 42));
+        let frame = heard.iter().find(|f| f.message_id == TIMESYNC_DATA::ID).unwrap();
+        assert_eq!((frame.padded()[16], frame.padded()[17]), GROUND, "an autopilot does not forward its own");
         assert!(ground.ask(link, &TIMESYNC_DATA { tc1: 5, ts1: 42 }).iter().all(|f| f.message_id != 111));
         let request = COMMAND_LONG_DATA {
             command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
@@ -185,6 +187,59 @@ fn time_and_version_are_told_on_either_link() {
         let version = heard.iter().find_map(Frame::decode::<AUTOPILOT_VERSION_DATA>).expect("told");
         assert!(version.capabilities.contains(MavProtocolCapability::MAV_PROTOCOL_CAPABILITY_FTP));
         assert!(version.flight_sw_version > 0);
+    }
+}
+
+#[test]
+fn a_flood_of_each_question_is_answered_at_its_rate() {
+    for (link, sender, seconds) in
+        [(Link::Swarm, 9, 60), (Link::Autopilot, SYSTEM, 60), (Link::Autopilot, 9, 60)]
+    {
+        let mut bench = Bench::new(config());
+        bench.until(State::Ready, 6.0);
+        let (mut counts, mut framer) = ([0u32; 3], Framer::new());
+        let mut out = [0; frame::MAX_SENT];
+        for i in 0..seconds * 20u32 {
+            for k in 0..30u32 {
+                let header = Header { system: sender, component: 7, sequence: (i * 30 + k) as u8 };
+                let length = match k % 3 {
+                    0 => frame::encode(header, &TIMESYNC_DATA { tc1: 0, ts1: 9 }, &mut out),
+                    1 => {
+                        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: 191 };
+                        frame::encode(header, &list, &mut out)
+                    }
+                    _ => {
+                        let start = COMMAND_LONG_DATA {
+                            command: MavCmd::MAV_CMD_MISSION_START,
+                            target_system: SYSTEM,
+                            target_component: 191,
+                            ..Default::default()
+                        };
+                        frame::encode(header, &start, &mut out)
+                    }
+                };
+                bench.companion.handle_bytes(link, bench.now, &out[..length]);
+            }
+            loop {
+                let length = bench.companion.poll_transmit(link, &mut out);
+                if length == 0 {
+                    break;
+                }
+                let frame = framer.next(bench.now, &mut &out[..length]).expect("a frame");
+                for (count, id) in
+                    counts.iter_mut().zip([TIMESYNC_DATA::ID, PARAM_VALUE_DATA::ID, COMMAND_ACK_DATA::ID])
+                {
+                    *count += u32::from(frame.message_id == id);
+                }
+            }
+            bench.tick();
+        }
+        assert_eq!(bench.state(), State::Ready);
+        let rates: [u32; 3] = if sender == SYSTEM { [2, 5, 5] } else { [1, 1, 1] };
+        for (count, rate) in counts.into_iter().zip(rates) {
+            assert!(count <= seconds * rate + 20, "{link:?} {sender}: {counts:?}");
+            assert!(count >= seconds / 3, "{link:?} {sender}: {counts:?}");
+        }
     }
 }
 
