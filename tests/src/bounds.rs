@@ -87,7 +87,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("store::Store::mount", "the bank read once: CRC of the roadmap, heads of the journal"),
     ("Companion::new", "v"),
     ("Companion::mount", "constant: the store is moved in"),
-    ("Companion::handle_bytes, a frame", "its length, one row of the table · 4, 7 parameters"),
+    ("Companion::handle_bytes, a frame", "its length, one row of the table · 4, 8 parameters"),
     ("Companion::handle_bytes, 256 hostile bytes", "the bytes × a frame's length"),
     ("Companion::handle_timeout, 32 speak", "advice, w, v, 4 rows of the table"),
     (
