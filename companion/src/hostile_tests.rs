@@ -32,7 +32,8 @@ fn nuisance(bench: &mut Bench, kind: u8, seed: u8) -> Vec<u8> {
             let at = usize::from(seed) % wrong.len();
             wrong[at] ^= 1 << (seed % 8);
         }
-        1 => wrong.truncate(usize::from(seed) % wrong.len()),
+        // Without its CRC: a next frame that begins with the one byte cut would complete it.
+        1 => wrong.truncate(usize::from(seed) % (wrong.len() - 2)),
         2 => {
             let now = bench.heartbeat();
             return [now.clone(), now].concat();

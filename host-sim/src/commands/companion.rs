@@ -49,6 +49,8 @@ pub struct Args {
 const NAP: Duration = Duration::from_millis(1);
 /// After its end it goes on telling the others and ground stations so, as a board does for good.
 const FAREWELL: Duration = Duration::from_secs(2);
+/// A vehicle whose autopilot is silent for longer cannot be helped.
+const HEARD: companion::Duration = companion::Duration::from_secs(5);
 
 /// Runs until the mission ends. Exit code 0 if it was flown to its end.
 ///
@@ -128,7 +130,11 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             companion = start(&config, &mut flash)?;
         }
         let state = companion.state();
-        if !is_finished(state) {
+        // In the air there may be something left to do: whoever flies it may hand it back.
+        let t = companion.telemetry();
+        let heard = t.heartbeat_age(now()) < HEARD;
+        let flies = t.armed && t.on_ground == Some(false) && heard;
+        if !is_finished(state) || flies {
             finished_at = None;
         } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL {
             return Ok(if state == State::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE });
