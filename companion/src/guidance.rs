@@ -352,11 +352,7 @@ impl Guidance {
             let _ = back.push(waypoint.position, clearance_m);
             clearance_m = waypoint.clearance_m;
         }
-        let tracker = Tracker {
-            along_m: from_m - self.tracker.along_m,
-            speed_mps: -self.tracker.speed_mps,
-            ..Tracker::default()
-        };
+        let tracker = Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
         let (phase, leg) = (self.phase, self.leg.take());
         *path = back;
         self.begin_path(now);

@@ -230,9 +230,8 @@ impl Guidance {
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
                 // Past a stranger it goes on in the same stop, slowly.
-                if now - since >= CLEAR && !self.filter.passes_stranger(now) {
-                    self.filter.reset_stop();
-                } else if self.filter.passes_stranger(now) && now - since >= STRANGER {
+                let clear_for = if self.filter.passes_stranger(now) { STRANGER } else { CLEAR };
+                if now - since >= clear_for {
                     self.filter.reset_stop();
                 }
             }
