@@ -7,7 +7,7 @@
 //! | separation from one that stands | safety distance + tracking + estimate + gust | it stands where the referee sees it, but its path ended where it believed to be |
 //! | tracking | [`companion::margins::TRACKING_M`] | beside the path by the own estimate |
 //! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`STRAY_M`] are measured with it |
-//! | estimate, `recorded`, PX4 | 0.9 m | three times the 0.3 m it reports; errors to 0.75 m across lie within, heights to 1.1 m do not |
+//! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, seldom and not beside an error of tracking |
 //! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |
 
@@ -27,7 +27,7 @@ pub const STRAY_PER_GUST_S: f32 = 0.05;
 pub fn estimate_m(estimator: Estimator, autopilot: Personality) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.0,
-        (Estimator::Recorded, Personality::Px4) => 0.9,
+        (Estimator::Recorded, Personality::Px4) => 0.65,
         (Estimator::Recorded, Personality::Ardupilot) => 0.12,
     }
 }

@@ -31,6 +31,7 @@ use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
+use crate::margins;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
@@ -188,7 +189,12 @@ fn simulate(
     }
     let took_s = began.elapsed().as_secs_f64();
     let vehicles: Vec<_> = (0..members.len())
-        .map(|i| vehicle_result(&members[i], &plan.flights[i], monitor.flown_m(i), nearest_goal_m[i], t_s))
+        .map(|i| {
+            // As far as the estimate is wrong, the vehicle cannot know.
+            let error_m = margins::estimate_m(settings.estimator, scenario.vehicles[i].personality);
+            let nearest_goal_m = nearest_goal_m[i] - error_m;
+            vehicle_result(&members[i], &plan.flights[i], monitor.flown_m(i), nearest_goal_m, t_s)
+        })
         .collect();
     let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
     let all_served = served == mission.goals.len().min(members.len());
