@@ -781,6 +781,10 @@ fn nearest_m<const W: usize>(path: &Path<W>, place: &Point, near_m: f32, window_
 fn correction(position: &Point, velocity: &Point, telemetry: &Telemetry) -> Point {
     let off = (position - telemetry.position) * HOLD_PER_S2 + (velocity - telemetry.velocity) * DAMP_PER_S;
     let across = libm::hypotf(off.x, off.y);
+    // A reported velocity near the largest number overflows: nothing is corrected by it.
+    if !across.is_finite() {
+        return Point::zeros();
+    }
     let share = if across > HOLD_MOST_MPS2 { HOLD_MOST_MPS2 / across } else { 1.0 };
     Point::new(off.x * share, off.y * share, 0.0)
 }
