@@ -462,7 +462,7 @@ impl Guidance {
             return true;
         }
         let kind = scene.telemetry.kind.unwrap_or_default();
-        let taken = matches!(state, State::PilotControl | State::Land | State::Disarm)
+        let taken = matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.lost |= !known || state == State::PositionLost;
         if known && (taken || !self.door.is_live()) {
@@ -812,5 +812,6 @@ pub fn setpoints_flow(state: State) -> bool {
             | PilotReturned
             | CancelStart
             | Disarm
+            | LandingHeld
     )
 }

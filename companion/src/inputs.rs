@@ -29,7 +29,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 !offboard && t.custom_mode != self.mode_before
             }
             // Disarming after a landing the autopilot chooses a mode of its own.
-            State::Land | State::Disarm => !offboard && t.custom_mode != kind.land_mode() && t.armed,
+            State::Land | State::LandingHeld | State::Disarm => {
+                !offboard && t.custom_mode != kind.land_mode() && t.armed
+            }
             _ => !offboard,
         };
         let climb_m = self.plan.as_ref().map_or(0.0, |plan| plan.climb_m);
@@ -103,6 +105,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             battery_low: charge_below(self.config.battery_low_percent),
             battery_critical: charge_below(self.config.battery_low_percent / 2),
+            column_blocked: self.guidance.filter.column_blocked_for(now),
+            column_clear: self.guidance.filter.column_clear_for(now),
+            yielded: self.guidance.filter.yielded_for(now),
+            hindered: self.guidance.filter.hindered_for(now),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
             outside: self.guidance.stands_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),

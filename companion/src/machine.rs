@@ -574,6 +574,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
             Action::HoldHere => self.guidance.hold_at(position),
+            Action::HoldOver => self.retry_at = now,
             Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
             Action::AskLand => self.ask_land(from),
             Action::AskDisarm if to == State::Disarm => self.retry_at = now + DISARM_AFTER,

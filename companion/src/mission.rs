@@ -65,6 +65,8 @@ pub enum State {
     PilotReturned,
     /// The start was cancelled or paused after arming was requested: holds on the pad until the motors are surely off.
     CancelStart,
+    /// A landing was stopped since another vehicle is below, or may be: holds until the column is free.
+    LandingHeld,
 }
 
 impl State {
@@ -97,6 +99,7 @@ impl State {
         Self::Stopping,
         Self::PilotReturned,
         Self::CancelStart,
+        Self::LandingHeld,
     ];
 }
 
@@ -137,7 +140,7 @@ impl Interrupted {
         // A request to the shell, and a disarming, begin again.
         let kept = match from {
             Replanning => Blocked,
-            Disarm => Land,
+            Disarm | LandingHeld => Land,
             other => other,
         };
         if Self::is_loss(to) && !Self::is_loss(from) {
@@ -291,6 +294,16 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
     ReturnInClimb,
+    /// The safety filter finds another vehicle in the column to the ground.
+    LandingBlocked,
+    /// It has found none for the limit.
+    LandingClear,
+    /// Before the take-off: the column above has not been free for the limit.
+    ColumnBlocked,
+    /// The safety filter has made this vehicle yield for the limit.
+    Yielded,
+    /// The safety filter has kept this vehicle from going on for the limit.
+    Hindered,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
     /// Battery charge below the configured limit, and no neighbour below.
@@ -342,6 +355,8 @@ pub enum Action {
     AskTakeOff,
     /// Begin the climb.
     BeginClimb,
+    /// Hold where the landing was stopped, and ask for Offboard or Guided, again every second.
+    HoldOver,
     /// Let the reference run along the path.
     RunPath,
     /// Brake the reference along the path.
@@ -468,6 +483,14 @@ pub struct Inputs {
     pub at_goal: bool,
     /// The way back to the path is free.
     pub near_path: bool,
+    /// Time that the column to the ground, or before take-off to the top, was not free of other vehicles.
+    pub column_blocked: Duration,
+    /// Time that it was.
+    pub column_clear: Duration,
+    /// Time for which the safety filter has made it yield.
+    pub yielded: Duration,
+    /// Time for which the safety filter has kept it from going on.
+    pub hindered: Duration,
     /// Battery charge below the configured limit.
     pub battery_low: bool,
     /// Battery charge below half of it.
@@ -556,6 +579,11 @@ impl Guard {
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
+            Self::LandingBlocked => i.column_blocked > Duration::default(),
+            Self::LandingClear => i.column_clear >= limit,
+            Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
+            Self::Yielded => i.yielded >= limit,
+            Self::Hindered => i.hindered >= limit,
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside && i.room_below,

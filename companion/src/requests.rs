@@ -14,6 +14,8 @@ use crate::outbox::Outgoing;
 use crate::telemetry::{Ack, Telemetry};
 use crate::time::{Duration, Instant};
 
+/// Before a landing is requested the safety filter has looked down: two steps.
+const LOOKS_DOWN: Duration = Duration::from_millis(100);
 const RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Longer than ArduCopter takes to spin up and lift off (2.3 s).
 const TAKE_OFF_AFTER: Duration = Duration::from_millis(4000);
@@ -227,7 +229,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             return;
         }
-        if now < self.retry_at {
+        // The safety filter looks down before a landing is requested.
+        let in_state = now - self.entered_at;
+        let looks =
+            self.state == State::Land && (in_state < LOOKS_DOWN || !self.guidance.filter.column_clear());
+        if now < self.retry_at || looks {
             return;
         }
         let autopilot = &mut self.outboxes[Link::Autopilot as usize];
@@ -238,6 +244,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         match self.state {
             State::Engaging => autopilot.push(change_to(kind.setpoint_mode())),
+            // HEARTBEAT may not show the mode yet in which a landing was requested.
+            State::LandingHeld if in_state < HEARD || self.telemetry.custom_mode != kind.setpoint_mode() => {
+                autopilot.push(change_to(kind.setpoint_mode()));
+            }
             State::CancelStart => autopilot.push(Outgoing::Arm(false)),
             State::TakeOff => {
                 self.retry_at = now + TAKE_OFF_AFTER;

@@ -385,6 +385,59 @@ fn every_row_has_its_scene() {
         Aborted,
         60.0,
     );
+    // Somebody hovers over the pad.
+    scene(
+        Bench::new(two_vehicles()),
+        &|b| {
+            b.neighbour = Some((Point::new(8.0, 12.0, 3.0), FLYING | ON_PLAN, 0.0, 5));
+            b.until(Ready, 6.0);
+            b.start();
+            b.run(25.0);
+        },
+        Scheduled,
+        1.0,
+    );
+    // On its way back it yields to one that follows the plan, and lands in the end.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.run(3.0);
+            back(b);
+            b.run(0.2);
+            b.neighbour = Some((Point::new(7.0, 12.0, 1.5), FLYING | ON_PLAN, 0.0, 5));
+        },
+        Aborted,
+        100.0,
+    );
+    // One that flies a way of its own stays in front of it.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.neighbour =
+                Some((Point::new(14.0, 12.0, 1.5), FLYING | ON_PLAN | crate::intent::DETOURS, 0.0, 5));
+        },
+        Aborted,
+        140.0,
+    );
+    // One is below where it lands.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.run(2.0);
+            b.neighbour = Some((b.enu + Point::new(1.0, 0.0, -2.5), FLYING | ON_PLAN, 0.0, 5));
+            b.run(0.3);
+            land(b);
+            b.until(LandingHeld, 8.0);
+            b.run(65.0);
+            assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
+            b.neighbour = Some((Point::new(8.0, 30.0, 1.5), FLYING | ON_PLAN, 0.0, 5));
+        },
+        Aborted,
+        30.0,
+    );
     // Nobody hears it on the ground.
     scene(
         Bench::new(two_vehicles()),

@@ -54,16 +54,31 @@ pub(crate) const STARTED: &[State] = &[Scheduled, PadReplanning, Streaming, Enga
 /// Started, on the pad.
 pub(crate) const ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
 /// In the air, or about to be, under our setpoints.
-pub(crate) const FLYING: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, AutopilotSilent, PositionLost];
+pub(crate) const FLYING: &[State] = &[
+    TakeOff,
+    Climb,
+    Follow,
+    Paused,
+    Alone,
+    Blocked,
+    Replanning,
+    Stopping,
+    LandingHeld,
+    AutopilotSilent,
+    PositionLost,
+];
 /// In the air, with links and position as they should be.
-pub(crate) const SOUND: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping];
+pub(crate) const SOUND: &[State] =
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, LandingHeld];
 /// The same, on its path under way or stopped: it can stop along it.
 pub(crate) const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning];
 
+/// The same, not yet landing.
+pub(crate) const IN_ROUTE: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping];
+
 /// In the air, and the autopilot was heard.
 pub(crate) const LINKED: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, PositionLost];
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, LandingHeld, PositionLost];
 
 /// The mission.
 #[rustfmt::skip]
@@ -110,8 +125,8 @@ pub static TABLE: &[Row] = &[
     warn(ON_PATH,             G::BatteryLow,       NOW,    Stopping,        A::BrakeOnPath, "Battery low: landing"),
     warn(&[TakeOff, Climb, PilotReturned], G::BatteryCritical, NOW,    Land,            A::AskLand,     "Battery critical: landing"),
     warn(&[TakeOff, Climb, PilotReturned], G::BatteryLow, NOW,    Land,            A::AskLand,     "Battery low: landing"),
-    warn(SOUND,               G::EstimateVague,    s(30),  Land,            A::AskLand,     "Estimate worse than margin for 30 s: landing"),
-    warn(SOUND,               G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
+    warn(IN_ROUTE,            G::EstimateVague,    s(30),  Land,            A::AskLand,     "Estimate worse than margin for 30 s: landing"),
+    warn(IN_ROUTE,            G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
     info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
     info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
     info(&[Paused],           G::ReturnInClimb,    NOW,    Land,            A::AskLand,     "Landing on the pad"),
@@ -142,6 +157,7 @@ pub static TABLE: &[Row] = &[
     info(&[PadReplanning],    G::DetourReady,      NOW,    Scheduled,       A::None,        "A way around is found"),
     warn(&[PadReplanning],    G::DetourFailed,     NOW,    Scheduled,       A::None,        "No way around yet"),
     warn(&[PadReplanning],    G::Elapsed,          s(5),   Scheduled,       A::MissDetour,  "The way around is late"),
+    warn(&[Scheduled],        G::ColumnBlocked,    s(20),  Scheduled,       A::None,        "Vehicle above the pad: start waits"),
     warn(&[Scheduled],        G::NeighboursSilent, s(10),  Scheduled,       A::None,        "No neighbour hears us: start waits"),
     info(&[Scheduled],        G::GatesOpen,        NOW,    Streaming,       A::HoldHere,    ""),
     info(&[Streaming],        G::Elapsed,          s(1),   Engaging,        A::AskOffboard, ""),
@@ -159,6 +175,8 @@ pub static TABLE: &[Row] = &[
     warn(&[TakeOff],          G::Elapsed,          s(12),  Land,            A::AskLand,     "Take-off takes too long: landing"),
     info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
     warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
+    warn(&[Follow, Blocked],  G::Yielded,          s(60),  Stopping,        A::BrakeOnPath, "Yielded for 60 s: landing"),
+    warn(&[Follow, Blocked],  G::Hindered,         s(90),  Stopping,        A::BrakeOnPath, "Vehicle in the way for 90 s: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
     info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
     warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
@@ -183,6 +201,9 @@ pub static TABLE: &[Row] = &[
     warn(&[PositionLost],     G::Elapsed,          s(3),   Land,            A::AskLand,     "Position still lost: landing"),
     info(&[Land, Disarm],     G::DisarmedAtGoal,   NOW,    Done,            A::ForgetStart, "Landed"),
     warn(&[Land, Disarm],     G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed short of the goal: mission over"),
+    warn(&[Land],             G::LandingBlocked,   NOW,    LandingHeld,     A::HoldOver,    "Vehicle below: landing stopped"),
+    info(&[LandingHeld],      G::LandingClear,     s(1),   Land,            A::AskLand,     "Clear below: landing"),
+    warn(&[LandingHeld],      G::Elapsed,          s(60),  LandingHeld,     A::HoldOver,    "Vehicle still below: landing waits"),
     info(&[Land],             G::OnGround,         NOW,    Disarm,          A::AskDisarm,   ""),
     warn(&[Land],             G::Elapsed,          s(120), Land,            A::AskLand,     "Landing takes long"),
     warn(&[Disarm],           G::InAir,            NOW,    Land,            A::AskLand,     "Still in the air: landing"),

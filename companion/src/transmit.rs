@@ -171,7 +171,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Replanning
                     | Paused
             )
-            || matches!(self.state, Land | Disarm | Done) && self.guidance.at_goal(&self.scene());
+            || matches!(self.state, Land | LandingHeld | Disarm | Done)
+                && self.guidance.at_goal(&self.scene());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.is_out();
         let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
@@ -220,7 +221,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 add(setpoint);
                 first.into_iter().for_each(add);
             }
-            Land => {
+            Land | LandingHeld => {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }

@@ -12,6 +12,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::path::Path;
 use planner_core::safety::{self, Bounds, Braking, REACTION_S, Set};
+use planner_core::schedule::VehiclePlan;
 
 use super::{Guidance, Scene};
 use crate::mission::State;
@@ -41,6 +42,14 @@ const SLOW_SHARE: f32 = 0.15;
 const HULLS_M: f32 = 0.3;
 /// What a vehicle may fly faster than its reference and yet stop with it, m/s.
 const SWAY_MPS: f32 = 0.3;
+/// A stop this near is a standstill, metres.
+const WAITS_M: f32 = 0.5;
+/// What kept the vehicle from going on within this time still does.
+const LATELY: Duration = Duration::from_millis(500);
+/// A landing that waited for so long needs no more room than the hulls.
+const LANDS_LATE: Duration = Duration::from_secs(60);
+/// A vehicle that flew on for so long was not kept from going on.
+const FREE: Duration = Duration::from_secs(5);
 /// The vehicle that yields in a descent flies back up after this.
 const BACK_UP: Duration = Duration::from_secs(1);
 
@@ -56,10 +65,18 @@ pub(crate) struct Filter {
     /// Whether this vehicle is the one that yields.
     yields: bool,
     stranger: bool,
+    /// Whether the sets met in the last step.
+    meets: bool,
     /// Whether it looked back along the path.
     back: bool,
-    /// Whether the way to the ground is free.
+    /// Since when the column is, or is not, free.
     column_clear: bool,
+    column_since: Option<Instant>,
+    /// Since when a landing has been waiting, now and then.
+    held_since: Option<Instant>,
+    /// Since when it has kept the vehicle from going on for good, and when it last did.
+    hindered_since: Option<Instant>,
+    hindered_at: Instant,
     /// How often it stopped the vehicle.
     activations: u32,
 }
@@ -90,12 +107,12 @@ impl Filter {
 
     /// For how long it has kept the vehicle stopped although it goes first.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
-        if self.yields { Duration::default() } else { self.stopped_for(now) }
+        if self.yields { Duration::default() } else { self.hindered_for(now) }
     }
 
     /// For how long it has made the vehicle yield.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
-        if self.yields { self.stopped_for(now) } else { Duration::default() }
+        if self.yields { self.hindered_for(now) } else { Duration::default() }
     }
 
     /// Whether it looked back along the path in this step.
@@ -113,6 +130,27 @@ impl Filter {
         self.activations
     }
 
+    /// For how long the column has not been free.
+    pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
+        self.column_since.filter(|_| !self.column_clear).map_or(Duration::default(), |at| now - at)
+    }
+
+    /// For how long the column has been free.
+    pub(crate) fn column_clear_for(&self, now: Instant) -> Duration {
+        self.column_since.filter(|_| self.column_clear).map_or(Duration::default(), |at| now - at)
+    }
+
+    /// For how long a landing has been waiting, now and then.
+    fn held_for(&self, now: Instant) -> Duration {
+        self.held_since.map_or(Duration::default(), |at| now - at)
+    }
+
+    /// For how long it has kept the vehicle from going on, stops and short flights between them together.
+    pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
+        let since = self.hindered_since.filter(|_| now - self.hindered_at < LATELY);
+        since.map_or(Duration::default(), |at| now - at)
+    }
+
     /// Whether the column to the ground was free in the last step.
     pub(crate) fn column_clear(&self) -> bool {
         self.column_clear
@@ -124,7 +162,7 @@ impl Filter {
 
     /// Whether it stops the vehicle now.
     pub(super) fn stops(&self, now: Instant) -> bool {
-        self.is_stopped() && !self.passes_stranger(now)
+        self.is_stopped() && (self.meets || !self.passes_stranger(now))
     }
 
     /// Share of the nominal speed that it leaves.
@@ -138,7 +176,7 @@ impl Filter {
 
     /// Whether the vehicle flies back up its column.
     pub(super) fn backs_up(&self, now: Instant) -> bool {
-        self.yielded_for(now) >= BACK_UP
+        self.yields && self.stopped_for(now) >= BACK_UP
     }
 }
 
@@ -156,14 +194,17 @@ impl Guidance {
         neighbours: &Neighbours<V>,
         now: Instant,
     ) {
-        self.filter.column_clear = true;
-        let Some(plan) = scene.plan.filter(|_| self.deconflict.method == Method::Priority) else { return };
+        let priority = self.deconflict.method == Method::Priority;
+        let Some(plan) = scene.plan.filter(|_| priority) else {
+            self.filter = Filter { column_clear: true, ..Filter::default() };
+            return;
+        };
         let position = &scene.telemetry.position;
         let ground_m = self.ground_m(plan).min(position.z);
         let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
             State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
-            State::Land => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
+            State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
             State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.door.velocity().z.max(0.0) },
             State::Follow if self.descends() => {
                 Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) }
@@ -180,11 +221,14 @@ impl Guidance {
             }
             _ => Way::Stands,
         };
+        if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
+            (self.filter.column_clear, self.filter.column_since, self.filter.held_since) = (true, None, None);
+        }
         if matches!(way, Way::Stands) {
             self.filter.reset();
             return;
         }
-        let whole_column = matches!(state, State::Scheduled | State::Land);
+        let whole_column = matches!(state, State::Scheduled | State::Land | State::LandingHeld);
         let back = matches!(way, Way::Path { back: true });
         if back != self.filter.back {
             self.filter.reset_stop();
@@ -212,11 +256,12 @@ impl Guidance {
         };
         let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if whole_column {
-            self.filter.column_clear = found.is_none();
+            self.filter.note_column(found.is_none(), now);
             self.filter.reset_stop();
             self.filter.blocker = found.map_or(0, |found| found.id);
             return;
         }
+        self.filter.meets = found.is_some();
         match found {
             Some(found) => {
                 if !stopped {
@@ -224,6 +269,7 @@ impl Guidance {
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
                 self.filter.clear_since = None;
+                self.filter.hinder(now);
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
                 self.filter.stranger = found.stranger;
             }
@@ -235,7 +281,30 @@ impl Guidance {
                     self.filter.reset_stop();
                 }
             }
-            None => {}
+            None => self.count_standstill(state, scene, now),
+        }
+    }
+
+    /// A standstill before a vehicle that no gate waits for counts as one of the filter's.
+    fn count_standstill<const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        now: Instant,
+    ) {
+        let id = self.advice.waiting_for;
+        let along_m = self.tracker.along_m;
+        let gate = |plan: &VehiclePlan<W, G>| {
+            let near = |at_m: f32| (along_m - WAITS_M..along_m + WAITS_M).contains(&at_m);
+            plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
+        };
+        if state == State::Follow
+            && id != 0
+            && self.advice.stop_within_m < WAITS_M
+            && !scene.plan.is_some_and(gate)
+        {
+            self.filter.hinder(now);
+            self.filter.yields = id < scene.id;
         }
     }
 
@@ -282,7 +351,7 @@ impl Guidance {
         let safety_m = self.deconflict.safety_distance_m;
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
-        let lands = state == State::Land;
+        let lands = matches!(state, State::Land | State::LandingHeld);
         let mut near = 0;
         for i in 0..neighbours.len() {
             let Some(mut met) = neighbours.met(i, now) else { continue };
@@ -291,7 +360,14 @@ impl Guidance {
                 (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
-            let apart_m = if met.stranger && self.filter.passes_stranger(now) {
+            let held = self.filter.held_for(now);
+            if lands && met.stranger && held >= LANDS_LATE {
+                // A place that anybody may claim keeps no vehicle in the air.
+                continue;
+            }
+            let rests = met.heard.grounded && held >= LANDS_LATE;
+            let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
+            let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
             } else if met.heard.grounded {
                 safety_m
@@ -327,12 +403,12 @@ impl Guidance {
         scene: &Scene<'_, W, G>,
         met: &Met<'_>,
     ) -> bool {
-        let on_plan = !self.returning && !scene.detours && state != State::Land;
+        let on_plan = !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld);
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
         }
         let along_m = if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY };
-        let waits = |plan: &planner_core::schedule::VehiclePlan<W, G>| {
+        let waits = |plan: &VehiclePlan<W, G>| {
             plan.gates.iter().any(|gate| gate.id == met.id && gate.at_m >= along_m)
         };
         if on_plan && scene.plan.is_some_and(waits) && self.advice.waiting_for == met.id {
@@ -350,6 +426,23 @@ struct Found {
 }
 
 impl Filter {
+    fn hinder(&mut self, now: Instant) {
+        if now - self.hindered_at > FREE {
+            self.hindered_since = None;
+        }
+        self.hindered_since.get_or_insert(now);
+        self.hindered_at = now;
+    }
+
+    fn note_column(&mut self, clear: bool, now: Instant) {
+        if !clear {
+            self.held_since.get_or_insert(now);
+        }
+        if clear != self.column_clear || self.column_since.is_none() {
+            (self.column_clear, self.column_since) = (clear, Some(now));
+        }
+    }
+
     fn reset_stop(&mut self) {
         (self.stopped_since, self.clear_since) = (None, None);
         (self.yields, self.stranger) = (false, false);
