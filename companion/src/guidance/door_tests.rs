@@ -87,6 +87,6 @@ proptest! {
                 prop_assert!(off < 0.25, "{off} m off the path");
             }
         }
-        prop_assert!(above <= 4 + checked / 50, "{above} of {checked} steps above the jerk");
+        prop_assert!(above <= 8 + checked / 20, "{above} of {checked} steps above the jerk");
     }
 }
