@@ -4,7 +4,7 @@
 //! executor for thread mode sleeps by WFE, which QEMU does not emulate: it would never sleep.)
 #![no_std]
 #![no_main]
-#![expect(unsafe_code, reason = "the handler of faults")]
+#![expect(unsafe_code, reason = "the handler of faults, and where a static lies")]
 
 use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::{ReadFlash, Store};
@@ -31,7 +31,8 @@ const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
 /// What a board says to which its mission gives nothing to do.
 const STRANGER: &str = "This system id is not in the mission: no plan";
 
-static SHELL: ConstStaticCell<Shell> = ConstStaticCell::new(Shell::new());
+#[cfg_attr(any(feature = "nucleo-h743", feature = "qemu"), unsafe(link_section = ".dtcm"))]
+static SHELL: StaticCell<Shell> = StaticCell::new();
 static MEMORY: ConstStaticCell<Memory> = ConstStaticCell::new(Memory::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION]> = ConstStaticCell::new([0; MISSION]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
@@ -101,7 +102,7 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
     if is_stranger {
         companion.say(true, STRANGER);
     }
-    let shell = SHELL.take();
+    let shell = SHELL.init_with(Shell::new);
     shell.start(companion);
     let shell: &'static Shell = shell;
     start_links(links, shell, known.is_none(), autopilot, swarm);
