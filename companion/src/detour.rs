@@ -157,6 +157,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.filter.is_stopped() && self.telemetry.velocity.norm() < STANDING_MPS
             }
             State::Blocked => stands,
+            // It goes on by itself only once its column is free.
+            State::LandingHeld => self.telemetry.velocity.norm() < STANDING_MPS,
             _ => false,
         }
     }

@@ -42,7 +42,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let fence = self.config.geofence;
         let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
-        let charge_below = |percent| (0..percent).contains(&t.battery_percent);
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
         Inputs {
@@ -103,10 +102,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 (_, State::PositionLost) => self.guidance.near_path(&scene, LOST_WINDOW_M),
                 _ => false,
             },
-            battery_low: charge_below(self.config.battery_low_percent),
-            battery_critical: charge_below(self.config.battery_low_percent / 2),
+            battery_low: t.charge_below(self.config.battery_low_percent),
+            battery_critical: t.charge_below(self.config.battery_low_percent / 2),
             column_blocked: self.guidance.filter.column_blocked_for(now),
             column_clear: self.guidance.filter.column_clear_for(now),
+            must_land: self.must_land(),
+            can_turn_back: self.guidance.along_m() > 0.0 && !self.guidance.returning,
             yielded: self.guidance.filter.yielded_for(now),
             hindered: self.guidance.filter.hindered_for(now),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
@@ -119,5 +120,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             underneath: self.underneath(),
             standing,
         }
+    }
+
+    /// Whether it comes down whatever is below: with a battery that is nearly empty, or no place known to hold.
+    pub(crate) fn must_land(&self) -> bool {
+        let t = &self.telemetry;
+        t.charge_below(self.config.battery_low_percent / 2)
+            || t.origin_moved
+            || t.position_age(self.now) >= FRESH
     }
 }

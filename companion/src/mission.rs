@@ -298,6 +298,8 @@ pub enum Guard {
     LandingBlocked,
     /// It has found none for the limit.
     LandingClear,
+    /// It has found one for the limit, and the path leads back to the pad.
+    NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
     /// The safety filter has made this vehicle yield for the limit.
@@ -487,6 +489,10 @@ pub struct Inputs {
     pub column_blocked: Duration,
     /// Time that it was.
     pub column_clear: Duration,
+    /// On its path, and not on the way back yet.
+    pub can_turn_back: bool,
+    /// It comes down in any case: the battery is nearly empty, or it does not know where it would hold.
+    pub must_land: bool,
     /// Time for which the safety filter has made it yield.
     pub yielded: Duration,
     /// Time for which the safety filter has kept it from going on.
@@ -579,7 +585,8 @@ impl Guard {
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
-            Self::LandingBlocked => i.column_blocked > Duration::default(),
+            Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
+            Self::NoRoomToLand => i.column_blocked >= limit && i.offboard && i.can_turn_back,
             Self::LandingClear => i.column_clear >= limit,
             Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
             Self::Yielded => i.yielded >= limit,

@@ -205,6 +205,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::ReturnCommanded => i.turn_back = true,
         G::LandingBlocked => i.column_blocked = long,
         G::LandingClear => i.column_clear = long,
+        G::NoRoomToLand => (i.column_blocked, i.offboard, i.can_turn_back) = (long, true, true),
         G::ColumnBlocked => (i.column_blocked, i.in_state) = (long, long),
         G::Yielded => (i.yielded, i.hindered) = (long, long),
         G::Hindered => i.hindered = long,

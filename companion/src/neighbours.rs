@@ -215,6 +215,8 @@ pub(crate) struct Met<'a> {
     pub(crate) on_plan: bool,
     /// Whether it has stood for a while.
     pub(crate) stands: bool,
+    /// Whether it has been silent for so long that it counts as lost.
+    pub(crate) lost: bool,
     /// What its set follows from.
     pub(crate) heard: Heard<'a>,
 }
@@ -442,6 +444,7 @@ impl<const V: usize> Neighbours<V> {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
+            lost: dead,
             stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
             heard,
         })

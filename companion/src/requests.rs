@@ -233,7 +233,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let in_state = now - self.entered_at;
         let looks =
             self.state == State::Land && (in_state < LOOKS_DOWN || !self.guidance.filter.column_clear());
-        if now < self.retry_at || looks {
+        if now < self.retry_at || (looks && !self.must_land()) {
             return;
         }
         let autopilot = &mut self.outboxes[Link::Autopilot as usize];

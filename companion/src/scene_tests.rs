@@ -431,9 +431,27 @@ fn every_row_has_its_scene() {
             b.run(0.3);
             land(b);
             b.until(LandingHeld, 8.0);
+            b.until(Follow, 25.0);
+            // Back over its pad there is no room either.
+            b.neighbour = Some((START - Point::new(1.35, 0.0, 1.35), FLYING | ON_PLAN, 0.0, 5));
+            b.until(LandingHeld, 120.0);
             b.run(65.0);
             assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
             b.neighbour = Some((Point::new(8.0, 30.0, 1.5), FLYING | ON_PLAN, 0.0, 5));
+        },
+        Aborted,
+        30.0,
+    );
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.run(2.0);
+            b.neighbour = Some((b.enu + Point::new(1.0, 0.0, -2.5), FLYING | ON_PLAN, 0.0, 5));
+            b.run(0.3);
+            land(b);
+            b.until(LandingHeld, 8.0);
+            b.battery = 5;
         },
         Aborted,
         30.0,

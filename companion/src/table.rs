@@ -203,6 +203,8 @@ pub static TABLE: &[Row] = &[
     warn(&[Land, Disarm],     G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed short of the goal: mission over"),
     warn(&[Land],             G::LandingBlocked,   NOW,    LandingHeld,     A::HoldOver,    "Vehicle below: landing stopped"),
     info(&[LandingHeld],      G::LandingClear,     s(1),   Land,            A::AskLand,     "Clear below: landing"),
+    warn(&[LandingHeld],      G::BatteryCritical,  NOW,    Land,            A::AskLand,     "Battery critical: landing"),
+    warn(&[LandingHeld],      G::NoRoomToLand,     s(20),  Follow,          A::TurnBack,    "No room to land: flying back to the start"),
     warn(&[LandingHeld],      G::Elapsed,          s(60),  LandingHeld,     A::HoldOver,    "Vehicle still below: landing waits"),
     info(&[Land],             G::OnGround,         NOW,    Disarm,          A::AskDisarm,   ""),
     warn(&[Land],             G::Elapsed,          s(120), Land,            A::AskLand,     "Landing takes long"),

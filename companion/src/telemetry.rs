@@ -152,6 +152,11 @@ impl Telemetry {
         self.system_status >= CRITICAL
     }
 
+    /// Whether the battery is known to hold less than so many percent.
+    pub(crate) fn charge_below(&self, percent: i8) -> bool {
+        (0..percent).contains(&self.battery_percent)
+    }
+
     /// Time since the last HEARTBEAT; the greatest value if none came.
     pub fn heartbeat_age(&self, now: Instant) -> Duration {
         age(self.heartbeat_at, now)

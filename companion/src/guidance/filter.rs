@@ -365,7 +365,9 @@ impl Guidance {
                 // A place that anybody may claim keeps no vehicle in the air.
                 continue;
             }
-            let rests = met.heard.grounded && held >= LANDS_LATE;
+            // Only beside its own pad, and where no path leads back to it: everywhere else there is another place.
+            let last_place = self.returning || !self.on_path;
+            let rests = (met.heard.grounded || met.lost) && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
