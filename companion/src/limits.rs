@@ -70,7 +70,7 @@ pub struct AutopilotLimits {
 
 impl AutopilotLimits {
     /// The defaults of a kind.
-    pub fn default_of(kind: Kind) -> Self {
+    pub(crate) fn default_of(kind: Kind) -> Self {
         let mut limits = Self { values: [f32::INFINITY; LIMITS] };
         for parameter in kind.limits() {
             limits.values[parameter.limit as usize] = parameter.default * parameter.unit;
@@ -79,12 +79,12 @@ impl AutopilotLimits {
     }
 
     /// A limit.
-    pub fn get(&self, limit: Limit) -> f32 {
+    pub(crate) fn get(&self, limit: Limit) -> f32 {
         self.values[limit as usize]
     }
 
     /// Takes a value as it was read; whether a limit changed. One that no vehicle has is ignored.
-    pub fn set(&mut self, parameter: &LimitParameter, value: f32) -> bool {
+    pub(crate) fn set(&mut self, parameter: &LimitParameter, value: f32) -> bool {
         let (value, (least, most)) = (value * parameter.unit, parameter.limit.range());
         if !(least..=most).contains(&value) {
             return false;
@@ -112,7 +112,7 @@ pub struct Limits {
 
 impl Limits {
     /// The mission's limits, lowered to what the autopilot flies.
-    pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
+    pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
         let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
         // What the door's longest average smooths to that jerk.
@@ -130,12 +130,12 @@ impl Limits {
     }
 
     /// Greatest jerk, m/s³.
-    pub fn jerk(&self, urgent: bool) -> f32 {
+    pub(crate) fn jerk(&self, urgent: bool) -> f32 {
         if urgent { fminf(URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
     }
 
     /// No setpoint moves faster, m/s.
-    pub fn fastest_mps(&self) -> f32 {
+    pub(crate) fn fastest_mps(&self) -> f32 {
         libm::fmaxf(self.speed_mps, libm::fmaxf(self.climb_mps, self.descend_mps))
     }
 }

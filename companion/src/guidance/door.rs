@@ -9,7 +9,7 @@
 //!   straight leg stays exact, a stop is not overshot, a corner is rounded by at most Δv·T/6, and points inside the
 //!   geofence (a box) give setpoints inside it.
 //! - Its jerk is the second difference of the raw velocity over T, divided by T²: Δv / T² for a sudden change of
-//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that, with some room: 0.85 s for 1.5 m/s² and 4 m/s³.
+//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that: 0.75 s for 1.5 m/s² and 4 m/s³.
 //! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
 //!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
 //!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
@@ -31,24 +31,18 @@ const MOST_N: usize = 24;
 pub const SMOOTH_MOST_S: f32 = MOST_N as f32 * TICK_S;
 /// Shortest.
 const LEAST_N: usize = 8;
-/// The averages leave so much of the jerk to corners and to the clock.
-const JERK_ROOM: f32 = 1.12;
 /// Raw velocities that count for one value of both averages.
 const LEN: usize = 2 * MOST_N - 1;
 /// The clock takes this share of the jerk that the curve leaves: its own steps are 50 ms long.
 const CLOCK_SHARE: f32 = 0.7;
-/// The clock leaves the rest of the jerk to what it cannot foresee: the next raw point.
-const JERK_USED: f32 = 0.9;
-/// The end of a change of speed is planned with this share of the jerk: the curve may need the rest.
-const END_SHARE: f32 = 0.4;
-/// The same where it speeds up: nothing depends on how soon it runs again.
-const RISE_SHARE: f32 = 0.15;
+/// Least jerk left to the clock, m/s³.
+const CLOCK_JERK_LEAST: f32 = 0.5;
 /// Below this speed of the curve the clock's acceleration is that of this speed, m/s.
 const SLOW_MPS: f32 = 0.2;
 /// Slower than this stands, m/s.
 const STANDS_MPS: f32 = 0.01;
 /// The end of a stop: speed falls by this share of itself each second.
-const TAIL_PER_S: f32 = 4.0;
+const TAIL_PER_S: f32 = 6.0;
 /// A raw point this little outside the fence is put inside without a word, metres.
 const FENCE_SLACK_M: f32 = 0.01;
 /// A step may exceed the speed limit by this much, metres: rounding at a kilometre from the origin.
@@ -113,7 +107,7 @@ pub struct Door {
 }
 
 impl Door {
-    pub fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
+    pub(crate) fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
         Self {
             limits,
             fence,
@@ -138,58 +132,58 @@ impl Door {
     }
 
     /// Takes other limits; from a standstill only.
-    pub fn tune(&mut self, limits: Limits, fence: Option<(Point, Point)>) {
+    pub(crate) fn tune(&mut self, limits: Limits, fence: Option<(Point, Point)>) {
         (self.limits, self.fence, self.n) = (limits, fence, average(&limits));
         self.rest();
     }
 
     /// Whether there is a last setpoint.
-    pub fn is_live(&self) -> bool {
+    pub(crate) fn is_live(&self) -> bool {
         self.live
     }
 
     /// Nothing is sent any more.
-    pub fn close(&mut self) {
+    pub(crate) fn close(&mut self) {
         self.live = false;
     }
 
     /// Place of the last setpoint.
-    pub fn position(&self) -> Point {
+    pub(crate) fn position(&self) -> Point {
         self.position
     }
 
     /// Its velocity.
-    pub fn velocity(&self) -> Point {
+    pub(crate) fn velocity(&self) -> Point {
         self.velocity
     }
 
     /// Its acceleration.
-    pub fn acceleration(&self) -> Point {
+    pub(crate) fn acceleration(&self) -> Point {
         self.acceleration
     }
 
     /// Where the raw point is: ahead of the setpoint by what the averages hold.
-    pub fn raw(&self) -> Point {
+    pub(crate) fn raw(&self) -> Point {
         self.raw
     }
 
     /// Speed that the raw point had last, m/s: that of the setpoint T later, if the clock runs.
-    pub fn raw_speed_mps(&self) -> f32 {
+    pub(crate) fn raw_speed_mps(&self) -> f32 {
         self.steps[self.at].norm() / TICK_S * self.clock
     }
 
     /// Greatest jerk, m/s³.
-    pub fn jerk_mps3(&self, urgent: bool) -> f32 {
+    pub(crate) fn jerk_mps3(&self, urgent: bool) -> f32 {
         self.limits.jerk(urgent)
     }
 
     /// Whether the setpoint stands.
-    pub fn stands(&self) -> bool {
+    pub(crate) fn stands(&self) -> bool {
         self.velocity.norm_squared() < STANDS_MPS * STANDS_MPS
     }
 
     /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
-    pub fn braking_m(&self, urgent: bool) -> f32 {
+    pub(crate) fn braking_m(&self, urgent: bool) -> f32 {
         let speed = self.velocity.norm();
         if speed < STANDS_MPS {
             return 0.0;
@@ -197,12 +191,11 @@ impl Door {
         let (accel, jerk) = (self.limits.accel_mps2, CLOCK_SHARE * self.limits.jerk(urgent));
         let ahead = fmaxf(self.acceleration.dot(&self.velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
-        let end_s = 0.5 * accel / (END_SHARE * self.limits.jerk(urgent)) + 0.5 / TAIL_PER_S;
-        speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
+        speed * speed / (2.0 * accel) + speed * (0.5 * accel / jerk + build_up_s) + 0.02
     }
 
     /// Begins at a place, at rest: only where nothing was sent, where nobody flies by it, or where it stands.
-    pub fn reset(&mut self, place: Point) {
+    pub(crate) fn reset(&mut self, place: Point) {
         let place = if place.iter().all(|c| c.is_finite()) { place } else { self.position };
         self.position = self.inside(place);
         self.live = true;
@@ -210,7 +203,7 @@ impl Door {
     }
 
     /// Forgets the curve ahead; from a standstill only.
-    pub fn rest(&mut self) {
+    pub(crate) fn rest(&mut self) {
         self.steps = [Point::zeros(); LEN];
         self.slopes = [Point::zeros(); 3];
         (self.raw, self.mean) = (self.position, self.position);
@@ -219,7 +212,7 @@ impl Door {
     }
 
     /// The nearest place inside the fence.
-    pub fn inside(&self, mut place: Point) -> Point {
+    pub(crate) fn inside(&self, mut place: Point) -> Point {
         if let Some((low, high)) = self.fence {
             for axis in 0..3 {
                 place[axis] = fmaxf(fminf(place[axis], high[axis]), low[axis]);
@@ -229,21 +222,19 @@ impl Door {
     }
 
     /// Whether a place may be sent.
-    pub fn allows(&self, place: &Point) -> bool {
+    pub(crate) fn allows(&self, place: &Point) -> bool {
         self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
     /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push`] takes them, then [`Self::finish`] makes the
     /// setpoint.
-    pub fn begin(&mut self, pace: Pace, dt_s: f32) -> u8 {
+    pub(crate) fn begin(&mut self, pace: Pace, dt_s: f32) -> u8 {
         if !(self.live && dt_s > 0.0) {
             self.dt_s = 0.0;
             return 0;
         }
         self.dt_s = fminf(dt_s, f32::from(TICKS) * TICK_S);
-        // A hard stop that has begun ends as one.
-        self.stopping = pace.urgent || (self.stopping && self.clock_rate < 0.0);
-        let pace = Pace { urgent: self.stopping, ..pace };
+        self.stopping = pace.urgent;
         let clock_before = self.clock;
         self.run_clock(pace, self.dt_s);
         self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
@@ -253,7 +244,7 @@ impl Door {
     }
 
     /// Takes the next raw point. One that is not finite, too far, or outside the fence is not followed.
-    pub fn push(&mut self, next: Point) {
+    pub(crate) fn push(&mut self, next: Point) {
         let step = self.inside(next) - self.raw;
         let furthest = self.limits.fastest_mps() * TICK_S + STEP_SLACK_M;
         // NaN is not near.
@@ -263,7 +254,7 @@ impl Door {
     }
 
     /// Makes the setpoint; whether it is the one that was asked for. If not, it holds.
-    pub fn finish(&mut self) -> bool {
+    pub(crate) fn finish(&mut self) -> bool {
         let dt_s = self.dt_s;
         let sound = core::mem::replace(&mut self.sound, true);
         if dt_s <= 0.0 {
@@ -303,28 +294,20 @@ impl Door {
         let along = bend.dot(&slope) / speed;
         let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock;
+        let left = limits.jerk(pace.urgent) - third.norm() * clock * clock * clock;
+        let jerk = CLOCK_SHARE * fmaxf(left, CLOCK_JERK_LEAST);
         let accel = limits.accel_mps2;
         // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
         let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
-        let size = fmaxf(fabsf(lack) - fabsf(self.clock_rate) * speed * dt_s, 0.0);
-        let end_share = if lack > 0.0 { RISE_SHARE } else { END_SHARE };
-        let end_jerk = end_share * limits.jerk(pace.urgent);
-        let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), TAIL_PER_S * size);
+        let size = fabsf(lack);
+        let rate = fminf(fminf(accel, sqrtf(1.6 * jerk * size)), TAIL_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
-        // It speeds up only by what the curve itself leaves of the acceleration, which may change while it does.
-        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)) / speed;
-        // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the
-        // curve alone takes all of it, the rate that adds the least.
-        let ahead = bend + third * (clock * dt_s);
-        let next = (clock + self.clock_rate * dt_s).clamp(0.0, 1.0);
-        let change = ahead * (next * next) - self.acceleration;
-        let most = JERK_USED * limits.jerk(pace.urgent) * dt_s;
-        let slope_sq = fmaxf(slope.norm_squared(), SLOW_MPS * SLOW_MPS);
-        let middle = -change.dot(&slope) / slope_sq;
-        let left = most * most - change.norm_squared() + middle * middle * slope_sq;
-        let half = sqrtf(fmaxf(left, 0.0) / slope_sq);
-        let rate = wanted.clamp(middle - half, middle + half);
+        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - own, 0.0)) / speed;
+        let bent = 3.0 * along * clock * self.clock_rate;
+        let (least, most) = ((-jerk - bent) / speed * dt_s, (jerk - bent) / speed * dt_s);
+        let change = (wanted - self.clock_rate).clamp(fminf(least, 0.0), fmaxf(most, 0.0));
+        let rate = self.clock_rate + change;
         let next = (clock + rate * dt_s).clamp(0.0, 1.0);
         let done = fabsf(lack) < 1e-3 * speed && fabsf(rate) < 0.02;
         self.clock = if done { pace.share.clamp(0.0, 1.0) } else { next };
@@ -368,7 +351,7 @@ impl Door {
 
 /// Ticks of each average: long enough for the autopilot's jerk.
 fn average(limits: &Limits) -> usize {
-    let n = libm::ceilf(2.0 * JERK_ROOM * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
+    let n = libm::ceilf(2.0 * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
     n.clamp(LEAST_N, MOST_N)
 }
 

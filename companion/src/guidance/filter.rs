@@ -269,7 +269,10 @@ impl Guidance {
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
                 self.filter.clear_since = None;
-                self.filter.hinder(now);
+                // A stranger hinders it for good only where it is in the way of the hull.
+                if !found.stranger || self.filter.passes_stranger(now) {
+                    self.filter.hinder(now);
+                }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
                 self.filter.stranger = found.stranger;
             }
