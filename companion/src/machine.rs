@@ -491,7 +491,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn watch_estimate(&mut self) {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
-        let pace = margins::pace(bound_m, config.required_clearance_m, config.radius_m);
+        // The best that a receiver can do was weighed when the margin was chosen.
+        let pace = match bound_m <= margins::ESTIMATE_M {
+            true => 1.0,
+            false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
+        };
         let before = core::mem::replace(&mut self.guidance.pace, pace);
         self.vague_since = if pace > 0.0 { None } else { self.vague_since.or(Some(now)) };
         let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };

@@ -11,7 +11,8 @@
 //! | gust | scenario | m | the desk adds what a gust is announced to push ([`room_m`]'s caller); on board it is part of the margin |
 //!
 //! What is left for the estimate is compared with its bound. A bound worse than what is left at cruise refuses the start and
-//! slows the vehicle in flight; one worse than what is left at a crawl stops it.
+//! slows the vehicle in flight; one worse than what is left at a crawl stops it. A bound of at most [`ESTIMATE_M`] refuses
+//! nothing: no receiver does better, and the operator chose the margin. A margin below that flies at the operator's risk.
 //!
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights PX4's SIH reported 0.25 m while
 //! the estimate was 0.7 m off: a receiver's bias and a barometer's drift look to the filter like the truth. Three times

@@ -9,7 +9,7 @@
 //!   straight leg stays exact, a stop is not overshot, a corner is rounded by at most Δv·T/6, and points inside the
 //!   geofence (a box) give setpoints inside it.
 //! - Its jerk is the second difference of the raw velocity over T, divided by T²: Δv / T² for a sudden change of
-//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that: 0.75 s for 1.5 m/s² and 4 m/s³.
+//!   velocity, at most 2·a / T where braking turns into speeding up. T follows from that, with some room: 0.85 s for 1.5 m/s² and 4 m/s³.
 //! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
 //!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
 //!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
@@ -31,18 +31,24 @@ const MOST_N: usize = 24;
 pub const SMOOTH_MOST_S: f32 = MOST_N as f32 * TICK_S;
 /// Shortest.
 const LEAST_N: usize = 8;
+/// The averages leave so much of the jerk to corners and to the clock.
+const JERK_ROOM: f32 = 1.12;
 /// Raw velocities that count for one value of both averages.
 const LEN: usize = 2 * MOST_N - 1;
 /// The clock takes this share of the jerk that the curve leaves: its own steps are 50 ms long.
 const CLOCK_SHARE: f32 = 0.7;
-/// Least jerk left to the clock, m/s³.
-const CLOCK_JERK_LEAST: f32 = 0.5;
+/// The clock leaves the rest of the jerk to what it cannot foresee: the next raw point.
+const JERK_USED: f32 = 0.9;
+/// The end of a change of speed is planned with this share of the jerk: the curve may need the rest.
+const END_SHARE: f32 = 0.4;
+/// The same where it speeds up: nothing depends on how soon it runs again.
+const RISE_SHARE: f32 = 0.15;
 /// Below this speed of the curve the clock's acceleration is that of this speed, m/s.
 const SLOW_MPS: f32 = 0.2;
 /// Slower than this stands, m/s.
 const STANDS_MPS: f32 = 0.01;
 /// The end of a stop: speed falls by this share of itself each second.
-const TAIL_PER_S: f32 = 6.0;
+const TAIL_PER_S: f32 = 4.0;
 /// A raw point this little outside the fence is put inside without a word, metres.
 const FENCE_SLACK_M: f32 = 0.01;
 /// A step may exceed the speed limit by this much, metres: rounding at a kilometre from the origin.
@@ -191,7 +197,8 @@ impl Door {
         let (accel, jerk) = (self.limits.accel_mps2, CLOCK_SHARE * self.limits.jerk(urgent));
         let ahead = fmaxf(self.acceleration.dot(&self.velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
-        speed * speed / (2.0 * accel) + speed * (0.5 * accel / jerk + build_up_s) + 0.02
+        let end_s = 0.5 * accel / (END_SHARE * self.limits.jerk(urgent)) + 0.5 / TAIL_PER_S;
+        speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
     /// Begins at a place, at rest: only where nothing was sent, where nobody flies by it, or where it stands.
@@ -234,7 +241,9 @@ impl Door {
             return 0;
         }
         self.dt_s = fminf(dt_s, f32::from(TICKS) * TICK_S);
-        self.stopping = pace.urgent;
+        // A hard stop that has begun ends as one.
+        self.stopping = pace.urgent || (self.stopping && self.clock_rate < 0.0);
+        let pace = Pace { urgent: self.stopping, ..pace };
         let clock_before = self.clock;
         self.run_clock(pace, self.dt_s);
         self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
@@ -294,20 +303,28 @@ impl Door {
         let along = bend.dot(&slope) / speed;
         let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock;
-        let left = limits.jerk(pace.urgent) - third.norm() * clock * clock * clock;
-        let jerk = CLOCK_SHARE * fmaxf(left, CLOCK_JERK_LEAST);
         let accel = limits.accel_mps2;
         // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
         let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
-        let size = fabsf(lack);
-        let rate = fminf(fminf(accel, sqrtf(1.6 * jerk * size)), TAIL_PER_S * size);
+        let size = fmaxf(fabsf(lack) - fabsf(self.clock_rate) * speed * dt_s, 0.0);
+        let end_share = if lack > 0.0 { RISE_SHARE } else { END_SHARE };
+        let end_jerk = end_share * limits.jerk(pace.urgent);
+        let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), TAIL_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
-        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - own, 0.0)) / speed;
-        let bent = 3.0 * along * clock * self.clock_rate;
-        let (least, most) = ((-jerk - bent) / speed * dt_s, (jerk - bent) / speed * dt_s);
-        let change = (wanted - self.clock_rate).clamp(fminf(least, 0.0), fmaxf(most, 0.0));
-        let rate = self.clock_rate + change;
+        // It speeds up only by what the curve itself leaves of the acceleration, which may change while it does.
+        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)) / speed;
+        // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the
+        // curve alone takes all of it, the rate that adds the least.
+        let ahead = bend + third * (clock * dt_s);
+        let next = (clock + self.clock_rate * dt_s).clamp(0.0, 1.0);
+        let change = ahead * (next * next) - self.acceleration;
+        let most = JERK_USED * limits.jerk(pace.urgent) * dt_s;
+        let slope_sq = fmaxf(slope.norm_squared(), SLOW_MPS * SLOW_MPS);
+        let middle = -change.dot(&slope) / slope_sq;
+        let left = most * most - change.norm_squared() + middle * middle * slope_sq;
+        let half = sqrtf(fmaxf(left, 0.0) / slope_sq);
+        let rate = wanted.clamp(middle - half, middle + half);
         let next = (clock + rate * dt_s).clamp(0.0, 1.0);
         let done = fabsf(lack) < 1e-3 * speed && fabsf(rate) < 0.02;
         self.clock = if done { pace.share.clamp(0.0, 1.0) } else { next };
@@ -351,7 +368,7 @@ impl Door {
 
 /// Ticks of each average: long enough for the autopilot's jerk.
 fn average(limits: &Limits) -> usize {
-    let n = libm::ceilf(2.0 * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
+    let n = libm::ceilf(2.0 * JERK_ROOM * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
     n.clamp(LEAST_N, MOST_N)
 }
 

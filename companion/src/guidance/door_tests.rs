@@ -66,12 +66,12 @@ proptest! {
             let off = ((door.position() - at) / dt_s - mean).norm();
             prop_assert!(off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
             let accel = door.acceleration().norm();
-            prop_assert!(accel < 4.5, "{accel} m/s²");
+            prop_assert!(accel < 2.8, "{accel} m/s²");
             if fence.is_none() && dt_s <= 0.06 {
                 let jerk = (door.acceleration() - acceleration).norm() / dt_s.max(0.02);
                 let most = if door.stopping || urgent_before { 8.0 } else { 4.0 };
-                // Where the clock meets its end or a pace turns in a corner, a step exceeds the limit: not solved yet.
-                prop_assert!(jerk < most * 8.0, "{jerk} m/s³ of {most}, {pace:?}");
+                // Where the clock meets its end or a pace turns in a corner, a step may exceed the limit.
+                prop_assert!(jerk < most * 3.0, "{jerk} m/s³ of {most}, {pace:?}");
                 above += u32::from(jerk > most * 1.05);
                 checked += 1;
             }
@@ -87,6 +87,6 @@ proptest! {
                 prop_assert!(off < 0.25, "{off} m off the path");
             }
         }
-        prop_assert!(above <= 8 + checked / 10, "{above} of {checked} steps above the jerk");
+        prop_assert!(above <= 8 + checked / 20, "{above} of {checked} steps above the jerk");
     }
 }
