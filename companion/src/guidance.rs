@@ -306,6 +306,8 @@ impl Guidance {
         self.leg = None;
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
+        // Whatever kept it from going on did so on the other path.
+        self.filter.reset();
         self.run(now);
     }
 
@@ -439,7 +441,8 @@ impl Guidance {
         dt_s: f32,
     ) -> bool {
         let position = scene.telemetry.position;
-        if let (Some(plan), State::Scheduled | State::Follow) = (scene.plan, state) {
+        let asks = matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
+        if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
             let own = Own { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
@@ -450,7 +453,10 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                State::Follow => along_m + self.advice.stop_within_m.max(0.0),
+                // What stopped it is looked at on.
+                State::Follow | State::Blocked | State::Replanning => {
+                    along_m + self.advice.stop_within_m.max(0.0)
+                }
                 _ => self.setpoint_m + self.door.braking_m(false),
             };
         }

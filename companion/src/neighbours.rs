@@ -215,6 +215,8 @@ pub(crate) struct Met<'a> {
     pub(crate) on_plan: bool,
     /// Whether it has stood for a while.
     pub(crate) stands: bool,
+    /// Whether it stands until another vehicle moves.
+    pub(crate) waits: bool,
     /// Whether it has been silent for so long that it counts as lost.
     pub(crate) lost: bool,
     /// What its set follows from.
@@ -425,9 +427,13 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
         let contact = self.contacts.get(i)?;
         let age_s = (now - contact.position_at?).secs_f32();
-        let here = contact.state.position;
-        let grounded = contact.tells(GROUNDED | LANDED);
-        let dead = contact.is_dead(now) && !contact.points.is_empty();
+        // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
+        let unplaced_for = now - contact.position_at?;
+        let dead = (contact.is_dead(now) || unplaced_for >= DEAD) && !contact.points.is_empty();
+        let lies = dead && unplaced_for >= DOWN && !contact.floor_m.is_nan();
+        let mut here = contact.state.position;
+        here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { here.z };
+        let grounded = contact.tells(GROUNDED | LANDED) || lies;
         let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
         let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
         let heard = Heard {
@@ -445,6 +451,7 @@ impl<const V: usize> Neighbours<V> {
             stranger: contact.rank == STRANGER,
             on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
             lost: dead,
+            waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
             stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
             heard,
         })

@@ -301,7 +301,7 @@ impl Guidance {
             let near = |at_m: f32| (along_m - WAITS_M..along_m + WAITS_M).contains(&at_m);
             plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
         };
-        if state == State::Follow
+        if matches!(state, State::Follow | State::Blocked | State::Replanning)
             && id != 0
             && self.advice.stop_within_m < WAITS_M
             && !scene.plan.is_some_and(gate)
@@ -374,7 +374,8 @@ impl Guidance {
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
-            } else if met.heard.grounded {
+            } else if met.heard.grounded || (met.stands && met.on_plan && self.on_plan(state, scene)) {
+                // Past a vehicle that waits the schedule leads as near as that and what both stray.
                 safety_m
             } else {
                 safety_m + STRAY_M
@@ -400,6 +401,10 @@ impl Guidance {
         None
     }
 
+    fn on_plan<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> bool {
+        !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
+    }
+
     /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then the gates' order decides,
     /// then the lower id goes.
     fn yields_to<const W: usize, const G: usize>(
@@ -408,7 +413,7 @@ impl Guidance {
         scene: &Scene<'_, W, G>,
         met: &Met<'_>,
     ) -> bool {
-        let on_plan = !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld);
+        let on_plan = self.on_plan(state, scene);
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
         }
@@ -418,6 +423,10 @@ impl Guidance {
         };
         if on_plan && scene.plan.is_some_and(waits) && self.advice.waiting_for == met.id {
             return true;
+        }
+        // A vehicle on the plan that waits does so for one that goes first.
+        if on_plan && met.waits {
+            return false;
         }
         met.id < scene.id
     }
