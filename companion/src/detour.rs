@@ -107,6 +107,8 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found in a row.
     pub(crate) failed: u8,
+    /// Ways around on which it did not move, in a row.
+    pub(crate) fruitless: u8,
     /// When no way aside was found.
     pub(crate) no_way_aside_at: Option<Instant>,
     /// Where and when it was before its position jumped.
@@ -366,8 +368,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan.gates.clear();
             plan.depart_s = 0.0;
         }
+        let stuck = self.around.flying && self.now - self.guidance.progress_at() > STUCK;
+        let fruitless = if stuck { self.around.fruitless.saturating_add(1) } else { 0 };
         let Around { aside, left_at_m, .. } = self.around;
-        self.around = Around { left: true, flying: true, ready: true, aside, left_at_m, ..Around::default() };
+        let flying = Around { left: true, flying: true, ready: true, ..Around::default() };
+        self.around = Around { aside, left_at_m, fruitless, ..flying };
         self.neighbours.avoid(self.now);
         self.obstacles.avoided = self.obstacles.requested;
     }

@@ -116,7 +116,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             blocked: self.around.blocked,
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
-            detours_failed: self.around.failed,
+            detours_failed: self.around.failed.saturating_add(self.around.fruitless),
             underneath: self.underneath(),
             standing,
         }

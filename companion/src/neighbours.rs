@@ -430,7 +430,8 @@ impl<const V: usize> Neighbours<V> {
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let unplaced_for = now - contact.position_at?;
         let dead = (contact.is_dead(now) || unplaced_for >= DEAD) && !contact.points.is_empty();
-        let lies = dead && unplaced_for >= DOWN && !contact.floor_m.is_nan();
+        let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
+        let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
         let mut here = contact.state.position;
         here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { here.z };
         let grounded = contact.tells(GROUNDED | LANDED) || lies;

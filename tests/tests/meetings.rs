@@ -39,11 +39,11 @@ fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
 
 /// What is asked for is no violation that a stop would have prevented, no touch by own motion, and everybody on the ground in
 /// the end. Until off-plan meetings of many vehicles keep that too, these shares of all meetings are not to be exceeded.
-const TOO_NEAR_MOST: f32 = 0.02;
-const TOUCHES_MOST: f32 = 0.01;
-const STUCK_MOST: f32 = 0.10;
+const TOO_NEAR_MOST: f32 = 0.05;
+const TOUCHES_MOST: f32 = 0.04;
+const STUCK_MOST: f32 = 0.03;
 /// Meetings in which no stop would have kept the distance.
-const UNAVOIDABLE_MOST: f32 = 0.08;
+const UNAVOIDABLE_MOST: f32 = 0.11;
 
 #[test]
 fn companions_that_meet_at_random_keep_apart() {

@@ -388,7 +388,9 @@ impl Guidance {
             }
             near += 1;
             let yields = self.yields_to(state, scene, &met);
-            let ahead_s = if yields { ahead_s } else { 0.0 };
+            // Between two on the plan the gates keep the order.
+            let by_gates = met.on_plan && self.on_plan(state, scene);
+            let ahead_s = if yields && !by_gates { ahead_s } else { 0.0 };
             let found = Found { id: met.id, yields, stranger: met.stranger };
             if near > NEAR_MOST {
                 return Some(found);
