@@ -51,6 +51,11 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 
 #[entry]
 fn main() -> ! {
+    #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
+    // SAFETY: nothing runs yet.
+    unsafe {
+        firmware::boards::tcm::zero();
+    }
     let crashed = crash::take();
     let parts = chosen::start();
     let plans = parts.plans;

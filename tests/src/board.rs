@@ -39,7 +39,7 @@ const MAP: u32 = 0x6080_0000;
 /// An address of no memory.
 const NOWHERE: u32 = 0xF000_0000;
 /// The far end of the stack, which nothing reaches.
-const SPARE: u32 = 0x2008_0400;
+const SPARE: u32 = 0x2008_A000;
 /// `cpsid i`, then a branch to itself.
 const SPIN: [u8; 4] = [0x72, 0xB6, 0xFE, 0xE7];
 /// So many instructions later a panic has turned the interrupts off.

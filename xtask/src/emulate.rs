@@ -27,8 +27,8 @@ const SHIFT: &str = "shift=4";
 const ALONE_AFTER: Duration = Duration::from_secs(22);
 
 /// Where the stack lies, as in the board's memory map.
-const STACK: u32 = 0x2008_0400;
-const STACK_LEN: usize = 127 << 10;
+const STACK: u32 = 0x2008_A000;
+const STACK_LEN: usize = 88 << 10;
 /// Setpoints may be no further apart by a board's own time, milliseconds.
 const GAP_MS: u32 = 150;
 /// What no stack has touched since the start.

@@ -15,7 +15,7 @@ pub mod qemu;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod stack;
 #[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
-mod tcm;
+pub mod tcm;
 
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub use nucleo_h743 as chosen;

@@ -1,5 +1,5 @@
 //! Statics in the tightly coupled memory below the stack: the start code of `cortex-m-rt` zeroes `.bss` alone, so this
-//! zeroes them before anything runs.
+//! zeroes them before anything uses them.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::ptr::addr_of_mut;
@@ -9,9 +9,11 @@ unsafe extern "C" {
     static mut __edtcm: u32;
 }
 
-/// Runs on the bare stack, before `.bss` and `.data` are there.
-#[cortex_m_rt::pre_init]
-unsafe fn zero() {
+/// Zeroes them.
+///
+/// # Safety
+/// Only once, before any of these statics is used.
+pub unsafe fn zero() {
     let (mut word, end) = (addr_of_mut!(__sdtcm), addr_of_mut!(__edtcm));
     while word < end {
         // SAFETY: between the linker's two symbols lie statics that nothing uses yet; both are aligned to 8 bytes.
