@@ -10,7 +10,7 @@ use flockmate_tests::{board, workspace};
 /// Another compiler's code may need so much more, and what has grown a little needs no new table.
 const SLACK: f64 = 1.25;
 /// Instructions of a control step among 32 neighbours, whatever they do.
-const STEP: u64 = 60_000;
+const STEP: u64 = 75_000;
 /// Modules of companion that are its own, where no call is public, and doubles of its tests.
 const PRIVATE: [&str; 10] = [
     "guidance",

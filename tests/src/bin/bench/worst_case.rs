@@ -12,9 +12,9 @@ use crate::Row;
 /// What a step may cost by deconfliction alone and in all, thousands of instructions.
 const LIMITS: [(&str, &str, f64); 4] = [
     ("board advise", "deconflict::advise, priority", 60.0),
-    ("board control step, all speak", "Companion::handle_timeout, 32 speak", 60.0),
-    ("board control step, most gone", "Companion::handle_timeout, most gone", 60.0),
-    ("board control step, else", "Companion::handle_timeout, else", 60.0),
+    ("board control step, all speak", "Companion::handle_timeout, 32 speak", 75.0),
+    ("board control step, most gone", "Companion::handle_timeout, most gone", 75.0),
+    ("board control step, else", "Companion::handle_timeout, else", 75.0),
 ];
 
 /// Prints the table; rows for what has a limit.
