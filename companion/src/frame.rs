@@ -31,7 +31,7 @@ const V2_START: u8 = 0xFD;
 const COMPONENT_INFORMATION: u32 = 395;
 const SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
-/// Times of arrival are told apart by steps of an eighth of the lifetime; bytes received in one step count as received
+/// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
 /// with the last of them.
 const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
 /// Steps that a lifetime touches, and one.

@@ -659,7 +659,7 @@ impl Guidance {
         self.phase == Phase::Descent
     }
 
-    /// Height of the ground below the vehicle, as far as the plan tells, metres.
+    /// Height of the ground below the vehicle, as far as the plan says, metres.
     pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
         let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
         let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);

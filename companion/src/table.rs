@@ -176,7 +176,7 @@ pub static TABLE: &[Row] = &[
     info(&[Climb],            G::ClimbDone,        NOW,    Follow,          A::RunPath,     "Following the path"),
     warn(&[Climb],            G::Elapsed,          s(60),  Land,            A::AskLand,     "Climb takes too long: landing"),
     warn(&[Follow, Blocked],  G::Yielded,          s(60),  Stopping,        A::BrakeOnPath, "Yielded for 60 s: landing"),
-    warn(&[Follow, Blocked],  G::Hindered,         s(90),  Stopping,        A::BrakeOnPath, "Vehicle in the way for 90 s: landing"),
+    warn(&[Follow, Blocked],  G::Hindered,         s(90),  Stopping,        A::BrakeOnPath, "Vehicle on the path for 90 s: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
     info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
     warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
@@ -223,5 +223,5 @@ pub static TABLE: &[Row] = &[
     warn(&[Failsafe],         G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed after failsafe: mission over"),
     warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
     warn(&[Aborted, Done],    G::Unattended,       NOW,    Land,            A::AskLand,     "Still in the air: landing"),
-    info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start anew when ready"),
+    info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
 ];

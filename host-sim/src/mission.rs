@@ -348,7 +348,7 @@ fn height_over_ground(
             bail!("{why}\nhint: the nearest place that would do is [{}, {}, {}]", place.x, place.y, place.z)
         }
         None => {
-            bail!("{why}\nhint: no place within 5 m would do; `host-sim map info` tells the map's extent")
+            bail!("{why}\nhint: no place within 5 m would do; `host-sim map info` shows the map's extent")
         }
     }
 }

@@ -38,7 +38,7 @@ pub struct DeconflictConfig {
 /// A vehicle as last heard.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Neighbour {
-    /// MAVLink system id.
+    /// Id of the vehicle, unique in the swarm.
     pub id: u8,
     /// Place in the roster sorted by id, from 0: the `h` of Algorithm 2.
     pub rank: u16,

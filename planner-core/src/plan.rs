@@ -42,7 +42,7 @@ pub enum Mode {
 /// One vehicle of the request; vehicle `i` starts at node `i` of the roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleTask {
-    /// MAVLink system id.
+    /// Id of the vehicle, unique in the swarm.
     pub id: u8,
     /// Radius + safety margin, metres: edges must have more clearance.
     pub required_clearance_m: f32,

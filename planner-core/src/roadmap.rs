@@ -31,7 +31,7 @@ pub const VERSION: u16 = 1;
 pub const HEADER_LEN: usize = 72;
 /// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
 pub const MAX_NODES: usize = u16::MAX as usize;
-/// Largest coordinate magnitude, metres: up to there f32 tells places a millimetre apart.
+/// Largest coordinate magnitude, metres: up to there f32 distinguishes places a millimetre apart.
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
 /// Longest edge a roadmap may have, metres. The schedule looks at each metre of an edge, so this bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;

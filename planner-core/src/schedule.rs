@@ -55,7 +55,7 @@ pub struct ScheduleConfig {
 /// One vehicle's way from its pad to the ground below its goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flight<const W: usize> {
-    /// MAVLink system id.
+    /// Id of the vehicle, unique in the swarm.
     pub id: u8,
     /// Index of the goal flown to; `None` stays on its pad.
     pub goal: Option<u16>,
@@ -112,7 +112,7 @@ impl<const W: usize> Flight<W> {
 pub struct Gate {
     /// Where to wait, metres along the own path; −climb is the pad.
     pub at_m: f32,
-    /// Whom to wait for: MAVLink system id.
+    /// Which vehicle to wait for: its id.
     pub id: u8,
     /// Progress of the other that opens the gate, metres along its path.
     pub until_m: f32,

@@ -4,7 +4,7 @@
 //! ([`planner_core::safety`]). Where the two come too near, the vehicle stops. It goes on once the next metre of its way
 //! is free. The vehicle that yields also waits until the way of the other one is free ([`AHEAD_S`]), or that one stands.
 //! In a descent it flies back up its own column. The filter knows no gates, no progress and no advice: it only asks the
-//! gates who goes first where both have stopped.
+//! gates which vehicle goes first where both have stopped.
 //!
 //! ENU metres. Cost: a bound for each neighbour, sets for those within it; more than [`NEAR_MOST`] of those is a stop.
 
@@ -269,7 +269,7 @@ impl Guidance {
                     self.filter.activations = self.filter.activations.wrapping_add(1);
                 }
                 self.filter.clear_since = None;
-                // A stranger hinders it for good only where it is in the way of the hull.
+                // A stranger hinders it for good only where the hull would touch it.
                 if !found.stranger || self.filter.passes_stranger(now) {
                     self.filter.hinder(now);
                 }

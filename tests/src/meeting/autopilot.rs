@@ -35,7 +35,7 @@ pub enum Failsafe {
     Return,
 }
 
-/// Who flies the vehicle at this moment.
+/// What flies the vehicle at this moment.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Flown {
     /// The companion, by setpoints.
@@ -144,7 +144,7 @@ impl Autopilot {
         self.airborne
     }
 
-    /// Who flies it.
+    /// What flies it.
     pub fn flown(&self) -> Flown {
         if self.mode == self.kind.setpoint_mode() {
             if self.takeoff_z.is_some() { Flown::Commanded } else { Flown::Setpoints }

@@ -136,7 +136,7 @@ struct World<'a> {
     trace: Option<Vec<String>>,
 }
 
-/// Flies a meeting; with `traced` the outcome tells what happened.
+/// Flies a meeting; with `traced` the outcome says what happened.
 pub fn fly(scene: &Scene, traced: bool) -> Outcome {
     let mut world = World::new(scene, traced);
     let mut oracle = Oracle::new(scene.vehicles.len());

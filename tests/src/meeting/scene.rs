@@ -1,4 +1,4 @@
-//! Random meetings: who flies from where to where, by which plan, and what happens to them.
+//! Random meetings: which vehicle flies from where to where, by which plan, and what happens to them.
 
 use companion::autopilot::Kind;
 use planner_core::Point;
@@ -522,7 +522,7 @@ fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening> {
                     push(at_s + 0.5 * lasts_s, What::PilotTakes(Point::zeros()));
                     push(until, What::PilotReturns);
                     (1..5).for_each(|i| push(until + 1.5 * i as f32, What::Resume));
-                    // Who cannot go on is landed.
+                    // A vehicle that cannot go on is landed.
                     push(until + 40.0, What::Land);
                 } else {
                     push(until, What::PilotLands);
