@@ -54,7 +54,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             } else {
                 Duration::default()
             },
-            neighbour_age: self.neighbours.silence(now, self.entered_at),
+            // On its way back it is already on its way to the ground: it does not stop for want of being heard.
+            neighbour_age: match self.guidance.returning {
+                true => Duration::default(),
+                false => self.neighbours.silence(now, self.entered_at),
+            },
             neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
             plan_ready: self.plan.is_some(),
             plan_failed: self.plan_failure.is_some(),
