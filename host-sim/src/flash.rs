@@ -7,6 +7,9 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use companion::store::{Fault, FlashRequest, Layout, READ, ReadFlash};
 
+use crate::files;
+use crate::quote::quoted_path;
+
 /// What a desk's companion keeps its files in: the default board's bank.
 pub const LAYOUT: Layout = Layout::H743;
 
@@ -24,7 +27,10 @@ impl DeskFlash {
     pub fn open(path: Option<&Path>) -> anyhow::Result<Self> {
         let mut bytes = vec![0xFF; LAYOUT.len() as usize];
         let Some(path) = path else { return Ok(Self { bytes, file: None }) };
-        let failed = || format!("cannot keep a flash: {}", path.display());
+        let failed = || format!("cannot keep a flash: {}", quoted_path(path));
+        if path.exists() {
+            files::regular(path).with_context(failed)?;
+        }
         let opened = File::options().read(true).write(true).create(true).truncate(false).open(path);
         let mut file = opened.with_context(failed)?;
         match file.metadata().with_context(failed)?.len() {
@@ -32,7 +38,9 @@ impl DeskFlash {
             length if length == u64::from(LAYOUT.len()) => {
                 file.read_exact(&mut bytes).with_context(failed)?;
             }
-            _ => bail!("no flash image: {}: it has not {} bytes", path.display(), LAYOUT.len()),
+            length => {
+                bail!("no flash image: {}: it has {length} bytes, not {}", quoted_path(path), LAYOUT.len())
+            }
         }
         Ok(Self { bytes, file: Some(file) })
     }

@@ -4,6 +4,7 @@
 pub mod autopilot;
 pub mod capacity;
 pub mod commands;
+pub mod files;
 pub mod flash;
 pub mod link;
 pub mod map;
@@ -11,6 +12,7 @@ pub mod margins;
 pub mod mission;
 pub mod output;
 pub mod progress;
+pub mod quote;
 pub mod report;
 pub mod result;
 pub mod roadmap;

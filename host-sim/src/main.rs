@@ -1,9 +1,12 @@
 //! Command line of `host-sim`.
 
+use std::io::IsTerminal as _;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
-use host_sim::{autopilot, commands, map};
+use anyhow::bail;
+use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser, Subcommand};
+use host_sim::{autopilot, commands, map, progress, quote, say};
 
 /// Plans and flies drone swarms on the desk, with the code that flies on the board.
 #[derive(Parser)]
@@ -39,9 +42,22 @@ enum Command {
 const BAD_INPUT: u8 = 2;
 
 fn main() -> ExitCode {
-    let done = match Cli::parse().command {
+    let done = match Cli::try_parse() {
+        Ok(cli) => run(cli.command),
+        Err(error) => refused(&error),
+    };
+    // Results that nobody could read are none.
+    let done = done.and_then(|code| progress::printed().map(|()| code));
+    done.unwrap_or_else(|error| {
+        eprintln!("error: {}", quote::message(&format!("{error:#}")));
+        ExitCode::from(BAD_INPUT)
+    })
+}
+
+fn run(command: Command) -> anyhow::Result<ExitCode> {
+    match command {
         Command::Demo(args) => commands::fly::demo(&args),
-        Command::Map(args) => map::command::run(&args).map(|()| ExitCode::SUCCESS),
+        Command::Map(args) => map::command::run(&args),
         Command::Roadmap(args) => commands::roadmap::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Fly(args) => commands::fly::run(&args),
@@ -49,9 +65,40 @@ fn main() -> ExitCode {
         Command::Companion(args) => commands::companion::run(&args),
         Command::Upload(args) => commands::upload::run(&args),
         Command::Radio(args) => commands::radio::run(&args),
-    };
-    done.unwrap_or_else(|error| {
-        eprintln!("error: {error:#}");
-        ExitCode::from(BAD_INPUT)
-    })
+    }
+}
+
+/// A command line that is no command: help that was asked for, or one line that says what is wrong, and a hint.
+fn refused(error: &clap::Error) -> anyhow::Result<ExitCode> {
+    let asked = matches!(error.kind(), ErrorKind::DisplayHelp | ErrorKind::DisplayVersion);
+    if asked {
+        let text = error.render();
+        let text = if std::io::stdout().is_terminal() { text.ansi().to_string() } else { text.to_string() };
+        say!("{}", text.trim_end());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let arguments: Vec<String> = std::env::args_os().map(|a| a.to_string_lossy().into_owned()).collect();
+    let help = help_of(&arguments);
+    if error.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+        bail!("no command given\nhint: `{help}` lists them");
+    }
+    let text = quote::about_arguments(&error.to_string(), arguments.into_iter().skip(1));
+    let mut lines = text.lines().map(str::trim);
+    let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
+    let tips = lines.filter_map(|line| line.strip_prefix("tip: "));
+    let tips: String = tips.map(|tip| format!("\nhint: {tip}")).collect();
+    let what = what.join(" ");
+    bail!("{}{tips}\nhint: `{help}` says more", what.strip_prefix("error: ").unwrap_or(&what))
+}
+
+/// The command line that explains the command that was meant.
+fn help_of(arguments: &[String]) -> String {
+    let mut command = &Cli::command();
+    let mut line = command.get_name().to_owned();
+    for argument in arguments.iter().skip(1) {
+        let Some(next) = command.find_subcommand(argument) else { break };
+        command = next;
+        line = format!("{line} {}", next.get_name());
+    }
+    line + " --help"
 }

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use anyhow::Context;
 use planner_core::Point;
 
+use crate::files::Results;
 use crate::mission::{Mission, SwarmPlan};
 use crate::report::{
     self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
@@ -84,29 +84,28 @@ pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyho
     Ok(page)
 }
 
-/// Writes `result.json`, `timing.json` and `report.html`.
-pub fn write(
-    dir: &Path,
+/// What every command with a result writes.
+pub const NAMES: [&str; 3] = ["result.json", "timing.json", "report.html"];
+
+/// Adds the files of [`NAMES`].
+///
+/// # Errors
+/// One cannot be written.
+pub fn add(
+    results: &mut Results,
     result: &MissionResult,
     timing: &Timing,
     mut page: ReportData,
 ) -> anyhow::Result<()> {
-    std::fs::create_dir_all(dir).with_context(|| format!("cannot make {}", dir.display()))?;
-    result::write_json(&dir.join("result.json"), result)?;
-    result::write_json(&dir.join("timing.json"), timing)?;
+    results.add(NAMES[0], result::json(result)?.as_bytes())?;
+    results.add(NAMES[1], result::json(timing)?.as_bytes())?;
     page.timing = Some(serde_json::to_value(timing)?);
-    report::write(&dir.join("report.html"), &page)
+    results.add(NAMES[2], report::page(&page)?.as_bytes())
 }
 
-/// Writes one `x y z` a line, metres, for other programs to be given the same work.
-pub fn write_points(path: &Path, points: impl Iterator<Item = Point>) -> anyhow::Result<()> {
-    let text: String = points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect();
-    write_file(path, text.as_bytes())
-}
-
-/// Writes a file whole.
-pub fn write_file(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write: {}", path.display()))
+/// One `x y z` a line, metres, for other programs to be given the same work.
+pub fn points(points: impl Iterator<Item = Point>) -> String {
+    points.map(|p| format!("{} {} {}\n", p.x, p.y, p.z)).collect()
 }
 
 /// Prints what `result.json` holds, for a person.

@@ -1,8 +1,10 @@
 //! Progress bars on a terminal, nothing in a pipe.
 
-use std::io::IsTerminal;
+use std::io::{IsTerminal, Write as _};
+use std::sync::Mutex;
 use std::time::Duration;
 
+use anyhow::Context as _;
 use indicatif::{ProgressBar, ProgressStyle};
 
 /// Shows what is being done, on standard error, if that is a terminal.
@@ -66,11 +68,32 @@ impl Drop for Stage {
     }
 }
 
-/// Prints a line. A reader that has gone away, as in `host-sim plan … | head -1`, is no error of ours.
+/// What was wrong with standard output when it took a line last.
+static UNPRINTED: Mutex<Option<std::io::Error>> = Mutex::new(None);
+
+/// Prints a line: what [`say!`](crate::say) calls.
+pub fn print_line(line: std::fmt::Arguments<'_>) {
+    let mut out = std::io::stdout().lock();
+    if let Err(error) = out.write_fmt(line).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
+        *UNPRINTED.lock().expect("nobody panics with it") = Some(error);
+    }
+}
+
+/// Whether everything was printed so far.
+///
+/// # Errors
+/// Standard output did not take a line: its reader has gone away, or a disk is full.
+pub fn printed() -> anyhow::Result<()> {
+    match UNPRINTED.lock().expect("nobody panics with it").take() {
+        Some(error) => Err(error).context("cannot print: standard output"),
+        None => Ok(()),
+    }
+}
+
+/// Prints a line. Where that fails the work goes on, since it may fly something; [`printed`](crate::progress::printed)
+/// tells at its end.
 #[macro_export]
 macro_rules! say {
-    ($($text:tt)*) => {{
-        use std::io::Write as _;
-        let _ = writeln!(std::io::stdout(), $($text)*);
-    }};
+    () => { $crate::progress::print_line(format_args!("")) };
+    ($($text:tt)*) => { $crate::progress::print_line(format_args!($($text)*)) };
 }

@@ -2,9 +2,6 @@
 //!
 //! `result.json` is the same for the same scenario and seed, whatever the machine or the build; nothing timed goes in it.
 
-use std::path::Path;
-
-use anyhow::Context;
 use serde::Serialize;
 
 /// `result.json`.
@@ -121,9 +118,9 @@ pub fn rounded(value: f32) -> f64 {
     (f64::from(value) * 1e4).round() / 1e4
 }
 
-/// Writes a value as indented JSON.
-pub fn write_json(path: &Path, value: &impl Serialize) -> anyhow::Result<()> {
+/// A value as indented JSON.
+pub fn json(value: &impl Serialize) -> anyhow::Result<String> {
     let mut text = serde_json::to_string_pretty(value)?;
     text.push('\n');
-    std::fs::write(path, text).with_context(|| format!("cannot write: {}", path.display()))
+    Ok(text)
 }

@@ -14,6 +14,7 @@ use planner_core::frames::Geodetic;
 
 use super::{Autopilot, Config, Personality};
 use crate::link::{Link, LinkUrl};
+use crate::progress::printed;
 use crate::say;
 
 const STEP: Duration = Duration::from_millis(4);
@@ -96,6 +97,8 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         say!("listening {}", url.opened(&*link));
         links.push((url, link));
     }
+    // Whoever waits for these lines would wait for ever.
+    printed()?;
     let ground_up_m = -config.vehicle.radius_m;
     let mut next = Instant::now();
     loop {

@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 
 use super::load;
+use crate::files::Results;
 use crate::link::LinkUrl;
 use crate::mission::Mission;
 use crate::output;
@@ -99,6 +100,7 @@ fn plan_and_fly(
 ) -> anyhow::Result<ExitCode> {
     faults::check(&scenario)?;
     let gateway = qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
+    let mut results = Results::open(out, &output::NAMES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;
@@ -110,7 +112,8 @@ fn plan_and_fly(
     let page = output::flown_page(&mission, &plan, &flight)?;
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();
-    output::write(out, &flight.result, &mission.timing, page)?;
+    output::add(&mut results, &flight.result, &mission.timing, page)?;
+    results.keep()?;
     output::print_summary(&flight.result, out);
     for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
         let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));

@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use super::load;
 use crate::capacity::WAYPOINTS;
+use crate::files::Results;
 use crate::mission::{Mission, SwarmPlan};
 use crate::output;
 use crate::progress::Progress;
@@ -29,16 +30,22 @@ pub struct Args {
 /// Bad input, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let mut mission = Mission::prepare(load(&args.scenario, None)?, &Progress::on_terminal())?;
+    let scenario = load(&args.scenario, None)?;
+    let names = ["starts.txt", "goals.txt", "roadmap.bin", "mission.bin"];
+    let mut results = Results::open(&args.out, &[&output::NAMES[..], &names].concat())?;
+    let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let plan = mission.plan()?;
     let result = planned(&mission, &plan);
     let page = output::planned_page(&mission, &plan, &result)?;
     mission.timing.wall_s = began.elapsed().as_secs_f64();
-    output::write(&args.out, &result, &mission.timing, page)?;
-    output::write_points(&args.out.join("starts.txt"), mission.scenario.vehicles.iter().map(|v| v.start))?;
-    output::write_points(&args.out.join("goals.txt"), mission.goals.iter().copied())?;
-    output::write_file(&args.out.join("roadmap.bin"), &mission.roadmap_file)?;
-    output::write_file(&args.out.join("mission.bin"), &mission.mission_file)?;
+    output::add(&mut results, &result, &mission.timing, page)?;
+    let starts = output::points(mission.scenario.vehicles.iter().map(|v| v.start));
+    let goals = output::points(mission.goals.iter().copied());
+    let contents = [starts.as_bytes(), goals.as_bytes(), &mission.roadmap_file, &mission.mission_file];
+    for (name, bytes) in names.iter().zip(contents) {
+        results.add(name, bytes)?;
+    }
+    results.keep()?;
     output::print_summary(&result, &args.out);
     say!("pads       where each stands, as `--home` of `host-sim autopilot`");
     for (i, task) in mission.tasks.iter().enumerate() {

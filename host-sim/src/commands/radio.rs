@@ -10,6 +10,7 @@ use companion::frame::{Framer, MAX_SENT};
 use planner_core::Point;
 
 use crate::link::{Link, LinkUrl};
+use crate::progress::printed;
 use crate::say;
 use crate::swarm::radio::{Radio, RadioConfig};
 
@@ -60,6 +61,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         say!("listening {}", url.opened(&*link));
         links.push((url, link, Framer::new()));
     }
+    printed()?;
     let began = Clock::now();
     let mut buffer = [0; 2048];
     loop {

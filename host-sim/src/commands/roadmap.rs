@@ -8,9 +8,10 @@ use clap::Subcommand;
 use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
 use super::load;
+use crate::files::{self, Results};
 use crate::mission::Mission;
-use crate::output;
 use crate::progress::Progress;
+use crate::quote::quoted_path;
 use crate::say;
 
 /// Arguments of `host-sim roadmap`.
@@ -44,14 +45,18 @@ enum Action {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Build { scenario, out } => {
-            let mission = Mission::prepare(load(scenario, None)?, &Progress::on_terminal())?;
-            output::write_file(out, &mission.roadmap_file)?;
+            let scenario = load(scenario, None)?;
+            let mut results = Results::file(out)?;
+            let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
+            results.add_file(out, &mission.roadmap_file)?;
+            results.keep()?;
             print(&mission.view());
         }
         Action::Info { file } => {
-            let bytes = std::fs::read(file).with_context(|| format!("cannot read: {}", file.display()))?;
+            let bytes = files::read(file, files::BINARY_BYTES)
+                .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
             let view = RoadmapView::parse(&bytes)
-                .map_err(|error| anyhow!("not a roadmap: {}: {}", file.display(), why(&error)))?;
+                .map_err(|error| anyhow!("not a roadmap: {}: {}", quoted_path(file), why(&error)))?;
             print(&view);
         }
     }

@@ -8,8 +8,10 @@ use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::File;
 use planner_core::roadmap::{self, RoadmapView};
 
+use crate::files;
 use crate::link::LinkUrl;
 use crate::progress::Progress;
+use crate::quote::quoted_path;
 use crate::say;
 use crate::upload::Client;
 
@@ -35,8 +37,9 @@ pub struct Args {
 /// # Errors
 /// A file that is neither; no companion heard; a companion that refuses it; a link that fails.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let path = args.file.display();
-    let bytes = std::fs::read(&args.file).with_context(|| format!("cannot read: {path}"))?;
+    let path = quoted_path(&args.file);
+    let bytes =
+        files::read(&args.file, files::BINARY_BYTES).with_context(|| format!("cannot read: {path}"))?;
     let file = kind(&bytes).with_context(|| format!("not for upload: {path}"))?;
     let mut client = Client::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
     let system = client.find()?;

@@ -23,6 +23,8 @@ use std::net::{SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
 use std::time::Duration;
 
+use crate::quote::quoted;
+
 /// The longest wait for a TCP server at the start.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
@@ -72,15 +74,20 @@ pub enum LinkError {
     #[error("bad link URL: {0}: {1}")]
     Url(String, &'static str),
     /// The link could not be opened.
-    #[error("cannot open link: {0}: {1}")]
-    Open(LinkUrl, io::Error),
+    #[error("cannot open link: {}: {why}", quoted(&url.to_string()))]
+    Open {
+        /// The link.
+        url: LinkUrl,
+        /// What the system said.
+        why: io::Error,
+    },
 }
 
 impl FromStr for LinkUrl {
     type Err = LinkError;
 
     fn from_str(text: &str) -> Result<Self, LinkError> {
-        let bad = |why| LinkError::Url(text.to_owned(), why);
+        let bad = |why| LinkError::Url(quoted(text), why);
         let (scheme, rest) = text
             .split_once(':')
             .ok_or_else(|| bad("expected tcp:, tcp-listen:, udp:, udp-listen: or serial:"))?;
@@ -143,7 +150,7 @@ impl LinkUrl {
     }
 
     fn open_once(&self, timeout: Duration) -> Result<Box<dyn Link>, LinkError> {
-        let failed = |why| LinkError::Open(self.clone(), why);
+        let failed = |why| LinkError::Open { url: self.clone(), why };
         match self {
             Self::Tcp(at) => {
                 Ok(Box::new(tcp::Client::connect(resolve(at).map_err(failed)?, timeout).map_err(failed)?))

@@ -7,35 +7,23 @@
 //! bounded by four times its length whatever the header claims.
 
 use std::fmt::Write as _;
-use std::io::Read as _;
 use std::path::Path;
 
 use super::error::MapError;
 use super::octree::{DEPTH, INNER, Inner, Octree};
+use crate::files;
 
+/// Trees that are read: a coloured one is written without its colours.
+const IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
 const MAGIC: &str = "# Octomap OcTree binary file";
-/// Longest file read: a guard against devices that never end.
-const MAX_BYTES: u64 = 1 << 30;
+/// Longest file read: four times its length is what it takes in memory. The largest public scans have a tenth of it.
+const MAX_BYTES: u64 = 1 << 26;
 /// Longest header line; OctoMap's own comment takes 75 bytes.
 const MAX_LINE: usize = 1024;
 
 /// Reads a `.bt` file.
 pub fn read(path: &Path) -> Result<Octree, MapError> {
-    let io = |source| MapError::io("read", path, source);
-    let file = std::fs::File::open(path).map_err(io)?;
-    if !file.metadata().map_err(io)?.is_file() {
-        return Err(io(std::io::Error::other("not a regular file")));
-    }
-    let mut bytes = Vec::new();
-    file.take(MAX_BYTES + 1).read_to_end(&mut bytes).map_err(io)?;
-    if bytes.len() as u64 > MAX_BYTES {
-        return Err(MapError::Malformed {
-            file: path.into(),
-            offset: MAX_BYTES,
-            expected: "the end of the file within 1 GiB".into(),
-            found: "more data".into(),
-        });
-    }
+    let bytes = files::read(path, MAX_BYTES).map_err(|source| MapError::io("read", path, source))?;
     parse(&bytes, path)
 }
 
@@ -122,8 +110,8 @@ impl<'a> Reader<'a> {
             match word {
                 "" => {}
                 _ if line.starts_with('#') => {}
-                "id" if value == "OcTree" => id = true,
-                "id" => return Err(self.fail(value_at, "the id `OcTree`", quoted(value))),
+                "id" if IDS.contains(&value) => id = true,
+                "id" => return Err(self.fail(value_at, "the id `OcTree` or `ColorOcTree`", quoted(value))),
                 "size" => match value.parse::<u64>() {
                     Ok(n) => nodes = Some((n, value_at)),
                     Err(_) => return Err(self.fail(value_at, "a number of nodes", quoted(value))),
@@ -246,6 +234,15 @@ mod tests {
         assert_eq!(to_bytes(&tree), bytes);
     }
 
+    #[test]
+    fn a_coloured_tree_is_read_as_one_without_colours() {
+        let data = b"size 2\nres 0.1\ndata\n\x02\x00";
+        let plain = file(HEADER, data);
+        let coloured = file("# Octomap OcTree binary file\nid ColorOcTree\n", data);
+        let tree = parse(&coloured, Path::new("coloured.bt")).unwrap();
+        assert_eq!(to_bytes(&tree), plain);
+    }
+
     /// Sixteen times the same first child: a chain down to a leaf at depth 16.
     fn chain(levels: usize, last: u16) -> Vec<u8> {
         let mut data = [3u8, 0].repeat(levels);
@@ -275,8 +272,8 @@ mod tests {
             (vec![b'#'; 5000], "byte 0: expected `# Octomap OcTree binary file`, found no end of line"),
             (file(HEADER, b""), "byte 39: expected `size N`, found the end of the file"),
             (
-                file("# Octomap OcTree binary file\nid ColorOcTree\n", b""),
-                "byte 32: expected the id `OcTree`, found `ColorOcTree`",
+                file("# Octomap OcTree binary file\nid ScalarField\n", b""),
+                "byte 32: expected the id `OcTree` or `ColorOcTree`, found `ScalarField`",
             ),
             (file(HEADER, b"size -1\n"), "byte 44: expected a number of nodes, found `-1`"),
             (

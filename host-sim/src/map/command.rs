@@ -1,15 +1,16 @@
 //! `host-sim map info|convert`.
 
-use std::io::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
+use std::process::ExitCode;
 
-use anyhow::Context as _;
 use clap::{Args, Subcommand};
 use serde::Serialize;
 
 use super::occupancy::OccupancyMap;
 use super::octree::Octree;
-use super::{MapError, Source, bt, building};
+use super::{MapError, RESOLUTIONS_M, Source, bt, building};
+use crate::files::Results;
+use crate::say;
 
 /// Planning resolution where none is given, metres.
 pub const DEFAULT_RESOLUTION_M: f32 = 0.25;
@@ -28,7 +29,7 @@ enum Action {
         /// An OctoMap `.bt` file or `builtin:building`
         file: String,
         /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
-        #[arg(long, value_name = "METRES")]
+        #[arg(long, value_name = "METRES", value_parser = resolution)]
         resolution: Option<f32>,
         /// Print JSON
         #[arg(long)]
@@ -41,7 +42,7 @@ enum Action {
         /// The `.bt` file to write
         out: PathBuf,
         /// Cells of this edge, metres; a file's own resolution if absent, 0.25 for a builtin
-        #[arg(long, value_name = "METRES")]
+        #[arg(long, value_name = "METRES", value_parser = resolution)]
         resolution: Option<f32>,
     },
 }
@@ -74,11 +75,13 @@ pub struct Info {
 }
 
 impl Info {
-    /// Sums up a tree.
-    pub fn of(kind: &'static str, tree: &Octree) -> Self {
+    /// Sums up a tree that lies `shift_m` beside its keys.
+    pub fn of(kind: &'static str, tree: &Octree, shift_m: [f64; 3]) -> Self {
         let counts = tree.counts();
         let (lo, hi) = tree.key_bounds().unwrap_or_default();
         let (min_m, max_m) = tree.metric_bounds().unwrap_or_default();
+        let moved = |corner: [f64; 3]| [0, 1, 2].map(|a| corner[a] + shift_m[a]);
+        let (min_m, max_m) = (moved(min_m), moved(max_m));
         let dims = [0, 1, 2].map(|a| hi[a] - lo[a]);
         let all_m3 = dims.iter().map(|&d| f64::from(d) * tree.resolution_m()).product::<f64>();
         Self {
@@ -114,41 +117,93 @@ impl Info {
 }
 
 /// Runs the command; what it prints goes to standard output.
-pub fn run(args: &MapArgs) -> anyhow::Result<()> {
+///
+/// # Errors
+/// Bad input, by name and place.
+pub fn run(args: &MapArgs) -> anyhow::Result<ExitCode> {
     match &args.action {
         Action::Info { file, resolution, json } => {
-            let (kind, tree) = tree(file, *resolution)?;
-            let info = Info::of(kind, &tree);
-            let text = if *json { serde_json::to_string_pretty(&info)? } else { info.text() };
-            writeln!(std::io::stdout(), "{text}").context("cannot print")?;
+            let info = info(file, *resolution)?;
+            say!("{}", if *json { serde_json::to_string_pretty(&info)? } else { info.text() });
         }
         Action::Convert { file, out, resolution } => {
             if !matches!(Source::parse(&out.to_string_lossy()), Ok(Source::Bt(_))) {
                 let expected = "a file to write that ends in `.bt`";
                 return Err(MapError::UnknownKind { file: out.display().to_string(), expected }.into());
             }
-            bt::write(&tree(file, *resolution)?.1, Path::new(out))?;
+            let mut results = Results::file(out)?;
+            let tree = match read(file, *resolution)?.1 {
+                Map::Grid(grid) => grid.to_octree(file)?,
+                Map::Tree(tree) => tree,
+            };
+            results.add_file(out, &bt::to_bytes(&tree))?;
+            results.keep()?;
         }
     }
-    Ok(())
+    Ok(ExitCode::SUCCESS)
 }
 
-/// A map as an octree, resampled if a resolution is asked for.
-fn tree(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Octree), MapError> {
-    match Source::parse(file)? {
-        Source::Building(seed) => {
+/// A map as it is, or laid on a planning grid.
+enum Map {
+    Tree(Octree),
+    Grid(OccupancyMap),
+}
+
+/// Reads or makes a map; the same grid as is planned on if a resolution is asked for.
+fn read(file: &str, resolution_m: Option<f32>) -> Result<(&'static str, Map), MapError> {
+    match (Source::parse(file)?, resolution_m) {
+        (Source::Building(seed), _) => {
             let map = building::building(seed, resolution_m.unwrap_or(DEFAULT_RESOLUTION_M))?;
-            Ok(("builtin", map.to_octree(file)?))
+            Ok(("builtin", Map::Grid(map)))
         }
-        Source::Bt(path) => {
-            let tree = bt::read(path)?;
-            let tree = match resolution_m {
-                Some(resolution_m) => {
-                    OccupancyMap::from_octree(&tree, resolution_m, file)?.to_octree(file)?
-                }
-                None => tree,
-            };
-            Ok(("octomap", tree))
+        (Source::Bt(path), None) => Ok(("octomap", Map::Tree(bt::read(path)?))),
+        (Source::Bt(path), Some(resolution_m)) => {
+            Ok(("octomap", Map::Grid(OccupancyMap::from_octree(&bt::read(path)?, resolution_m, file)?)))
+        }
+    }
+}
+
+fn info(file: &str, resolution_m: Option<f32>) -> Result<Info, MapError> {
+    let (kind, map) = read(file, resolution_m)?;
+    let (tree, shift) = match map {
+        Map::Tree(tree) => (Some(tree), [0.0; 3]),
+        Map::Grid(grid) => grid.to_shifted_octree(),
+    };
+    let refuse = || MapError::Grid { file: file.into(), why: "all its cells are alike".into() };
+    Ok(Info::of(kind, &tree.ok_or_else(refuse)?, shift))
+}
+
+/// Edge of a planning cell as scenarios take it.
+fn resolution(text: &str) -> Result<f32, String> {
+    let given = text.parse().ok().filter(|r: &f32| RESOLUTIONS_M.contains(&f64::from(*r)));
+    let (least, most) = (RESOLUTIONS_M.start(), RESOLUTIONS_M.end());
+    given.ok_or_else(|| format!("expected a number from {least} to {most}, in metres"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::Occupancy;
+
+    /// Planning lays a map on cells of any size; what `map info` says of it must not ask for more.
+    #[test]
+    fn any_resolution_that_is_planned_on_is_told_about() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("hall.bt");
+        let tree = Octree::from_cells(0.1, [32_700, 32_801, 32_768], [70, 41, 33], |[x, _, z]| {
+            if z == 0 || x % 9 == 0 { Occupancy::Occupied } else { Occupancy::Free }
+        });
+        bt::write(&tree.unwrap(), &path).unwrap();
+        let file = path.to_str().unwrap();
+        for resolution_m in [0.05, 0.1, 0.13, 0.15, 0.2, 0.25, 0.3, 0.43, 1.0, 7.0] {
+            let grid = crate::map::load(file, resolution_m).unwrap();
+            let info = info(file, Some(resolution_m)).unwrap();
+            assert_eq!(info.dims, grid.shape().dims, "{resolution_m}");
+            for axis in 0..3 {
+                let (from_m, to_m) = (grid.shape().min[axis], grid.shape().max()[axis]);
+                assert!((info.min_m[axis] - f64::from(from_m)).abs() < 1e-4, "{resolution_m}: {info:?}");
+                assert!((info.max_m[axis] - f64::from(to_m)).abs() < 1e-4, "{resolution_m}: {info:?}");
+            }
         }
     }
 }

@@ -2,11 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::quote::{quoted, quoted_path};
+
 /// Why a map could not be read, made or written.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file system said no.
-    #[error("cannot {action} the map: {}", file.display())]
+    #[error("cannot {action} the map: {}", quoted_path(file))]
     Io {
         /// What was tried: "read", "write".
         action: &'static str,
@@ -16,7 +18,7 @@ pub enum MapError {
         source: std::io::Error,
     },
     /// The bytes are not what the format asks for.
-    #[error("malformed map: {}: byte {offset}: expected {expected}, found {found}", file.display())]
+    #[error("malformed map: {}: byte {offset}: expected {expected}, found {found}", quoted_path(file))]
     Malformed {
         /// The file.
         file: PathBuf,
@@ -28,7 +30,7 @@ pub enum MapError {
         found: String,
     },
     /// No reader for such a name.
-    #[error("unknown kind of map: {file}: expected {expected}")]
+    #[error("unknown kind of map: {}: expected {expected}", quoted(file))]
     UnknownKind {
         /// The name as given.
         file: String,
@@ -36,7 +38,7 @@ pub enum MapError {
         expected: &'static str,
     },
     /// The map cannot be laid on the grid that was asked for.
-    #[error("map does not fit: {file}: {why}")]
+    #[error("map does not fit: {}: {why}", quoted(file))]
     Grid {
         /// The name as given.
         file: String,

@@ -9,7 +9,7 @@ use planner_core::Point;
 use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
 
 use super::error::MapError;
-use super::octree::{KEY_ORIGIN, Occupancy, Octree};
+use super::octree::{KEY_ORIGIN, KEYS, Occupancy, Octree};
 
 /// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over [`MAX_DIM`] cells.
 pub const HAIR: f64 = 2e-3;
@@ -131,20 +131,33 @@ impl OccupancyMap {
     /// The same cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner lies on a
     /// multiple of the resolution (an error otherwise, or beyond ±32768 cells).
     pub fn to_octree(&self, name: &str) -> Result<Octree, MapError> {
-        let refuse = |why: &str| MapError::Grid { file: name.into(), why: why.into() };
+        let refuse = |why: String| MapError::Grid { file: name.into(), why };
+        let corner = self.shape.min;
+        let (tree, shift) = self.to_shifted_octree();
+        if shift.iter().any(|s| s.abs() > HAIR * f64::from(self.shape.resolution_m)) {
+            let why = format!(
+                "its corner [{}, {}, {}] does not lie on a multiple of {} m, as OctoMap's cells do",
+                corner.x, corner.y, corner.z, self.shape.resolution_m
+            );
+            return Err(refuse(why));
+        }
+        tree.ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side".into()))
+    }
+
+    /// The same cells as a pruned octree beside its place, and what brings it there, metres east, north, up. `None` where
+    /// the tree would have no root: see [`Octree::from_cells`].
+    pub fn to_shifted_octree(&self) -> (Option<Octree>, [f64; 3]) {
         // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
         let resolution: f64 = self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
-        let mut min = [0; 3];
-        for (key_min, &corner) in min.iter_mut().zip(self.shape.min.iter()) {
-            let cells = f64::from(corner) / resolution;
-            if (cells - cells.round()).abs() > HAIR {
-                return Err(refuse("its corner does not lie on a multiple of the resolution"));
-            }
-            let key = cells.round() + f64::from(KEY_ORIGIN);
-            *key_min = if key >= 0.0 { key as u32 } else { u32::MAX };
+        let (mut min, mut shift) = ([0; 3], [0.0; 3]);
+        for axis in 0..3 {
+            let cells = f64::from(self.shape.min[axis]) / resolution;
+            let most = f64::from(KEYS - self.shape.dims[axis].min(KEYS));
+            let key = (cells.round() + f64::from(KEY_ORIGIN)).clamp(0.0, most);
+            min[axis] = key as u32;
+            shift[axis] = (cells - (key - f64::from(KEY_ORIGIN))) * resolution;
         }
-        Octree::from_cells(resolution, min, self.shape.dims, |cell| self.at(cell))
-            .ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side"))
+        (Octree::from_cells(resolution, min, self.shape.dims, |cell| self.at(cell)), shift)
     }
 
     /// Shape and place.

@@ -9,9 +9,6 @@ mod pack;
 mod page;
 mod surface;
 
-use std::fs;
-use std::path::Path;
-
 use anyhow::Context;
 use planner_core::Point;
 use serde::Serialize;
@@ -187,14 +184,13 @@ pub fn vehicle_color(index: usize) -> [u8; 3] {
     ROUND[index % ROUND.len()].map(|c| (u16::from(c) * percent / 100) as u8)
 }
 
-/// Writes the page to `path`, in one piece of a few megabytes.
+/// The page, in one piece of a few megabytes.
 ///
 /// # Errors
-/// The data disagrees with itself (an edge without its node, a curve of unequal lengths), or the file cannot be written.
-pub fn write(path: &Path, data: &ReportData) -> anyhow::Result<()> {
-    check(data).with_context(|| format!("cannot report to {}", path.display()))?;
-    let html = page::html(data)?;
-    fs::write(path, html).with_context(|| format!("cannot write: {}", path.display()))
+/// The data disagrees with itself: an edge without its node, a curve of unequal lengths.
+pub fn page(data: &ReportData) -> anyhow::Result<String> {
+    check(data).context("cannot report")?;
+    page::html(data)
 }
 
 fn check(data: &ReportData) -> anyhow::Result<()> {

@@ -3,6 +3,11 @@
 use std::fmt;
 use std::ops::Range;
 
+use crate::quote::{MOST, quoted};
+
+/// Of a long line, this many characters are shown before what is meant.
+const BEFORE: usize = 40;
+
 /// What is wrong with a scenario, where, and what would be right.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScenarioError {
@@ -54,8 +59,9 @@ impl fmt::Display for ScenarioError {
                 let margin = " ".repeat(line.to_string().len());
                 writeln!(f, "bad scenario: {file}:{line}:{column}: {why}")?;
                 writeln!(f, "{margin} |")?;
-                writeln!(f, "{line} | {}", text.replace('\t', " "))?;
-                write!(f, "{margin} | {}{}", " ".repeat(column - 1), "^".repeat(*marked))?;
+                let (shown, before, marked) = around(text, column - 1, *marked);
+                writeln!(f, "{line} | {shown}")?;
+                write!(f, "{margin} | {}{}", " ".repeat(before), "^".repeat(marked))?;
             }
         }
         match hint {
@@ -65,4 +71,35 @@ impl fmt::Display for ScenarioError {
     }
 }
 
+/// A line as it is shown, of which `marked` characters from `from` on are meant; then how many characters of it stand
+/// before those, and how many of those are shown. Of a long line that is the part around them.
+fn around(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
+    let begin = if from + marked > MOST { from.saturating_sub(BEFORE) } else { 0 };
+    let plain = |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
+    let mut shown: String = text.chars().skip(begin).take(MOST - 2).map(plain).collect();
+    let length = shown.chars().count();
+    if text.chars().nth(begin + length).is_some() {
+        shown.push('…');
+    }
+    let before = from - begin + usize::from(begin > 0);
+    let marked = marked.min((length + usize::from(begin > 0)).saturating_sub(before)).max(1);
+    (if begin > 0 { format!("…{shown}") } else { shown }, before, marked)
+}
+
 impl std::error::Error for ScenarioError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_long_line_the_part_is_shown_that_is_meant() {
+        let text = format!("{}KEY = 1{}", "x".repeat(5000), "y".repeat(5000));
+        let (shown, before, marked) = around(&text, 5000, 3);
+        assert_eq!(shown.chars().skip(before).take(marked).collect::<String>(), "KEY");
+        assert!(shown.chars().count() <= MOST && shown.starts_with('…') && shown.ends_with('…'));
+        assert_eq!(around("a\tb\u{1b}c", 2, 1), ("a b c".to_owned(), 2, 1));
+        let (shown, before, marked) = around(&text, 0, 9000);
+        assert_eq!((before + marked, shown.chars().count()), (MOST - 2, MOST - 1));
+    }
+}

@@ -18,8 +18,10 @@ use planner_core::Point;
 use planner_core::frames::Geodetic;
 
 pub use crate::autopilot::{Estimator, Personality};
+use crate::files;
 use crate::link::LinkUrl;
 use crate::map::Unknown;
+use crate::quote::quoted_path;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
@@ -286,9 +288,9 @@ impl Scenario {
 
 /// Reads a scenario file; paths in it are relative to its folder.
 pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
-    let name = path.display().to_string();
+    let name = quoted_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
-    let text = std::fs::read_to_string(path).map_err(|e| fail(format!("cannot read it: {e}")))?;
+    let text = files::read_text(path).map_err(|e| fail(format!("cannot read it: {e}")))?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     sections::parse(&text, &name, &folder)
 }

@@ -11,6 +11,7 @@ use toml::Spanned;
 use toml::de::{DeString, DeTable, DeValue};
 
 use super::error::{Place, ScenarioError};
+use crate::quote::quoted;
 
 /// Bytes of the scenario.
 pub(super) type Span = Range<usize>;
@@ -180,7 +181,7 @@ impl<'a> Table<'a> {
 
     fn unknown(&self, key: &Spanned<DeString<'_>>, hint: Option<String>) -> ScenarioError {
         let place = if self.name.is_empty() { String::new() } else { format!(" in {}", self.name) };
-        let error = self.text.error(&key.span(), format!("unknown key `{}`{place}", key.get_ref()));
+        let error = self.text.error(&key.span(), format!("unknown key `{}`{place}", quoted(key.get_ref())));
         ScenarioError { hint, ..error }
     }
 

@@ -14,9 +14,11 @@ use super::{
     Companion, Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission,
     Mode, Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Unbuilt, Vehicle,
 };
+use crate::files;
 use crate::link::LinkUrl;
-use crate::map::{Source, Unknown};
+use crate::map::{RESOLUTIONS_M, Source, Unknown};
 use crate::margins;
+use crate::quote::{quoted, quoted_path};
 
 /// Most vehicles of a swarm: the system ids there are.
 const MAX_ID: u64 = 250;
@@ -27,7 +29,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let text = Text { file, text };
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
-        text.error(&span, format!("not TOML: {}", error.message().lines().next().unwrap_or_default()))
+        text.error(&span, format!("not TOML: {}", quoted(error.message().lines().next().unwrap_or_default())))
     })?;
     let root = Table::new(text, "", 0..0, root.get_ref());
     root.expect(&[
@@ -153,7 +155,7 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let origin = table.get("origin").map(|v| geodetic(&v)).transpose()?;
     let map = Map {
         file,
-        resolution_m: table.f32("resolution_m", 0.25, 0.001..=100.0)?,
+        resolution_m: table.f32("resolution_m", 0.25, RESOLUTIONS_M)?,
         unknown: table.word(
             "unknown",
             Unknown::Blocked,
@@ -275,8 +277,8 @@ fn place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
 /// One `x y z` a line; empty lines and those that begin with `#` are passed over.
 fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<Point>> {
     let path = folder.join(value.str()?);
-    let text = std::fs::read_to_string(&path)
-        .map_err(|error| value.error(&format!("cannot be read: {}: {error}", path.display())))?;
+    let text = files::read_text(&path)
+        .map_err(|error| value.error(&format!("cannot be read: {}: {error}", quoted_path(&path))))?;
     let mut goals = Vec::new();
     for (index, line) in text.lines().enumerate() {
         let line = line.trim();
@@ -292,9 +294,11 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<Point>> {
                 goals.push(Point::new(x, y, z));
             }
             _ => {
-                let place = format!("{}:{}", path.display(), index + 1);
-                return Err(value
-                    .error(&format!("is malformed: {place}: expected `x y z` in metres, found `{line}`")));
+                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                return Err(value.error(&format!(
+                    "is malformed: {place}: expected `x y z` in metres, found `{}`",
+                    quoted(line)
+                )));
             }
         }
     }
