@@ -26,6 +26,10 @@ const JERK_MPS3: f32 = 8.0;
 const SILENT_S: f32 = 3.0;
 /// So much of the way has to be free before the vehicle goes on, metres.
 const RESUME_M: f32 = 1.0;
+/// And so much before a vehicle that stands begins to move: less is flown before the filter sees it move.
+const START_M: f32 = 0.15;
+/// Slower than this stands, m/s.
+const START_MPS: f32 = 0.1;
 /// And for so long.
 const CLEAR: Duration = Duration::from_millis(300);
 /// The vehicle that yields waits until so many seconds of the other one's way are free.
@@ -42,6 +46,10 @@ const SLOW_SHARE: f32 = 0.15;
 const HULLS_M: f32 = 0.3;
 /// What a vehicle may fly faster than its reference and yet stop with it, m/s.
 const SWAY_MPS: f32 = 0.3;
+/// A setpoint slower than this may turn, m/s.
+const TURNS_MPS: f32 = 0.05;
+/// And where no more than this is left to the reference, metres.
+const TURNS_M: f32 = 0.03;
 /// A stop this near is a standstill, metres.
 const WAITS_M: f32 = 0.5;
 /// What kept the vehicle from going on within this time still does.
@@ -217,7 +225,7 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                Way::Path { back: self.tracker.speed_mps < 0.0 || self.back_to_m.is_some() }
+                Way::Path { back: self.flies_back(&plan.path) }
             }
             _ => Way::Stands,
         };
@@ -235,7 +243,11 @@ impl Guidance {
             self.filter.back = back;
         }
         let stopped = self.filter.is_stopped();
-        let extra_m = if stopped { RESUME_M } else { 0.0 };
+        let extra_m = match stopped {
+            true => RESUME_M,
+            false if self.door.velocity().norm_squared() < START_MPS * START_MPS => START_M,
+            false => 0.0,
+        };
         let bounds = self.bounds();
         let own = match way {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
@@ -286,6 +298,23 @@ impl Guidance {
             }
             None => self.count_standstill(state, scene, now),
         }
+    }
+
+    /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
+    /// reference that turns back leaves the setpoint on its way.
+    fn flies_back<const W: usize>(&self, path: &Path<W>) -> bool {
+        let along_m = self.tracker.along_m;
+        let velocity = self.door.velocity();
+        let beside = |by_m: f32| path.point_at((self.setpoint_m + by_m).clamp(0.0, path.length_m()));
+        let onward = match (beside(-TURNS_M), beside(TURNS_M)) {
+            (Some(from), Some(to)) => velocity.dot(&(to - from)),
+            _ => 0.0,
+        };
+        let moves = velocity.norm_squared() > TURNS_MPS * TURNS_MPS;
+        if along_m > self.setpoint_m + TURNS_M || (moves && onward > 0.0) {
+            return false;
+        }
+        (moves && onward < 0.0) || self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
     }
 
     /// A standstill before a vehicle that no gate waits for counts as one of the filter's.
