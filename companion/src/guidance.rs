@@ -9,14 +9,16 @@
 mod brakes;
 mod door;
 mod filter;
+mod waypoints;
 
 use planner_core::Point;
-use planner_core::deconflict::{self, Advice, DeconflictConfig, Own};
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Own};
 use planner_core::path::{self, Path, Reference, TrackConfig, Tracker};
 use planner_core::schedule::VehiclePlan;
 
 use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
+use self::waypoints::Waypoints;
 use crate::autopilot::Kind;
 use crate::config::Config;
 use crate::limits::{AutopilotLimits, Limit, Limits};
@@ -116,6 +118,8 @@ pub struct Guidance {
     /// The straight way of a climb, a join or a descent; none while it is to be made from where the setpoint stands.
     leg: Option<Path<2>>,
     leg_tracker: Tracker,
+    /// Which waypoint it flies to, by Algorithm 2.
+    waypoints: Waypoints,
     /// Whether the raw point is where the setpoint stands.
     settled: bool,
     /// The position was unknown: no place was sent.
@@ -205,6 +209,7 @@ impl Guidance {
             tracker: Tracker::default(),
             leg: None,
             leg_tracker: Tracker::default(),
+            waypoints: Waypoints::default(),
             settled: true,
             lost: false,
             advice: NOT_ASKED,
@@ -243,6 +248,7 @@ impl Guidance {
         self.tracker = Tracker::default();
         self.phase = Phase::Hold;
         self.leg = None;
+        self.waypoints = Waypoints::default();
         self.on_path = false;
         self.returning = false;
         self.aside = false;
@@ -304,6 +310,7 @@ impl Guidance {
         self.tracker = Tracker::default();
         self.phase = Phase::Path;
         self.leg = None;
+        self.waypoints = Waypoints::default();
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
         // Whatever kept it from going on did so on the other path.
@@ -487,7 +494,7 @@ impl Guidance {
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
         let path = scene.plan.map(|plan| &plan.path);
-        if let (Some(path), true) = (path, known && self.on_path) {
+        if let (Some(path), true) = (path, known && self.on_path && !self.is_algorithm2()) {
             self.retreat(state, path, &mut advice, neighbours, now);
         }
         if self.leg.is_none() {
@@ -588,6 +595,9 @@ impl Guidance {
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
                 Point::new(raw.x, raw.y, if self.up { end.z } else { end.z - self.guided_m(plan.descent_m) })
             }),
+            Phase::Path if self.is_algorithm2() => {
+                return self.next_to_waypoint(path, &scene.telemetry.position, advice).unwrap_or(raw);
+            }
             Phase::Path => return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw),
         };
         let Some(target) = target else { return raw };
@@ -649,6 +659,60 @@ impl Guidance {
         Some(position)
     }
 
+    /// The next raw point by Algorithm 2: straight to the current waypoint, at the speed advised.
+    fn next_to_waypoint<const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        position: &Point,
+        advice: &Advice,
+    ) -> Option<Point> {
+        let (raw, before) = (self.door.raw(), self.waypoints);
+        let target = self.waypoints.next(path, position);
+        let mut advice = *advice;
+        match target {
+            None => advice.speed_scale = 0.0,
+            Some(target) if self.leg.is_none() || self.waypoints != before => {
+                let mut leg = Path::new();
+                // Room for both.
+                let _ = leg.push(raw, self.track.lead_max_m);
+                let _ = leg.push(target, self.track.lead_max_m);
+                let course = |leg: &Path<2>| match leg.waypoints() {
+                    [from, to] => (to.position - from.position) / (to.along_m - from.along_m),
+                    _ => Point::zeros(),
+                };
+                // Of its speed it keeps what leads to the new waypoint.
+                let kept = self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
+                let speed_mps = self.leg_tracker.speed_mps * kept;
+                (self.leg, self.leg_tracker) = (Some(leg), Tracker { along_m: 0.0, speed_mps });
+            }
+            Some(_) => {}
+        }
+        let leg = self.leg.as_ref()?;
+        let speed = self.leg_tracker.speed_mps.max(0.0);
+        let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
+        let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + LEG_LEAST_M;
+        if leg.point_at(ahead_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+            advice.stop_within_m = braking_m;
+            self.fenced = true;
+        }
+        let reference = path::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
+        self.lead_m = LEG_LEAD_M;
+        self.tracker.speed_mps = self.leg_tracker.speed_mps;
+        let length_m = path.length_m();
+        self.tracker.along_m = if self.waypoints.completed() {
+            length_m
+        } else {
+            let seen_m = path.project(&reference.position, self.tracker.along_m, SETTLE_WINDOW_M);
+            seen_m.max(self.tracker.along_m).min((length_m - LEG_LEAST_M).max(0.0))
+        };
+        Some(reference.position)
+    }
+
+    /// Whether waypoints and the end of the path are those of the paper.
+    fn is_algorithm2(&self) -> bool {
+        self.deconflict.method == Method::Algorithm2
+    }
+
     /// Whether the straight way is flown by the raw point.
     fn leg_done(&self) -> bool {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
@@ -697,6 +761,10 @@ impl Guidance {
 
     /// Whether the path and the guided descent are flown.
     pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        if self.is_algorithm2() {
+            let stands = self.stands() && scene.telemetry.velocity.norm() < STANDING_MPS;
+            return stands && self.on_path && self.waypoints.completed() && !self.aside;
+        }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
         let Some(low) = leg.waypoints().last() else { return false };
         self.phase == Phase::Descent
@@ -710,6 +778,7 @@ impl Guidance {
     fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
         let Some(plan) = scene.plan else { return false };
         self.reached_end(&plan.path)
+            && !self.is_algorithm2()
             && !self.aside
             && self.stands()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {

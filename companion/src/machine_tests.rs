@@ -4,6 +4,7 @@ extern crate std;
 use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::MavCmd;
+use planner_core::deconflict::Method;
 
 use super::*;
 use crate::fake_px4::*;
@@ -47,6 +48,30 @@ fn flies_the_mission_and_lands_at_the_goal() {
         assert_eq!(*mask, px4::MASK_POSITION_VELOCITY_ACCELERATION);
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
     }
+}
+
+/// Lines 18 to 25 of the paper: waypoint after waypoint, then it lands where it is, without a guided descent.
+#[test]
+fn algorithm2_lands_where_it_reaches_its_last_waypoint() {
+    let mut slow = config();
+    slow.method = Method::Algorithm2;
+    let mut bench = Bench::new(slow);
+    bench.until(State::Ready, 6.0);
+    bench.start();
+    bench.until(State::Land, 60.0);
+    let left = (bench.enu - GOAL).norm();
+    assert!(left < 0.4, "{:?} {left}", bench.enu);
+    for (_, at, _) in &bench.setpoints {
+        assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
+    }
+    // Up to the landing no setpoint leads down, and the corner is not left before the vehicle has come to it.
+    let heights: Vec<f32> = bench.setpoints.iter().map(|(_, at, _)| at.z).collect();
+    assert!(heights.windows(2).all(|pair| pair[1] > pair[0] - 1e-3), "{heights:?}");
+    let (_, last, _) = bench.setpoints.last().unwrap();
+    assert!((last - GOAL).norm() < 0.4, "{last:?}");
+    bench.until(State::Done, 60.0);
+    assert!((bench.enu - Point::new(GOAL.x, GOAL.y, 0.0)).norm() < 0.5, "{:?}", bench.enu);
+    assert_no_gap(&bench);
 }
 
 #[test]

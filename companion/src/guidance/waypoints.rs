@@ -1,0 +1,65 @@
+//! P3D Algorithm 2, lines 10, 11 and 18 to 25, as printed: the waypoint a vehicle flies to, and the end of its path.
+//!
+//! The vehicle flies straight to its current waypoint at the speed that lines 12 to 17 leave
+//! ([`planner_core::deconflict`]). The next one is loaded when the vehicle is nearer than `Wp_radius`; within that of the
+//! last the path is completed: speed 0, then it lands where it is. Nothing of our tracker is in it: no speed that follows
+//! from a corner's clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
+
+use planner_core::Point;
+use planner_core::path::Path;
+
+/// Within this distance a waypoint is reached, metres: nearer than what the referee counts as reached, by the greatest
+/// error of an RTK estimate.
+pub const WP_RADIUS_M: f32 = 0.4;
+
+/// The paper's `nWaypoint`, and whether the path is completed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Waypoints {
+    next: usize,
+    completed: bool,
+}
+
+impl Waypoints {
+    /// One turn of the loop for a vehicle at `position`: where it flies to; `None` once the path is completed.
+    pub fn next<const W: usize>(&mut self, path: &Path<W>, position: &Point) -> Option<Point> {
+        let points = path.waypoints();
+        let goal = points.get(self.next)?.position;
+        if (goal - position).norm() < WP_RADIUS_M {
+            if self.next + 1 < points.len() {
+                self.next += 1;
+            } else {
+                self.completed = true;
+            }
+        }
+        (!self.completed).then(|| points[self.next].position)
+    }
+
+    /// Whether the last waypoint was reached.
+    pub fn completed(self) -> bool {
+        self.completed
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn waypoints_are_loaded_one_by_one_and_the_last_ends_the_path() {
+        let mut path = Path::<4>::new();
+        for (x, y) in [(0.0, 0.0), (5.0, 0.0), (5.0, 5.0)] {
+            path.push(Point::new(x, y, 1.0), 1.0).unwrap();
+        }
+        let mut waypoints = Waypoints::default();
+        let mut at = |x: f32, y: f32| waypoints.next(&path, &Point::new(x, y, 1.0)).map(|p| (p.x, p.y));
+        assert_eq!(at(-1.0, 0.0), Some((0.0, 0.0)));
+        assert_eq!(at(-0.41, 0.0), Some((0.0, 0.0)), "outside Wp_radius");
+        assert_eq!(at(-0.39, 0.0), Some((5.0, 0.0)));
+        assert_eq!(at(5.0, 4.9), Some((5.0, 0.0)), "the last one does not count before its turn");
+        assert_eq!(at(5.0, 0.2), Some((5.0, 5.0)));
+        assert_eq!(at(5.0, 4.7), None);
+        assert_eq!(at(0.0, 0.0), None, "completed for good");
+        assert!(waypoints.completed());
+        assert_eq!(Waypoints::default().next(&Path::<4>::new(), &Point::zeros()), None);
+    }
+}
