@@ -9,6 +9,7 @@
 mod brakes;
 mod door;
 mod filter;
+mod follower;
 mod waypoints;
 
 use planner_core::Point;
@@ -62,6 +63,8 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// A setpoint that stands this near the end of the path has flown it, metres.
 const AT_END_M: f32 = 0.02;
+/// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
+const FENCE_MARGIN_M: f32 = 0.05;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -124,6 +127,8 @@ pub struct Guidance {
     settled: bool,
     /// The position was unknown: no place was sent.
     lost: bool,
+    /// The autopilot flew by itself or by its pilot: setpoints followed the vehicle.
+    taken: bool,
     /// Last advice of the neighbours.
     pub advice: Advice,
     on_path: bool,
@@ -212,6 +217,7 @@ impl Guidance {
             waypoints: Waypoints::default(),
             settled: true,
             lost: false,
+            taken: false,
             advice: NOT_ASKED,
             on_path: false,
             lead_m: LEG_LEAD_M,
@@ -265,9 +271,9 @@ impl Guidance {
         }
     }
 
-    /// Holds a point until the pilot's vehicle is resumed; where the flight was interrupted is kept.
+    /// Holds where the setpoint followed the pilot's vehicle to, until that is resumed; where the flight was interrupted is kept.
     pub fn hold_after_pilot(&mut self, point: Point) {
-        self.door.reset(point);
+        self.hold_at(point);
         self.settle();
     }
 
@@ -478,9 +484,16 @@ impl Guidance {
         let taken = matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.lost |= !known || state == State::PositionLost;
-        if known && (taken || !self.door.is_live()) {
-            // The autopilot does not follow, or nothing was sent: begin where the vehicle is.
-            self.door.reset(position);
+        let flies = scene.telemetry.on_ground == Some(false);
+        let taken_before = core::mem::replace(&mut self.taken, taken);
+        if known && (taken || taken_before || !self.door.is_live()) {
+            // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
+            if taken || !self.door.is_live() {
+                self.door.reset(position);
+            }
+            if flies && !taken {
+                self.door.move_on(&scene.telemetry.velocity);
+            }
             self.settle();
             self.lost = false;
         }
@@ -511,7 +524,6 @@ impl Guidance {
         }
         let lead_m = (position - self.door.position()).norm();
         let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
-        let flies = scene.telemetry.on_ground == Some(false);
         let share = match moves {
             true if flies || state == State::Climb => share.min(self.pace),
             true => self.pace,
@@ -648,7 +660,7 @@ impl Guidance {
         // Where the path leaves the geofence, it stops before it.
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
-        let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + LEG_LEAST_M;
+        let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
         if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
             advice.stop_within_m = advice.stop_within_m.min(braking_m);
             self.fenced = true;

@@ -3,7 +3,8 @@
 //! The autopilot's own limits are parameters, read on connecting. A value that did not come, or that no vehicle has, counts
 //! as the default of its kind. Source: PX4 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
 
-use libm::fminf;
+use libm::{fmaxf, fminf};
+use planner_core::Point;
 
 use crate::autopilot::Kind;
 use crate::config::Config;
@@ -13,6 +14,8 @@ use crate::guidance::SMOOTH_MOST_S;
 pub const JERK_MPS3: f32 = 4.0;
 /// The same while the safety filter stops a vehicle, m/s³.
 pub const URGENT_JERK_MPS3: f32 = 8.0;
+/// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
+const CORNER_SHARE: f32 = 1.5;
 
 /// What an autopilot's parameter limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,6 +109,8 @@ pub struct Limits {
     pub accel_mps2: f32,
     /// Upwards and downwards, m/s².
     pub accel_z_mps2: f32,
+    /// Of a setpoint, across and vertically, m/s²: a corner adds to what is braked and gained before and behind it.
+    pub most_mps2: [f32; 2],
     /// Of a setpoint, m/s³.
     pub jerk_mps3: f32,
 }
@@ -118,13 +123,15 @@ impl Limits {
         // What the door's longest average smooths to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
-        let vertical_mps2 = least(&[Limit::AccelUp, Limit::AccelDown]);
+        let (across_mps2, vertical_mps2) =
+            (least(&[Limit::Accel]), least(&[Limit::AccelUp, Limit::AccelDown]));
         Self {
             speed_mps: fminf(config.cruise_mps, least(&[Limit::Speed])),
             climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
             descend_mps: fminf(config.climb_mps, least(&[Limit::Descend])),
-            accel_mps2: fminf(accel_mps2, least(&[Limit::Accel])),
+            accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
+            most_mps2: [across_mps2, vertical_mps2].map(|most| fminf(CORNER_SHARE * accel_mps2, most)),
             jerk_mps3,
         }
     }
@@ -134,9 +141,25 @@ impl Limits {
         if urgent { fminf(URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
     }
 
+    /// Greatest acceleration along a direction (a unit vector, or nearly none), m/s².
+    pub(crate) fn accel_along(&self, direction: &Point) -> f32 {
+        let (across, up) = (libm::hypotf(direction.x, direction.y), libm::fabsf(direction.z));
+        let least = fminf(self.accel_mps2 / fmaxf(across, 1e-3), self.accel_z_mps2 / fmaxf(up, 1e-3));
+        fminf(least, fmaxf(self.accel_mps2, self.accel_z_mps2))
+    }
+
+    /// The nearest acceleration that may be asked for, m/s².
+    pub(crate) fn within(&self, accel: &Point) -> Point {
+        let across = libm::hypotf(accel.x, accel.y);
+        let [most, most_z] = self.most_mps2;
+        let share = most / fmaxf(across, most);
+        let z = fmaxf(fminf(accel.z, most_z), -most_z);
+        Point::new(accel.x * share, accel.y * share, z)
+    }
+
     /// No setpoint moves faster, m/s.
     pub(crate) fn fastest_mps(&self) -> f32 {
-        libm::fmaxf(self.speed_mps, libm::fmaxf(self.climb_mps, self.descend_mps))
+        fmaxf(self.speed_mps, fmaxf(self.climb_mps, self.descend_mps))
     }
 }
 
@@ -144,7 +167,6 @@ impl Limits {
 mod tests {
     extern crate std;
 
-    use planner_core::Point;
     use planner_core::frames::Geodetic;
 
     use super::*;
@@ -186,6 +208,8 @@ mod tests {
                 (l.descend_mps, 0.1, 1.0),
                 (l.accel_mps2, 0.2, 1.5),
                 (l.accel_z_mps2, 0.2, 1.5),
+                (l.most_mps2[0], 0.2, 2.25),
+                (l.most_mps2[1], 0.2, 2.25),
                 (l.jerk_mps3, 1.0, 4.0),
             ] {
                 proptest::prop_assert!((least..=most).contains(&value), "{l:?}");

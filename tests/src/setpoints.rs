@@ -1,14 +1,18 @@
 //! The one checker of a stream of setpoints: what it asks of the vehicle, and whether it is fit to be flown.
 //!
-//! Speed, acceleration and jerk are differences of the positions that were sent, in the autopilot's frame, so they hold
-//! whatever feed-forward goes along. A gap longer than [`GAP_S`] begins another stream, and so does a setpoint that an
-//! autopilot in another mode did not follow: it has to be finite and inside the fence all the same.
+//! Speed, acceleration and jerk are divided differences of the positions that were sent, in the autopilot's frame, so they
+//! hold whatever feed-forward goes along, and however the steps lie in time: a curve whose third derivative is bounded has
+//! third divided differences within that bound. A gap longer than [`GAP_S`] begins another stream, and so does a setpoint
+//! that an autopilot in another mode did not follow: it has to be finite and inside the fence all the same. A setpoint that
+//! moves without a velocity of its own follows a vehicle that another flies, and asks for nothing: only jumps count there.
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;
 
 /// After a longer pause the next setpoint is the first of another stream, seconds.
 const GAP_S: f32 = 0.3;
+/// A setpoint without velocity that moves further than this follows the vehicle, metres.
+const STILL_M: f32 = 1e-4;
 /// Of the mask: the position is ignored.
 const NO_POSITION: u16 = 0b111;
 
@@ -88,6 +92,8 @@ impl std::fmt::Display for SetpointStats {
 #[derive(Clone, Copy, Debug)]
 struct Last {
     at_s: f64,
+    /// Time since the setpoint before, and since the one before that, seconds.
+    dt_s: [f32; 2],
     position: Vector3<f32>,
     velocity: Option<Vector3<f32>>,
     accel: Option<Vector3<f32>>,
@@ -149,29 +155,35 @@ impl SetpointCheck {
             self.fault(at_s, format!("outside the fence: {position:?}"));
         }
         let before = self.last.filter(|last| ((at_s - last.at_s) as f32) < GAP_S);
-        let mut next = Last { at_s, position, velocity: None, accel: None, jerk_mps3: 0.0 };
+        let mut next = Last { at_s, dt_s: [0.0; 2], position, velocity: None, accel: None, jerk_mps3: 0.0 };
         if let Some(before) = before {
             let dt_s = ((at_s - before.at_s) as f32).max(1e-3);
             let moved = position - before.position;
             let velocity = moved / dt_s;
-            next.velocity = Some(velocity);
+            next.dt_s = [dt_s, before.dt_s[0]];
             let stats = &mut self.stats;
             stats.step_m = stats.step_m.max(moved.norm());
             stats.speed_mps = stats.speed_mps.max(velocity.norm());
             let sent = Vector3::new(data.vx, data.vy, data.vz);
-            stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
             let jumps = velocity.norm() > self.limits.speed_mps;
             if jumps {
                 stats.jumps += 1;
                 self.fault(at_s, format!("a step of {:.2} m in {dt_s:.3} s", moved.norm()));
             }
+            if sent == Vector3::zeros() && moved.norm() > STILL_M {
+                self.last = Some(next);
+                return;
+            }
+            let stats = &mut self.stats;
+            stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
+            next.velocity = Some(velocity);
             if let Some(velocity_before) = before.velocity {
-                let accel = (velocity - velocity_before) / dt_s;
+                let accel = (velocity - velocity_before) / (0.5 * (dt_s + before.dt_s[0]));
                 next.accel = Some(accel);
-                let stats = &mut self.stats;
                 stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
                 if let Some(accel_before) = before.accel {
-                    next.jerk_mps3 = ((accel - accel_before) / dt_s).norm();
+                    let over_s = (dt_s + before.dt_s[0] + before.dt_s[1]) / 3.0;
+                    next.jerk_mps3 = ((accel - accel_before) / over_s).norm();
                     stats.jerk_mps3 = stats.jerk_mps3.max(next.jerk_mps3);
                     if next.jerk_mps3 > self.limits.jerk_mps3 {
                         stats.jerky += 1;

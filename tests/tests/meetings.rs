@@ -59,6 +59,7 @@ fn companions_that_meet_at_random_keep_apart() {
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
-    assert_eq!((setpoints.jumps, setpoints.outside, setpoints.not_finite), (0, 0, 0), "{setpoints}");
+    let unfit = (setpoints.jumps, setpoints.jerky, setpoints.outside, setpoints.not_finite);
+    assert_eq!(unfit, (0, 0, 0, 0), "{setpoints}");
     assert!(setpoints.count > 100_000 && setpoints.accel_mps2 < ACCEL_MPS2, "{setpoints}");
 }

@@ -13,12 +13,14 @@
 //! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
 //!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
 //!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
+//! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly.
 //!
 //! ENU metres, seconds. Work: 2·[`MOST_N`] vector sums for each tick, at most [`TICKS`] ticks a step.
 
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
+use super::follower::{Motion, shortened};
 use crate::limits::Limits;
 
 /// Time between two raw points, seconds: the rate of the setpoints.
@@ -105,9 +107,10 @@ pub struct Door {
     dt_s: f32,
     stopping: bool,
     sound: bool,
-    position: Point,
-    velocity: Point,
-    acceleration: Point,
+    /// Acceleration of the curve at the last setpoint.
+    asked: Point,
+    /// The setpoint.
+    motion: Motion,
     /// Statistics since the companion's start.
     pub stats: Stats,
 }
@@ -130,9 +133,8 @@ impl Door {
             dt_s: 0.0,
             stopping: false,
             sound: true,
-            position: Point::zeros(),
-            velocity: Point::zeros(),
-            acceleration: Point::zeros(),
+            asked: Point::zeros(),
+            motion: Motion::at(Point::zeros()),
             stats: Stats::default(),
         }
     }
@@ -155,17 +157,17 @@ impl Door {
 
     /// Place of the last setpoint.
     pub(crate) fn position(&self) -> Point {
-        self.position
+        self.motion.position
     }
 
     /// Its velocity.
     pub(crate) fn velocity(&self) -> Point {
-        self.velocity
+        self.motion.velocity
     }
 
     /// Its acceleration.
     pub(crate) fn acceleration(&self) -> Point {
-        self.acceleration
+        self.motion.acceleration
     }
 
     /// Where the raw point is: ahead of the setpoint by what the averages hold.
@@ -185,17 +187,19 @@ impl Door {
 
     /// Whether the setpoint stands.
     pub(crate) fn stands(&self) -> bool {
-        self.velocity.norm_squared() < STANDS_MPS * STANDS_MPS
+        self.velocity().norm_squared() < STANDS_MPS * STANDS_MPS
     }
 
     /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
     pub(crate) fn braking_m(&self, urgent: bool) -> f32 {
-        let speed = self.velocity.norm();
+        let velocity = self.velocity();
+        let speed = velocity.norm();
         if speed < STANDS_MPS {
             return 0.0;
         }
-        let (accel, jerk) = (self.limits.accel_mps2, CLOCK_SHARE * self.limits.jerk(urgent));
-        let ahead = fmaxf(self.acceleration.dot(&self.velocity) / speed, 0.0);
+        let accel = self.limits.accel_along(&(velocity / speed));
+        let jerk = CLOCK_SHARE * self.limits.jerk(urgent);
+        let ahead = fmaxf(self.acceleration().dot(&velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
         let end_s = 0.5 * accel / (END_SHARE * self.limits.jerk(urgent)) + 0.5 / TAIL_PER_S;
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
@@ -203,19 +207,27 @@ impl Door {
 
     /// Begins at a place, at rest: only where nothing was sent, where nobody flies by it, or where it stands.
     pub(crate) fn reset(&mut self, place: Point) {
-        let place = if place.iter().all(|c| c.is_finite()) { place } else { self.position };
-        self.position = self.inside(place);
+        let place = if place.iter().all(|c| c.is_finite()) { place } else { self.position() };
+        self.motion = Motion::at(self.inside(place));
         self.live = true;
         self.rest();
     }
 
-    /// Forgets the curve ahead; from a standstill only.
+    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back.
+    pub(crate) fn move_on(&mut self, velocity: &Point) {
+        let velocity = shortened(*velocity, self.limits.fastest_mps());
+        if velocity.iter().all(|c| c.is_finite()) {
+            self.motion.velocity = velocity;
+        }
+    }
+
+    /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own limits.
     pub(crate) fn rest(&mut self) {
         self.steps = [Point::zeros(); LEN];
         self.slopes = [Point::zeros(); 3];
-        (self.raw, self.mean) = (self.position, self.position);
+        (self.raw, self.mean) = (self.position(), self.position());
         (self.share, self.clock, self.clock_rate) = (0.0, 1.0, 0.0);
-        (self.velocity, self.acceleration) = (Point::zeros(), Point::zeros());
+        self.asked = Point::zeros();
     }
 
     /// The nearest place inside the fence.
@@ -242,7 +254,8 @@ impl Door {
         }
         self.dt_s = fminf(dt_s, f32::from(TICKS) * TICK_S);
         // A hard stop that has begun ends as one.
-        self.stopping = pace.urgent || (self.stopping && self.clock_rate < 0.0);
+        let brakes = self.clock_rate < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
+        self.stopping = pace.urgent || (self.stopping && brakes);
         let pace = Pace { urgent: self.stopping, ..pace };
         let clock_before = self.clock;
         self.run_clock(pace, self.dt_s);
@@ -272,24 +285,37 @@ impl Door {
         let (place, slope, bend) = self.curve();
         let velocity = slope * self.clock;
         let acceleration = bend * (self.clock * self.clock) + slope * self.clock_rate;
-        let finite = [place, velocity, acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()));
-        let step_m = (place - self.position).norm();
-        let reachable = step_m <= self.limits.fastest_mps() * dt_s + STEP_SLACK_M;
+        let to = Motion { position: place, velocity, acceleration };
         self.stats.made = self.stats.made.saturating_add(1);
-        if !(sound && finite && reachable) {
+        if !(sound && to.is_finite()) {
             self.stats.held = self.stats.held.saturating_add(1);
         }
-        if !(finite && reachable) {
+        if !to.is_finite() {
             self.rest();
             return false;
         }
-        let jerk_mps3 = (acceleration - self.acceleration).norm() / fmaxf(dt_s, 0.02);
+        self.asked = acceleration;
+        let before = self.motion;
+        self.motion.follow(&to, &self.limits, self.limits.jerk(self.stopping), dt_s);
+        self.hold_inside();
+        let step_m = (self.motion.position - before.position).norm();
+        let jerk_mps3 = (self.motion.acceleration - before.acceleration).norm() / dt_s;
         let worst = if self.stopping { &mut self.stats.urgent_jerk_mps3 } else { &mut self.stats.jerk_mps3 };
         *worst = fmaxf(*worst, jerk_mps3);
-        self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / fmaxf(dt_s, 0.02));
-        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, acceleration.norm());
-        (self.position, self.velocity, self.acceleration) = (place, velocity, acceleration);
+        self.stats.speed_mps = fmaxf(self.stats.speed_mps, (step_m - STEP_SLACK_M) / dt_s);
+        self.stats.accel_mps2 = fmaxf(self.stats.accel_mps2, self.motion.acceleration.norm());
         sound
+    }
+
+    /// What the follower strays from the curve does not lead out of the fence: that comes before smoothness.
+    fn hold_inside(&mut self) {
+        let place = self.inside(self.motion.position);
+        for axis in 0..3 {
+            if place[axis] != self.motion.position[axis] {
+                (self.motion.velocity[axis], self.motion.acceleration[axis]) = (0.0, 0.0);
+            }
+        }
+        self.motion.position = place;
     }
 
     /// Speed of the clock after `dt_s`: as near to the pace as acceleration and jerk allow. With s the curve's speed, f its
@@ -303,7 +329,7 @@ impl Door {
         let along = bend.dot(&slope) / speed;
         let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock;
-        let accel = limits.accel_mps2;
+        let accel = limits.accel_along(&(slope / fmaxf(true_speed, 1e-3)));
         // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
         let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_rate) * speed * dt_s, 0.0);
@@ -318,7 +344,7 @@ impl Door {
         // curve alone takes all of it, the rate that adds the least.
         let ahead = bend + third * (clock * dt_s);
         let next = (clock + self.clock_rate * dt_s).clamp(0.0, 1.0);
-        let change = ahead * (next * next) - self.acceleration;
+        let change = ahead * (next * next) - self.asked;
         let most = JERK_USED * limits.jerk(pace.urgent) * dt_s;
         let slope_sq = fmaxf(slope.norm_squared(), SLOW_MPS * SLOW_MPS);
         let middle = -change.dot(&slope) / slope_sq;

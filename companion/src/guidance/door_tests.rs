@@ -14,6 +14,7 @@ const LIMITS: Limits = Limits {
     descend_mps: 1.0,
     accel_mps2: 1.5,
     accel_z_mps2: 1.5,
+    most_mps2: [2.25, 2.0],
     jerk_mps3: 4.0,
 };
 
@@ -39,7 +40,6 @@ proptest! {
         let cfg = TrackConfig::default();
         let (mut tracker, mut door) = (Tracker::default(), Door::new(LIMITS, fence));
         door.reset(first);
-        let (mut urgent_before, mut above, mut checked) = (false, 0, 0);
         for (step, (kind, share, steps)) in
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()
         {
@@ -53,31 +53,35 @@ proptest! {
             let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
             let (at, velocity, acceleration) = (door.position(), door.velocity(), door.acceleration());
             for _ in 0..door.begin(pace, dt_s) {
-                let advice = if steps % 3 == 0 { Advice { stop_within_m: 0.0, ..Advice::FREE } } else { Advice::FREE };
+                let mut advice = Advice { stop_within_m: if steps % 3 == 0 { 0.0 } else { f32::INFINITY }, ..Advice::FREE };
+                // Guidance stops before the fence.
+                let v = tracker.speed_mps;
+                let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
+                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !door.allows(&ahead)) {
+                    advice.stop_within_m = advice.stop_within_m.min(braking_m);
+                }
                 let reference = path::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
                 door.push(reference.position);
             }
             door.finish();
             let dt_s = dt_s.min(0.2);
+            // The fence comes before smoothness.
+            let place = door.position();
+            let held = fence.is_some_and(|(low, high)| (0..3).any(|i| place[i] == low[i] || place[i] == high[i]));
             let moved = (door.position() - at).norm();
-            prop_assert!(moved <= 2.0 * dt_s + 3e-3, "{moved} m in {dt_s} s");
+            prop_assert!(moved <= 2.1 * dt_s + 1e-3, "{moved} m in {dt_s} s");
             // The velocity is that of the positions.
             let mean = (door.velocity() + velocity) * 0.5;
             let off = ((door.position() - at) / dt_s - mean).norm();
-            prop_assert!(off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
-            let accel = door.acceleration().norm();
-            prop_assert!(accel < 2.8, "{accel} m/s²");
-            if fence.is_none() && dt_s <= 0.06 {
-                let jerk = (door.acceleration() - acceleration).norm() / dt_s.max(0.02);
-                let most = if door.stopping || urgent_before { 8.0 } else { 4.0 };
-                // Where the clock meets its end or a pace turns in a corner, a step may exceed the limit.
-                prop_assert!(jerk < most * 3.0, "{jerk} m/s³ of {most}, {pace:?}");
-                above += u32::from(jerk > most * 1.05);
-                checked += 1;
-            }
-            urgent_before = door.stopping;
+            prop_assert!(held || off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
+            let a = door.acceleration();
+            let [across, up] = LIMITS.most_mps2;
+            prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
+            let jerk = (a - acceleration).norm() / dt_s;
+            let most = LIMITS.jerk(door.stopping);
+            prop_assert!(held || jerk <= most * 1.001 + 1e-3, "{jerk} m/s³ of {most}, {pace:?}");
             if let Some((low, high)) = fence {
-                prop_assert!((0..3).all(|a| door.position()[a] >= low[a] - 1e-3 && door.position()[a] <= high[a] + 1e-3));
+                prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]));
             }
             // Corners are rounded, stops are not overshot: never far from the path that the raw point has drawn.
             if fence.is_none() && step % 16 == 0 {
@@ -87,6 +91,5 @@ proptest! {
                 prop_assert!(off < 0.25, "{off} m off the path");
             }
         }
-        prop_assert!(above <= 8 + checked / 20, "{above} of {checked} steps above the jerk");
     }
 }

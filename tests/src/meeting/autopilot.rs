@@ -189,6 +189,10 @@ impl Autopilot {
     }
 
     fn enter(&mut self, mode: u32) {
+        if mode != self.mode {
+            // What was sent before was not followed.
+            self.check.restart();
+        }
         (self.mode, self.critical, self.lost, self.landing_commanded) = (mode, false, false, false);
         self.takeoff_z = None;
     }

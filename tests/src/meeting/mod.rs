@@ -41,8 +41,8 @@ const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 
 const JERK_MPS3: f32 = 9.0;
 /// A vehicle that is faster is not stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
-/// Speed of a setpoint, m/s.
-const SPEED_MPS: f32 = 3.5;
+/// Speed of a setpoint, m/s: nominal, and what it may run over where it catches up.
+const SPEED_MPS: f32 = 2.2;
 
 type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
 

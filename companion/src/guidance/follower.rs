@@ -1,0 +1,60 @@
+//! The last stage of the door: a point that follows the curve and never exceeds the vehicle's acceleration and jerk.
+//!
+//! The curve is within the limits but for rare moments: corners that come close together, a clock that changes its speed in
+//! a corner. There the follower falls behind it by centimetres and comes up again. It integrates a jerk that is constant
+//! within a step, so the jerk of the *positions* is bounded too. Its acceleration moves towards a wanted one, inside a convex
+//! set of accelerations (a disc across, an interval upwards), by no more than the jerk allows: it cannot leave that set.
+//!
+//! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
+//! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`RATE_SHARE`]): the
+//! limits do not make it swing.
+//!
+//! ENU metres, seconds. Constant work.
+
+use libm::fmaxf;
+use planner_core::Point;
+
+use crate::limits::Limits;
+
+/// Rate of the loop, as a share of jerk over acceleration: twice the rate is how fast a change of velocity dies away.
+const RATE_SHARE: f32 = 0.45;
+
+/// A moving point: place, velocity, acceleration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    pub(super) position: Point,
+    pub(super) velocity: Point,
+    pub(super) acceleration: Point,
+}
+
+impl Motion {
+    /// At rest at a place.
+    pub(super) fn at(position: Point) -> Self {
+        Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        [self.position, self.velocity, self.acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()))
+    }
+
+    /// Moves on by `dt_s` towards where the curve is then.
+    pub(super) fn follow(&mut self, to: &Self, limits: &Limits, jerk_mps3: f32, dt_s: f32) {
+        let (velocity, before) = (self.velocity, self.acceleration);
+        // Where it comes to if it takes on the curve's acceleration.
+        let place = self.position + velocity * dt_s + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
+        let speed = velocity + (before + to.acceleration) * (0.5 * dt_s);
+        let rate = RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);
+        let back = to.velocity + (to.position - place) * (0.5 * rate);
+        let wanted = to.acceleration + (shortened(back, limits.fastest_mps()) - speed) * (2.0 * rate);
+        let change = limits.within(&wanted) - before;
+        let jerk = shortened(change / dt_s, jerk_mps3);
+        self.acceleration = before + jerk * dt_s;
+        self.velocity = velocity + (before + jerk * (0.5 * dt_s)) * dt_s;
+        self.position += (velocity + (before * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
+    }
+}
+
+/// A vector no longer than `most`.
+pub(super) fn shortened(vector: Point, most: f32) -> Point {
+    vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
+}
