@@ -17,5 +17,6 @@ pub mod report;
 pub mod result;
 pub mod roadmap;
 pub mod scenario;
+pub mod shortage;
 pub mod swarm;
 pub mod upload;

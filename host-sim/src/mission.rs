@@ -9,9 +9,10 @@ use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, 
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
+use planner_core::path::PathError;
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::prm::Config;
-use planner_core::roadmap::{RoadmapHeader, RoadmapView};
+use planner_core::roadmap::{MAX_EDGE_M, RoadmapHeader, RoadmapView};
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::search::SearchWorkspace;
 use planner_core::segment::segment_is_clear;
@@ -23,7 +24,7 @@ use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
-use crate::scenario::{self, Scenario};
+use crate::scenario::{self, Scenario, Terminals};
 use crate::swarm::member::DeskCompanion;
 
 /// The plan of a swarm with the desk's capacities.
@@ -98,7 +99,12 @@ impl Mission {
         let descents_m = goals
             .iter()
             .enumerate()
-            .map(|(i, goal)| height_over_ground(&scenario, &map, &format!("goal {i}"), goal, largest_m))
+            .map(|(i, goal)| {
+                // The slots around a single goal stand where that stands.
+                let places = &scenario.mission.goal_places;
+                let place = places.get(i).or(places.first());
+                height_over_ground(&scenario, &map, &format!("goal {i}"), place, goal, largest_m)
+            })
             .collect::<anyhow::Result<_>>()?;
         let (roadmap, header) = build(&scenario, &map, &goals)?;
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
@@ -157,12 +163,40 @@ impl Mission {
         let path = &self.scenario.path;
         match error {
             PlanError::Schedule(id, ScheduleError::Blocked) => anyhow!(
-                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\n\
-                 hint: move its start or goal out of their way, or give the roadmap more nodes"
+                "vehicle {id} cannot pass the others: {path}: no order and no side-step lets it by\nhint: {}",
+                self.too_near().unwrap_or_else(|| "move its start or goal out of their way, or give the \
+                                                   roadmap more nodes"
+                    .into())
             ),
+            PlanError::Schedule(id, ScheduleError::GatesFull) => {
+                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates")
+            }
+            PlanError::Schedule(id, ScheduleError::PiecesFull) | PlanError::Path(id, PathError::PathFull) => {
+                anyhow!(
+                    "the flight of vehicle {id} is too long: {path}: a path holds at most {WAYPOINTS} waypoints\n\
+                     hint: a larger roadmap.edge_max_m makes fewer of them"
+                )
+            }
+            PlanError::SwarmFull => anyhow!("too many vehicles or goals: {path}: at most {VEHICLES}"),
             PlanError::Search(id, error) => anyhow!("no search for vehicle {id}: {path}: {error:?}"),
             other => anyhow!("no plan: {path}: {other:?}"),
         }
+    }
+
+    /// Two goals that are too near to each other for two vehicles to land there, and the distance needed.
+    fn too_near(&self) -> Option<String> {
+        let scenario = &self.scenario;
+        let needed_m = self.schedule.parked_separation_m;
+        let landed = |i: usize| self.goals[i] - Point::new(0.0, 0.0, self.descents_m[i]);
+        let place = |i: usize| scenario.mission.goal_places.get(i).map_or(&*scenario.path, String::as_str);
+        let mut pairs = (0..self.goals.len()).flat_map(|i| (0..i).map(move |j| (j, i)));
+        let (j, i) = pairs.find(|&(j, i)| (landed(i) - landed(j)).norm() < needed_m)?;
+        Some(format!(
+            "vehicles that land at goals {j} ({}) and {i} ({}) are {:.2} m apart: they need {needed_m:.2} m",
+            place(j),
+            place(i),
+            (landed(i) - landed(j)).norm()
+        ))
     }
 
     /// Goals that no vehicle flies to, and vehicles that no goal is left for.
@@ -171,6 +205,7 @@ impl Mission {
         Left {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
             vehicles: plan.flights.iter().filter(|f| f.goal.is_none()).map(|f| f.id).collect(),
+            reasons: Vec::new(),
         }
     }
 
@@ -309,6 +344,7 @@ fn height_over_ground(
     scenario: &Scenario,
     map: &VoxelMap,
     what: &str,
+    place: Option<&String>,
     point: &Point,
     radius_m: f32,
 ) -> anyhow::Result<f32> {
@@ -317,7 +353,7 @@ fn height_over_ground(
         Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
         Err(error) => error,
     };
-    let at = format!("{}: [{}, {}, {}]", scenario.path, point.x, point.y, point.z);
+    let at = format!("{}: [{}, {}, {}]", place.unwrap_or(&scenario.path), point.x, point.y, point.z);
     let why = match error {
         ColumnError::NotFree => {
             format!("{what} is not free: {at} lies in an obstacle, in unknown space or outside the map")
@@ -348,22 +384,23 @@ fn height_over_ground(
             bail!("{why}\nhint: the nearest place that would do is [{}, {}, {}]", place.x, place.y, place.z)
         }
         None => {
-            bail!("{why}\nhint: no place within 5 m would do; `host-sim map info` shows the map's extent")
+            bail!("{why}\nhint: no place near it would do; `host-sim map info` shows the map's extent")
         }
     }
 }
 
 fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
-    let task = |vehicle: &scenario::Vehicle| {
+    let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
+        let place = scenario.vehicle_places.get(i);
         let what = format!("start of vehicle {}", vehicle.id);
         Ok(VehicleTask {
             id: vehicle.id,
             required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(scenario, map, &what, &vehicle.start, vehicle.radius_m)?,
+            climb_m: height_over_ground(scenario, map, &what, place, &vehicle.start, vehicle.radius_m)?,
             goal: vehicle.goal.map(|goal| goal as u16),
         })
     };
-    scenario.vehicles.iter().map(task).collect()
+    scenario.vehicles.iter().enumerate().map(task).collect()
 }
 
 /// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
@@ -397,10 +434,29 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
         }
     }
     bail!(
-        "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it",
-        scenario.path,
+        "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it\n\
+         hint: a goal with {reach_m:.0} m of free floor around it has room for all; fewer vehicles or a smaller \
+         deconfliction.safety_distance_m need less",
+        scenario.mission.goal_places.first().unwrap_or(&scenario.path),
         slots.len()
     )
+}
+
+/// Shortest and longest edge, metres; shares are of the map's longest side.
+fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32)> {
+    let settings = &scenario.roadmap;
+    let size_m = (map.shape.max() - map.shape.min).max();
+    let metres = |share: Option<f32>, metres: f32| share.map_or(metres, |share| share * size_m);
+    let min_m = metres(settings.edge_min_share, settings.edge_min_m);
+    let max_m = metres(settings.edge_max_share, settings.edge_max_m);
+    if !(min_m < max_m && max_m <= MAX_EDGE_M) {
+        bail!(
+            "roadmap edges cannot be from {min_m} to {max_m} m long: {}: the map's longest side is {size_m} m, \
+             and the longest edge must be above the shortest and at most {MAX_EDGE_M} m",
+            scenario.path
+        );
+    }
+    Ok((min_m, max_m))
 }
 
 fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<(Roadmap, RoadmapHeader)> {
@@ -409,15 +465,20 @@ fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result
     let settings = &scenario.roadmap;
     // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too small for it.
     let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
+    let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
     let config = Config {
         nodes: settings.nodes as usize,
-        edge_min_m: settings.edge_min_m,
-        edge_max_m: settings.edge_max_m,
+        edge_min_m,
+        edge_max_m,
         clearance_m: smallest_m + settings.safety_margin_m,
         seed: scenario.seed,
         sampling: settings.sampling,
     };
-    let roadmap = roadmap::build(map, &terminals, &config)?;
+    let mut roadmap = roadmap::build(map, &terminals, &config)?;
+    if settings.terminals == Terminals::Apart {
+        let is_terminal = |node: u16| usize::from(node) < terminals.len();
+        roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
+    }
     let header = RoadmapHeader {
         origin: scenario.map.origin,
         edge_min_m: config.edge_min_m,

@@ -9,7 +9,7 @@ use crate::mission::{Mission, SwarmPlan};
 use crate::report::{
     self, Curve, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
 };
-use crate::result::{self, Left, MissionResult, Timing};
+use crate::result::{self, MissionResult, Timing};
 use crate::say;
 use crate::swarm::Flight;
 use crate::swarm::monitor::Sample;
@@ -125,12 +125,8 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
             v.end
         );
     }
-    let Left { goals, vehicles } = &result.left;
-    if !goals.is_empty() {
-        say!("left       goals {goals:?}: no vehicle is left for them, or no way leads there");
-    }
-    if !vehicles.is_empty() {
-        say!("left       vehicles {vehicles:?}: no goal is left for them, or no way leads to one");
+    for reason in &result.left.reasons {
+        say!("left       {reason}");
     }
     let safety = &result.safety;
     let metres = |value: Option<f64>| value.map_or("-".to_owned(), |m| format!("{m:.2} m"));

@@ -34,6 +34,8 @@ pub struct Left {
     pub goals: Vec<u16>,
     /// Vehicles, by id; they stay on their pads.
     pub vehicles: Vec<u8>,
+    /// A line for each: where it is, why it is left, and what would help.
+    pub reasons: Vec<String>,
 }
 
 /// One vehicle.

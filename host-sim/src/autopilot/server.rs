@@ -36,7 +36,7 @@ pub struct AutopilotArgs {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: u8,
     /// Seconds from its start until ArduCopter's estimator has a position; PX4 has one at once
-    #[arg(long, value_name = "S", default_value_t = 40.0)]
+    #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = seconds)]
     pub ready_after: f32,
     /// Where it stands: degrees, degrees, metres above the sea
     #[arg(
@@ -49,6 +49,11 @@ pub struct AutopilotArgs {
     /// Origin of its own local frame (EKF origin); home if not given
     #[arg(long, value_name = "LAT,LON,ALT", allow_hyphen_values = true)]
     pub origin: Option<Place>,
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    let sound = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
+    sound.ok_or_else(|| "expected a number of seconds from 0 to 3600".to_owned())
 }
 
 /// A place as it is written on the command line.

@@ -17,6 +17,7 @@ use crate::link::{self, LinkUrl};
 use crate::mission::Mission;
 use crate::progress::Progress;
 use crate::say;
+use crate::shortage;
 use crate::swarm::ground_station::mission_start;
 use crate::swarm::member::{DeskCompanion, is_finished};
 use crate::swarm::{companion_config, new_companion};
@@ -34,7 +35,7 @@ pub struct Args {
     #[arg(long, value_name = "URL")]
     swarm: Option<LinkUrl>,
     /// Which vehicle of the scenario this is, by its MAVLink system id
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..))]
     id: u8,
     /// Start the mission as soon as it is ready, without a ground station's command
     #[arg(long)]
@@ -57,16 +58,24 @@ const HEARD: companion::Duration = companion::Duration::from_secs(5);
 /// # Errors
 /// Bad input or a link that fails, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
-    let mut mission = Mission::prepare(load(&args.scenario, None)?, &Progress::on_terminal())?;
+    let scenario = load(&args.scenario, None)?;
+    // What it needs is tried before the work.
+    let mut flash = DeskFlash::open(args.flash.as_deref())?;
+    let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
     let plan = mission.plan()?;
+    let left = mission.left(&plan);
+    // A goal is left, and this vehicle has none.
+    let is_short = left.vehicles.contains(&args.id) && !left.goals.is_empty();
+    if is_short {
+        shortage::lines(&mission, &plan).iter().for_each(|line| say!("left       {line}"));
+    }
     let mut config = companion_config(&mission, args.id)?;
     if args.swarm.is_none() {
         say!("no --swarm link: vehicle {} flies as the only one", args.id);
         config.roster =
             config.roster.iter().filter(|e| e.system_id == args.id).copied().collect::<FixedVec<_, _>>();
     }
-    let mut flash = DeskFlash::open(args.flash.as_deref())?;
     let mut companion = start(&config, &mut flash)?;
     let mut links: Vec<(Link, Box<dyn link::Link>)> = vec![(Link::Autopilot, args.autopilot.open()?)];
     if let Some(swarm) = &args.swarm {
@@ -137,7 +146,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         if !is_finished(state) || flies {
             finished_at = None;
         } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL {
-            return Ok(if state == State::Done { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+            return Ok(if state == State::Done && !is_short { ExitCode::SUCCESS } else { ExitCode::FAILURE });
         }
         sleep(NAP);
     }

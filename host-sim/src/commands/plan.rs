@@ -10,8 +10,9 @@ use crate::files::Results;
 use crate::mission::{Mission, SwarmPlan};
 use crate::output;
 use crate::progress::Progress;
-use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
 use crate::say;
+use crate::shortage;
 
 /// Arguments of `host-sim plan`.
 #[derive(Debug, clap::Args)]
@@ -94,6 +95,6 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
             deadlocks: 0,
         },
         roadmap: mission.roadmap_size(),
-        left: mission.left(plan),
+        left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
     }
 }

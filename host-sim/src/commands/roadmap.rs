@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, anyhow};
+use anyhow::{Context, anyhow, ensure};
 use clap::Subcommand;
 use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
@@ -55,8 +55,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         Action::Info { file } => {
             let bytes = files::read(file, files::BINARY_BYTES)
                 .with_context(|| format!("cannot read: {}", quoted_path(file)))?;
-            let view = RoadmapView::parse(&bytes)
-                .map_err(|error| anyhow!("not a roadmap: {}: {}", quoted_path(file), why(&error)))?;
+            let view = parse(&bytes).with_context(|| format!("not a roadmap: {}", quoted_path(file)))?;
             print(&view);
         }
     }
@@ -81,8 +80,15 @@ fn print(view: &RoadmapView<'_>) {
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
 
+/// A file that is a roadmap and nothing else.
+pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
+    let view = RoadmapView::parse(bytes).map_err(|error| anyhow!(why(&error)))?;
+    ensure!(view.byte_len() == bytes.len(), "{} bytes follow its end", bytes.len() - view.byte_len());
+    Ok(view)
+}
+
 /// What is wrong with a file.
-pub(super) fn why(error: &RoadmapError) -> String {
+fn why(error: &RoadmapError) -> String {
     match error {
         RoadmapError::Truncated => "it ends too early".to_owned(),
         RoadmapError::Magic => "it does not begin as a roadmap file does".to_owned(),

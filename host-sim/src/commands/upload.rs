@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use anyhow::{Context, anyhow, bail};
+use anyhow::{Context, anyhow, bail, ensure};
 use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::File;
-use planner_core::roadmap::{self, RoadmapView};
+use planner_core::roadmap;
 
 use crate::files;
 use crate::link::LinkUrl;
@@ -56,10 +56,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 
 fn kind(bytes: &[u8]) -> anyhow::Result<File> {
     if bytes.starts_with(&roadmap::MAGIC) {
-        RoadmapView::parse(bytes).map_err(|e| anyhow!("no sound roadmap: {}", super::roadmap::why(&e)))?;
+        super::roadmap::parse(bytes).context("no sound roadmap")?;
         Ok(File::Roadmap)
     } else if bytes.starts_with(&mission_file::MAGIC) {
-        MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {}", why(&e)))?;
+        let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {}", why(&e)))?;
+        let more = bytes.len() - view.byte_len();
+        ensure!(more == 0, "no sound mission: {more} bytes follow its end");
         Ok(File::Mission)
     } else {
         bail!(

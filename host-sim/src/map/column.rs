@@ -13,6 +13,8 @@ use super::VoxelMap;
 
 /// How far [`nearest_column`] looks, metres.
 const NEAREST_M: f32 = 5.0;
+/// Most cells it looks at: a second or two.
+const NEAREST_CELLS: f32 = 3e8;
 /// Spacing of the places it tries, metres.
 const NEAREST_STEP_M: f32 = 0.1;
 
@@ -85,8 +87,11 @@ fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m
             nearest = (Point::from(place.map(|x| x as f32)), distance, unknown);
         }
     };
+    let mut reach_m = reach_m;
     if map.outside == Outside::Blocked {
         for (axis, end) in [(0, min.x), (0, max.x), (1, min.y), (1, max.y), (2, max.z)] {
+            // Nothing beyond the nearest face can be nearer.
+            reach_m = reach_m.min((end - at[axis]).abs());
             let mut place = [at.x, at.y, at.z];
             place[axis] = end;
             consider(place, true);
@@ -121,7 +126,7 @@ fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m
     nearest
 }
 
-/// The nearest place at the same height whose column is clear, within 5 m.
+/// The nearest place at the same height whose column is clear, within 5 m, or nearer where much room is required.
 pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Option<Point> {
     let steps = (NEAREST_M / NEAREST_STEP_M) as i32;
     let mut offsets: Vec<(i32, i32)> =
@@ -129,7 +134,11 @@ pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: 
     offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
     // Only what two decimals can say, so that what is printed is what was tried.
     let round = |x: f32| (f64::from(x) * 100.0).round() as f32 / 100.0;
-    offsets.into_iter().find_map(|(i, j)| {
+    let across = 2.0 * required_m / map.shape.resolution_m + 3.0;
+    let layers =
+        (map.shape.dims[2] as f32).min(across + (point.z - map.shape.min.z) / map.shape.resolution_m);
+    let most = (NEAREST_CELLS / (across * across * layers)) as usize;
+    offsets.into_iter().take(most).find_map(|(i, j)| {
         let (x, y) = (point.x + i as f32 * NEAREST_STEP_M, point.y + j as f32 * NEAREST_STEP_M);
         let place = Point::new(round(x), round(y), point.z);
         column(map, &place, radius_m, required_m).is_ok().then_some(place)

@@ -43,6 +43,8 @@ pub struct Scenario {
     pub mission: Mission,
     /// `[[vehicles]]`, as they stand in the file.
     pub vehicles: Vec<Vehicle>,
+    /// Where the start of each stands, as `FILE:LINE`.
+    pub vehicle_places: Vec<String>,
     /// `[deconfliction]`
     pub deconfliction: Deconfliction,
     /// `[simulation]`
@@ -86,10 +88,25 @@ pub struct Roadmap {
     pub edge_min_m: f32,
     /// Longest edge.
     pub edge_max_m: f32,
+    /// The same as shares of the map's longest side, where they are given so (P2D).
+    pub edge_min_share: Option<f32>,
+    /// See `edge_min_share`.
+    pub edge_max_share: Option<f32>,
+    /// Whether edges join two terminals.
+    pub terminals: Terminals,
     /// Margin beyond a vehicle's radius.
     pub safety_margin_m: f32,
     /// How nodes are drawn.
     pub sampling: Sampling,
+}
+
+/// Whether edges join two starts or goals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Terminals {
+    /// As any other nodes (P3D).
+    Joined,
+    /// Never (P2D).
+    Apart,
 }
 
 /// `[mission]`
@@ -103,6 +120,8 @@ pub struct Mission {
     pub cruise_mps: f32,
     /// Tasks, ENU metres.
     pub goals: Vec<Point>,
+    /// Where each stands, as `FILE:LINE`.
+    pub goal_places: Vec<String>,
     /// Where vehicles may be.
     pub geofence: Option<Geofence>,
     /// System ids whose commands count; 0 is no id.

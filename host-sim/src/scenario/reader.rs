@@ -25,6 +25,11 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
+    /// Where it is, as `FILE:LINE`.
+    pub(super) fn line(&self, span: &Span) -> String {
+        format!("{}:{}", self.file, Place::of(self.text, span).line)
+    }
+
     pub(super) fn error(&self, span: &Span, why: impl Into<String>) -> ScenarioError {
         ScenarioError {
             file: self.file.into(),

@@ -12,8 +12,9 @@ use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::{
     Companion, Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission,
-    Mode, Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Unbuilt, Vehicle,
+    Mode, Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Terminals, Unbuilt, Vehicle,
 };
+use crate::capacity::VEHICLES;
 use crate::files;
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTIONS_M, Source, Unknown};
@@ -22,6 +23,8 @@ use crate::quote::{quoted, quoted_path};
 
 /// Most vehicles of a swarm: the system ids there are.
 const MAX_ID: u64 = 250;
+/// Most faults of a scenario.
+const MAX_FAULTS: usize = 1000;
 /// Mission origin where none is given: a test field.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
@@ -71,6 +74,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let faults = match &faults_value {
         Some(value) => {
             let items = value.items()?;
+            at_most(value, items.len(), MAX_FAULTS, "faults")?;
             items.iter().map(|v| fault(&v.table()?, &ids)).collect::<Result<Vec<_>>>()?
         }
         None => Vec::new(),
@@ -81,9 +85,10 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         unsupported.push(not_yet(text, span, "this mission.mode"));
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
-    check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m)?;
     check_goals(text, &vehicles, &mission)?;
+    let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m, &simulation, &vehicles)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, &roadmap, &deconfliction, &simulation, &vehicles)?;
     }
@@ -96,6 +101,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         roadmap,
         mission,
         vehicles,
+        vehicle_places,
         deconfliction,
         simulation,
         faults,
@@ -169,10 +175,23 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
 
 fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
     let edge_max = table.get("edge_max_m");
+    let shares = [("edge_min_share", "edge_min_m"), ("edge_max_share", "edge_max_m")];
+    for (share, metres) in shares {
+        if let (Some(value), true) = (table.get(share), table.get(metres).is_some()) {
+            return Err(value.error(&format!("cannot stand beside roadmap.{metres}: give one of them")));
+        }
+    }
     let roadmap = Roadmap {
         nodes: table.whole("nodes", 2300, 0..=1_000_000)? as u32,
         edge_min_m: table.f32("edge_min_m", 0.5, 0.0..=MAX_EDGE_M.into())?,
         edge_max_m: table.f32("edge_max_m", 8.0, 0.001..=MAX_EDGE_M.into())?,
+        edge_min_share: table.optional_f32("edge_min_share", 0.0..=1.0)?,
+        edge_max_share: table.optional_f32("edge_max_share", 0.0001..=1.0)?,
+        terminals: table.word(
+            "terminals",
+            Terminals::Joined,
+            &[("joined", Terminals::Joined), ("apart", Terminals::Apart)],
+        )?,
         safety_margin_m: table.f32("safety_margin_m", 0.5, 0.0..=100.0)?,
         sampling: table.word(
             "sampling",
@@ -181,7 +200,8 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
         )?,
     };
     table.finish()?;
-    if roadmap.edge_min_m >= roadmap.edge_max_m {
+    let in_metres = roadmap.edge_min_share.is_none() && roadmap.edge_max_share.is_none();
+    if in_metres && roadmap.edge_min_m >= roadmap.edge_max_m {
         let (min, max) = (roadmap.edge_min_m, roadmap.edge_max_m);
         let span = edge_max.map_or(table.span.clone(), |v| v.span);
         let why = format!("roadmap.edge_max_m ({max} m) must be above roadmap.edge_min_m ({min} m)");
@@ -222,10 +242,15 @@ fn mission(
         (Some(_), Some(file)) => {
             return Err(file.error("cannot stand beside mission.goals: give one of them"));
         }
-        (Some(list), None) => list.items()?.iter().map(|v| place(v, origin)).collect::<Result<Vec<_>>>()?,
+        (Some(list), None) => {
+            let goals = list.items()?;
+            at_most(list, goals.len(), VEHICLES, "goals")?;
+            goals.iter().map(|v| Ok((place(v, origin)?, table.text.line(&v.span)))).collect::<Result<_>>()?
+        }
         (None, Some(file)) => goals_file(file, folder)?,
         (None, None) => Vec::new(),
     };
+    let (goals, goal_places): (Vec<Point>, Vec<String>) = goals.into_iter().unzip();
     let takes_goals = !matches!(mode, Mode::Coverage | Mode::Formation);
     if takes_goals && goals.is_empty() {
         let span = given.or(file).map_or(table.span.clone(), |v| v.span);
@@ -241,7 +266,16 @@ fn mission(
     let ground_stations = table.get("ground_stations").map(|v| ground_stations(&v, vehicles)).transpose()?;
     let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
     table.finish()?;
-    Ok((Mission { mode, objective, cruise_mps, goals, geofence, ground_stations }, mode_span))
+    let mission = Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
+    Ok((mission, mode_span))
+}
+
+/// Refuses a list that is longer than any mission's.
+fn at_most(value: &Value<'_>, count: usize, most: usize, what: &str) -> Result<()> {
+    if count > most {
+        return Err(value.error(&format!("holds more than {most} {what}")));
+    }
+    Ok(())
 }
 
 /// System ids whose commands count.
@@ -275,7 +309,7 @@ fn place(value: &Value<'_>, origin: Option<&Geodetic>) -> Result<Point> {
 }
 
 /// One `x y z` a line; empty lines and those that begin with `#` are passed over.
-fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<Point>> {
+fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> {
     let path = folder.join(value.str()?);
     let text = files::read_text(&path)
         .map_err(|error| value.error(&format!("cannot be read: {}: {error}", quoted_path(&path))))?;
@@ -291,7 +325,9 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<Point>> {
                 if line.split_whitespace().count() == 3
                     && numbers.iter().all(|n| n.is_finite() && n.abs() <= MAX_COORDINATE_M) =>
             {
-                goals.push(Point::new(x, y, z));
+                let place = format!("{}:{}", quoted_path(&path), index + 1);
+                goals.push((Point::new(x, y, z), place));
+                at_most(value, goals.len(), VEHICLES, "goals")?;
             }
             _ => {
                 let place = format!("{}:{}", quoted_path(&path), index + 1);
@@ -514,22 +550,38 @@ fn check_apart(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], safety_dist
 }
 
 /// Vehicles land below their goals: two goals too near would put two vehicles too near for good.
-fn check_goals_apart(table: &Table<'_>, mission: &Mission, safety_distance_m: f32) -> Result<()> {
+fn check_goals_apart(
+    table: &Table<'_>,
+    mission: &Mission,
+    safety_distance_m: f32,
+    simulation: &Simulation,
+    vehicles: &[Vehicle],
+) -> Result<()> {
     let goals = &mission.goals;
     for (i, goal) in goals.iter().enumerate() {
         for (j, other) in goals[..i].iter().enumerate() {
             let apart = (goal - other).norm();
             if apart < safety_distance_m {
-                let span =
-                    table.get("goals").or(table.get("goals_file")).map_or(table.span.clone(), |v| v.span);
+                let span = goal_span(table, i);
                 let why = format!(
                     "goals {j} and {i} are {apart:.2} m apart, below the safety distance of {safety_distance_m} m"
                 );
-                return Err(table.text.error(&span, why));
+                let needed_m = margins::parked_separation_m(simulation, safety_distance_m, vehicles);
+                let hint = format!("vehicles that land at both need {needed_m:.2} m between them");
+                return Err(table.text.with_hint(&span, why, hint));
             }
         }
     }
     Ok(())
+}
+
+/// Where a goal stands in the scenario.
+fn goal_span(table: &Table<'_>, index: usize) -> Span {
+    let Some(goals) = table.get("goals") else {
+        return table.get("goals_file").map_or(table.span.clone(), |v| v.span);
+    };
+    let item = goals.items().ok().and_then(|items| items.get(index).map(|item| item.span.clone()));
+    item.unwrap_or(goals.span)
 }
 
 fn check_goals(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], mission: &Mission) -> Result<()> {

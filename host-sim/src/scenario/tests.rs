@@ -316,3 +316,24 @@ fn the_scanned_buildings_have_room() {
         }
     }
 }
+
+#[test]
+fn edges_are_given_in_metres_or_as_shares() {
+    let text = changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nterminals = \"apart\"\n[mission]");
+    let roadmap = parse(&text, "p2d.toml").unwrap().roadmap;
+    assert_eq!((roadmap.edge_max_share, roadmap.terminals), (Some(0.2), Terminals::Apart));
+    let text = changed("[mission]", "[roadmap]\nedge_max_share = 0.2\nedge_max_m = 8\n[mission]");
+    let error = parse(&text, "p2d.toml").unwrap_err();
+    assert!(error.why.contains("cannot stand beside roadmap.edge_max_m"), "{error}");
+}
+
+#[test]
+fn goals_know_their_lines_and_how_far_apart_they_have_to_be() {
+    let text = changed("[3.0, 4.0, 12.5]]", "\n [3.0, 4.0, 12.5]]");
+    let scenario = parse(&text, "lines.toml").unwrap();
+    assert_eq!(scenario.mission.goal_places, ["lines.toml:5", "lines.toml:6"]);
+    assert_eq!(scenario.vehicle_places, ["lines.toml:9", "lines.toml:12"]);
+    let error = parse(&text.replace("3.0, 4.0, 12.5", "38.5, 19.0, 8.3"), "lines.toml").unwrap_err();
+    assert_eq!(error.place.as_ref().map(|place| place.line), Some(6), "{error}");
+    assert_eq!(error.hint.as_deref(), Some("vehicles that land at both need 1.75 m between them"));
+}

@@ -289,6 +289,11 @@ impl Member {
         }
     }
 
+    /// What was wrong with its serial link over `lasted_s` seconds, the worse direction first.
+    pub fn link_trouble(&self, lasted_s: f64) -> Option<String> {
+        self.up.trouble(lasted_s).or_else(|| self.down.trouble(lasted_s))
+    }
+
     /// Passes on to a board without a radio what a ground station tells its companion: by the autopilot, as that forwards it.
     pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_mute(now_us) {

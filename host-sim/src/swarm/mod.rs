@@ -35,8 +35,9 @@ use crate::margins;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
-use crate::result::{MissionResult, Safety, Totals, VehicleResult, rounded};
+use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
 use crate::scenario;
+use crate::shortage;
 
 /// A vehicle within this distance of its goal has reached it, metres.
 const REACHED_M: f32 = 0.5;
@@ -232,8 +233,14 @@ fn simulate(
             deadlocks: monitor.deadlocks,
         },
         roadmap: mission.roadmap_size(),
-        left: mission.left(plan),
+        left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
     };
+    for (member, vehicle) in members.iter().zip(&result.vehicles) {
+        if let (false, Some(text)) = (did_its_task(vehicle), member.link_trouble(t_s)) {
+            let level = report::Level::Error;
+            log.push(report::Event { t_s: t_s as f32, vehicle: Some(vehicle.id), level, text });
+        }
+    }
     log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
         t_s: *t_s as f32,
         vehicle: Some(scenario.vehicles[*i].id),
@@ -268,16 +275,23 @@ fn vehicle_result(
     nearest_goal_m: f32,
     now_s: f64,
 ) -> VehicleResult {
+    let reached = nearest_goal_m <= REACHED_M;
+    let end = match (flight.goal, member.state()) {
+        (None, _) => "no goal".to_owned(),
+        // By its estimate it was there.
+        (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
+        _ => member.end(),
+    };
     let flight_time_s = member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
     VehicleResult {
         id: flight.id,
         goal: flight.goal,
-        reached: nearest_goal_m <= REACHED_M,
+        reached,
         landed: member.landed_s.is_some(),
         path_m: rounded(flight.path.length_m()),
         flown_m: rounded(flown_m as f32),
         flight_time_s: rounded(flight_time_s as f32),
-        end: member.end(),
+        end,
     }
 }
 

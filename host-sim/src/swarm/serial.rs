@@ -21,6 +21,11 @@ pub struct SerialConfig {
     pub buffer: usize,
 }
 
+/// Shares of bytes lost, or of writes damaged, above which a link explains a failure.
+const TELLS: f64 = 0.02;
+/// The usual rates of lines, bits per second.
+const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
+
 /// One direction of a serial link; time in microseconds since the start of the simulation.
 #[derive(Debug)]
 pub struct SerialLink {
@@ -31,8 +36,14 @@ pub struct SerialLink {
     /// Arrival time and length of each write still under way.
     writes: VecDeque<(u64, usize)>,
     stalled_until_us: u64,
+    /// Bytes that were to be sent.
+    pub offered: u64,
     /// Bytes lost to a full buffer.
     pub overrun: u64,
+    /// Writes, and those of which a byte was changed.
+    pub writes_sent: u64,
+    /// See `writes_sent`.
+    pub writes_damaged: u64,
 }
 
 impl SerialLink {
@@ -45,12 +56,45 @@ impl SerialLink {
             bytes: VecDeque::new(),
             writes: VecDeque::new(),
             stalled_until_us: 0,
+            offered: 0,
             overrun: 0,
+            writes_sent: 0,
+            writes_damaged: 0,
         }
+    }
+
+    /// What was wrong with the link over `lasted_s` seconds, if anything, and what would do.
+    pub fn trouble(&self, lasted_s: f64) -> Option<String> {
+        let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
+        let lost = share(self.overrun, self.offered);
+        if lost > TELLS {
+            let offered = (self.offered as f64 / lasted_s.max(1e-3)) as u64;
+            let enough = BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
+            return Some(format!(
+                "its serial link lost {:.0} % of the bytes: {} baud carry {} bytes a second, {offered} were to be sent; \
+                 simulation.serial_baud of {enough} would do",
+                100.0 * lost,
+                self.config.baud,
+                self.config.baud / 10
+            ));
+        }
+        let damaged = share(self.writes_damaged, self.writes_sent);
+        (damaged > TELLS).then(|| {
+            format!(
+                "its serial link damaged {:.0} % of what it carried, and damaged messages are dropped: {} of its bytes \
+                 change; a simulation.serial_corruption of {:.0e} damages less than {:.0} %",
+                100.0 * damaged,
+                self.config.corruption as f32,
+                self.config.corruption * TELLS / damaged,
+                100.0 * TELLS
+            )
+        })
     }
 
     /// Sends bytes.
     pub fn write(&mut self, now_us: u64, data: &[u8]) {
+        self.offered += data.len() as u64;
+        self.writes_sent += 1;
         if self.bytes.len() + data.len() > self.config.buffer {
             self.overrun += data.len() as u64;
             return;
@@ -62,11 +106,14 @@ impl SerialLink {
         self.bytes.extend(data);
         if self.config.corruption > 0.0 {
             let sent = self.bytes.len() - data.len();
+            let mut damaged = false;
             for byte in self.bytes.range_mut(sent..) {
                 if unit(&mut self.rng) < self.config.corruption {
                     *byte ^= 1 << (self.rng.next_u32() % 8);
+                    damaged = true;
                 }
             }
+            self.writes_damaged += u64::from(damaged);
         }
     }
 

@@ -1,0 +1,272 @@
+//! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what would help.
+//!
+//! Whether a way is missing in the roadmap or in the building is told by the map itself: the widest way from a goal to a
+//! start, over the centres of its cells, by a flood that always goes on from the widest cell it has reached. Its width is
+//! the distance to the nearest obstacle at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood
+//! of each near a wall; only missions that fall short pay it.
+
+use std::collections::BTreeMap;
+
+use planner_core::Point;
+use planner_core::roadmap::RoadmapView;
+use planner_core::segment::point_clearance;
+
+use crate::map::VoxelMap;
+use crate::mission::{Mission, SwarmPlan};
+
+/// Widths are told apart by this much, metres.
+const STEP_M: f32 = 0.05;
+/// Larger grids are not flooded: the list of cells takes 4 bytes each.
+const MOST_CELLS: usize = 1 << 25;
+/// Most lines about goals; the rest are counted.
+const MOST_LINES: usize = 8;
+
+/// One line for each goal that is left and each vehicle without one, with its place and what would help.
+pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
+    let left = mission.left(plan);
+    let all = left.goals.len() + left.vehicles.len();
+    if all == 0 {
+        return Vec::new();
+    }
+    let mut asked = Asked { mission, reach: Reach::new(mission), widths: BTreeMap::new() };
+    let mut lines = Vec::new();
+    for &goal in left.goals.iter().take(MOST_LINES) {
+        lines.push(goal_line(&mut asked, usize::from(goal)));
+    }
+    // Where goals are left, what would help stands with them.
+    let asks = left.goals.is_empty();
+    for &id in left.vehicles.iter().take(MOST_LINES.max(lines.len()) - lines.len()) {
+        lines.push(vehicle_line(&mut asked, id, asks));
+    }
+    if all > lines.len() {
+        lines.push(format!("and {} more", all - lines.len()));
+    }
+    lines
+}
+
+/// What was found out so far.
+struct Asked<'a> {
+    mission: &'a Mission,
+    reach: Reach,
+    /// For each vehicle asked about, [`widths_m`] to all goals.
+    widths: BTreeMap<usize, Option<Vec<f32>>>,
+}
+
+fn goal_line(asked: &mut Asked<'_>, goal: usize) -> String {
+    let (mission, reach) = (asked.mission, &asked.reach);
+    let (at, vehicles) = (&mission.goals[goal], mission.tasks.len());
+    let what = format!("goal {goal} at [{}, {}, {}]", at.x, at.y, at.z);
+    let place = mission.scenario.mission.goal_places.get(goal).map_or(String::new(), |p| format!(" ({p})"));
+    let bound =
+        mission.tasks.iter().enumerate().find(|(_, task)| task.goal.is_some_and(|g| usize::from(g) == goal));
+    let reachable = match bound {
+        Some((vehicle, _)) => reach.joined(vehicle, goal),
+        None => (0..vehicles).any(|vehicle| reach.joined(vehicle, goal)),
+    };
+    let labelled = mission.tasks.iter().any(|task| task.goal.is_some());
+    let why = match (reachable, bound, labelled) {
+        (false, bound, _) => {
+            let vehicle = bound.map_or_else(|| smallest(mission), |(vehicle, _)| vehicle);
+            format!("no way in the roadmap leads there; {}", what_helps(asked, vehicle, goal))
+        }
+        (true, _, true) => "no vehicle names it as its goal".to_owned(),
+        (true, _, false) if vehicles < mission.goals.len() => {
+            format!("{vehicles} vehicles serve at most {vehicles} of {} goals", mission.goals.len())
+        }
+        (true, ..) => {
+            "the vehicles that a way leads to it for serve other goals; more roadmap.nodes may help"
+                .to_owned()
+        }
+    };
+    format!("{what}{place}: {why}")
+}
+
+fn vehicle_line(asked: &mut Asked<'_>, id: u8, asks: bool) -> String {
+    let (mission, reach) = (asked.mission, &asked.reach);
+    let vehicle = mission.tasks.iter().position(|task| task.id == id).unwrap_or_default();
+    let at = &mission.scenario.vehicles[vehicle].start;
+    let place = mission.scenario.vehicle_places.get(vehicle).map_or(String::new(), |p| format!(" ({p})"));
+    let goals = mission.goals.len();
+    let why = if !(0..goals).any(|goal| reach.joined(vehicle, goal)) {
+        let goal = mission.tasks[vehicle].goal.map_or(0, usize::from);
+        let helps = if asks { format!("; {}", what_helps(asked, vehicle, goal)) } else { String::new() };
+        format!("no way in the roadmap leads from it to a goal{helps}")
+    } else if goals < mission.tasks.len() {
+        format!("{goals} goals are for at most {goals} of {} vehicles", mission.tasks.len())
+    } else {
+        "the goals that a way leads to from it are served by others, or not its own".to_owned()
+    };
+    format!("vehicle {id} at [{}, {}, {}]{place}: {why}", at.x, at.y, at.z)
+}
+
+/// The vehicle that fits through most.
+fn smallest(mission: &Mission) -> usize {
+    let radius = |i: &usize| mission.scenario.vehicles[*i].radius_m;
+    (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
+}
+
+/// What would bring this vehicle to this goal.
+fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
+    let mission = asked.mission;
+    let settings = &mission.scenario.vehicles[vehicle];
+    let (radius_m, required_m) = (settings.radius_m, mission.tasks[vehicle].required_clearance_m);
+    let widths = asked.widths.entry(vehicle).or_insert_with(|| {
+        let field = mission.clearance_field();
+        widths_m(&mission.map, |p| field.lower_bound_m(p), &settings.start, &mission.goals, required_m)
+    });
+    let Some(widest_m) = widths.as_ref().map(|widths| widths[goal]) else {
+        return "more roadmap.nodes or a smaller roadmap.safety_margin_m may help".to_owned();
+    };
+    let half_m = mission.map.shape.resolution_m / 2.0;
+    if widest_m >= required_m {
+        let nodes = mission.scenario.roadmap.nodes;
+        format!(
+            "the map has one with the {required_m:.2} m to the nearest obstacle that are needed: \
+             more roadmap.nodes ({nodes}) would help"
+        )
+    } else if widest_m > radius_m {
+        let margin_m = ((widest_m - radius_m - half_m).max(0.0) * 100.0).floor() / 100.0;
+        format!(
+            "the widest on the map leaves {widest_m:.2} m to the nearest obstacle and {required_m:.2} m are needed: \
+             a roadmap.safety_margin_m of at most {margin_m} leaves it open"
+        )
+    } else if widest_m > 0.0 {
+        format!(
+            "the widest on the map leaves {widest_m:.2} m, less than the radius of {radius_m} m: nothing helps"
+        )
+    } else {
+        "the map has none: it is walled off".to_owned()
+    }
+}
+
+/// Which goals each vehicle's start is joined to by edges that are wide enough for it.
+struct Reach {
+    /// For each vehicle, for each goal.
+    joined: Vec<Vec<bool>>,
+}
+
+impl Reach {
+    fn new(mission: &Mission) -> Self {
+        let view = mission.view();
+        let vehicles = mission.tasks.len();
+        let row = |vehicle: usize| {
+            let seen = component(&view, vehicle, mission.tasks[vehicle].required_clearance_m);
+            (0..mission.goals.len()).map(|goal| seen[vehicles + goal]).collect()
+        };
+        Self { joined: (0..vehicles).map(row).collect() }
+    }
+
+    fn joined(&self, vehicle: usize, goal: usize) -> bool {
+        self.joined[vehicle][goal]
+    }
+}
+
+/// The nodes that edges of this clearance join to a node.
+fn component(view: &RoadmapView<'_>, from: usize, required_m: f32) -> Vec<bool> {
+    let mut seen = vec![false; view.node_count()];
+    let mut open = vec![from as u16];
+    seen[from] = true;
+    while let Some(node) = open.pop() {
+        for edge in view.half_edges(node).filter(|edge| view.clears(edge, required_m)) {
+            if !std::mem::replace(&mut seen[usize::from(edge.target)], true) {
+                open.push(edge.target);
+            }
+        }
+    }
+    seen
+}
+
+/// Distance to the nearest obstacle at the narrowest cell of the widest way to each goal, metres, at most `most_m` rounded
+/// up to a step; 0 where there is no way. `None` where the map is too large to be asked. `at_least_m` is a cheap bound.
+fn widths_m(
+    map: &VoxelMap,
+    at_least_m: impl Fn(&Point) -> f32,
+    from: &Point,
+    goals: &[Point],
+    most_m: f32,
+) -> Option<Vec<f32>> {
+    let (shape, grid) = (&map.shape, map.grid());
+    let steps = (most_m / STEP_M).ceil() as usize;
+    let [nx, ny, nz] = shape.dims.map(|d| d as usize);
+    let cells = nx.checked_mul(ny)?.checked_mul(nz)?;
+    if cells > MOST_CELLS {
+        return None;
+    }
+    let from = shape.cell_of(from)?;
+    let goals: Vec<_> = goals.iter().map(|goal| shape.cell_of(goal)).collect();
+    let mut widths = vec![0.0; goals.len()];
+    let mut missing = goals.len();
+    let at = |[i, j, k]: [u32; 3]| (k as usize * ny + j as usize) * nx + i as usize;
+    let step = |[i, j, k]: [u32; 3]| {
+        let r = shape.resolution_m;
+        let centre = shape.min + Point::new(i as f32 + 0.5, j as f32 + 0.5, k as f32 + 0.5) * r;
+        let most_m = STEP_M * steps as f32;
+        if at_least_m(&centre) >= most_m {
+            return steps;
+        }
+        ((point_clearance(&grid, &centre, most_m) / STEP_M + 1e-3) as usize).min(steps)
+    };
+    let mut seen = vec![0u64; cells.div_ceil(64)];
+    let mut open: Vec<Vec<[u32; 3]>> = vec![Vec::new(); steps + 1];
+    let mut width = step(from);
+    open[width].push(from);
+    seen[at(from) / 64] |= 1 << (at(from) % 64);
+    while width > 0 && missing > 0 {
+        let Some(cell) = open[width].pop() else {
+            width -= 1;
+            continue;
+        };
+        for (found, _) in widths.iter_mut().zip(&goals).filter(|(_, goal)| **goal == Some(cell)) {
+            *found = width as f32 * STEP_M;
+            missing -= 1;
+        }
+        for axis in 0..3 {
+            for next in
+                [cell[axis].checked_sub(1), cell[axis].checked_add(1).filter(|&c| c < shape.dims[axis])]
+            {
+                let Some(next) = next else { continue };
+                let mut place = cell;
+                place[axis] = next;
+                let (word, mask) = (at(place) / 64, 1 << (at(place) % 64));
+                if seen[word] & mask != 0 || grid.is_occupied(place) {
+                    continue;
+                }
+                seen[word] |= mask;
+                // Never wider than what led there.
+                open[step(place).min(width)].push(place);
+            }
+        }
+    }
+    Some(widths)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::map::Occupancy;
+    use crate::map::occupancy::{OccupancyMap, Unknown};
+    use planner_core::voxel::GridShape;
+
+    /// Two rooms behind a wall with a door of `door` cells of 0.1 m.
+    fn rooms(door: u32) -> VoxelMap {
+        let shape = GridShape { dims: [60, 40, 20], min: Point::zeros(), resolution_m: 0.1 };
+        let mut map = OccupancyMap::unknown(shape, "rooms").unwrap();
+        for (i, j, k) in (0..60).flat_map(|i| (0..40).flat_map(move |j| (0..20).map(move |k| (i, j, k)))) {
+            let in_door = (20 - door / 2..20 + door.div_ceil(2)).contains(&j);
+            let wall = (i == 30 && !in_door) || k == 0;
+            map.set([i, j, k], if wall { Occupancy::Occupied } else { Occupancy::Free });
+        }
+        map.voxel_map(Unknown::Free)
+    }
+
+    #[test]
+    fn the_widest_way_is_as_wide_as_the_door() {
+        let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
+        for door in [2, 5, 8, 12] {
+            let width_m = widths_m(&rooms(door), |_| 0.0, &from, &[to], 2.0).unwrap()[0];
+            let half_m = door as f32 * 0.05;
+            assert!((width_m - half_m).abs() <= 0.1, "{door}: {width_m} for {half_m}");
+        }
+        assert_eq!(widths_m(&rooms(0), |_| 0.0, &from, &[from, to], 2.0).unwrap()[1], 0.0);
+    }
+}
