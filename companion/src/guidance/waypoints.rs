@@ -10,18 +10,18 @@ use planner_core::path::Path;
 
 /// Within this distance a waypoint is reached, metres: nearer than what the referee counts as reached, by the greatest
 /// error of an RTK estimate.
-pub const WP_RADIUS_M: f32 = 0.4;
+const WP_RADIUS_M: f32 = 0.4;
 
 /// The paper's `nWaypoint`, and whether the path is completed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Waypoints {
+pub(super) struct Waypoints {
     next: usize,
     completed: bool,
 }
 
 impl Waypoints {
     /// One turn of the loop for a vehicle at `position`: where it flies to; `None` once the path is completed.
-    pub fn next<const W: usize>(&mut self, path: &Path<W>, position: &Point) -> Option<Point> {
+    pub(super) fn next<const W: usize>(&mut self, path: &Path<W>, position: &Point) -> Option<Point> {
         let points = path.waypoints();
         let goal = points.get(self.next)?.position;
         if (goal - position).norm() < WP_RADIUS_M {
@@ -35,7 +35,7 @@ impl Waypoints {
     }
 
     /// Whether the last waypoint was reached.
-    pub fn completed(self) -> bool {
+    pub(super) fn completed(self) -> bool {
         self.completed
     }
 }
