@@ -82,7 +82,9 @@ impl Results {
     /// # Errors
     /// As [`Self::open`], or the path names no file.
     pub fn file(path: &Path) -> anyhow::Result<Self> {
-        let name = path.file_name().and_then(|name| name.to_str());
+        // `a/` means a directory, though its last part is `a`.
+        let slash = path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
+        let name = path.file_name().and_then(|name| name.to_str()).filter(|_| !slash);
         let name = name.with_context(|| format!("cannot write: {}: it names no file", quoted_path(path)))?;
         Self::open(path.parent().unwrap_or(Path::new(".")), &[name])
     }
@@ -207,7 +209,7 @@ mod tests {
         for (dir, name) in [("file", "result.json"), ("file/x", "result.json"), ("out", "result.json")] {
             assert!(Results::open(&folder.path().join(dir), &[name]).is_err(), "{dir}");
         }
-        for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y"] {
+        for path in ["/dev/full", "/dev/null", "/", "/proc/x/y", "/proc/self/oom_score_adj/y", "/tmp/x/"] {
             assert!(Results::file(Path::new(path)).is_err(), "{path}");
         }
         assert!(!folder.path().join("file/x").exists());

@@ -85,7 +85,8 @@ fn refused(error: &clap::Error) -> anyhow::Result<ExitCode> {
     let text = quote::about_arguments(&error.to_string(), arguments.into_iter().skip(1));
     let mut lines = text.lines().map(str::trim);
     let what: Vec<&str> = lines.by_ref().take_while(|line| !line.is_empty()).collect();
-    let tips = lines.filter_map(|line| line.strip_prefix("tip: "));
+    // How to pass `-x` as a value is never what was meant.
+    let tips = lines.filter_map(|line| line.strip_prefix("tip: ")).filter(|tip| !tip.starts_with("to pass"));
     let tips: String = tips.map(|tip| format!("\nhint: {tip}")).collect();
     let what = what.join(" ");
     bail!("{}{tips}\nhint: `{help}` says more", what.strip_prefix("error: ").unwrap_or(&what))

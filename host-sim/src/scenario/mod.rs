@@ -309,7 +309,12 @@ impl Scenario {
 pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
     let name = quoted_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
-    let text = files::read_text(path).map_err(|e| fail(format!("cannot read it: {e}")))?;
+    let text = files::read_text(path).map_err(|e| {
+        let toml = path.with_extension("toml");
+        let hint =
+            (!path.exists() && toml.is_file()).then(|| format!("did you mean `{}`?", quoted_path(&toml)));
+        ScenarioError { hint, ..fail(format!("cannot read it: {e}")) }
+    })?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
     sections::parse(&text, &name, &folder)
 }

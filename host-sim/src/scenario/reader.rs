@@ -118,14 +118,20 @@ impl<'a> Value<'a> {
     }
 
     pub(super) fn items(&self) -> Result<Vec<Value<'a>>> {
-        let array = self.value.as_array().ok_or_else(|| self.expected("a list"))?;
+        let array = self.value.as_array().ok_or_else(|| {
+            let error = self.expected("a list");
+            let hint = self
+                .is_table()
+                .then(|| format!("in double brackets, [[{0}]], each is one of {0}", self.name));
+            ScenarioError { hint, ..error }
+        })?;
         let item = |(i, value)| Value::new(self.text, format!("{}[{i}]", self.name), value);
         Ok(array.iter().enumerate().map(item).collect())
     }
 
     /// Three finite numbers.
     pub(super) fn triple(&self) -> Result<[f64; 3]> {
-        let items = self.items()?;
+        let items = self.items().map_err(|_| self.expected("[east, north, up] in metres"))?;
         let [x, y, z] = items.as_slice() else {
             return Err(
                 self.error(&format!("must be three numbers, east, north, up in metres, not {}", items.len()))
@@ -222,7 +228,8 @@ impl<'a> Table<'a> {
 
 /// The nearest word, or all of them where none is near.
 fn nearest<'w>(given: &str, words: impl Iterator<Item = &'w str> + Clone) -> Option<String> {
-    let score = |word: &&str| strsim::jaro_winkler(given, word);
+    let given = given.to_lowercase();
+    let score = |word: &&str| strsim::jaro_winkler(&given, word);
     let best = words.clone().max_by(|a, b| score(a).total_cmp(&score(b)))?;
     if score(&best) > 0.7 {
         return Some(format!("did you mean `{best}`?"));

@@ -32,7 +32,10 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let text = Text { file, text };
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
-        text.error(&span, format!("not TOML: {}", quoted(error.message().lines().next().unwrap_or_default())))
+        let what = quoted(error.message().lines().next().unwrap_or_default());
+        let hint = syntax_hint(&text.text[span.start.min(text.text.len())..], &what);
+        let error = text.error(&span, format!("not TOML: {what}"));
+        ScenarioError { hint: hint.map(str::to_owned), ..error }
     })?;
     let root = Table::new(text, "", 0..0, root.get_ref());
     root.expect(&[
@@ -86,6 +89,7 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_goals(text, &vehicles, &mission)?;
+    check_inside(&mission_table, &vehicles, &mission)?;
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m, &simulation, &vehicles)?;
@@ -109,6 +113,18 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         formation,
         unsupported,
     })
+}
+
+/// What usually is behind text that is no TOML.
+fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
+    match rest.chars().next() {
+        Some('“' | '”' | '„' | '‘' | '’' | '«') => Some("quotes of TOML are straight: \""),
+        _ if what.contains("escape") => Some("a path is written with /, or between single quotes"),
+        Some('[') if what.contains("duplicate") => {
+            Some("each vehicle is a `[[vehicles]]`, each fault a `[[faults]]`")
+        }
+        _ => None,
+    }
 }
 
 /// A table that the file leaves out: all defaults.
@@ -573,6 +589,23 @@ fn check_goals_apart(
         }
     }
     Ok(())
+}
+
+/// Nobody starts or lands outside the geofence.
+fn check_inside(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)], mission: &Mission) -> Result<()> {
+    let Some(fence) = &mission.geofence else { return Ok(()) };
+    let outside = |p: &Point| (0..3).any(|axis| p[axis] < fence.min[axis] || p[axis] > fence.max[axis]);
+    if let Some((vehicle, spans)) = vehicles.iter().find(|(vehicle, _)| outside(&vehicle.start)) {
+        let why = format!("vehicle {} starts outside mission.geofence", vehicle.id);
+        return Err(table.text.error(&spans.start, why));
+    }
+    match mission.goals.iter().position(outside) {
+        Some(goal) => {
+            let why = format!("goal {goal} lies outside mission.geofence");
+            Err(table.text.error(&goal_span(table, goal), why))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Where a goal stands in the scenario.

@@ -337,3 +337,19 @@ fn goals_know_their_lines_and_how_far_apart_they_have_to_be() {
     assert_eq!(error.place.as_ref().map(|place| place.line), Some(6), "{error}");
     assert_eq!(error.hint.as_deref(), Some("vehicles that land at both need 1.75 m between them"));
 }
+
+#[test]
+fn usual_mistakes_get_a_hint() {
+    let hint =
+        |from: &str, to: &str| parse(&changed(from, to), "usual.toml").unwrap_err().hint.unwrap_or_default();
+    assert_eq!(hint("\"builtin:building\"", "“builtin:building”"), "quotes of TOML are straight: \"");
+    assert_eq!(
+        hint("builtin:building", "C:\\maps\\hall.bt"),
+        "a path is written with /, or between single quotes"
+    );
+    assert_eq!(hint("id = 1", "id = 1\npersonality = \"PX4\""), "did you mean `px4`?");
+    let fence = "[mission]\ngeofence = { min = [0, 0, 0], max = [9, 20, 20] }";
+    let error = parse(&changed("[mission]", fence), "fence.toml").unwrap_err();
+    assert_eq!(error.why, "goal 0 lies outside mission.geofence");
+    assert_eq!(error.place.map(|place| place.line), Some(6));
+}

@@ -149,6 +149,8 @@ fn add_contradictions(cases: &mut Cases) {
         ("single goal of two", "[mission]", "mode", "\"single-goal\""),
         ("a mode to come", "[mission]", "mode", "\"coverage\""),
         ("a fence inside out", "[mission]", "geofence", "{ min = [5, 5, 5], max = [4, 6, 6] }"),
+        ("a start outside the fence", "[mission]", "geofence", "{ min = [20, -5, 0], max = [50, 30, 60] }"),
+        ("a goal outside the fence", "[mission]", "geofence", "{ min = [-5, -5, 0], max = [20, 30, 60] }"),
         ("a vehicle as ground station", "[mission]", "ground_stations", "[2]"),
         ("too many ground stations", "[mission]", "ground_stations", "[251, 252, 253, 254, 255]"),
         ("an id twice", "[[vehicles]]", "id", "2"),
@@ -195,6 +197,9 @@ fn add_syntax(cases: &mut Cases) {
         let (before, after) = good.split_at(at);
         cases.scenario(format!("{code:?} at {at}"), &format!("{before}{code}{after}"));
     }
+    cases.scenario("round quotes", &good.replace('"', "“"));
+    cases.scenario("a path with backslashes", &good.replace("builtin:building", "C:\\maps\\hall.bt"));
+    cases.scenario("single brackets", &good.replace("[[vehicles]]", "[vehicles]"));
     cases.scenario("a key twice", &format!("seed = 2\n{good}"));
     cases.scenario("a table twice", &format!("{good}[map]\nfile = \"builtin:building\"\n"));
     cases.scenario("brackets without end", &"[".repeat(200_000));
