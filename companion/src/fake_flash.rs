@@ -19,7 +19,8 @@ use crate::mission_file::{self, MissionHeader, MissionVehicle};
 use crate::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
 
 /// As the H743's bank, but smaller, so that many cuts are tried in little time.
-pub const LAYOUT: Layout = Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10 };
+pub const LAYOUT: Layout =
+    Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
 
 /// The power went.

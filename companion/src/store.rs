@@ -61,13 +61,17 @@ pub struct Layout {
     pub slot_len: u32,
     /// Length of a half of the journal, whole sectors.
     pub half_len: u32,
+    /// Whether nothing runs while it programs: then it does so on the ground alone.
+    pub stalls: bool,
 }
 
 impl Layout {
     /// Bank 2 of the STM32H743: 8 sectors of 128 kB, roadmap slots in 0–2 and 3–5, journal in 6 and 7.
-    pub const H743: Self = Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10 };
+    pub const H743: Self =
+        Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10, stalls: false };
     /// 832 kB of the RP2350's external flash, sectors of 4 kB.
-    pub const PICO2: Self = Self { sector_len: 4 << 10, slot_len: 384 << 10, half_len: 32 << 10 };
+    pub const PICO2: Self =
+        Self { sector_len: 4 << 10, slot_len: 384 << 10, half_len: 32 << 10, stalls: true };
 
     /// Bytes of the whole bank.
     pub const fn len(&self) -> u32 {

@@ -105,6 +105,61 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
     assert_eq!(store.take(24 << 10, &[0; 1]), Taken::TooLarge);
 }
 
+/// Does what the store asks for while armed, which must be reading alone.
+fn run_armed(store: &mut Store, flash: &mut Flash) {
+    let mut read = [0; READ];
+    while let Some(request) = store.poll(Erasing::Forbidden) {
+        assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
+        let outcome = obey(flash, request, Erasing::Forbidden, &mut read).expect("the power is on");
+        store.handle(outcome.map(|len| &read[..len]));
+    }
+}
+
+#[test]
+fn a_flash_that_stalls_only_reads_while_armed() {
+    let mut flash = Flash::new(1);
+    let layout = Layout { stalls: true, ..LAYOUT };
+    let mut store = Store::mount(layout, &mut flash);
+    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    let (road, flown) = (roadmap(300), mission(9));
+    assert_eq!(upload(&mut store, &mut flash, File::Mission, &flown, 239).unwrap(), Ok(()));
+    for file in File::ALL {
+        assert_eq!(store.open(file, Erasing::Forbidden), Err(UploadError::Armed));
+    }
+    // A parameter is kept when it is over.
+    store.set_parameter(0, 3.5).unwrap();
+    run_armed(&mut store, &mut flash);
+    assert!(store.is_unsaved());
+    assert!(store.read(File::Mission, 0, 10), "what is there can be read");
+    run_armed(&mut store, &mut flash);
+    run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+    assert!(!store.is_unsaved());
+    // Armed at any moment of an upload: nothing is programmed, and it goes on when it is over.
+    let pieces: Vec<_> = road.chunks(239).collect();
+    for armed_at in 0..=pieces.len() {
+        let mut flash = Flash::new(2);
+        let mut store = Store::mount(layout, &mut flash);
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        store.open(File::Roadmap, Erasing::Allowed).unwrap();
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        for (i, piece) in pieces.iter().enumerate() {
+            if i == armed_at {
+                run_armed(&mut store, &mut flash);
+            }
+            assert_eq!(store.take((i * 239) as u32, piece), Taken::Yes);
+            if i == armed_at {
+                run_armed(&mut store, &mut flash);
+            }
+            run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        }
+        store.close();
+        run_armed(&mut store, &mut flash);
+        assert_ne!(store.upload(), Some(UploadState::Ended(Ok(()))), "it cannot be sealed yet");
+        run(&mut store, &mut flash, Erasing::Allowed).unwrap();
+        assert_eq!(store.upload(), Some(UploadState::Ended(Ok(()))));
+    }
+}
+
 #[test]
 fn nothing_is_erased_while_armed() {
     let mut flash = Flash::new(3);

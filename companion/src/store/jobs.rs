@@ -38,9 +38,14 @@ pub enum Job {
 }
 
 impl Store {
-    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only where that is allowed.
+    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only
+    /// where that is allowed; a flash that stalls the processor only reads where it is forbidden.
     pub fn poll(&mut self, erasing: Erasing) -> Option<FlashRequest<'_>> {
         if self.asked {
+            return None;
+        }
+        let reads = matches!(self.job, Job::Read { .. } | Job::Sum { .. });
+        if self.layout.stalls && erasing == Erasing::Forbidden && !reads {
             return None;
         }
         if self.job == Job::None {

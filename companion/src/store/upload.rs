@@ -50,6 +50,9 @@ impl Store {
             return Err(UploadError::Waiting);
         }
         self.abandon();
+        if self.layout.stalls && erasing == Erasing::Forbidden {
+            return Err(UploadError::Armed);
+        }
         if file == File::Roadmap {
             let slot = self.target().ok_or(UploadError::Waiting)?;
             if self.slots[slot] != Condition::Clean && erasing == Erasing::Forbidden {
