@@ -4,6 +4,18 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
+/// What the linker checks last, when all is placed. The guard is `GUARD_LEN` of `boards/mod.rs`;
+/// emulated UARTs have 10 kB in `.data`.
+const CHECKS: &str = r#"
+ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
+ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");
+"#;
+/// Of the firmware for the chip, which is one program.
+const PARTS: &str = r#"
+ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
+  "a part has lost its name, or its first value is not all zeros");
+"#;
+
 fn main() {
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return;
@@ -12,13 +24,13 @@ fn main() {
     let manifest = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
     let boards = manifest.join("src/boards");
     if chosen("QEMU") {
-        link(&boards.join("qemu/memory.x"));
+        link(&boards.join("qemu/memory.x"), &[CHECKS]);
         // Its interrupts are all in its own table; the chips' crates bring theirs.
         write("device.x", b"");
     } else if chosen("NUCLEO_H743") {
-        link(&manifest.join("../memory.x"));
+        link(&manifest.join("../memory.x"), &[CHECKS, PARTS]);
     } else if chosen("PICO2") {
-        link(&boards.join("pico2/memory.x"));
+        link(&boards.join("pico2/memory.x"), &[]);
     }
 }
 
@@ -31,15 +43,16 @@ fn write(name: &str, bytes: &[u8]) {
     println!("cargo:rustc-link-search={}", out().display());
 }
 
-/// Cortex-m-rt's script includes `memory.x`, and a linker looks for that where it was started first: at the top of the checkout,
-/// which is right for the default board alone. So the script is copied to include the chosen board's map instead.
-fn link(memory: &Path) {
+/// Cortex-m-rt's script includes `memory.x`, and a linker looks for that where it was started
+/// first: at the top of the checkout, which is right for the default board alone. So the script is
+/// copied to include the chosen board's map instead, and the checks behind it.
+fn link(memory: &Path, checks: &[&str]) {
     println!("cargo:rerun-if-changed={}", memory.display());
     write("board-memory.x", &fs::read(memory).expect("the board has a memory map"));
     let script = link_script().expect("cortex-m-rt is built before us: it declares what it links");
     let included = script.replace("INCLUDE memory.x", "INCLUDE board-memory.x");
     assert_ne!(script, included, "cortex-m-rt's link.x includes memory.x");
-    write("board-link.x", included.as_bytes());
+    write("board-link.x", (included + &checks.concat()).as_bytes());
     println!("cargo:rustc-link-arg-bins=--nmagic");
     println!("cargo:rustc-link-arg-bins=-Tboard-link.x");
     println!("cargo:rustc-link-arg-bins=-Tdefmt.x");

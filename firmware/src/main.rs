@@ -12,15 +12,19 @@ use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
-use firmware::boards::chosen::{self, LAYOUT, Receiver, Transmitter, Watchdog};
+use firmware::boards::chosen::{self, Flash, LAYOUT, Receiver, Transmitter, Watchdog};
 use firmware::boards::crash;
-use firmware::boards::parts::Parts;
-use firmware::capacity::VEHICLES;
-use firmware::planner::{Memory, Planner};
+use firmware::boards::parts::{Parts, WARNINGS};
+use firmware::capacity::{VEHICLES, WAYPOINTS};
+use firmware::kept::Work;
+use firmware::lent::Lent;
+use firmware::planner::{Memory, Own, Planner};
+use firmware::scratch::Scratch;
 use firmware::shell::{ALIVE_EVERY, BoardCompanion, NO_AUTOPILOT, Shell, hear_system_id};
-use heapless::String;
+use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
+use planner_core::plan::SwarmPlan;
 use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};
 
@@ -31,9 +35,15 @@ const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
 /// What a board says to which its mission gives nothing to do.
 const STRANGER: &str = "This system id is not in the mission: no plan";
 
-#[cfg_attr(any(feature = "nucleo-h743", feature = "qemu"), unsafe(link_section = ".dtcm"))]
+/// What is said of files that are not used any more.
+const ROADMAP_ASIDE: &str = "Roadmap set aside: it crashed 3 starts in a row";
+const MISSION_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
+
+// `memory.x` names these: each lies where it says. Their first values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
-static MEMORY: ConstStaticCell<Memory> = ConstStaticCell::new(Memory::new());
+static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
+static OWN_PLAN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION]> = ConstStaticCell::new([0; MISSION]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
 
@@ -51,40 +61,47 @@ unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
 
 #[entry]
 fn main() -> ! {
+    let cause = chosen::reset_cause();
     #[cfg(any(feature = "nucleo-h743", feature = "qemu"))]
-    // SAFETY: nothing runs yet.
+    // SAFETY: nothing runs yet, and the chip's memories do since it was asked for the cause.
     unsafe {
-        firmware::boards::tcm::zero();
+        firmware::boards::sections::zero();
     }
-    let crashed = crash::take();
+    let crashed = crash::take(cause);
     let parts = chosen::start();
-    let plans = parts.plans;
-    plans.spawn(work(parts, crashed).expect("there is one such task"));
+    let shell: &'static Shell = SHELL.init_with(Shell::new);
+    let Parts { links, plans, autopilot, swarm, flash, watchdog, warnings } = parts;
+    links.spawn(watch(shell, watchdog).expect("there is one such task"));
+    let said = Said { crashed, warnings };
+    plans.spawn(work(shell, links, autopilot, swarm, flash, said).expect("there is one such task"));
     loop {
         cortex_m::asm::wfi();
     }
 }
 
+/// A line's two ends.
+type Ends = (Receiver, Transmitter);
+
+/// What the start has to say.
+struct Said {
+    crashed: Option<String<50>>,
+    warnings: Vec<&'static str, WARNINGS>,
+}
+
 /// Brings the companion up, then plans and keeps the flash.
 #[task]
-async fn work(parts: Parts, crashed: Option<String<50>>) {
-    let Parts { links, mut autopilot, swarm, mut flash, watchdog, .. } = parts;
+async fn work(
+    shell: &'static Shell,
+    links: SendSpawner,
+    mut autopilot: Ends,
+    swarm: Ends,
+    mut flash: Flash,
+    said: Said,
+) {
     let mut store = Store::mount(LAYOUT, &mut flash);
-    let roadmap = loop {
-        let lies = store.roadmap().and_then(|r| flash.view(r.start, (r.end - r.start) as usize));
-        match lies.and_then(|bytes| RoadmapView::parse(bytes).ok()) {
-            None if store.refuse_roadmap() => {}
-            found => break found,
-        }
-    };
-    let bytes = MISSION_BYTES.take();
-    // The mission is copied: the journal it lies in moves.
-    let mission = store.mission().and_then(|r| {
-        let bytes = bytes.get_mut(..(r.end - r.start) as usize)?;
-        flash.read(r.start, bytes).ok()?;
-        MissionView::parse(bytes).ok()
-    });
-    let mission = mission.filter(|m| roadmap.as_ref().is_some_and(|roadmap| m.fits(roadmap)));
+    let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
+    let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
+    let (mission, files, mission_aside) = find_mission(&store, &mut flash, roadmap.as_ref());
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
         None => hear_system_id(&mut autopilot.0).await,
@@ -96,33 +113,92 @@ async fn work(parts: Parts, crashed: Option<String<50>>) {
         roadmap.is_some(),
         mission.is_some()
     );
-    let own = mission.as_ref().map(|mission| mission.config(system_id));
+    let aside = [(roadmap_aside, ROADMAP_ASIDE), (mission_aside, MISSION_ASIDE)];
+    let aside = aside.into_iter().filter_map(|(is, text)| is.then_some(text));
+    bring_up(shell, store, known, mission.as_ref(), said, aside);
+    start_links(links, shell, known.is_none(), autopilot, swarm);
+    let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
+    let mut planner = Planner { roadmap, mission, system_id, files, memory };
+    shell.work(&mut planner, &mut flash).await
+}
+
+/// The newest roadmap that is one, as long as it may be used; and whether one was set aside.
+fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
+    let mut aside = false;
+    loop {
+        let lies = store.roadmap();
+        if let Some(lent) = lies.and_then(|r| flash.lend(r.start, (r.end - r.start) as usize)) {
+            // A file ends with its checksum.
+            let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
+            let begun = crash::begin(Work::CheckRoadmap, sum);
+            aside |= !begun;
+            let is_one = begun && RoadmapView::parse(&lent).is_ok();
+            crash::finish();
+            if is_one {
+                return (Some(lent), aside);
+            }
+            flash.take_back(lent);
+        }
+        if !store.refuse_roadmap() {
+            return (None, aside);
+        }
+    }
+}
+
+/// The mission, if it is one on this roadmap; a checksum of both; and whether it was set aside. It
+/// is copied: the journal it lies in moves.
+fn find_mission(
+    store: &Store,
+    flash: &mut Flash,
+    roadmap: Option<&RoadmapView<'_>>,
+) -> (Option<MissionView<'static>>, u32, bool) {
+    let bytes = MISSION_BYTES.take();
+    let lies = store.mission().zip(roadmap);
+    let found = lies.and_then(|(r, roadmap)| {
+        let bytes = bytes.get_mut(..(r.end - r.start) as usize)?;
+        flash.read(r.start, bytes).ok()?;
+        Some((&*bytes, roadmap))
+    });
+    let Some((bytes, roadmap)) = found else { return (None, 0, false) };
+    let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
+    let files = roadmap.crc() ^ sum.rotate_left(1);
+    // What it crashed may be its reading, or a plan.
+    if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
+        return (None, files, true);
+    }
+    let mission = MissionView::parse(bytes).ok().filter(|mission| mission.fits(roadmap));
+    crash::finish();
+    (mission, files, false)
+}
+
+/// Puts the companion into the shell, and what is to be said into the companion. Not part of the
+/// task: what a task holds lies in its memory for good.
+#[inline(never)]
+fn bring_up(
+    shell: &Shell,
+    store: Store,
+    known: Option<u8>,
+    mission: Option<&MissionView<'_>>,
+    said: Said,
+    aside: impl Iterator<Item = &'static str>,
+) {
+    let system_id = known.unwrap_or(NO_AUTOPILOT);
+    let own = mission.map(|mission| mission.config(system_id));
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
     let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
     let mut companion = BoardCompanion::new(config).expect("every setting was checked");
     companion.mount(store);
-    if let Some(text) = crashed {
+    if let Some(text) = said.crashed {
         companion.say(true, CRASH.init(text).as_str());
     }
+    said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
     if is_stranger {
         companion.say(true, STRANGER);
     }
-    let shell = SHELL.init_with(Shell::new);
     shell.start(companion);
-    let shell: &'static Shell = shell;
-    start_links(links, shell, known.is_none(), autopilot, swarm);
-    links.spawn(watch(shell, watchdog).expect("there is one such task"));
-    let mut planner = Planner { roadmap, mission, system_id, memory: MEMORY.take() };
-    shell.work(&mut planner, &mut flash).await
 }
 
-fn start_links(
-    links: SendSpawner,
-    shell: &'static Shell,
-    for_autopilot: bool,
-    autopilot: (Receiver, Transmitter),
-    swarm: (Receiver, Transmitter),
-) {
+fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {
     let once = "there is one such task for each link";
     links.spawn(receive(shell, Link::Autopilot, autopilot.0, for_autopilot).expect(once));
     links.spawn(receive(shell, Link::Swarm, swarm.0, false).expect(once));
@@ -149,7 +225,6 @@ async fn keep_time(shell: &'static Shell) {
 /// Feeds the watchdog while all is well, and starts anew when that is asked for.
 #[task]
 async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
-    watchdog.wake();
     loop {
         Timer::after(ALIVE_EVERY).await;
         if shell.wants_restart() {

@@ -11,7 +11,9 @@ use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleError, VehiclePlan};
 use planner_core::search::SearchError;
 
+use crate::boards;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::kept::Work;
 use crate::scratch::Scratch;
 use crate::shell::BoardCompanion;
 
@@ -19,24 +21,30 @@ use crate::shell::BoardCompanion;
 /// than these and there is no way around, not one past what was left out.
 const OBSTACLES: usize = 4 * VEHICLES;
 
-/// What planning needs beside roadmap and mission.
-pub struct Memory {
-    scratch: Scratch,
-    plan: SwarmPlan<VEHICLES, WAYPOINTS>,
-    own: VehiclePlan<WAYPOINTS, GATES>,
+/// What planning needs beside roadmap and mission: pieces that lie in memories of their own.
+pub struct Memory<'a> {
+    /// To search in.
+    pub scratch: &'a mut Scratch,
+    /// The swarm's plan.
+    pub swarm: &'a mut SwarmPlan<VEHICLES, WAYPOINTS>,
+    /// The vehicle's own.
+    pub own: &'a mut Own,
+}
+
+/// A vehicle's plan, and what it is made from beside the swarm's.
+pub struct Own {
+    plan: VehiclePlan<WAYPOINTS, GATES>,
     obstacles: Vec<KeepOff, OBSTACLES>,
     /// Whether there were more.
     crowded: bool,
     nodes: Vec<u16, WAYPOINTS>,
 }
 
-impl Memory {
+impl Own {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
         Self {
-            scratch: Scratch::new(),
-            plan: SwarmPlan::new(),
-            own: VehiclePlan {
+            plan: VehiclePlan {
                 goal: None,
                 path: Path::new(),
                 climb_m: 0.0,
@@ -52,7 +60,7 @@ impl Memory {
     }
 }
 
-impl Default for Memory {
+impl Default for Own {
     fn default() -> Self {
         Self::new()
     }
@@ -66,20 +74,23 @@ pub struct Planner<'a> {
     pub mission: Option<MissionView<'a>>,
     /// Whose plan it is.
     pub system_id: u8,
+    /// A checksum of both.
+    pub files: u32,
     /// Its memory.
-    pub memory: &'a mut Memory,
+    pub memory: Memory<'a>,
 }
 
 impl Planner<'_> {
     /// What the companion would have flown around; `None` if it asks for the mission's plan.
     pub fn note_detour(&mut self, companion: &BoardCompanion) -> Option<DetourRequest> {
-        let Memory { obstacles, crowded, .. } = &mut *self.memory;
+        let Own { obstacles, crowded, .. } = &mut *self.memory.own;
         obstacles.clear();
         *crowded = false;
         companion.detour(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
-    /// The plan asked for.
+    /// The plan asked for. Files of which it is known that they bring the board down are not
+    /// planned on.
     ///
     /// # Errors
     /// Why there is none.
@@ -87,34 +98,48 @@ impl Planner<'_> {
         &mut self,
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+        if !boards::begin(Work::Plan, self.files) {
+            return Err(PlanFailure::Invalid);
+        }
+        let outcome = self.plan(detour);
+        boards::finish();
+        outcome
+    }
+
+    /// Kept apart so that a debugger finds it.
+    #[inline(never)]
+    fn plan(
+        &mut self,
+        detour: Option<&DetourRequest>,
+    ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
         let (Some(roadmap), Some(mission)) = (&self.roadmap, &self.mission) else {
             return Err(PlanFailure::NoRoadmap);
         };
-        let memory = &mut *self.memory;
-        let ws = memory.scratch.planner();
+        let Memory { scratch, swarm, own } = &mut self.memory;
+        let ws = scratch.planner();
         if let Some(request) = detour {
-            if memory.crowded {
+            if own.crowded {
                 return Err(PlanFailure::Capacity);
             }
             detour::plan_vehicle(
                 roadmap,
                 request,
-                &mut memory.obstacles,
+                &mut own.obstacles,
                 &mut ws.search,
-                &mut memory.nodes,
-                &mut memory.own,
+                &mut own.nodes,
+                &mut own.plan,
             )
             .map_err(|_| PlanFailure::Unreachable)?;
-            return Ok(&memory.own);
+            return Ok(&own.plan);
         }
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
         let request =
             mission.request(&mut tasks, &mut descents_m, GATES).map_err(|_| PlanFailure::Capacity)?;
-        plan::plan_swarm(roadmap, &request, ws, &mut memory.plan).map_err(|error| failure(&error))?;
-        plan::vehicle_plan(&memory.plan, index, &request.schedule, &mut ws.schedule, &mut memory.own)
+        plan::plan_swarm(roadmap, &request, ws, swarm).map_err(|error| failure(&error))?;
+        plan::vehicle_plan(swarm, index, &request.schedule, &mut ws.schedule, &mut own.plan)
             .map_err(|_| PlanFailure::Capacity)?;
-        Ok(&memory.own)
+        Ok(&own.plan)
     }
 }
 

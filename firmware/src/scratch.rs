@@ -4,7 +4,7 @@
 //! room for it.
 #![expect(unsafe_code, reason = "two uses of one piece of memory")]
 
-use core::mem::ManuallyDrop;
+use core::mem::{ManuallyDrop, MaybeUninit};
 
 use planner_core::Point;
 use planner_core::plan::PlanWorkspace;
@@ -27,6 +27,14 @@ union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<Builder>,
 }
+
+/// All zeros are a planner and a builder: the compiler refuses a constant that is no value of its
+/// type.
+#[expect(dead_code, reason = "made by the compiler alone")]
+const ZEROS: (Planner, Builder) = {
+    // SAFETY: the compiler checks it.
+    unsafe { (MaybeUninit::zeroed().assume_init(), MaybeUninit::zeroed().assume_init()) }
+};
 
 impl Scratch {
     /// All zeros, so a static costs .bss alone.

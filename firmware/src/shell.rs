@@ -59,6 +59,8 @@ pub struct Shell {
     writes: AtomicBool,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
     seen_ms: [AtomicU32; TASKS],
+    /// Whether there is a companion.
+    started: AtomicBool,
     setpoints: Setpoints,
     /// Errors that the UARTs reported.
     pub line_errors: [AtomicU32; 2],
@@ -141,6 +143,10 @@ impl Ear {
     }
 }
 
+/// Looking through the flash, checking the roadmap and listening for an autopilot take a board no
+/// longer; the watchdog is fed so long without any task of links or time.
+pub const STARTS_WITHIN_MS: u32 = 20_000;
+
 const HEARTBEAT: u32 = 0;
 const TASKS: usize = 5;
 const TIME: usize = 4;
@@ -171,14 +177,18 @@ impl Shell {
             restart_ms: AtomicU32::new(0),
             writes: AtomicBool::new(false),
             seen_ms: [const { AtomicU32::new(0) }; TASKS],
+            started: AtomicBool::new(false),
             setpoints: Setpoints::new(),
             line_errors: [const { AtomicU32::new(0) }; 2],
         }
     }
 
-    /// Puts the companion in, before any task starts.
-    pub fn start(&mut self, companion: BoardCompanion) {
-        *self.companion.get_mut().get_mut() = Some(companion);
+    /// Puts the companion in, before any task of links or time starts. Until then the board is
+    /// alive for no longer than [`STARTS_WITHIN_MS`].
+    pub fn start(&self, companion: BoardCompanion) {
+        self.companion.lock(|held| *held.borrow_mut() = Some(companion));
+        (0..TASKS).for_each(|task| self.seen(task));
+        self.started.store(true, Ordering::Relaxed);
     }
 
     /// Holds the companion for the time of `work`.
@@ -362,6 +372,9 @@ impl Shell {
     }
 
     fn is_alive_at(&self, now_ms: u32, awake_ms: u32) -> bool {
+        if !self.started.load(Ordering::Relaxed) {
+            return awake_ms < STARTS_WITHIN_MS;
+        }
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
             && self.setpoints.since(awake_ms).is_none_or(|passed| passed < limit)
@@ -456,6 +469,8 @@ mod tests {
     #[test]
     fn the_watchdog_is_fed_only_while_tasks_come_by_and_setpoints_flow() {
         let shell = Shell::new();
+        assert!(shell.is_alive_at(19_999, 19_999) && !shell.is_alive_at(20_000, 20_000), "it starts");
+        shell.started.store(true, Ordering::Relaxed);
         let come_by = |ms| shell.seen_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
         come_by(1000);
         assert!(shell.is_alive_at(1399, 1399) && !shell.is_alive_at(1400, 1400));

@@ -46,6 +46,12 @@ const SPIN: [u8; 4] = [0x72, 0xB6, 0xFE, 0xE7];
 const TO_PANIC: usize = 200;
 /// In the name of a function of `core` that does nothing but panic, at a place of its own.
 const PANICS: &str = "smallsort22panic_on_ord_violation";
+/// In the name of the function that makes a plan on a board.
+const PLANS: &str = "Planner4plan";
+/// An instruction that there is not.
+const UNDEFINED: [u8; 2] = [0x00, 0xDE];
+/// Less than an interrupt takes of a stack.
+const STACK_LEFT: u32 = 8;
 
 /// A program for the board `qemu`, from the directory that `FLOCKMATE_FIRMWARE` names, as seen from the checkout; `None` with a line
 /// that says what is skipped.
@@ -81,11 +87,13 @@ pub enum Downfall {
     Panic,
     /// The program goes nowhere, and hears no interrupt.
     Hang,
+    /// The stack is as full as can be: what comes next reaches into the guard below it.
+    Overflow,
 }
 
 impl Downfall {
     /// All there are.
-    pub const ALL: [Self; 4] = [Self::Reset, Self::Fault, Self::Panic, Self::Hang];
+    pub const ALL: [Self; 5] = [Self::Reset, Self::Fault, Self::Panic, Self::Hang, Self::Overflow];
 
     /// How what the next start says of it begins.
     pub fn said(self) -> &'static str {
@@ -93,6 +101,7 @@ impl Downfall {
             Self::Reset | Self::Hang => "Restarted: watchdog, reset key or brown-out",
             Self::Fault => "Restarted: fault at 0xf0000000",
             Self::Panic => "Restarted: panic at smallsort.rs:",
+            Self::Overflow => "Restarted: stack overflow",
         }
     }
 }
@@ -168,13 +177,7 @@ impl Emulated {
         match how {
             Downfall::Reset => self.reset(),
             Downfall::Fault => self.jump(NOWHERE, 1),
-            Downfall::Panic => {
-                let bytes = std::fs::read(&self.program).expect("it was started");
-                let elf = object::File::parse(&*bytes).expect("a program");
-                let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(|name| name.contains(PANICS));
-                let place = elf.symbols().find(named).expect("a function that panics by itself").address();
-                self.jump(place as u32 & !1, TO_PANIC);
-            }
+            Downfall::Panic => self.jump(self.function(PANICS), TO_PANIC),
             Downfall::Hang => {
                 self.order("watchdog_action reset");
                 let mut debugger = Debugger::new(connect(self.stub));
@@ -182,7 +185,34 @@ impl Emulated {
                 debugger.jump(SPARE, 1);
                 debugger.leave();
             }
+            Downfall::Overflow => {
+                let mut debugger = Debugger::new(connect(self.stub));
+                debugger.set_stack(SPARE + STACK_LEFT);
+                debugger.leave();
+            }
         }
+    }
+
+    /// Has its planner fault whenever it plans, until the next start.
+    ///
+    /// # Panics
+    /// The program has no planner.
+    pub fn break_planner(&mut self) {
+        self.halt(true);
+        let mut debugger = Debugger::new(connect(self.stub));
+        debugger.write(self.function(PLANS), &UNDEFINED);
+        debugger.leave();
+        self.halt(false);
+    }
+
+    /// The address of the function whose name contains this.
+    fn function(&self, part: &str) -> u32 {
+        let bytes = std::fs::read(&self.program).expect("it was started");
+        let elf = object::File::parse(&*bytes).expect("a program");
+        let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(|name| name.contains(part));
+        let symbol =
+            elf.symbols().find(named).unwrap_or_else(|| panic!("no function has {part} in its name"));
+        symbol.address() as u32 & !1
     }
 
     fn jump(&self, address: u32, instructions: usize) {

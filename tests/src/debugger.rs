@@ -6,7 +6,8 @@
 use std::io::{Read, Write};
 use std::net::TcpStream;
 
-/// Program counter and program status of a Cortex-M, by the stub's numbers.
+/// Stack pointer, program counter and program status of a Cortex-M, by the stub's numbers.
+const SP: u8 = 13;
 const PC: u8 = 15;
 const XPSR: u8 = 25;
 /// No flags, and Thumb state, as always.
@@ -41,6 +42,14 @@ impl Debugger {
             let stopped = self.ask("s");
             assert!(stopped.starts_with('T') || stopped.starts_with('S'), "{stopped}");
         }
+    }
+
+    /// Has the stack end elsewhere.
+    ///
+    /// # Panics
+    /// As [`new`](Self::new).
+    pub fn set_stack(&mut self, address: u32) {
+        self.set(SP, address);
     }
 
     /// Puts bytes into its memory.

@@ -21,6 +21,20 @@ pub enum Board {
     Pico2,
 }
 
+/// A memory of a board.
+pub struct Region {
+    /// Name of its row.
+    pub name: &'static str,
+    /// Its first byte.
+    pub at: u64,
+    /// Its bytes.
+    pub len: usize,
+    /// Bytes that statics may take.
+    pub most: usize,
+    /// Whether the stack lies in it too.
+    pub has_stack: bool,
+}
+
 impl Board {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Qemu, Self::NucleoH743, Self::Pico2];
@@ -34,12 +48,45 @@ impl Board {
         }
     }
 
-    /// Bytes of flash for the program, and of memory for statics and the worst stack.
-    pub fn memory(self) -> (usize, usize) {
+    /// Bytes of flash for the program.
+    pub fn flash(self) -> usize {
         match self {
-            // AXI SRAM and DTCM.
-            Self::Qemu | Self::NucleoH743 => (512 << 10, 576 << 10),
-            Self::Pico2 => (1 << 20, 512 << 10),
+            Self::Qemu | Self::NucleoH743 => 512 << 10,
+            Self::Pico2 => 1 << 20,
+        }
+    }
+
+    /// Its memories, as its `memory.x` has them, and how much of each statics may take.
+    pub fn regions(self) -> &'static [Region] {
+        const fn region(name: &'static str, at: u64, len: usize, most: usize, has_stack: bool) -> Region {
+            Region { name, at, len: len << 10, most: most << 10, has_stack }
+        }
+        // The companion, crash record and guard have 40 kB of DTCM, the stack the rest.
+        const H743: &[Region] = &[
+            region("axi_bytes", 0x2400_0000, 512, 400, false),
+            region("dtcm_bytes", 0x2000_0000, 128, 36, true),
+            region("sram12_bytes", 0x3000_0000, 256, 256, false),
+            region("sram3_bytes", 0x3004_0000, 32, 32, false),
+            region("sram4_bytes", 0x3800_0000, 64, 32, false),
+            region("itcm_bytes", 0x400, 63, 63, false),
+        ];
+        // The same, elsewhere; its UARTs' 10 kB of bytes lie in AXI SRAM.
+        const QEMU: &[Region] = &[
+            region("axi_bytes", 0x2000_0000, 512, 400, false),
+            region("dtcm_bytes", 0x2008_0000, 128, 36, true),
+            region("sram12_bytes", 0x2010_0000, 256, 256, false),
+            region("sram3_bytes", 0x2014_0000, 32, 32, false),
+            region("sram4_bytes", 0x2015_0000, 64, 32, false),
+            region("itcm_bytes", 0x2016_0000, 63, 63, false),
+        ];
+        const PICO2: &[Region] = &[
+            region("ram_bytes", 0x2000_0000, 512, 448, true),
+            region("crash_bytes", 0x2008_0000, 4, 4, false),
+        ];
+        match self {
+            Self::Qemu => QEMU,
+            Self::NucleoH743 => H743,
+            Self::Pico2 => PICO2,
         }
     }
 

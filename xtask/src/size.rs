@@ -11,7 +11,7 @@ use object::elf::{SHF_ALLOC, SHF_EXECINSTR, SHF_WRITE, SHT_NOBITS};
 use object::{Object, ObjectSection, SectionFlags};
 use serde_json::json;
 
-use crate::bare_metal::{self, Board};
+use crate::bare_metal::{self, Board, Region};
 use crate::emulate;
 
 /// What to size.
@@ -30,8 +30,8 @@ pub fn run(args: &Args) -> Result<()> {
     let stack = emulate::run_emulate(&emulate::Args::default())?;
     let rows = rows(args.board, stack)?;
     if let Some(out) = &args.out {
-        let row = |(name, ours, theirs): &(&str, usize, usize)| {
-            let ratio = *theirs as f64 / *ours as f64;
+        let row = |(name, ours, theirs): &Row| {
+            let ratio = *theirs as f64 / (*ours).max(1) as f64;
             json!({ "name": name, "ours": ours, "theirs": theirs, "ratio": ratio, "unit": "bytes", "n": 1 })
         };
         let rows: Vec<_> = rows.iter().map(row).collect();
@@ -41,28 +41,46 @@ pub fn run(args: &Args) -> Result<()> {
     Ok(())
 }
 
-/// The rows of a board, printed: name, bytes, bytes there are. Too much is an error.
-pub fn rows(board: Board, stack: usize) -> Result<Vec<(&'static str, usize, usize)>> {
+/// A row: name, bytes, bytes there are or that are planned.
+pub type Row = (&'static str, usize, usize);
+
+/// The rows of a board, printed. Too much is an error.
+pub fn rows(board: Board, stack: usize) -> Result<Vec<Row>> {
     let program = bare_metal::build(board)?.folder.join("flockmate");
-    let Parts { code, constants, initialised, zeroed } = parts(&program)?;
-    let (most_flash, most_ram) = board.memory();
-    let (flash, statics) = (code + constants + initialised, initialised + zeroed);
-    let rows = vec![
+    let Parts { code, constants, initialised, regions } = parts(&program, board)?;
+    let most_flash = board.flash();
+    let flash = code + constants + initialised;
+    let mut rows = vec![
         ("code_bytes", code, most_flash),
         ("constants_bytes", constants, most_flash),
         ("flash_bytes", flash, most_flash),
-        ("statics_bytes", statics, most_ram),
-        ("stack_bytes", stack, most_ram),
-        ("ram_bytes", statics + stack, most_ram),
     ];
+    rows.extend(board.regions().iter().zip(regions).map(|(region, bytes)| (region.name, bytes, region.most)));
+    rows.push(("stack_bytes", stack, STACK));
     println!("{}", board.name());
     for (name, ours, most) in &rows {
         println!("  {name:16} {ours:>8} of {most}");
     }
-    ensure!(flash <= most_flash, "{}: more than {most_flash} bytes of flash", board.name());
-    ensure!(statics + stack <= most_ram, "{}: more than {most_ram} bytes of memory", board.name());
+    for (name, ours, most) in &rows {
+        ensure!(ours <= most, "{}: {name}: {ours} bytes are more than {most}", board.name());
+    }
+    // The stack lies behind the statics of one memory.
+    for region in board.regions().iter().filter(|region| region.has_stack) {
+        let statics = rows.iter().find(|row| row.0 == region.name).map_or(0, |row| row.1);
+        let all = statics + stack;
+        ensure!(
+            all <= region.len,
+            "{}: {} and stack are {all} of {} bytes",
+            board.name(),
+            region.name,
+            region.len
+        );
+    }
     Ok(rows)
 }
+
+/// Most bytes of a stack.
+const STACK: usize = 64 << 10;
 
 /// Bytes of a program.
 #[derive(Default)]
@@ -71,28 +89,36 @@ struct Parts {
     constants: usize,
     /// In flash and in memory.
     initialised: usize,
-    zeroed: usize,
+    /// Statics of each of the board's memories.
+    regions: Vec<usize>,
 }
 
 /// Adds up the sections of a program that take memory.
-fn parts(program: &Path) -> Result<Parts> {
+fn parts(program: &Path, board: Board) -> Result<Parts> {
     let bytes = std::fs::read(program).with_context(|| format!("cannot read: {}", program.display()))?;
     let elf = object::File::parse(&*bytes)
         .with_context(|| format!("no program for a board: {}", program.display()))?;
-    let mut parts = Parts::default();
+    let mut parts = Parts { regions: vec![0; board.regions().len()], ..Parts::default() };
     for section in elf.sections() {
         let SectionFlags::Elf { sh_type, sh_flags } = section.flags() else { continue };
         let has = |flag| sh_flags & flag == flag;
         if !has(SHF_ALLOC) {
             continue;
         }
-        let part = match (sh_type == SHT_NOBITS, has(SHF_WRITE), has(SHF_EXECINSTR)) {
-            (true, _, _) => &mut parts.zeroed,
-            (false, true, _) => &mut parts.initialised,
-            (false, false, true) => &mut parts.code,
-            (false, false, false) => &mut parts.constants,
-        };
-        *part += section.size() as usize;
+        let size = section.size() as usize;
+        match (sh_type == SHT_NOBITS, has(SHF_WRITE), has(SHF_EXECINSTR)) {
+            (true, _, _) => {}
+            (false, true, _) => parts.initialised += size,
+            (false, false, true) => parts.code += size,
+            (false, false, false) => parts.constants += size,
+        }
+        if size > 0 && (sh_type == SHT_NOBITS || has(SHF_WRITE)) {
+            let at = section.address();
+            let lies = |region: &Region| (region.at..region.at + region.len as u64).contains(&at);
+            let region = board.regions().iter().position(lies);
+            let region = region.with_context(|| format!("{:?} lies nowhere: {at:#x}", section.name()))?;
+            parts.regions[region] += size;
+        }
     }
     Ok(parts)
 }

@@ -1,78 +1,93 @@
-//! What brought the firmware down, kept in memory that a warm reset leaves alone, and told at the next start; so is that it ran
-//! and ended without a word.
+//! What brought the firmware down, kept in memory that a warm reset leaves alone
+//! ([`kept`](crate::kept)), and told at the next start.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::fmt::Write;
 use core::mem::MaybeUninit;
+use core::ops::Range;
 use core::panic::PanicInfo;
+use core::ptr::addr_of;
 
+use cortex_m::peripheral::SCB;
 use heapless::String;
 
-/// Longest text of a STATUSTEXT.
-const TEXT: usize = 50;
-/// Says that a record was written.
-const CRASHED: u32 = 0x464c_4b21;
-/// Says that the firmware ran, and did not end by itself.
-const RUNS: u32 = 0x464c_4b22;
-/// What is told of that.
-const UNANNOUNCED: &str = "Restarted: watchdog, reset key or brown-out";
-
-#[derive(Clone, Copy)]
-#[repr(C)]
-struct Record {
-    magic: u32,
-    len: u32,
-    text: [u8; TEXT],
-}
+use super::chosen;
+use crate::chips::{ResetCause, fault};
+use crate::kept::{Kept, TEXT, WORDS, Work};
 
 #[unsafe(link_section = ".crash")]
-static mut RECORD: MaybeUninit<Record> = MaybeUninit::uninit();
+static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
+
+unsafe extern "C" {
+    static _stack_end: u32;
+}
+
+/// What is kept. Interrupts are off: tasks and the end of the program use it.
+fn read() -> Option<Kept> {
+    // SAFETY: nobody else runs, and any bytes are words.
+    Kept::from_words(&unsafe { (&raw const RECORD).cast::<[u32; WORDS]>().read_volatile() })
+}
+
+fn write(kept: &Kept) {
+    // SAFETY: as above.
+    unsafe { (&raw mut RECORD).cast::<[u32; WORDS]>().write_volatile(kept.to_words()) };
+}
+
+/// Changes what is kept.
+fn change<T>(change: impl FnOnce(&mut Kept) -> T) -> T {
+    critical_section::with(|_| {
+        let mut kept = read().unwrap_or_default();
+        let result = change(&mut kept);
+        write(&kept);
+        result
+    })
+}
 
 /// What the last start left, once; nothing after the power came.
-pub fn take() -> Option<String<TEXT>> {
-    let record = &raw mut RECORD;
-    // SAFETY: called once at the start, when nothing else runs; any bytes are a `Record`.
-    let found = unsafe {
-        let found = record.cast::<Record>().read_volatile();
-        record.cast::<Record>().write_volatile(Record { magic: RUNS, ..found });
-        found
-    };
-    if found.magic == RUNS {
-        return String::try_from(UNANNOUNCED).ok();
-    }
-    let text = found.text.get(..found.len as usize).filter(|_| found.magic == CRASHED)?;
-    String::try_from(core::str::from_utf8(text).ok()?).ok()
+pub fn take(cause: ResetCause) -> Option<String<TEXT>> {
+    critical_section::with(|_| {
+        let (kept, said) = Kept::start(read(), cause);
+        write(&kept);
+        said
+    })
+}
+
+/// Whether work with files may begin.
+pub fn may_begin(work: Work, files: u32) -> bool {
+    change(|kept| kept.may_begin(work, files))
+}
+
+/// Begins work with files; false if it brought three starts in a row down, and is not to be done.
+pub fn begin(work: Work, files: u32) -> bool {
+    change(|kept| kept.begin(work, files))
+}
+
+/// The work came to its end.
+pub fn finish() {
+    change(Kept::finish);
 }
 
 /// Starts anew, as somebody asked for: there is nothing to tell.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
-    write(Record { magic: 0, len: 0, text: [0; TEXT] });
-    cortex_m::peripheral::SCB::sys_reset()
+    change(Kept::ask);
+    chosen::reset()
 }
 
 /// Keeps what happened, logs it and starts anew. Kept first, and logged once: what is wrong may be the log.
 fn end(text: &str) -> ! {
     cortex_m::interrupt::disable();
-    // SAFETY: interrupts are off.
-    let ended = unsafe { (&raw const RECORD).cast::<Record>().read_volatile() }.magic == CRASHED;
+    let ended = change(|kept| {
+        let ended = kept.has_crashed();
+        if !ended {
+            kept.crash(text);
+        }
+        ended
+    });
     if !ended {
-        let mut record = Record { magic: CRASHED, len: 0, text: [0; TEXT] };
-        let bytes = text.as_bytes();
-        let len = bytes.len().min(TEXT);
-        record.text[..len].copy_from_slice(&bytes[..len]);
-        record.len = len as u32;
-        write(record);
         defmt::error!("{=str}", text);
     }
-    cortex_m::peripheral::SCB::sys_reset()
-}
-
-/// To be called with interrupts off.
-fn write(record: Record) {
-    let to = &raw mut RECORD;
-    // SAFETY: nobody else runs, and who calls this starts anew.
-    unsafe { to.cast::<Record>().write_volatile(record) };
+    chosen::reset()
 }
 
 /// Keeps where it was and starts anew. What runs above it does not go on in a program that is wrong.
@@ -87,8 +102,21 @@ pub fn panicked(info: &PanicInfo<'_>) -> ! {
     end(&text)
 }
 
+/// The memory below the stack that nothing may touch.
+pub fn guard() -> Range<u32> {
+    let end = addr_of!(_stack_end) as u32;
+    end - super::GUARD_LEN..end
+}
+
 /// Keeps the program counter of a fault and starts anew.
 pub fn faulted(pc: u32) -> ! {
+    // SAFETY: registers that are read.
+    let scb = unsafe { &*SCB::PTR };
+    let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
+    if fault::is_overflow(cfsr, mmfar, &guard()) {
+        // Where it was lies on the stack that was too small.
+        end("Restarted: stack overflow")
+    }
     let mut text = String::<TEXT>::new();
     // It fits.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");

@@ -1,9 +1,13 @@
 //! What differs from board to board: registers, clocks, memory. The only place with `unsafe`.
 
+use crate::kept::Work;
+
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod crash;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod lock;
+#[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
+mod mpu;
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub mod nucleo_h743;
 #[cfg(all(target_os = "none", feature = "board"))]
@@ -12,10 +16,10 @@ pub mod parts;
 pub mod pico2;
 #[cfg(all(target_os = "none", feature = "qemu"))]
 pub mod qemu;
+#[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
+pub mod sections;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod stack;
-#[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
-pub mod tcm;
 
 #[cfg(all(target_os = "none", feature = "nucleo-h743"))]
 pub use nucleo_h743 as chosen;
@@ -44,3 +48,22 @@ pub fn overslept_us() -> u32 {
 /// The watchdog resets the board so long after it was last fed, microseconds.
 #[cfg(all(target_os = "none", feature = "board"))]
 pub(crate) const BITES_AFTER_US: u32 = 1_000_000;
+
+/// Bytes below the stack that nothing may touch; frames of the stack are larger than a few bytes.
+#[cfg(all(target_os = "none", feature = "board"))]
+pub(crate) const GUARD_LEN: u32 = 4096;
+
+/// Work with uploaded files begins; false if it brought three starts in a row down, and is not to
+/// be done. A desk has no starts.
+pub fn begin(work: Work, files: u32) -> bool {
+    #[cfg(all(target_os = "none", feature = "board"))]
+    return crash::begin(work, files);
+    #[cfg(not(all(target_os = "none", feature = "board")))]
+    return crate::kept::Kept::default().begin(work, files);
+}
+
+/// The work came to its end.
+pub fn finish() {
+    #[cfg(all(target_os = "none", feature = "board"))]
+    crash::finish();
+}

@@ -3,8 +3,12 @@
 
 use cortex_m::interrupt::InterruptNumber;
 use embassy_executor::{InterruptExecutor, SendSpawner};
+use heapless::Vec;
 
 use super::chosen::{Flash, Receiver, Transmitter, Watchdog};
+
+/// Most warnings.
+pub const WARNINGS: usize = 2;
 
 /// The board, ready.
 pub struct Parts {
@@ -18,8 +22,10 @@ pub struct Parts {
     pub swarm: (Receiver, Transmitter),
     /// For files and parameters.
     pub flash: Flash,
-    /// Asleep.
+    /// Awake.
     pub watchdog: Watchdog,
+    /// What a person should know of the board.
+    pub warnings: Vec<&'static str, WARNINGS>,
 }
 
 static LINKS: InterruptExecutor = InterruptExecutor::new();

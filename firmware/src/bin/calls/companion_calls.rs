@@ -47,7 +47,7 @@ pub fn run(meter: &mut impl Meter) {
     missions(meter);
     values(meter);
     let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
-    let flash = Ram(memory::spare());
+    let flash = Ram(memory::spare().expect("it is taken once"));
     Ground { companion, flash, meter, now: Instant::ZERO + Duration::from_secs(11), sequence: 0, packet: 0 }
         .run();
 }

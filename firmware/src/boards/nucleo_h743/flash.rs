@@ -11,6 +11,9 @@
 //! failed: it clears them by FLASH_SR2, which on this chip is read-only for them. So they are cleared before. It leaves PSIZE at 8 bits
 //! when it has programmed, as which a sector is erased at the slowest (DS12110, "Flash memory programming"): so that is widened before.
 //!
+//! The bank is not cached, so a load that fails is this code's own, and what was programmed is what
+//! is read. Only the sectors of the roadmap in use are: the MPU holds them read only for as long.
+//!
 //! None of this has run on a chip.
 #![expect(unsafe_code, reason = "flash is memory, and its errors are faults")]
 
@@ -21,6 +24,10 @@ use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Async, Flash as Device};
 use embassy_stm32::pac;
+
+use super::super::mpu;
+use crate::chips::h743;
+use crate::lent::{Lender, Lent};
 
 /// Where bank 2 begins, from the start of the flash.
 const BANK2: u32 = 1 << 20;
@@ -39,19 +46,38 @@ const BUS_FAULTS: u32 = 0xFF00;
 pub const LAYOUT: Layout = Layout::H743;
 
 /// Bank 2; there is one.
-pub struct Flash(Device<'static, Async>);
+pub struct Flash {
+    device: Device<'static, Async>,
+    lender: Lender,
+}
 
 impl Flash {
     pub(super) fn new(device: Device<'static, Async>) -> Self {
-        Self(device)
+        Self { device, lender: Lender::new() }
     }
 
-    /// A roadmap as it lies in the bank; `None` where it would reach beyond. The store gives only what it has read whole, by
-    /// [`ReadFlash::read`]: no word of it is torn.
-    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
+    /// A roadmap as it lies in the bank, cached, and not to be changed until it is given back;
+    /// `None` where it would reach beyond, or another one is lent. The store gives only what it has
+    /// read whole, by [`ReadFlash::read`]: no word of it is torn.
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
         let address = place(at, len)?;
-        // SAFETY: inside the bank. The store never erases or programs the slot that a start uses, until the next start.
-        Some(unsafe { core::slice::from_raw_parts(address as *const u8, len) })
+        // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
+        let lent = self.lender.lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
+        // SAFETY: nobody writes there.
+        unsafe { mpu::set(super::ROADMAP, Some(&h743::roadmap(at, len as u32))) };
+        Some(lent)
+    }
+
+    /// It is not used any more, and nothing of it stays in the cache.
+    pub fn take_back(&mut self, lent: Lent) {
+        // SAFETY: a region less; and the cache's maintenance, which nobody else does after the
+        // start.
+        unsafe {
+            mpu::set(super::ROADMAP, None);
+            let mut core = cortex_m::Peripherals::steal();
+            core.SCB.clean_invalidate_dcache(&mut core.CPUID);
+        }
+        self.lender.take_back(lent);
     }
 }
 
@@ -132,13 +158,19 @@ fn widen() {
 
 impl crate::shell::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+        if !self.lender.allows(at, LAYOUT.sector_len) {
+            return Err(Fault);
+        }
         clear_errors();
         widen();
-        self.0.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
+        self.device.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
     }
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+        if !self.lender.allows(at, bytes.len() as u32) {
+            return Err(Fault);
+        }
         clear_errors();
-        self.0.write(BANK2 + at, bytes).await.map_err(|_| Fault)
+        self.device.write(BANK2 + at, bytes).await.map_err(|_| Fault)
     }
 }

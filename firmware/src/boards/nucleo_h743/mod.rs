@@ -1,4 +1,5 @@
-//! ST's NUCLEO-H743ZI: STM32H743 at 480 MHz, 1 MB of RAM, 2 MB of flash.
+//! ST's NUCLEO-H743ZI: STM32H743 at 480 MHz (400 where the silicon is of revision Y), 1 MB of RAM,
+//! 2 MB of flash.
 //!
 //! | pin | is |
 //! |---|---|
@@ -9,16 +10,18 @@
 
 use defmt_rtt as _;
 use embassy_stm32::flash::{Flash as Device, InterruptHandler};
-use embassy_stm32::gpio::{Level, Output, Speed};
+use embassy_stm32::gpio::{Level, Output, Pull, Speed};
 use embassy_stm32::interrupt;
 use embassy_stm32::interrupt::{InterruptExt, Priority};
-use embassy_stm32::mode::Async as ByDma;
-use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
+use embassy_stm32::usart::{self, RingBufferedUartRx, Uart};
 use embassy_stm32::wdg::IndependentWatchdog;
-use embassy_stm32::{Peri, bind_interrupts, dma, peripherals, rcc};
+use embassy_stm32::{Peri, bind_interrupts, dma, pac, peripherals};
+use heapless::Vec;
 use static_cell::ConstStaticCell;
 
+use self::start::{clocks, guards};
 use super::parts::{self, Parts};
+use crate::chips::h743::{self, Revision};
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<peripherals::USART2>;
@@ -31,21 +34,32 @@ bind_interrupts!(struct Irqs {
 });
 
 mod flash;
+mod start;
+mod transmitter;
 
 pub use flash::{Flash, LAYOUT};
+pub use start::{reset, reset_cause};
+pub use transmitter::Transmitter;
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
-/// The DMA turns in it: 22 ms of the autopilot's bytes. Statics lie in AXI SRAM, where the DMA reaches them.
+/// The DMA turns in it: 22 ms of the autopilot's bytes. `memory.x` puts statics of these names
+/// where the DMA reaches them and nothing is cached.
 const RING: usize = 2048;
-static AUTOPILOT_RING: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
-static RADIO_RING: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+static DMA_RADIO_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
+static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
+
+/// Region of the MPU for the roadmap in use: above that of the bank, below the guard's.
+const ROADMAP: u32 = 3;
+/// What is said of option bytes as a chip has them from the factory.
+const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
+/// What is said where the ST-LINK gives no clock.
+const NO_HSE: &str = "No 8 MHz from the ST-LINK: own oscillator";
 
 /// Receives by DMA into a ring.
 pub type Receiver = RingBufferedUartRx<'static>;
-/// Transmits by DMA.
-pub type Transmitter = UartTx<'static, ByDma>;
-
 /// Priority of the executor of links and setpoints: below all devices.
 pub const LINKS_PRIORITY: u8 = LINKS_AT as u8;
 const LINKS_AT: Priority = Priority::P8;
@@ -64,16 +78,27 @@ unsafe fn UART8() {
     unsafe { parts::on_plans() }
 }
 
-/// Starts the board. To be called once.
+/// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
-    let p = embassy_stm32::init(clocks());
-    // SAFETY: the instruction cache is this function's alone, which is called once. Code is never written.
-    unsafe { cortex_m::Peripherals::steal() }.SCB.enable_icache();
+    start::wake_watchdog();
+    let revision = Revision::of(pac::DBGMCU.idc().read().0);
+    let has_hse = start::try_hse();
+    let p = embassy_stm32::init(clocks(revision, has_hse));
+    let mut watchdog = Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low));
+    watchdog.wake();
+    guards();
+    let mut warnings = Vec::new();
+    let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
+    let wrong = [(level < 3, BROWN_OUT_OFF), (!has_hse, NO_HSE)].into_iter().filter(|(is, _)| *is);
+    // There is room for both.
+    wrong.for_each(|(_, text)| _ = warnings.push(text));
     interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);
     let serial = |baudrate| {
         let mut config = usart::Config::default();
         config.baudrate = baudrate;
+        // A cable that is not there is silence, not noise.
+        config.rx_pull = Pull::Up;
         config
     };
     let fits = "the baud rate can be made from the clock";
@@ -81,43 +106,23 @@ pub fn start() -> Parts {
         Uart::new(p.USART2, p.PD6, p.PD5, p.DMA1_CH0, p.DMA1_CH1, Irqs, serial(AUTOPILOT_BAUD))
             .expect(fits)
             .split();
-    let autopilot = (receives.into_ring_buffered(AUTOPILOT_RING.take()), sends);
+    let sends = Transmitter::new(sends, DMA_AUTOPILOT_OUT.take());
+    let autopilot = (receives.into_ring_buffered(DMA_AUTOPILOT_IN.take()), sends);
     let (sends, receives) =
         Uart::new(p.USART6, p.PC7, p.PC6, p.DMA1_CH2, p.DMA1_CH3, Irqs, serial(RADIO_BAUD))
             .expect(fits)
             .split();
-    let swarm = (receives.into_ring_buffered(RADIO_RING.take()), sends);
+    let sends = Transmitter::new(sends, DMA_RADIO_OUT.take());
+    let swarm = (receives.into_ring_buffered(DMA_RADIO_IN.take()), sends);
     Parts {
         links: parts::start_links(interrupt::UART7),
         plans: parts::start_plans(interrupt::UART8),
         autopilot,
         swarm,
         flash: Flash::new(Device::new(p.FLASH, Irqs)),
-        watchdog: Watchdog::new(p.IWDG1, Output::new(p.PB0, Level::Low, Speed::Low)),
+        watchdog,
+        warnings,
     }
-}
-
-/// 480 MHz from the internal oscillator.
-fn clocks() -> embassy_stm32::Config {
-    let mut config = embassy_stm32::Config::default();
-    config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
-    config.rcc.pll1 = Some(rcc::Pll {
-        source: rcc::PllSource::HSI,
-        prediv: rcc::PllPreDiv::DIV4,
-        mul: rcc::PllMul::MUL60,
-        fracn: None,
-        divp: Some(rcc::PllDiv::DIV2),
-        divq: Some(rcc::PllDiv::DIV8),
-        divr: None,
-    });
-    config.rcc.sys = rcc::Sysclk::PLL1_P;
-    config.rcc.ahb_pre = rcc::AHBPrescaler::DIV2;
-    config.rcc.apb1_pre = rcc::APBPrescaler::DIV2;
-    config.rcc.apb2_pre = rcc::APBPrescaler::DIV2;
-    config.rcc.apb3_pre = rcc::APBPrescaler::DIV2;
-    config.rcc.apb4_pre = rcc::APBPrescaler::DIV2;
-    config.rcc.voltage_scale = rcc::VoltageScale::Scale0;
-    config
 }
 
 /// The independent watchdog, and the light that shows that it is fed.
@@ -131,8 +136,7 @@ impl Watchdog {
         Self { device: IndependentWatchdog::new(device, super::BITES_AFTER_US), light }
     }
 
-    /// Wakes it.
-    pub fn wake(&mut self) {
+    fn wake(&mut self) {
         self.device.unleash();
     }
 

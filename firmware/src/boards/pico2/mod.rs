@@ -6,8 +6,12 @@
 //! | GP4 / GP5 | UART1 TX / RX, the swarm's radio, 460 800 baud |
 //! | GP25 | the light |
 //!
-//! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a UART may be lost. Sectors are erased
-//! only on the ground, disarmed; a page, as of an upload or a parameter in flight, is programmed within a millisecond or so.
+//! While the flash erases or programs nothing runs from it: no setpoint goes out, and bytes of a
+//! UART may be lost. So both are done only on the ground, disarmed (`Layout::stalls`): uploads are
+//! refused in flight, and parameters are kept when it is over.
+//!
+//! `SYSRESETREQ` resets the processor and leaves watchdog, UARTs and all else as they are: so this
+//! board starts anew by its watchdog, which resets all of it but the oscillators.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
 use companion::store::{Fault, Layout, ReadFlash};
@@ -17,10 +21,13 @@ use embassy_rp::gpio::{Level, Output};
 use embassy_rp::interrupt;
 use embassy_rp::interrupt::{InterruptExt, Priority};
 use embassy_rp::uart::{self, BufferedInterruptHandler, BufferedUart, BufferedUartRx, BufferedUartTx};
-use embassy_rp::{Peri, bind_interrupts, peripherals, watchdog};
+use embassy_rp::{Peri, bind_interrupts, install_core0_stack_guard, pac, peripherals, watchdog};
+use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 use super::parts::{self, Parts};
+use crate::chips::{ResetCause, rp2350};
+use crate::lent::{Lender, Lent};
 
 bind_interrupts!(struct Irqs {
     UART0_IRQ => BufferedInterruptHandler<peripherals::UART0>;
@@ -67,9 +74,39 @@ unsafe fn SWI_IRQ_1() {
     unsafe { parts::on_plans() }
 }
 
-/// Starts the board. To be called once.
+/// Why the chip started.
+pub fn reset_cause() -> ResetCause {
+    let chip = pac::POWMAN.chip_reset().read().0;
+    rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
+}
+
+/// Starts anew: by the watchdog, at once.
+pub fn reset() -> ! {
+    set_watchdog_resets();
+    pac::WATCHDOG.ctrl().modify(|w| w.set_trigger(true));
+    loop {
+        cortex_m::asm::nop();
+    }
+}
+
+/// What the watchdog resets; embassy-rp's `start` sets what the RP2040's would.
+fn set_watchdog_resets() {
+    pac::PSM.wdsel().write_value(pac::psm::regs::Wdsel(rp2350::WATCHDOG_RESETS));
+}
+
+/// Below the stack nothing may be written, but by the handler of that fault.
+fn guard_stack() {
+    install_core0_stack_guard().expect("MSPLIM is always there");
+    // SAFETY: a bit of the processor's that means the handlers of hard faults alone.
+    unsafe { (*cortex_m::peripheral::SCB::PTR).ccr.modify(|ccr| ccr | rp2350::STKOFHFNMIGN) };
+}
+
+/// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
+    guard_stack();
     let p = embassy_rp::init(embassy_rp::config::Config::default());
+    let mut watchdog = Watchdog::new(p.WATCHDOG, Output::new(p.PIN_25, Level::Low));
+    watchdog.wake();
     interrupt::SWI_IRQ_0.set_priority(LINKS_AT);
     interrupt::SWI_IRQ_1.set_priority(Priority::P2);
     let serial = |baudrate| {
@@ -82,6 +119,14 @@ pub fn start() -> Parts {
         BufferedUart::new(p.UART0, p.PIN_0, p.PIN_1, Irqs, sends, receives, serial(AUTOPILOT_BAUD));
     let [sends, receives] = RADIO_RINGS.take();
     let swarm = BufferedUart::new(p.UART1, p.PIN_4, p.PIN_5, Irqs, sends, receives, serial(RADIO_BAUD));
+    // The first bytes of a burst are taken early, so that the last ones find room.
+    for uart in [pac::UART0, pac::UART1] {
+        uart.uartifls().modify(|w| w.set_rxiflsel(rp2350::RX_QUARTER));
+    }
+    // A cable that is not there is silence, not noise.
+    for receives in [1, 5] {
+        pac::PADS_BANK0.gpio(receives).modify(|w| w.set_pue(true));
+    }
     let (sends, receives) = autopilot.split();
     let autopilot = (receives, sends);
     let (sends, receives) = swarm.split();
@@ -90,37 +135,53 @@ pub fn start() -> Parts {
         plans: parts::start_plans(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),
-        flash: Flash(Device::new_blocking(p.FLASH)),
-        watchdog: Watchdog::new(p.WATCHDOG, Output::new(p.PIN_25, Level::Low)),
+        flash: Flash { device: Device::new_blocking(p.FLASH), lender: Lender::new() },
+        watchdog,
+        warnings: Vec::new(),
     }
 }
 
 /// The part of the flash after the program.
-pub struct Flash(Device<'static, peripherals::FLASH, Blocking, FLASH>);
+pub struct Flash {
+    device: Device<'static, peripherals::FLASH, Blocking, FLASH>,
+    lender: Lender,
+}
 
 impl Flash {
-    /// A roadmap as it lies there; `None` where it would reach beyond.
-    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
-        let end = (at as usize).checked_add(len)?;
-        // SAFETY: inside the flash. The store never erases or programs the slot that a start uses, until the next start.
-        let view = || unsafe { core::slice::from_raw_parts((STORE_ADDRESS + at as usize) as *const u8, len) };
-        (end <= LAYOUT.len() as usize).then(view)
+    /// A roadmap as it lies there, not to be changed until it is given back; `None` where it would
+    /// reach beyond, or another one is lent.
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
+        (at as usize).checked_add(len).filter(|end| *end <= LAYOUT.len() as usize)?;
+        let from = (STORE_ADDRESS + at as usize) as *const u8;
+        // SAFETY: inside the flash, which nobody erases or programs there as long as it is lent.
+        self.lender.lend(at, unsafe { core::slice::from_raw_parts(from, len) })
+    }
+
+    /// It is not used any more.
+    pub fn take_back(&mut self, lent: Lent) {
+        self.lender.take_back(lent);
     }
 }
 
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        self.0.blocking_read(STORE + at, out).map_err(|_| Fault)
+        self.device.blocking_read(STORE + at, out).map_err(|_| Fault)
     }
 }
 
 impl crate::shell::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
-        self.0.blocking_erase(STORE + at, STORE + at + LAYOUT.sector_len).map_err(|_| Fault)
+        if !self.lender.allows(at, LAYOUT.sector_len) {
+            return Err(Fault);
+        }
+        self.device.blocking_erase(STORE + at, STORE + at + LAYOUT.sector_len).map_err(|_| Fault)
     }
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
-        self.0.blocking_write(STORE + at, bytes).map_err(|_| Fault)
+        if !self.lender.allows(at, bytes.len() as u32) {
+            return Err(Fault);
+        }
+        self.device.blocking_write(STORE + at, bytes).map_err(|_| Fault)
     }
 }
 
@@ -135,9 +196,11 @@ impl Watchdog {
         Self { device: watchdog::Watchdog::new(device), light }
     }
 
-    /// Wakes it.
-    pub fn wake(&mut self) {
+    /// Wakes it; it stands still while a debugger has a processor halted.
+    fn wake(&mut self) {
+        self.device.pause_on_debug(true);
         self.device.start(embassy_time::Duration::from_micros(super::BITES_AFTER_US.into()));
+        set_watchdog_resets();
     }
 
     /// Puts the reset off.

@@ -5,6 +5,8 @@
 use companion::store::{Fault, Layout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
+use crate::lent::{Lender, Lent};
+
 /// Where the bank lies.
 const BANK: usize = 0x6000_0000;
 /// A byte for each word: what happened to it last. Real flash keeps a checksum there.
@@ -25,7 +27,7 @@ const PROGRAM: Duration = Duration::from_micros(100);
 pub const LAYOUT: Layout = Layout::H743;
 
 /// The bank; there is one.
-pub struct Flash(());
+pub struct Flash(Lender);
 
 impl Flash {
     /// To be called once, at the start: the bank is empty if the power was off.
@@ -38,25 +40,36 @@ impl Flash {
                 (MADE as *mut u32).write_volatile(MAGIC);
             }
         }
-        Self(())
+        Self(Lender::new())
     }
 
-    /// A roadmap as it lies in the bank; `None` where it cannot be read.
-    pub fn view(&self, at: u32, len: usize) -> Option<&'static [u8]> {
-        let at = at as usize;
-        let end = at.checked_add(len).filter(|end| *end <= LEN)?;
-        if (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN) {
-            return None;
-        }
-        // SAFETY: inside the bank. The store never erases or programs the slot that a start uses, until the next start.
-        Some(unsafe { core::slice::from_raw_parts((BANK + at) as *const u8, len) })
+    /// A roadmap as it lies in the bank, not to be changed until it is given back; `None` where it
+    /// cannot be read, or another one is lent.
+    pub fn lend(&mut self, at: u32, len: usize) -> Option<Lent> {
+        let place = readable(at, len)?;
+        // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
+        self.0.lend(at, unsafe { core::slice::from_raw_parts(place, len) })
     }
+
+    /// It is not used any more.
+    pub fn take_back(&mut self, lent: Lent) {
+        self.0.take_back(lent);
+    }
+}
+
+/// Where bytes lie; `None` where they would reach beyond, or a word of them is torn.
+fn readable(at: u32, len: usize) -> Option<*const u8> {
+    let at = at as usize;
+    let end = at.checked_add(len).filter(|end| *end <= LEN)?;
+    let torn = (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN);
+    (!torn).then_some((BANK + at) as *const u8)
 }
 
 impl crate::shell::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
-        let (at, len) = (at as usize, LAYOUT.sector_len as usize);
-        if !at.is_multiple_of(len) || at + len > LEN {
+        let (allowed, at, len) =
+            (self.0.allows(at, LAYOUT.sector_len), at as usize, LAYOUT.sector_len as usize);
+        if !at.is_multiple_of(len) || at + len > LEN || !allowed {
             return Err(Fault);
         }
         // A cut while it lasts leaves words that are neither.
@@ -64,7 +77,7 @@ impl crate::shell::Flash for Flash {
             set_mark(word, TORN);
         }
         Timer::after(ERASE).await;
-        // SAFETY: inside the bank, and no view of this sector is held (see `view`).
+        // SAFETY: inside the bank, and nothing of this sector is lent.
         unsafe { ((BANK + at) as *mut u8).write_bytes(0xFF, len) };
         for word in at / WORD..(at + len) / WORD {
             set_mark(word, ERASED);
@@ -73,8 +86,9 @@ impl crate::shell::Flash for Flash {
     }
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
-        let at = at as usize;
-        if !at.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) || at + bytes.len() > LEN {
+        let (allowed, at) = (self.0.allows(at, bytes.len() as u32), at as usize);
+        if !allowed || !at.is_multiple_of(WORD) || !bytes.len().is_multiple_of(WORD) || at + bytes.len() > LEN
+        {
             return Err(Fault);
         }
         for (i, word) in bytes.chunks(WORD).enumerate() {
@@ -84,7 +98,7 @@ impl crate::shell::Flash for Flash {
             }
             set_mark(place, TORN);
             Timer::after(PROGRAM).await;
-            // SAFETY: inside the bank, and no view of this word is held (see `view`).
+            // SAFETY: inside the bank, and this word is not lent.
             unsafe { ((BANK + place * WORD) as *mut u8).copy_from_nonoverlapping(word.as_ptr(), WORD) };
             set_mark(place, WHOLE);
         }
@@ -94,7 +108,9 @@ impl crate::shell::Flash for Flash {
 
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        out.copy_from_slice(self.view(at, out.len()).ok_or(Fault)?);
+        let from = readable(at, out.len()).ok_or(Fault)?;
+        // SAFETY: inside the bank, and `out` is not.
+        unsafe { out.as_mut_ptr().copy_from_nonoverlapping(from, out.len()) };
         Ok(())
     }
 }

@@ -1,6 +1,8 @@
 //! What lies in memory beside the program.
 #![expect(unsafe_code, reason = "memory that the linker knows nothing of")]
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 /// Where `-device loader` puts a map for measurements: beyond all that the firmware uses.
 const MAP: usize = 0x6080_0000;
 /// Bytes before its words: three dimensions, three coordinates of the minimum corner, the resolution, the number of words.
@@ -28,8 +30,13 @@ pub fn map() -> ([u8; MAP_HEAD], &'static [u64]) {
     (head, words)
 }
 
-/// Memory as long as bank 2 and a place for a flash that programs and erases in no time, for measurements.
-pub fn spare() -> &'static mut [u8] {
-    // SAFETY: memory of this board that nothing else uses; `calls` takes it once.
-    unsafe { core::slice::from_raw_parts_mut(SPARE as *mut u8, BANK2_LEN) }
+/// Memory as long as bank 2 and a place for a flash that programs and erases in no time, for
+/// measurements; once.
+pub fn spare() -> Option<&'static mut [u8]> {
+    static TAKEN: AtomicBool = AtomicBool::new(false);
+    if TAKEN.swap(true, Ordering::Relaxed) {
+        return None;
+    }
+    // SAFETY: memory of this board that nothing else uses, given out once.
+    Some(unsafe { core::slice::from_raw_parts_mut(SPARE as *mut u8, BANK2_LEN) })
 }

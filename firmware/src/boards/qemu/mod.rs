@@ -15,17 +15,35 @@ pub use interrupts::LINKS as LINKS_PRIORITY;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;
 
+use heapless::Vec;
+
+use super::mpu;
 use super::parts::Parts;
+use crate::chips::ResetCause;
+
+/// This board does not say.
+pub fn reset_cause() -> ResetCause {
+    ResetCause::Unknown
+}
+
+/// Starts anew.
+pub fn reset() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
+    mpu::enable(&[Some(mpu::guard())]);
     clock::start();
+    let mut watchdog = Watchdog(());
+    watchdog.wake();
     Parts {
         links: interrupts::start_links(),
         plans: interrupts::start_plans(),
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
         swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),
         flash: Flash::new(),
-        watchdog: Watchdog(()),
+        watchdog,
+        warnings: Vec::new(),
     }
 }

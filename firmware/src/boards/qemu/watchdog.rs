@@ -25,7 +25,7 @@ pub struct Watchdog(pub(super) ());
 
 impl Watchdog {
     /// Wakes it.
-    pub fn wake(&mut self) {
+    pub(super) fn wake(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(COUNTS);
         Register::new(WATCHDOG, CTRL).write(ENABLED);

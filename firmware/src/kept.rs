@@ -1,0 +1,322 @@
+//! What is kept in memory that a warm reset leaves alone: how the last start ended, and how often
+//! the planner brought a start down. The memory may hold anything after the power came, so a
+//! checksum goes with it.
+
+use core::{array, str};
+
+use crc::{CRC_32_ISO_HDLC, Crc, NoTable};
+use heapless::String;
+
+use crate::chips::ResetCause;
+
+/// Longest text of a STATUSTEXT.
+pub const TEXT: usize = 50;
+/// Words that it takes: what is kept, then the checksum.
+pub const WORDS: usize = 25;
+/// Words of the text, and before it.
+const TEXT_WORDS: usize = TEXT.div_ceil(4);
+const HEAD: usize = 5 + 2 * WORKS;
+/// Kinds of work.
+const WORKS: usize = 3;
+/// Starts in a row that files may bring down before they are set aside.
+const PATIENCE: u32 = 3;
+/// What is said where neither the program nor the chip knows better.
+const UNANNOUNCED: &str = "Restarted: watchdog, reset key or brown-out";
+
+/// A few bytes at a start and at an end need no table.
+static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+
+/// How a start ended.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+enum End {
+    /// There was none before.
+    #[default]
+    None = 0,
+    /// It runs; found at a start, it ended without a word.
+    Runs = 0x464c_4b22,
+    /// By a panic or a fault.
+    Crashed = 0x464c_4b21,
+    /// Somebody asked for it.
+    Asked = 0x464c_4b23,
+}
+
+/// What is done with uploaded files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Work {
+    /// Nothing.
+    #[default]
+    None = 0,
+    /// The roadmap is checked.
+    CheckRoadmap = 1,
+    /// The mission is read.
+    ReadMission = 2,
+    /// A plan is made.
+    Plan = 3,
+}
+
+/// Work with certain files, told by a checksum.
+type Task = (Work, u32);
+
+/// What is kept.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Kept {
+    end: End,
+    text: String<TEXT>,
+    /// Under way.
+    task: Task,
+    /// Of each kind of work: the files with which it brought starts down, and how many in a row.
+    failed: [(u32, u32); WORKS],
+    /// A bit for each kind that came to its end in this start, with those files.
+    done: u32,
+}
+
+impl Kept {
+    /// What a start finds: `kept` is what the memory holds, `cause` why the chip started. Returns
+    /// what is kept from now on, and what is to be said of the end before.
+    pub fn start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
+        let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
+        let crashed = kept.end == End::Crashed;
+        let said = match (kept.end, cause) {
+            (End::Crashed, _) => kept.text.as_str(),
+            (_, ResetCause::Watchdog) => "Restarted: watchdog",
+            (_, ResetCause::BrownOut) => "Restarted: brown-out",
+            (End::Runs, ResetCause::Key) => "Restarted: reset key",
+            (End::Runs, ResetCause::Request) => "Restarted: debugger",
+            (End::Runs, ResetCause::Unknown) => UNANNOUNCED,
+            _ => "",
+        };
+        let said = String::try_from(said).ok().filter(|said| !said.is_empty());
+        let by_itself = matches!(cause, ResetCause::Watchdog | ResetCause::Unknown);
+        let (work, files) = kept.task;
+        for (i, failed) in kept.failed.iter_mut().enumerate() {
+            if work as usize != i + 1 {
+                // All such work of that start came to its end: the row is broken.
+                if kept.done >> i & 1 == 1 {
+                    failed.1 = 0;
+                }
+            } else if crashed || kept.end == End::Runs && by_itself {
+                let before = if failed.0 == files { failed.1 } else { 0 };
+                *failed = (files, before.saturating_add(1));
+            }
+        }
+        (kept.task, kept.done, kept.end) = (Task::default(), 0, End::Runs);
+        (kept, said)
+    }
+
+    /// It ends by a panic or a fault, of which the next start says this.
+    pub fn crash(&mut self, text: &str) {
+        self.end = End::Crashed;
+        self.text.clear();
+        // A text too long is cut.
+        let _ = text.chars().try_for_each(|c| self.text.push(c));
+    }
+
+    /// Whether it has ended.
+    pub fn has_crashed(&self) -> bool {
+        self.end == End::Crashed
+    }
+
+    /// It ends because somebody asked for that.
+    pub fn ask(&mut self) {
+        self.end = End::Asked;
+    }
+
+    /// Whether work with files may begin: it did not bring three starts in a row down.
+    pub fn may_begin(&self, work: Work, files: u32) -> bool {
+        let failed = (work as usize).checked_sub(1).map(|i| self.failed[i]);
+        failed.is_none_or(|(of, times)| of != files || times < PATIENCE)
+    }
+
+    /// Begins work with files; false, and nothing begins, if it may not.
+    pub fn begin(&mut self, work: Work, files: u32) -> bool {
+        let may = self.may_begin(work, files);
+        if may {
+            self.task = (work, files);
+        }
+        may
+    }
+
+    /// The work came to its end.
+    pub fn finish(&mut self) {
+        let (work, files) = core::mem::take(&mut self.task);
+        if let Some(i) = (work as usize).checked_sub(1)
+            && self.failed[i].0 == files
+        {
+            self.done |= 1 << i;
+        }
+    }
+
+    /// As words of memory.
+    pub fn to_words(&self) -> [u32; WORDS] {
+        let mut text = [0; 4 * TEXT_WORDS];
+        text[..self.text.len()].copy_from_slice(self.text.as_bytes());
+        let mut words = [0; WORDS];
+        let head = [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
+        let failed = self.failed.iter().flat_map(|(files, times)| [*files, *times]);
+        let text = text.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
+        let all = head.into_iter().chain(failed).chain(text);
+        words.iter_mut().zip(all).for_each(|(word, value)| *word = value);
+        words[WORDS - 1] = sum(&words);
+        words
+    }
+
+    /// From words of memory; `None` where the checksum is wrong.
+    pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
+        let end =
+            [End::None, End::Runs, End::Crashed, End::Asked].into_iter().find(|e| *e as u32 == words[0])?;
+        if sum(words) != words[WORDS - 1] {
+            return None;
+        }
+        let work = |word: u32| {
+            let all = [Work::None, Work::CheckRoadmap, Work::ReadMission, Work::Plan];
+            all.into_iter().find(|work| *work as u32 == word)
+        };
+        let mut bytes = [0; 4 * TEXT_WORDS];
+        for (to, word) in bytes.chunks_exact_mut(4).zip(&words[HEAD..]) {
+            to.copy_from_slice(&word.to_le_bytes());
+        }
+        let text = str::from_utf8(bytes.get(..words[1] as usize)?).ok()?;
+        Some(Self {
+            end,
+            text: String::try_from(text).ok()?,
+            task: (work(words[2])?, words[3]),
+            failed: array::from_fn(|i| (words[5 + 2 * i], words[6 + 2 * i])),
+            done: words[4],
+        })
+    }
+}
+
+/// The checksum of all words but the last.
+fn sum(words: &[u32; WORDS]) -> u32 {
+    let mut digest = CRC.digest();
+    words[..WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));
+    digest.finalize()
+}
+
+const _: () = assert!(HEAD + TEXT_WORDS + 1 == WORDS, "the text has room");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A start from what the one before left.
+    fn start(kept: &Kept, cause: ResetCause) -> (Kept, Option<String<TEXT>>) {
+        let words = kept.to_words();
+        let read = Kept::from_words(&words);
+        assert_eq!(read.as_ref(), Some(kept), "as it was written");
+        Kept::start(read, cause)
+    }
+
+    #[test]
+    fn any_flipped_bit_is_noticed_and_so_is_memory_of_one_kind() {
+        let (mut kept, _) = Kept::start(None, ResetCause::Unknown);
+        kept.begin(Work::Plan, 7);
+        kept.crash("Restarted: panic at machine.rs:123");
+        let words = kept.to_words();
+        for bit in 0..32 * WORDS {
+            let mut flipped = words;
+            flipped[bit / 32] ^= 1 << (bit % 32);
+            assert_eq!(Kept::from_words(&flipped), None, "bit {bit}");
+        }
+        for word in [0, u32::MAX, 0xAAAA_AAAA, 0xcccc_cccc] {
+            assert_eq!(Kept::from_words(&[word; WORDS]), None);
+        }
+    }
+
+    #[test]
+    fn each_end_is_said_as_it_was() {
+        let (fresh, said) = Kept::start(None, ResetCause::Unknown);
+        assert_eq!(said, None, "nothing was before");
+        let says = |kept: &Kept, cause| start(kept, cause).1;
+        let rows = [
+            (ResetCause::Power, None),
+            (ResetCause::BrownOut, Some("Restarted: brown-out")),
+            (ResetCause::Key, Some("Restarted: reset key")),
+            (ResetCause::Watchdog, Some("Restarted: watchdog")),
+            (ResetCause::Request, Some("Restarted: debugger")),
+            (ResetCause::Unknown, Some(UNANNOUNCED)),
+        ];
+        for (cause, said) in rows {
+            assert_eq!(says(&fresh, cause).as_deref(), said, "{cause:?}");
+        }
+        let mut asked = fresh.clone();
+        asked.ask();
+        assert_eq!((says(&asked, ResetCause::Request), says(&asked, ResetCause::Unknown)), (None, None));
+        let mut crashed = fresh;
+        crashed.crash("Restarted: panic at a_file_whose_name_is_so_long.rs:12345");
+        let cut = "Restarted: panic at a_file_whose_name_is_so_long.r";
+        assert_eq!(says(&crashed, ResetCause::Request).as_deref(), Some(cut));
+        assert_eq!(says(&crashed, ResetCause::Power), None, "memory of another day");
+    }
+
+    /// A start that ends amid a plan with these files; false if they are set aside.
+    fn fails(kept: &mut Kept, files: u32, cause: ResetCause, panics: bool) -> bool {
+        let begun = kept.begin(Work::Plan, files);
+        if panics {
+            kept.crash("Restarted: panic");
+        }
+        *kept = start(kept, cause).0;
+        begun
+    }
+
+    #[test]
+    fn files_that_bring_three_starts_in_a_row_down_are_set_aside() {
+        for (cause, panics) in
+            [(ResetCause::Request, true), (ResetCause::Unknown, true), (ResetCause::Watchdog, false)]
+        {
+            let mut kept = Kept::start(None, ResetCause::Power).0;
+            assert!((0..3).all(|_| fails(&mut kept, 7, cause, panics)));
+            assert!(!kept.begin(Work::Plan, 7), "three times");
+            let again = start(&kept, ResetCause::Key).0;
+            assert!(!again.clone().begin(Work::Plan, 7), "still after a reset");
+            assert!(again.clone().begin(Work::Plan, 8), "others may be tried");
+            assert!(again.clone().begin(Work::CheckRoadmap, 7), "and other work");
+            assert!(start(&again, ResetCause::Power).0.begin(Work::Plan, 7), "not after the power was off");
+        }
+    }
+
+    #[test]
+    fn a_roadmap_that_was_set_aside_stays_so_while_a_mission_fails() {
+        let mut kept = Kept::start(None, ResetCause::Power).0;
+        for _ in 0..3 {
+            assert!(kept.begin(Work::CheckRoadmap, 1));
+            kept.crash("Restarted: fault");
+            kept = start(&kept, ResetCause::Request).0;
+        }
+        for _ in 0..3 {
+            assert!(!kept.begin(Work::CheckRoadmap, 1));
+            assert!(kept.begin(Work::CheckRoadmap, 2));
+            kept.finish();
+            assert!(fails(&mut kept, 7, ResetCause::Request, true));
+        }
+        assert!(!kept.begin(Work::CheckRoadmap, 1) && !kept.begin(Work::Plan, 7));
+    }
+
+    #[test]
+    fn only_starts_in_a_row_count_and_only_those_that_the_planner_brought_down() {
+        let fail = |kept: &mut Kept| assert!(fails(kept, 7, ResetCause::Request, true));
+        let mut kept = Kept::start(None, ResetCause::Power).0;
+        (0..2).for_each(|_| fail(&mut kept));
+        // A start in which nothing is planned changes nothing, nor one that somebody else ended.
+        kept = start(&kept, ResetCause::Watchdog).0;
+        for cause in [ResetCause::Key, ResetCause::BrownOut, ResetCause::Request] {
+            assert!(fails(&mut kept, 7, cause, false));
+        }
+        // A plan that came to its end, after which another brought the start down, does not help.
+        assert!(kept.begin(Work::Plan, 7));
+        kept.finish();
+        fail(&mut kept);
+        assert!(!kept.clone().begin(Work::Plan, 7));
+        // A start whose plans all came to their ends begins the count again.
+        let mut kept = Kept::start(None, ResetCause::Power).0;
+        (0..2).for_each(|_| fail(&mut kept));
+        assert!(kept.begin(Work::Plan, 7));
+        kept.finish();
+        kept.crash("Restarted: fault, not the planner's");
+        kept = start(&kept, ResetCause::Request).0;
+        (0..3).for_each(|_| fail(&mut kept));
+        assert!(!kept.begin(Work::Plan, 7));
+    }
+}
