@@ -63,6 +63,8 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// A setpoint that stands this near the end of the path has flown it, metres.
 const AT_END_M: f32 = 0.02;
+/// While another flies the vehicle, the setpoint follows its estimate no faster than any vehicle flown so flies, m/s.
+const FOLLOWS_MPS: f32 = 15.0;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Shorter than this a leg need not be flown, metres.
@@ -489,7 +491,7 @@ impl Guidance {
         if known && (taken || taken_before || !self.door.is_live()) {
             // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
             if taken || !self.door.is_live() {
-                self.door.reset(position);
+                self.door.go_with(position, FOLLOWS_MPS * dt_s);
             }
             if flies && !taken {
                 self.door.move_on(&scene.telemetry.velocity);

@@ -125,7 +125,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             framers: [Framer::new(), Framer::new()],
             outboxes: [Outbox::default(), Outbox::default()],
             telemetry: Telemetry::new(),
-            neighbours: Neighbours::new(&config.roster, config.system_id),
+            neighbours: Neighbours::new(
+                &config.roster,
+                config.system_id,
+                config.cruise_mps.max(config.climb_mps),
+            ),
             plan: None,
             plan_failure: None,
             around: Around::default(),
@@ -357,8 +361,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
-                    // It may have been started anew and know nothing of the streams we asked for.
-                    self.ask_for_streams();
+                    // It may have been started anew and know nothing of the streams we asked for. Positions that jump
+                    // again and again are no reason to flood it.
+                    if self.now >= self.streams_at {
+                        self.ask_for_streams();
+                    }
                 }
                 change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
             }

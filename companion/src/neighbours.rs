@@ -60,6 +60,10 @@ const STRANGER_STAYS: Duration = Duration::from_secs(60);
 const STRANGER: u16 = u16::MAX;
 /// A vehicle that stood for so long is not about to go on.
 const STANDS: Duration = Duration::from_secs(5);
+/// Progress is believed as if it were that of so much later, seconds: messages come up to a second late, and then at once.
+const LATE_S: f32 = 1.0;
+/// What progress may jump, metres: where a vehicle takes up its path again, its nearest point is new.
+const STRIDE_M: f32 = 1.0;
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
 
@@ -85,6 +89,8 @@ struct Contact {
     speed_mps: f32,
     /// When it was last known to move.
     moved_at: Instant,
+    /// The furthest it can have come, metres along its path, and when that was.
+    furthest: Option<(f32, Instant)>,
     /// Where it rested when a way around was planned.
     avoided: Option<Point>,
     state: Neighbour,
@@ -115,6 +121,17 @@ impl Contact {
     /// Whether it is out, and was when it was last looked at what is in the way.
     fn is_out_since(&self, at: Instant) -> bool {
         self.out_at.is_some_and(|since| since <= at) || self.is_dead(at)
+    }
+
+    /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at
+    /// `fastest_mps`. The rest comes by and by, a landing that reports the whole way at once too. Less than before is
+    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle started anew too.
+    fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
+        let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
+        let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
+        let late_m = believed_m + fastest_mps * LATE_S + STRIDE_M;
+        self.furthest = Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
+        believed_m
     }
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
@@ -234,13 +251,22 @@ pub struct Neighbours<const V: usize> {
     dropped: u32,
     /// When it was last found that nobody who was out is in the way.
     clear_at: Instant,
+    /// No vehicle's progress grows faster, m/s.
+    fastest_mps: f32,
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// The vehicles of a roster sorted by id, without the own one; nobody heard yet.
-    pub fn new(roster: &[RosterEntry], own_id: u8) -> Self {
-        let mut table =
-            Self { contacts: Vec::new(), heard: Vec::new(), roster: 0, dropped: 0, clear_at: Instant::ZERO };
+    /// The vehicles of a roster sorted by id, without the own one; nobody heard yet. None of them flies faster along its path
+    /// than `nominal_mps`, or than it lands.
+    pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
+        let mut table = Self {
+            contacts: Vec::new(),
+            heard: Vec::new(),
+            roster: 0,
+            dropped: 0,
+            clear_at: Instant::ZERO,
+            fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
+        };
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id != own_id {
                 // A roster of at most V entries fits.
@@ -284,6 +310,7 @@ impl<const V: usize> Neighbours<V> {
             floor_m: f32::NAN,
             speed_mps: 0.0,
             moved_at: Instant::ZERO,
+            furthest: None,
             avoided: None,
             state,
         };
@@ -398,7 +425,8 @@ impl<const V: usize> Neighbours<V> {
         contact.points.clone_from(&intent.points);
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
-        contact.state.progress_m = shared.then_some(intent.progress_m);
+        contact.state.progress_m =
+            shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
     }
 
     /// Every neighbour whose position was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
@@ -524,7 +552,7 @@ impl<const V: usize> Neighbours<V> {
     /// There is another plan: what was found, and who was flown around, does not count any more.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
-        self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
+        self.contacts.iter_mut().for_each(|contact| (contact.avoided, contact.furthest) = (None, None));
     }
 
     /// Where the other vehicles of the roster are while they stand, those out of the plan among them.

@@ -4,7 +4,7 @@ const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 600.0 }
 
 fn table() -> Neighbours<4> {
     let entry = |system_id| RosterEntry { system_id, start: Point::zeros() };
-    Neighbours::new(&[entry(3), entry(5), entry(9)], 5)
+    Neighbours::new(&[entry(3), entry(5), entry(9)], 5, 2.0)
 }
 
 fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
@@ -208,4 +208,45 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     assert!(!out(&mut table, dead) && !table.at(dead)[0].grounded);
     table.found_clear(dead);
     assert!(out(&mut table, dead) && table.at(dead)[0].grounded);
+}
+
+proptest::proptest! {
+    /// Whatever is reported, what is believed grows no faster than a vehicle flies, but for a message's delay. True reports,
+    /// however late they come, are believed as they are; a jump is believed in the end.
+    #[test]
+    fn progress_grows_no_faster_than_a_vehicle_flies(
+        delays_ms in proptest::collection::vec(0u64..1000, 2..60),
+        lies_m in proptest::collection::vec(-50.0f32..200.0, 0..60),
+        speed_mps in 0.0f32..2.0,
+        begin_m in -30.0f32..0.0,
+    ) {
+        let place_of = |table: &Neighbours<4>| table.contacts[1].state.progress_m;
+        let (mut honest, mut lying) = (joined(0), joined(0));
+        let told = |progress_m| Intent { progress_m, ..intent(ON_PLAN, 1, 2) };
+        let (mut last, mut heard_ms) = (None::<(f32, Instant)>, 0);
+        for (i, delay_ms) in delays_ms.iter().enumerate() {
+            // Overtaken messages are dropped before.
+            let sent_ms = 200 * (i as u64 + 1);
+            heard_ms = heard_ms.max(sent_ms + delay_ms);
+            let now = Instant::from_millis(heard_ms);
+            let true_m = begin_m + speed_mps * sent_ms as f32 * 1e-3;
+            honest.handle_intent(now, 1, &told(true_m), 1, Some(2));
+            proptest::prop_assert_eq!(place_of(&honest), Some(true_m));
+            let reported_m = lies_m.get(i).copied().unwrap_or(true_m);
+            lying.handle_intent(now, 1, &told(reported_m), 1, Some(2));
+            let believed_m = place_of(&lying).unwrap();
+            proptest::prop_assert!(believed_m <= reported_m);
+            if let Some((before_m, at)) = last {
+                let most_m = before_m + 2.0 * (now - at).secs_f32() + 2.0 * LATE_S + STRIDE_M + 1e-3;
+                proptest::prop_assert!(believed_m <= most_m, "{believed_m} m after {before_m} m");
+            }
+            last = Some((believed_m, now));
+        }
+        // A landing that reports its whole way is believed after the time that it takes to fly it.
+        for second in 1..200 {
+            let now = Instant::from_millis(heard_ms + second * 1000);
+            lying.handle_intent(now, 1, &told(250.0), 1, Some(2));
+        }
+        proptest::prop_assert_eq!(place_of(&lying), Some(250.0));
+    }
 }

@@ -4,7 +4,8 @@
 //! hold whatever feed-forward goes along, and however the steps lie in time: a curve whose third derivative is bounded has
 //! third divided differences within that bound. A gap longer than [`GAP_S`] begins another stream, and so does a setpoint
 //! that an autopilot in another mode did not follow: it has to be finite and inside the fence all the same. A setpoint that
-//! moves without a velocity of its own follows a vehicle that another flies, and asks for nothing: only jumps count there.
+//! moves without a velocity of its own follows a vehicle that another flies, or is believed to: it moves no faster than
+//! [`FOLLOWS_MPS`].
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;
@@ -13,6 +14,8 @@ use nalgebra::Vector3;
 const GAP_S: f32 = 0.3;
 /// A setpoint without velocity that moves further than this follows the vehicle, metres.
 const STILL_M: f32 = 1e-4;
+/// How fast it does so at most, and some room for rounding, m/s.
+const FOLLOWS_MPS: f32 = 15.2;
 /// Of the mask: the position is ignored.
 const NO_POSITION: u16 = 0b111;
 
@@ -162,19 +165,20 @@ impl SetpointCheck {
             let velocity = moved / dt_s;
             next.dt_s = [dt_s, before.dt_s[0]];
             let stats = &mut self.stats;
-            stats.step_m = stats.step_m.max(moved.norm());
-            stats.speed_mps = stats.speed_mps.max(velocity.norm());
             let sent = Vector3::new(data.vx, data.vy, data.vz);
-            let jumps = velocity.norm() > self.limits.speed_mps;
+            let follows = sent == Vector3::zeros() && moved.norm() > STILL_M;
+            let jumps = velocity.norm() > if follows { FOLLOWS_MPS } else { self.limits.speed_mps };
             if jumps {
                 stats.jumps += 1;
                 self.fault(at_s, format!("a step of {:.2} m in {dt_s:.3} s", moved.norm()));
             }
-            if sent == Vector3::zeros() && moved.norm() > STILL_M {
+            if follows {
                 self.last = Some(next);
                 return;
             }
             let stats = &mut self.stats;
+            stats.step_m = stats.step_m.max(moved.norm());
+            stats.speed_mps = stats.speed_mps.max(velocity.norm());
             stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
             next.velocity = Some(velocity);
             if let Some(velocity_before) = before.velocity {

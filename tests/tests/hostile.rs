@@ -17,3 +17,14 @@ fn forged_frames_break_no_rule() {
     let seen = report.states.iter().filter(|steps| **steps > 0).count();
     assert!(seen >= 12, "only {seen} states were attacked");
 }
+
+/// Attacks that once broke a rule: floods of requests after positions that jump, setpoints that followed them.
+const ONCE_BROKEN: [u64; 11] = [309, 979, 1069, 1079, 1141, 1301, 1458, 1603, 1644, 1731, 1987];
+
+#[test]
+fn attacks_that_once_broke_a_rule_break_none() {
+    for seed in ONCE_BROKEN {
+        let report = hostile::attacks(seed, 1);
+        assert!(report.broken.is_empty() && report.unfit.is_empty(), "{report:#?}");
+    }
+}

@@ -213,6 +213,13 @@ impl Door {
         self.rest();
     }
 
+    /// Goes with a vehicle that another flies, no further than `most_m`: an estimate that jumps is no motion.
+    pub(crate) fn go_with(&mut self, place: Point, most_m: f32) {
+        let here = self.position();
+        let way = shortened(self.inside(place) - here, most_m);
+        self.reset(if self.live { here + way } else { place });
+    }
+
     /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back.
     pub(crate) fn move_on(&mut self, velocity: &Point) {
         let velocity = shortened(*velocity, self.limits.fastest_mps());
