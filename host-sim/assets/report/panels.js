@@ -28,7 +28,7 @@ function verdict(key, safety) {
 
 // Seconds below a tenth read better as milliseconds.
 function quantity(value, unit) {
-  if (unit === "s" && isNumber(value) && Math.abs(value) < 0.1) return [`${Number((value * 1000).toPrecision(2))}`, "ms"];
+  if (unit === "s" && isNumber(value) && value !== 0 && Math.abs(value) < 0.1) return [`${Number((value * 1000).toPrecision(2))}`, "ms"];
   return [valueText(value), isNumber(value) ? unit : ""];
 }
 
@@ -80,6 +80,12 @@ function buildSummary() {
       const count = ends.filter((v) => v[key]).length;
       row(top, name, `${count} of ${ends.length}`, { style: count === ends.length ? "ok" : "bad" });
     }
+  }
+  const reasons = result.left?.reasons ?? [];
+  if (reasons.length > 0) {
+    const box = host.appendChild(element("div"));
+    box.append(element("h3", "Left"));
+    for (const reason of reasons) box.append(element("p", reason, { class: "bad" }));
   }
   const sections = { ...result, computing_time: report.timing };
   for (const section of ["safety", "totals", "coverage", "formation", "roadmap", "computing_time"]) {
