@@ -14,7 +14,7 @@ use std::time::{Duration, Instant as Clock};
 use companion::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board::{self, Downfall, Emulated};
-use flockmate_tests::vehicle::{Vehicle, ahead, mission};
+use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
 use host_sim::autopilot::ardupilot;
 use host_sim::link::Link;
 use host_sim::mission::Mission;
@@ -234,6 +234,44 @@ fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
     let bank = board::bank(&others.roadmap_file, &others.mission_file);
     let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &ours, 1);
     vehicle.until_said("This system id is not in the mission: no plan");
+}
+
+/// What a board says of a mission that it does not plan any more.
+const ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
+
+#[test]
+fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
+    let Some(program) = board::program("flockmate") else { return };
+    let mission = mission(LOBBY);
+    let bank = board::bank(&mission.roadmap_file, &mission.mission_file);
+    let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &mission, 1);
+    let mut in_a_row = 0;
+    while in_a_row < 3 {
+        vehicle.board.break_planner();
+        vehicle.heard = Heard::default();
+        let crashed =
+            |vehicle: &Vehicle| vehicle.heard.texts.iter().any(|text| text.starts_with("Restarted: fault"));
+        vehicle.until("planning", |vehicle| crashed(vehicle) || vehicle.heard.state == State::Ready);
+        // Where this machine stood still the planner was done before it could be broken.
+        if crashed(&vehicle) {
+            in_a_row += 1;
+        } else {
+            in_a_row = 0;
+            vehicle.board.reset();
+        }
+        let texts = &vehicle.heard.texts;
+        let aside = texts.iter().any(|text| text == ASIDE);
+        assert!(in_a_row == 3 || !aside, "after {in_a_row} in a row: {texts:?}");
+    }
+    // The mission is left alone from that start on, whose planner is broken again: the board stays up.
+    vehicle.until_said(ASIDE);
+    vehicle.run(FINDS);
+    vehicle.board.break_planner();
+    vehicle.heard = Heard::default();
+    vehicle.run(2 * FINDS);
+    let heard = &vehicle.heard;
+    assert!(!heard.texts.iter().any(|text| text.starts_with("Restarted")), "{heard:?}");
+    assert_eq!(heard.state, State::Aborted, "there is no plan");
 }
 
 /// A client's end of a radio that the vehicle's thread serves.
