@@ -69,7 +69,7 @@ impl Swarm {
             .map(|system_id| RosterEntry { system_id, start: Point::zeros() })
             .collect();
         Self {
-            tables: (1..=links.len() as u8).map(|id| Neighbours::new(&roster, id)).collect(),
+            tables: (1..=links.len() as u8).map(|id| Neighbours::new(&roster, id, 2.0)).collect(),
             next: std::vec![0; links.len()],
             links,
             under_way: List::new(),
