@@ -161,15 +161,17 @@ impl Contact {
         })
     }
 
-    fn take(&mut self, item: &Item, at: Instant, now: Instant, same_plan: bool) {
+    /// `fastest_mps` bounds what is believed of its progress, as where it is heard itself; none where the plan is another.
+    fn take(&mut self, item: &Item, at: Instant, now: Instant, fastest_mps: Option<f32>) {
         let metres = |value: i16| f32::from(value) / PER_M;
         self.relayed_at = Some(at);
         self.flags = item.flags;
         self.column = item.column;
         self.floor_m = metres(item.floor_dm);
         self.state.grounded = self.tells(GROUNDED | LANDED);
-        let shared = same_plan && self.tells(ON_PLAN);
-        self.state.progress_m = shared.then_some(item.progress_m);
+        self.state.progress_m = fastest_mps
+            .filter(|_| item.flags & ON_PLAN != 0)
+            .map(|fastest_mps| self.believed_m(item.progress_m, fastest_mps, now));
         if self.position_at.is_none_or(|known| known < at) {
             let [x, y, z] = item.place_dm.map(metres);
             self.state.position = Point::new(x, y, z);
@@ -214,7 +216,8 @@ impl<const V: usize> Neighbours<V> {
             let told_at = Instant::from_micros(now.micros().saturating_sub(age_us));
             let newer = contact.known_at().is_none_or(|known| known < told_at);
             if newer && !contact.heard_within(now, SPEAKS) {
-                contact.take(item, told_at, now, plan_crc == Some(news.plan_crc));
+                let fastest_mps = plan_crc.filter(|crc| *crc == news.plan_crc).map(|_| self.fastest_mps);
+                contact.take(item, told_at, now, fastest_mps);
             }
         }
     }

@@ -203,13 +203,15 @@ fn who_is_heard_speaks_for_itself() {
     let mut swarm = Swarm::new(std::vec![std::vec![true; 3]; 3]);
     swarm.step(0, 0);
     swarm.step(STEP_MS, 0);
-    let away = Item { age_ds: 0, place_dm: [9000, 0, 0], ..item(1) };
+    let away = Item { age_ds: 0, progress_m: 500.0, place_dm: [9000, 0, 0], ..item(1) };
     let news = News { mission_crc: MISSION, plan_crc: PLAN, items: [away].into_iter().collect() };
     let place = |swarm: &mut Swarm, ms: u64| swarm.tables[0].at(Instant::from_millis(ms))[0].position.x;
     swarm.tables[0].handle_news(Instant::from_millis(900), 3, &news, Some(PLAN));
     assert!(place(&mut swarm, 900) < 1.0);
     swarm.tables[0].handle_news(Instant::from_millis(2500), 3, &news, Some(PLAN));
     assert_eq!(place(&mut swarm, 2500), 900.0);
+    let progress_m = swarm.tables[0].at(Instant::from_millis(2500))[0].progress_m;
+    assert!(progress_m.is_some_and(|m| m < 20.0), "no faster than it can fly: {progress_m:?}");
     let stranger = News { items: [Item { rank: 7, ..away }].into_iter().collect(), ..news };
     swarm.tables[0].handle_news(Instant::from_millis(2600), 3, &stranger, Some(PLAN));
     assert_eq!(swarm.tables[0].len(), 2, "nobody is added");
