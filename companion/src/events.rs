@@ -29,4 +29,9 @@ pub enum Event {
         /// Whether the row is a warning: the mission leaves its usual course.
         warning: bool,
     },
+    /// The mission waits for a vehicle that has not started.
+    WaitsForStart {
+        /// Its MAVLink system id.
+        id: u8,
+    },
 }

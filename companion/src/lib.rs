@@ -50,6 +50,7 @@ pub mod table;
 pub mod telemetry;
 pub mod time;
 mod transmit;
+mod waits;
 
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link};

@@ -31,6 +31,7 @@ use crate::senders::{Kind as AnswerKind, Rates, Sender};
 use crate::store::{Erasing, Store};
 use crate::telemetry::{Change, Telemetry};
 use crate::time::{Duration, Instant};
+use crate::waits::Waits;
 
 /// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
@@ -84,6 +85,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) limits_read: u16,
     pub(crate) limits_tries: u8,
     pub(crate) limits_at: Instant,
+    pub(crate) waits: Waits,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
     pub(crate) now: Instant,
@@ -149,6 +151,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             limits_read: 0,
             limits_tries: 0,
             limits_at: Instant::ZERO,
+            waits: Waits::default(),
             guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
             mode_before: 0,
             now: Instant::ZERO,
@@ -498,6 +501,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.held_at = now + HELD_EVERY;
             self.say(true, "Setpoint out of limits: holding");
         }
+        self.name_who_never_starts();
         self.look_around();
         self.run_table();
         self.repeat_requests();

@@ -20,7 +20,7 @@ pub(super) fn assert_no_gap(bench: &Bench) {
 fn states(bench: &Bench) -> Vec<State> {
     let to = |e: &Event| match e {
         Event::StateChanged { to, .. } => Some(*to),
-        Event::PlanRequested | Event::RestartRequested => None,
+        Event::PlanRequested | Event::RestartRequested | Event::WaitsForStart { .. } => None,
     };
     bench.events.iter().filter_map(to).collect()
 }
@@ -258,4 +258,28 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     assert_eq!(bench.companion.waiting_for(), 77);
     hear(&mut bench, 6.5, 5);
     bench.until(State::Follow, 20.0);
+}
+
+#[test]
+fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
+    let named = |bench: &Bench| bench.texts.iter().filter(|text| text.contains("it has not started")).count();
+    // Never heard; on its pad; flying, whoever waits for it.
+    let grounded = crate::intent::ON_PLAN | crate::intent::GROUNDED;
+    let flying = crate::intent::ON_PLAN | crate::intent::FLYING;
+    for (flags, expected) in [(None, 2..5), (Some(grounded), 2..5), (Some(flying), 0..1)] {
+        let mut gated = plan();
+        gated.gates.push(planner_core::schedule::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+        let mut bench = Bench::new(two_vehicles());
+        bench.answer_plan = Some(Ok(gated));
+        bench.until(State::Ready, 6.0);
+        bench.start();
+        for _ in 0..65 {
+            bench.neighbour = flags.map(|flags| (Point::new(8.0, 60.0, 10.0), flags, 0.0, 5));
+            bench.run(1.0);
+        }
+        // On both links.
+        assert!(expected.contains(&named(&bench)), "{flags:?}: {:?}", bench.texts);
+        let told = bench.events.contains(&Event::WaitsForStart { id: 77 });
+        assert_eq!(told, flags != Some(flying), "{:?}", bench.events);
+    }
 }

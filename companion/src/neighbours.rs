@@ -501,6 +501,12 @@ impl<const V: usize> Neighbours<V> {
         })
     }
 
+    /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
+    pub(crate) fn is_not_started(&self, id: u8) -> bool {
+        let waits = |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT));
+        self.in_roster(id).is_some_and(|at| waits(&self.contacts[at]))
+    }
+
     /// Whom we heard lately, a bit for each rank.
     pub fn heard_bits(&self, now: Instant) -> u32 {
         let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, LATELY));

@@ -211,7 +211,8 @@ impl Shell {
                             companion.say_count(false, "Setpoints: #, at most # ms apart", told);
                         }
                     }
-                    Event::StateChanged { .. } => {}
+                    // Its text says so.
+                    Event::StateChanged { .. } | Event::WaitsForStart { .. } => {}
                 }
             }
             if companion.streams() {

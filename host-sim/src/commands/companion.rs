@@ -107,6 +107,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         while let Some(event) = companion.poll_event() {
             match event {
                 Event::RestartRequested => restarts = true,
+                Event::WaitsForStart { id } => {
+                    say!("{:9.3} s  waiting for vehicle {id}: not started", began.elapsed().as_secs_f32());
+                }
                 Event::PlanRequested => {
                     let mut own = mission.answer(&plan, index, &companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {

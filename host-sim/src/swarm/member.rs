@@ -276,6 +276,8 @@ impl Member {
             match happened {
                 Event::PlanRequested => self.wants_plan = true,
                 Event::RestartRequested => restarts = true,
+                // Its text says so.
+                Event::WaitsForStart { .. } => {}
                 Event::StateChanged { from, to, text, warning } => {
                     self.note(from, to, text, warning);
                     log.push(self.entry(now_us, from, to, text));

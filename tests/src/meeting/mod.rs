@@ -431,7 +431,7 @@ impl<'a> World<'a> {
                 Event::StateChanged { from, to, text, .. } => {
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
                 }
-                Event::RestartRequested => {}
+                Event::RestartRequested | Event::WaitsForStart { .. } => {}
             }
         }
     }
