@@ -1,4 +1,9 @@
-//! Capacities of the desk's swarm, and what each costs. A board chooses its own.
+//! Capacities of the desk's swarm, and what each costs; what each board can hold.
+
+use companion::mission_file::MissionView;
+use companion::store::Layout;
+use companion::store::area::DATA_AT;
+use planner_core::roadmap::RoadmapView;
 
 /// Nodes of a roadmap, terminals among them: 30 bytes each in scratch.
 pub const ROADMAP_NODES: usize = 16_384;
@@ -12,6 +17,93 @@ pub const WAYPOINTS: usize = 64;
 pub const GATES: usize = 2048;
 /// Pieces of flights among which a vehicle steps aside: 44 bytes each.
 pub const PIECES: usize = 32_768;
+
+/// What a board can hold: its firmware's capacities.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Board {
+    /// Its name, as `cargo xtask build --board` takes it.
+    pub name: &'static str,
+    /// Nodes of a roadmap.
+    pub nodes: usize,
+    /// Half-edges of a roadmap: two for each edge.
+    pub half_edges: usize,
+    /// Vehicles of a mission, and goals.
+    pub vehicles: usize,
+    /// Gates of one vehicle.
+    pub gates: usize,
+    /// Bytes of a roadmap file.
+    pub roadmap_bytes: usize,
+}
+
+const fn roadmap_bytes(layout: &Layout) -> usize {
+    (layout.slot_len - DATA_AT) as usize
+}
+
+/// All boards; the first holds the most.
+pub const BOARDS: [Board; 3] = [
+    Board {
+        name: "nucleo-h743",
+        nodes: 4096,
+        half_edges: 65_536,
+        vehicles: 32,
+        gates: 128,
+        roadmap_bytes: roadmap_bytes(&Layout::H743),
+    },
+    Board {
+        name: "qemu",
+        nodes: 4096,
+        half_edges: 65_536,
+        vehicles: 32,
+        gates: 128,
+        roadmap_bytes: roadmap_bytes(&Layout::H743),
+    },
+    Board {
+        name: "pico2",
+        nodes: 2048,
+        half_edges: 32_768,
+        vehicles: 16,
+        gates: 128,
+        roadmap_bytes: roadmap_bytes(&Layout::PICO2),
+    },
+];
+
+impl Board {
+    /// The board of this name.
+    ///
+    /// # Errors
+    /// There is none; the error names those there are.
+    pub fn named(name: &str) -> Result<&'static Self, String> {
+        let names = || BOARDS.map(|board| board.name).join(", ");
+        BOARDS.iter().find(|board| board.name == name).ok_or_else(|| format!("boards are {}", names()))
+    }
+
+    /// What of a roadmap file is more than it holds: the first limit that is exceeded.
+    pub fn roadmap_excess(&self, roadmap: &RoadmapView<'_>) -> Option<String> {
+        self.excess(&[
+            ("nodes", roadmap.node_count(), self.nodes),
+            ("half-edges", roadmap.half_edge_count(), self.half_edges),
+            ("bytes of roadmap", roadmap.byte_len(), self.roadmap_bytes),
+        ])
+    }
+
+    /// What of a mission file is more than it holds.
+    pub fn mission_excess(&self, mission: &MissionView<'_>) -> Option<String> {
+        self.excess(&[
+            ("vehicles", mission.vehicles().len(), self.vehicles),
+            ("goals", mission.goals().len(), self.vehicles),
+        ])
+    }
+
+    /// Whether a vehicle's plan has more gates than it holds.
+    pub fn gates_excess(&self, gates: usize) -> Option<String> {
+        self.excess(&[("gates of one vehicle", gates, self.gates)])
+    }
+
+    fn excess(&self, limits: &[(&str, usize, usize)]) -> Option<String> {
+        let over = limits.iter().find(|(_, count, most)| count > most);
+        over.map(|(what, count, most)| format!("{count} {what}, {} holds {most}", self.name))
+    }
+}
 
 /// A large value on the heap. Debug builds make it on a stack first, so a thread with room for that makes it.
 pub fn on_heap<T: Send + 'static>(make: fn() -> T) -> Box<T> {

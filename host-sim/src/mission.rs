@@ -17,13 +17,13 @@ use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::search::SearchWorkspace;
 use planner_core::segment::segment_is_clear;
 
-use crate::capacity::{GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{Board, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::column::{ColumnError, column, nearest_column};
 use crate::map::{self, ClearanceField, VoxelMap};
 use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
-use crate::roadmap::{self, Roadmap};
+use crate::roadmap::{self, Parts, Roadmap};
 use crate::scenario::{self, Scenario, Terminals};
 use crate::swarm::member::DeskCompanion;
 
@@ -64,6 +64,8 @@ pub struct Mission {
     pub schedule: ScheduleConfig,
     /// What the clock said so far.
     pub timing: Timing,
+    /// The board that the files are for; none if they are for the desk.
+    board: Option<&'static Board>,
     clearance_field: OnceLock<ClearanceField>,
 }
 
@@ -73,6 +75,18 @@ impl Mission {
     /// # Errors
     /// A map that cannot be read; a start or goal in an obstacle or over no floor.
     pub fn prepare(scenario: Scenario, progress: &Progress) -> anyhow::Result<Self> {
+        Self::prepare_for(scenario, None, progress)
+    }
+
+    /// As [`Self::prepare`], so that the files fit a board.
+    ///
+    /// # Errors
+    /// The same, and more vehicles, goals or nodes than the board holds.
+    pub fn prepare_for(
+        scenario: Scenario,
+        board: Option<&'static Board>,
+        progress: &Progress,
+    ) -> anyhow::Result<Self> {
         let mut timing = Timing::default();
         let begun = Instant::now();
         let stage = progress.stage("map");
@@ -106,8 +120,24 @@ impl Mission {
                 height_over_ground(&scenario, &map, &format!("goal {i}"), place, goal, largest_m)
             })
             .collect::<anyhow::Result<_>>()?;
-        let (roadmap, header) = build(&scenario, &map, &goals)?;
+        if let Some(Board { name, vehicles, .. }) =
+            board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
+        {
+            bail!(
+                "the mission does not fit {name}: {}: {name} holds {vehicles} vehicles and goals",
+                scenario.path
+            );
+        }
+        let (mut roadmap, header, parts) = build(&scenario, &map, &goals)?;
+        timing.roadmap_parts = parts;
+        let capping = Instant::now();
+        if let Some(board) = board {
+            roadmap = roadmap.fit(board)?;
+            timing.roadmap_parts.cap_s = capping.elapsed().as_secs_f64();
+        }
+        let encoding = Instant::now();
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
+        timing.roadmap_parts.file_s = encoding.elapsed().as_secs_f64();
         let mut mission = Self {
             scenario,
             map,
@@ -119,6 +149,7 @@ impl Mission {
             descents_m,
             schedule,
             timing,
+            board,
             clearance_field: OnceLock::new(),
         };
         mission.mission_file = mission.encode()?;
@@ -141,7 +172,7 @@ impl Mission {
             descents_m: &self.descents_m,
             mode: planner_mode(&self.scenario.mission),
             schedule: self.schedule,
-            gates_most: GATES,
+            gates_most: self.board.map_or(GATES, |board| board.gates),
         };
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
@@ -264,6 +295,15 @@ impl Mission {
             edges: self.roadmap.edges.len(),
             bytes: self.roadmap_file.len(),
         }
+    }
+
+    /// What of the files is more than a board holds: the first limit that is exceeded.
+    pub fn excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
+        let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
+        board
+            .roadmap_excess(&self.view())
+            .or_else(|| board.mission_excess(&self.mission_view()))
+            .or_else(|| board.gates_excess((0..self.tasks.len()).map(gates).max().unwrap_or(0)))
     }
 
     /// Place of a vehicle in the scenario.
@@ -459,7 +499,11 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
     Ok((min_m, max_m))
 }
 
-fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<(Roadmap, RoadmapHeader)> {
+fn build(
+    scenario: &Scenario,
+    map: &VoxelMap,
+    goals: &[Point],
+) -> anyhow::Result<(Roadmap, RoadmapHeader, Parts)> {
     let starts = scenario.vehicles.iter().map(|v| v.start);
     let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
     let settings = &scenario.roadmap;
@@ -474,7 +518,7 @@ fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result
         seed: scenario.seed,
         sampling: settings.sampling,
     };
-    let mut roadmap = roadmap::build(map, &terminals, &config)?;
+    let (mut roadmap, parts) = roadmap::build(map, &terminals, &config)?;
     if settings.terminals == Terminals::Apart {
         let is_terminal = |node: u16| usize::from(node) < terminals.len();
         roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
@@ -488,5 +532,5 @@ fn build(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result
         starts: scenario.vehicles.len() as u16,
         goals: goals.len() as u16,
     };
-    Ok((roadmap, header))
+    Ok((roadmap, header, parts))
 }

@@ -4,6 +4,8 @@
 
 use serde::Serialize;
 
+use crate::roadmap::Parts;
+
 /// `result.json`.
 #[derive(Clone, Debug, Serialize)]
 pub struct MissionResult {
@@ -101,8 +103,10 @@ pub struct RoadmapSize {
 pub struct Timing {
     /// Reading or making the map.
     pub map_s: f64,
-    /// Sampling, edges and their clearances.
+    /// Starts and goals checked; the roadmap: nodes, edges and their clearances, file.
     pub roadmap_s: f64,
+    /// What of that each part took.
+    pub roadmap_parts: Parts,
     /// The shortest paths that tell what each goal would cost each vehicle.
     pub search_s: f64,
     /// Who flies to which goal.

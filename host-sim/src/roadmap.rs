@@ -3,23 +3,29 @@
 //!
 //! Edges come in the same order whatever the number of threads, because pieces of work are joined in their order.
 
+pub mod cap;
+
+use std::cell::Cell;
+use std::ops::Range;
+use std::time::Instant;
+
 use anyhow::{anyhow, bail};
 use planner_core::Point;
 use planner_core::prm::{self, Config, PrmError, Workspace};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
 use planner_core::search::SearchWorkspace;
-use planner_core::voxel::VoxelGrid;
+use planner_core::voxel::{GridShape, VoxelGrid};
 use rayon::prelude::*;
 
-use crate::capacity::{ROADMAP_CUBES, ROADMAP_NODES, on_heap};
-use crate::map::VoxelMap;
+use crate::capacity::{Board, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
+use crate::map::{BoxTree, VoxelMap};
 
 /// Where the clearance stored with an edge saturates, metres: beyond it no vehicle of ours is any wider.
 pub const CLEARANCE_MAX_M: f32 = 6.0;
 /// Nodes whose edges are one piece of work: a fifth of a millisecond.
 const NODES_A_PIECE: usize = 32;
-/// Edges whose clearances are one piece of work.
-const EDGES_A_PIECE: usize = 256;
+/// Clearances that differ by less are one, metres: the file keeps millimetres.
+const ALIKE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
 #[derive(Clone, Debug)]
@@ -30,14 +36,40 @@ pub struct Roadmap {
     pub edges: Vec<Edge>,
 }
 
-/// Samples and joins: Algorithm 1 of P3D, then the clearance of every edge. The result does not depend on the number
-/// of threads.
-pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<Roadmap> {
+/// How long each part took, seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
+pub struct Parts {
+    /// The tree of boxes over the map, from which distances are told.
+    pub boxes_s: f64,
+    /// Random free nodes.
+    pub nodes_s: f64,
+    /// Which pairs of them are joined, and the clearance of each.
+    pub edges_s: f64,
+    /// Which of the edges a board gets.
+    pub cap_s: f64,
+    /// The file: ways to the landmarks, rows, CRC-32.
+    pub file_s: f64,
+}
+
+/// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not depend on the number of
+/// threads.
+pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, Parts)> {
+    let begun = Instant::now();
+    let grid = map.grid();
+    let tree = BoxTree::new(&grid);
+    let with_boxes = Instant::now();
     let nodes = sample(map, terminals, config)?;
+    let with_nodes = Instant::now();
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
-    let joined = connect(&map.grid(), &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
-    let edges = annotate(&map.grid(), &nodes, &joined);
-    Ok(Roadmap { nodes, edges })
+    let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
+    let parts = Parts {
+        boxes_s: (with_boxes - begun).as_secs_f64(),
+        nodes_s: (with_nodes - with_boxes).as_secs_f64(),
+        edges_s: with_nodes.elapsed().as_secs_f64(),
+        cap_s: 0.0,
+        file_s: 0.0,
+    };
+    Ok((Roadmap { nodes, edges }, parts))
 }
 
 /// Terminals and free nodes.
@@ -61,33 +93,101 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     workspace: &mut Workspace<NODES, CUBES>,
 ) -> Result<Vec<prm::Edge>, PrmError> {
     workspace.index(nodes, config)?;
-    let workspace = &*workspace;
-    let pieces: Vec<Vec<prm::Edge>> = (0..nodes.len().div_ceil(NODES_A_PIECE))
+    in_pieces(nodes.len(), |range, edges| {
+        prm::connect_range(grid, workspace, config, range, |edge| {
+            edges.push(edge);
+            Ok(())
+        })
+    })
+}
+
+/// The same edges, each with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`]. `tree` is over `grid`: it
+/// tells the distances, and with them which segments are clear; only one that keeps almost exactly the clearance is checked
+/// by cells.
+pub fn join<const NODES: usize, const CUBES: usize>(
+    grid: &VoxelGrid<'_>,
+    tree: &BoxTree,
+    nodes: &[Point],
+    config: &Config,
+    workspace: &mut Workspace<NODES, CUBES>,
+) -> Result<Vec<Edge>, PrmError> {
+    workspace.index(nodes, config)?;
+    // No edge is farther from obstacles than its ends; most are just as far as the nearer of them.
+    let around: Vec<f32> =
+        nodes.par_iter().map(|node| tree.clearance_m(node, node, CLEARANCE_MAX_M, 0.0)).collect();
+    let ends = |edge: prm::Edge| (usize::from(edge.a), usize::from(edge.b));
+    let most_m = |edge: prm::Edge| {
+        let (a, b) = ends(edge);
+        around[a].min(around[b])
+    };
+    let clearance_m = |edge: prm::Edge, enough_m: f32| {
+        let (a, b) = ends(edge);
+        tree.clearance_m(&nodes[a], &nodes[b], most_m(edge), enough_m)
+    };
+    let unsure_m = rounding_m(grid.shape()) + 1e-5 * config.clearance_m;
+    in_pieces(nodes.len(), |range, edges| {
+        let told = Cell::new(None);
+        let hint = |edge| {
+            let nearest_m = clearance_m(edge, config.clearance_m - unsure_m);
+            told.set(Some(nearest_m));
+            let sure = (nearest_m - config.clearance_m).abs() > unsure_m;
+            sure.then_some(nearest_m > config.clearance_m)
+        };
+        prm::connect_range_with(grid, workspace, config, range, hint, |edge, room_m| {
+            let clearance_m = match told.take() {
+                Some(nearest_m) if room_m == 0.0 => nearest_m,
+                _ if room_m + ALIKE_M >= most_m(edge) => most_m(edge),
+                _ => clearance_m(edge, 0.0),
+            };
+            edges.push(Edge { a: edge.a, b: edge.b, clearance_m });
+            Ok(())
+        })
+    })
+}
+
+/// What `work` adds for all nodes, piece by piece on all threads, in the order of the pieces.
+fn in_pieces<T: Copy + Send>(
+    nodes: usize,
+    work: impl Fn(Range<usize>, &mut Vec<T>) -> Result<(), PrmError> + Sync,
+) -> Result<Vec<T>, PrmError> {
+    let pieces: Vec<Vec<T>> = (0..nodes.div_ceil(NODES_A_PIECE))
         .into_par_iter()
         .map(|piece| {
-            let mut edges = Vec::with_capacity(NODES_A_PIECE * 64);
-            let range = piece * NODES_A_PIECE..(piece + 1) * NODES_A_PIECE;
-            prm::connect_range(grid, workspace, config, range, |edge| {
-                edges.push(edge);
-                Ok(())
-            })?;
-            Ok(edges)
+            let mut found = Vec::with_capacity(NODES_A_PIECE * 64);
+            work(piece * NODES_A_PIECE..(piece + 1) * NODES_A_PIECE, &mut found)?;
+            Ok(found)
         })
         .collect::<Result<_, PrmError>>()?;
     Ok(pieces.concat())
 }
 
-/// Each edge with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`].
-fn annotate(grid: &VoxelGrid<'_>, nodes: &[Point], edges: &[prm::Edge]) -> Vec<Edge> {
-    let clearance = |edge| {
-        prm::edge_clearance(grid, nodes, edge, CLEARANCE_MAX_M)
-            .expect("both ends of an edge we found are nodes")
-    };
-    edges
-        .par_iter()
-        .with_min_len(EDGES_A_PIECE)
-        .map(|&edge| Edge { a: edge.a, b: edge.b, clearance_m: clearance(edge) })
-        .collect()
+/// What distances told by cells and by boxes may differ by, metres, many times over: both are rounded as coordinates are.
+fn rounding_m(shape: &GridShape) -> f32 {
+    let longest = shape.dims.into_iter().max().unwrap_or(0) as f32;
+    (1e-3 + longest * 16.0 * f32::EPSILON) * shape.resolution_m
+}
+
+impl Roadmap {
+    /// The same nodes with as many of the edges as a board holds: [`cap::cap`] chooses them.
+    ///
+    /// # Errors
+    /// It has more nodes than the board holds, or needs more edges to stay connected.
+    pub fn fit(self, board: &Board) -> anyhow::Result<Self> {
+        let (name, nodes) = (board.name, self.nodes.len());
+        if nodes > board.nodes {
+            bail!(
+                "the roadmap does not fit {name}: it would have {nodes} nodes, {name} holds {}\n\
+                 hint: lower roadmap.nodes; starts and goals are nodes too",
+                board.nodes
+            );
+        }
+        let bare = roadmap::encoded_len(nodes, 0, LANDMARKS).unwrap_or(usize::MAX);
+        let an_edge = 2 * size_of::<u32>();
+        let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
+        let edges = cap::cap(&self.nodes, &self.edges, most)
+            .ok_or_else(|| anyhow!("the roadmap does not fit {name}: {most} edges do not connect it"))?;
+        Ok(Self { edges, ..self })
+    }
 }
 
 /// The roadmap as the file that is uploaded to a board.

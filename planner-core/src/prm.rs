@@ -252,15 +252,31 @@ pub fn connect_range<const NODES: usize, const CUBES: usize>(
     range: Range<usize>,
     mut found: impl FnMut(Edge) -> Result<(), PrmError>,
 ) -> Result<(), PrmError> {
+    connect_range_with(grid, workspace, config, range, |_| None, |edge, _| found(edge))
+}
+
+/// As [`connect_range`], where `hint` may know already whether the segment between two nodes is clear. It must answer as
+/// [`segment_is_clear`] does, or not at all; it is asked only where the answer is not at hand, and just before `found`. With
+/// an edge `found` is given a distance in metres that it keeps to obstacles, to 2⁻¹¹ cell, or 0 where none is at hand.
+pub fn connect_range_with<const NODES: usize, const CUBES: usize>(
+    grid: &VoxelGrid<'_>,
+    workspace: &Workspace<NODES, CUBES>,
+    config: &Config,
+    range: Range<usize>,
+    hint: impl Fn(Edge) -> Option<bool>,
+    mut found: impl FnMut(Edge, f32) -> Result<(), PrmError>,
+) -> Result<(), PrmError> {
     config.check()?;
     let mut sight = Sight::new(grid, config);
     for place in range.start..range.end.min(workspace.len()) {
         sight.stand_at(workspace.point(place));
+        let edge = |other: usize| {
+            let (a, b) = (workspace.node(place), workspace.node(other));
+            Edge { a: a.min(b), b: a.max(b) }
+        };
         workspace.each_near(place, config, |places| {
-            sight.each_clear(workspace, places, |other| {
-                let (a, b) = (workspace.node(place), workspace.node(other));
-                found(Edge { a: a.min(b), b: a.max(b) })
-            })
+            let hint = |other| hint(edge(other));
+            sight.each_clear(workspace, places, hint, |other, room_m| found(edge(other), room_m))
         })?;
     }
     Ok(())

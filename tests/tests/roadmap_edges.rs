@@ -1,8 +1,8 @@
 //! The spatial index finds the same edges as the all-pairs loop of Algorithm 1 with the same segment check.
 
 use flockmate_tests::shared_data;
-use host_sim::map::{self, Unknown, VoxelMap};
-use host_sim::roadmap;
+use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
+use host_sim::roadmap::{self, CLEARANCE_MAX_M};
 use planner_core::prm::{self, Config, Sampling, Workspace};
 
 const SEEDS: u64 = 20;
@@ -14,6 +14,8 @@ fn load(file: &str, resolution_m: f32) -> VoxelMap {
 fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
     let mut fewest = usize::MAX;
     let mut workspace = Box::new(Workspace::<4096, 4096>::new());
+    let grid = map.grid();
+    let tree = BoxTree::new(&grid);
     for seed in 1..=SEEDS {
         let config = Config {
             nodes,
@@ -24,14 +26,23 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
             sampling: Sampling::Uniform,
         };
         let nodes = roadmap::sample(map, &[], &config).expect("there is free space");
-        let mut indexed =
-            roadmap::connect(&map.grid(), &nodes, &config, &mut workspace).expect("it connects");
+        let joined = roadmap::join(&grid, &tree, &nodes, &config, &mut workspace).expect("it joins");
+        let mut indexed: Vec<_> = joined.iter().map(|e| prm::Edge { a: e.a, b: e.b }).collect();
         let mut all_pairs = Vec::new();
         prm::connect_all_pairs(&map.grid(), &nodes, &config, |edge| all_pairs.push(edge))
             .expect("it connects");
         indexed.sort_unstable_by_key(|e| (e.a, e.b));
         all_pairs.sort_unstable_by_key(|e| (e.a, e.b));
         assert!(indexed == all_pairs, "{name}, clearance {clearance_m} m, seed {seed}");
+        if seed == 1 {
+            for edge in &joined {
+                let ends = prm::Edge { a: edge.a, b: edge.b };
+                let by_cells_m =
+                    prm::edge_clearance(&grid, &nodes, ends, CLEARANCE_MAX_M).expect("they are nodes");
+                let apart_m = (by_cells_m - edge.clearance_m).abs();
+                assert!(apart_m < 0.001, "{name}: {edge:?} has a clearance of {by_cells_m} m");
+            }
+        }
         fewest = fewest.min(indexed.len());
     }
     assert!(fewest > 100, "{name}: only {fewest} edges prove little");

@@ -8,6 +8,7 @@ use clap::Subcommand;
 use planner_core::roadmap::{LANDMARKS, RoadmapError, RoadmapView};
 
 use super::load;
+use crate::capacity::Board;
 use crate::files::{self, Results};
 use crate::mission::Mission;
 use crate::progress::Progress;
@@ -30,6 +31,9 @@ enum Action {
         /// The file to write
         #[arg(long, value_name = "FILE")]
         out: PathBuf,
+        /// Make a file that this board holds: nucleo-h743, qemu or pico2
+        #[arg(long, value_name = "BOARD", value_parser = Board::named)]
+        board: Option<&'static Board>,
     },
     /// Check a roadmap file and say what it holds
     Info {
@@ -44,10 +48,10 @@ enum Action {
 /// Bad input, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     match &args.action {
-        Action::Build { scenario, out } => {
+        Action::Build { scenario, out, board } => {
             let scenario = load(scenario, None)?;
             let mut results = Results::file(out)?;
-            let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
+            let mission = Mission::prepare_for(scenario, *board, &Progress::on_terminal())?;
             results.add_file(out, &mission.roadmap_file)?;
             results.keep()?;
             print(&mission.view());

@@ -8,6 +8,7 @@ use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::File;
 use planner_core::roadmap;
 
+use crate::capacity::{BOARDS, Board};
 use crate::files;
 use crate::link::LinkUrl;
 use crate::progress::Progress;
@@ -30,6 +31,10 @@ pub struct Args {
     /// System id to send from: one that the companion's mission names as a ground station
     #[arg(long, value_name = "N", default_value_t = 255, value_parser = clap::value_parser!(u8).range(1..))]
     ground_station: u8,
+    /// The vehicle's board: nucleo-h743, qemu or pico2. A file that it does not hold is not sent; without this option, one
+    /// that no board holds
+    #[arg(long, value_name = "BOARD", value_parser = Board::named)]
+    board: Option<&'static Board>,
 }
 
 /// Uploads, and compares the CRC-32 of what arrived. It is used from the companion's next start on.
@@ -40,7 +45,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let path = quoted_path(&args.file);
     let bytes =
         files::read(&args.file, files::BINARY_BYTES).with_context(|| format!("cannot read: {path}"))?;
-    let file = kind(&bytes).with_context(|| format!("not for upload: {path}"))?;
+    let board = args.board.unwrap_or(&BOARDS[0]);
+    let file = kind(&bytes, board).with_context(|| format!("not for upload: {path}"))?;
     let mut client = Client::new(args.link.open()?, args.id).from_ground_station(args.ground_station);
     let system = client.find()?;
     let bar = Progress::on_terminal().steps("upload", bytes.len() as u64);
@@ -54,19 +60,27 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn kind(bytes: &[u8]) -> anyhow::Result<File> {
-    if bytes.starts_with(&roadmap::MAGIC) {
-        super::roadmap::parse(bytes).context("no sound roadmap")?;
-        Ok(File::Roadmap)
+/// What the file is, if the board holds it.
+fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
+    let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
+        let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
+        (File::Roadmap, board.roadmap_excess(&view))
     } else if bytes.starts_with(&mission_file::MAGIC) {
         let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {}", why(&e)))?;
         let more = bytes.len() - view.byte_len();
         ensure!(more == 0, "no sound mission: {more} bytes follow its end");
-        Ok(File::Mission)
+        (File::Mission, board.mission_excess(&view))
     } else {
         bail!(
             "it begins neither as a roadmap nor as a mission\nhint: `host-sim plan` writes roadmap.bin and mission.bin"
         )
+    };
+    match excess {
+        Some(excess) => bail!(
+            "too large: {excess}\nhint: `host-sim plan --board {}` writes files that it holds",
+            board.name
+        ),
+        None => Ok(file),
     }
 }
 

@@ -55,13 +55,7 @@ pub fn building(seed: u64, resolution_m: f32) -> Result<OccupancyMap, MapError> 
     for Block { min, max, state } in blocks(seed) {
         let from = [0, 1, 2].map(|a| cells(min[a]).min(shape.dims[a] - 1));
         let to = [0, 1, 2].map(|a| cells(max[a]).clamp(from[a] + 1, shape.dims[a]));
-        for k in from[2]..to[2] {
-            for j in from[1]..to[1] {
-                for i in from[0]..to[0] {
-                    map.set([i, j, k], state);
-                }
-            }
-        }
+        map.fill(from, to, state);
     }
     Ok(map)
 }

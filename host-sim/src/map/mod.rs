@@ -1,5 +1,6 @@
 //! Maps: read, made and written here, queried by planner-core as bit-packed voxel grids.
 
+pub mod boxes;
 pub mod bt;
 pub mod building;
 pub mod column;
@@ -13,6 +14,7 @@ mod reference_test;
 
 use std::path::Path;
 
+pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};

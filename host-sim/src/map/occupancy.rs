@@ -189,6 +189,26 @@ impl OccupancyMap {
         }
     }
 
+    /// Sets the state of the cells `from..to` along each axis. Panics beyond the grid.
+    pub fn fill(&mut self, from: [u32; 3], to: [u32; 3], state: Occupancy) {
+        let [bx, by, _] = self.shape.bricks();
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, from[axis], to[axis]));
+        for &(k, z) in &zs {
+            for &(j, y) in &ys {
+                for &(i, x) in &xs {
+                    let (word, mask) = (((k * by + j) * bx + i) as usize, x & y & z);
+                    self.occupied[word] &= !mask;
+                    self.free[word] &= !mask;
+                    match state {
+                        Occupancy::Unknown => {}
+                        Occupancy::Free => self.free[word] |= mask,
+                        Occupancy::Occupied => self.occupied[word] |= mask,
+                    }
+                }
+            }
+        }
+    }
+
     /// Cells of each state.
     pub fn counts(&self) -> CellCounts {
         let ones = |words: &[u64]| words.iter().map(|w| u64::from(w.count_ones())).sum::<u64>();
@@ -211,27 +231,30 @@ impl OccupancyMap {
 
     /// Bits of the cells inside the dimensions; the last brick of a row may be wider.
     fn inside(&self) -> Vec<u64> {
-        let [bx, by, bz] = self.shape.bricks();
         let mut words = Vec::with_capacity(self.free.len());
-        let axis_bits = |axis: usize, brick: u32, pattern: [u64; 4]| {
-            (0..4)
-                .filter(|c| brick * 4 + c < self.shape.dims[axis])
-                .fold(0, |bits, c| bits | pattern[c as usize])
-        };
-        let x =
-            [0x1111_1111_1111_1111u64, 0x2222_2222_2222_2222, 0x4444_4444_4444_4444, 0x8888_8888_8888_8888];
-        let y =
-            [0x000F_000F_000F_000Fu64, 0x00F0_00F0_00F0_00F0, 0x0F00_0F00_0F00_0F00, 0xF000_F000_F000_F000];
-        let z = [0xFFFFu64, 0xFFFF_0000, 0xFFFF_0000_0000, 0xFFFF_0000_0000_0000];
-        for k in 0..bz {
-            for j in 0..by {
-                for i in 0..bx {
-                    words.push(axis_bits(0, i, x) & axis_bits(1, j, y) & axis_bits(2, k, z));
-                }
+        let [xs, ys, zs] = [0, 1, 2].map(|axis| lanes(axis, 0, self.shape.dims[axis]));
+        for (_, z) in &zs {
+            for (_, y) in &ys {
+                words.extend(xs.iter().map(|(_, x)| x & y & z));
             }
         }
         words
     }
+}
+
+/// The bricks that the cells `from..to` of an axis reach into, each with the bits of those cells.
+fn lanes(axis: usize, from: u32, to: u32) -> Vec<(u32, u64)> {
+    let lane = |c: u32| match axis {
+        0 => 0x1111_1111_1111_1111 << c,
+        1 => 0x000f_000f_000f_000f << (4 * c),
+        _ => 0xffff << (16 * c),
+    };
+    (from / 4..to.div_ceil(4))
+        .map(|brick| {
+            let cells = (0..4).filter(|c| (from..to).contains(&(brick * 4 + c)));
+            (brick, cells.fold(0, |bits, c| bits | lane(c)))
+        })
+        .collect()
 }
 
 /// Bit grids to plan on, owned.

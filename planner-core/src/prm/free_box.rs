@@ -121,25 +121,29 @@ impl<'g, 'a> Sight<'g, 'a> {
         self.view = Some(view);
     }
 
-    /// Calls `found` with those of `places` to which the segment from here is clear.
+    /// Calls `found` with those of `places` to which the segment from here is clear, and with what it keeps from the faces
+    /// of the box, metres: 0 where it leaves the box.
     #[inline(always)]
     pub(super) fn each_clear<E, const NODES: usize, const CUBES: usize>(
         &self,
         workspace: &Workspace<NODES, CUBES>,
         places: &[u16],
-        mut found: impl FnMut(usize) -> Result<(), E>,
+        hint: impl Fn(usize) -> Option<bool>,
+        mut found: impl FnMut(usize, f32) -> Result<(), E>,
     ) -> Result<(), E> {
         for &place in places {
             let place = usize::from(place);
             let there = workspace.point(place);
-            let clear =
+            let (clear, room) =
                 match self.view.as_ref().map_or(Judgement::Leaves(0.0), |view| self.judge(view, there)) {
-                    Judgement::Clear => true,
-                    Judgement::Blocked => false,
-                    Judgement::Leaves(known) => self.check(there, known),
+                    Judgement::Clear(room) => (true, room),
+                    Judgement::Blocked => (false, 0.0),
+                    Judgement::Leaves(known) => {
+                        (hint(place).unwrap_or_else(|| self.check(there, known)), 0.0)
+                    }
                 };
             if clear {
-                found(place)?;
+                found(place, room * self.grid.shape().resolution_m)?;
             }
         }
         Ok(())
@@ -170,7 +174,11 @@ impl<'g, 'a> Sight<'g, 'a> {
             & (d[2] > view.clear_low[2])
             & (d[2] < view.clear_high[2]);
         if inside {
-            return Judgement::Clear;
+            let room = [0, 1, 2].map(|axis| {
+                let (low, high) = (view.clear_low[axis], view.clear_high[axis]);
+                (d[axis].min(0.0) - low).min(high - d[axis].max(0.0))
+            });
+            return Judgement::Clear(room[0].min(room[1]).min(room[2]) + view.inset);
         }
         // A component of zero never leaves: the quotient is infinite.
         let leave = [0, 1, 2].map(|axis| {
@@ -205,8 +213,8 @@ impl<'g, 'a> Sight<'g, 'a> {
 
 /// What the box alone tells of a ray.
 enum Judgement {
-    /// It ends inside.
-    Clear,
+    /// It ends inside, so many cells from the nearest face, but for rounding.
+    Clear(f32),
     /// It meets an obstacle behind a face.
     Blocked,
     /// This share of it lies in the box; the rest is open.

@@ -7,6 +7,9 @@
 //! list of lengths beside it). Nothing is kept from one repeat to the next. Checking the file as a reader does is in
 //! neither time: theirs is read by nobody else.
 //!
+//! `roadmap_s of plan` is what `host-sim plan` reports for the same building, on two cores, for vehicles of 0.3 m without a
+//! safety margin: beside the above, starts and goals are checked and every edge gets its clearance, which theirs has not.
+//!
 //! Ten A*: both search each pair by itself. The matrix: theirs is a hundred A*, ours [`cost_matrix`].
 
 use std::io::Write as _;
@@ -16,6 +19,10 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use host_sim::map::{Unknown, bt, building};
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::result::Timing;
+use host_sim::scenario;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{self, Config, Edge, Sampling, Workspace, squared_length};
@@ -70,8 +77,10 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     let two = rayon::ThreadPoolBuilder::new().num_threads(2).build()?;
     let mut theirs = Vec::new();
     let mut times: [Vec<f64>; 4] = Default::default();
+    let mut whole = Vec::new();
     for round in 0..ROUNDS {
         theirs.push(run(peer, &files)?);
+        whole.extend(two.install(|| (0..REPEATS).map(|_| planned()).collect::<Result<Vec<_>>>())?);
         for repeat in 0..REPEATS {
             let seed = (1000 + round * REPEATS + repeat) as u64;
             let by_two = two.install(|| ours.build(seed, true))?;
@@ -98,18 +107,21 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
         ours.solved,
         ours.labelled_m
     );
+    print_parts(&whole);
     type Value = fn(&Theirs) -> f64;
     let build: Value = |t| t.nodes_ms + t.edges_ms;
-    let all: [(&str, Value, f64, usize); 4] = [
-        ("roadmap, one core", build, 8.0, NODES),
-        ("roadmap, two cores", build, 14.0, NODES),
-        ("ten A*", |t| t.labelled_search_ms, 2.0, VEHICLES),
-        ("10x10 matrix", |t| t.matrix_search_ms, 5.0, VEHICLES),
+    let [by_one, by_two, labelled, matrix] = times;
+    let whole = whole.iter().map(|timing| timing.roadmap_s * 1e3).collect();
+    let all: [(&str, Value, f64, usize, Vec<f64>); 5] = [
+        ("roadmap_s of plan", build, 7.0, NODES, whole),
+        ("roadmap, one core", build, 8.0, NODES, by_one),
+        ("roadmap, two cores", build, 14.0, NODES, by_two),
+        ("ten A*", |t| t.labelled_search_ms, 2.0, VEHICLES, labelled),
+        ("10x10 matrix", |t| t.matrix_search_ms, 5.0, VEHICLES, matrix),
     ];
     Ok(all
         .into_iter()
-        .zip(times)
-        .map(|((name, value, required, n), times)| {
+        .map(|(name, value, required, n, times)| {
             // Of each round by itself: a slow spell of the machine strikes both.
             let ratios =
                 theirs.iter().zip(times.chunks(REPEATS)).map(|(t, ours)| value(t) / median(ours.to_vec()));
@@ -125,6 +137,42 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
             }
         })
         .collect())
+}
+
+/// What a user waits for: `host-sim plan`'s map and roadmap with all their parts, of the same building, for ten vehicles whose
+/// safety margin is 0.
+fn planned() -> Result<Timing> {
+    let mut text = format!(
+        "[map]\nfile = \"builtin:building\"\nresolution_m = {RESOLUTION_M}\n\
+         [roadmap]\nnodes = {NODES}\nedge_min_m = {EDGE_MIN_M}\nedge_max_m = {EDGE_MAX_M}\nsafety_margin_m = 0.0\n\
+         [mission]\ngoals = ["
+    );
+    let terminals = terminals();
+    let (starts, goals) = terminals.split_at(VEHICLES);
+    for (i, goal) in goals.iter().enumerate() {
+        // Those of the ninth and tenth are above others.
+        let x = if i < 8 { goal.x } else { goal.x + 2.0 };
+        text += &format!("[{x}, {}, {}], ", goal.y, goal.z);
+    }
+    text += "]\n";
+    for (i, start) in starts.iter().enumerate() {
+        text += &format!("[[vehicles]]\nid = {}\nstart = [{}, {}, {}]\n", i + 1, start.x, start.y, start.z);
+    }
+    Ok(Mission::prepare(scenario::parse(&text, "bench.toml")?, &Progress::hidden())?.timing)
+}
+
+/// Where the time goes, medians.
+fn print_parts(whole: &[Timing]) {
+    let part = |value: fn(&Timing) -> f64| median(whole.iter().map(|t| value(t) * 1e3).collect());
+    println!(
+        "plan:   map {:.2} ms, roadmap {:.2} ms: boxes {:.2}, nodes {:.2}, edges with clearances {:.2}, file {:.2}",
+        part(|t| t.map_s),
+        part(|t| t.roadmap_s),
+        part(|t| t.roadmap_parts.boxes_s),
+        part(|t| t.roadmap_parts.nodes_s),
+        part(|t| t.roadmap_parts.edges_s),
+        part(|t| t.roadmap_parts.file_s)
+    );
 }
 
 /// Ten starts in the lobby, ten goals in the corridors above.

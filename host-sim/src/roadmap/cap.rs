@@ -1,0 +1,223 @@
+//! Fewer edges, so that a roadmap fits a board: every two nodes that were connected stay so, and paths lengthen little.
+//!
+//! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956): between two nodes it has a
+//!    way whose narrowest edge is as wide as that of the widest way there is (Hu 1961). So whatever clearance is
+//!    required, who could reach whom before still can.
+//! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the room.
+//! 3. *Far.* The rest of the room goes to the edges that most of the shortest paths from [`SOURCES`] nodes lead over: the
+//!    fewer paths lose an edge, the less they lengthen.
+//!
+//! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those of each class of
+//! required clearances ([`CLASSES_M`]).
+//!
+//! Cost: edges · log edges, and a search a source and class, on all cores.
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+use planner_core::Point;
+use planner_core::roadmap::Edge;
+use rayon::prelude::*;
+
+/// Required clearances that paths are kept short for, metres.
+pub const CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
+/// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer the usual ones; measured on
+/// the scanned maps of `tests/tests/boards_hold.rs`.
+const NEAR_SHARE: f32 = 0.6;
+/// Nodes from which shortest paths are counted.
+const SOURCES: usize = 64;
+
+/// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
+pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
+    if edges.len() <= most {
+        return Some(edges.to_vec());
+    }
+    let lengths: Vec<f32> =
+        edges.iter().map(|edge| (nodes[usize::from(edge.b)] - nodes[usize::from(edge.a)]).norm()).collect();
+    let mut kept = widest_forest(nodes.len(), edges);
+    let room = most.checked_sub(kept.iter().filter(|&&kept| kept).count())?;
+    let near = (room as f32 * NEAR_SHARE) as usize;
+    let rows = rows(nodes.len(), edges, &lengths);
+    let ranks = ranks(&rows, edges.len());
+    let usage = usage(&rows, edges.len());
+    let mut keep = |count: usize, order: &dyn Fn(usize) -> u32| {
+        let mut others: Vec<usize> = (0..edges.len()).filter(|&i| !kept[i]).collect();
+        others.sort_by(|&a, &b| {
+            order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b))
+        });
+        for i in others.into_iter().take(count) {
+            kept[i] = true;
+        }
+    };
+    keep(near, &|i| ranks[i]);
+    keep(room - near, &|i| u32::MAX - usage[i]);
+    Some(edges.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(edge, _)| *edge).collect())
+}
+
+/// An edge as seen from one of its nodes.
+#[derive(Clone, Copy)]
+struct Out {
+    to: u16,
+    /// How many of [`CLASSES_M`] it is wider than.
+    class: u8,
+    length_m: f32,
+    edge: u32,
+}
+
+/// The edges of each node, by length.
+fn rows(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out>> {
+    let mut rows = vec![Vec::new(); nodes];
+    for (i, (edge, &length_m)) in edges.iter().zip(lengths).enumerate() {
+        let class = CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count() as u8;
+        for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
+            rows[usize::from(from)].push(Out { to, class, length_m, edge: i as u32 });
+        }
+    }
+    rows.par_iter_mut().for_each(|row| {
+        row.sort_unstable_by(|a, b| a.length_m.total_cmp(&b.length_m).then(a.edge.cmp(&b.edge)));
+    });
+    rows
+}
+
+/// For each edge how many shorter ones its nodes have, wide enough for a vehicle of some class that it is wide enough for: the
+/// fewest of either node and any class.
+fn ranks(rows: &[Vec<Out>], edges: usize) -> Vec<u32> {
+    let mut ranks = vec![u32::MAX; edges];
+    for row in rows {
+        let mut shorter = [0; CLASSES_M.len() + 1];
+        for out in row {
+            for count in &mut shorter[..=usize::from(out.class)] {
+                let rank = &mut ranks[out.edge as usize];
+                *rank = (*rank).min(*count);
+                *count += 1;
+            }
+        }
+    }
+    ranks
+}
+
+/// Which edges belong to a spanning forest of greatest clearances; of equal ones, the first.
+fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
+    let mut order: Vec<usize> = (0..edges.len()).collect();
+    order.sort_by(|&a, &b| edges[b].clearance_m.total_cmp(&edges[a].clearance_m).then(a.cmp(&b)));
+    let mut root: Vec<u16> = (0..nodes as u16).collect();
+    let mut find = |mut node: u16, to: Option<u16>| {
+        while root[usize::from(node)] != node {
+            let above = root[usize::from(root[usize::from(node)])];
+            root[usize::from(node)] = above;
+            node = above;
+        }
+        if let Some(to) = to {
+            root[usize::from(node)] = to;
+        }
+        node
+    };
+    let mut kept = vec![false; edges.len()];
+    for i in order {
+        let (a, b) = (find(edges[i].a, None), find(edges[i].b, None));
+        if a != b {
+            find(a, Some(b));
+            kept[i] = true;
+        }
+    }
+    kept
+}
+
+/// For each edge the number of shortest paths that lead over it, of those from [`SOURCES`] nodes to all others, of vehicles
+/// of each class.
+fn usage(rows: &[Vec<Out>], edges: usize) -> Vec<u32> {
+    let sources = SOURCES.min(rows.len());
+    let searches: Vec<Vec<(u32, u32)>> = (0..sources * CLASSES_M.len())
+        .into_par_iter()
+        .map(|job| {
+            let (source, class) = (job / CLASSES_M.len(), job % CLASSES_M.len() + 1);
+            paths_from(source * rows.len() / sources, rows, class as u8)
+        })
+        .collect();
+    let mut usage = vec![0; edges];
+    for (edge, paths) in searches.into_iter().flatten() {
+        usage[edge as usize] += paths;
+    }
+    usage
+}
+
+/// The edges of the shortest paths from a node over edges of at least a class, each with how many of them lead over it
+/// (Dijkstra 1959).
+fn paths_from(source: usize, rows: &[Vec<Out>], class: u8) -> Vec<(u32, u32)> {
+    let mut way_m = vec![f32::INFINITY; rows.len()];
+    let mut last_edge = vec![None; rows.len()];
+    let (mut settled, mut order) = (vec![false; rows.len()], Vec::new());
+    // The bits of positive floats are in their order.
+    let mut waiting = BinaryHeap::from([(Reverse(0_u32), source)]);
+    way_m[source] = 0.0;
+    while let Some((_, node)) = waiting.pop() {
+        if std::mem::replace(&mut settled[node], true) {
+            continue;
+        }
+        order.push(node);
+        for out in rows[node].iter().filter(|out| out.class >= class) {
+            let (to, there_m) = (usize::from(out.to), way_m[node] + out.length_m);
+            if there_m < way_m[to] {
+                (way_m[to], last_edge[to]) = (there_m, Some((node, out.edge)));
+                waiting.push((Reverse(there_m.to_bits()), to));
+            }
+        }
+    }
+    let mut paths = vec![1; rows.len()];
+    let mut used = Vec::with_capacity(order.len());
+    for node in order.into_iter().rev() {
+        if let Some((before, i)) = last_edge[node] {
+            paths[before] += paths[node];
+            used.push((i, paths[node]));
+        }
+    }
+    used
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// For each node the least node that it reaches over edges wider than what is required.
+    fn reached(nodes: usize, edges: &[Edge], required_m: f32) -> Vec<u16> {
+        let mut least: Vec<u16> = (0..nodes as u16).collect();
+        for _ in 0..nodes {
+            for edge in edges.iter().filter(|e| e.clearance_m > required_m) {
+                let (a, b) = (usize::from(edge.a), usize::from(edge.b));
+                let both = least[a].min(least[b]);
+                (least[a], least[b]) = (both, both);
+            }
+        }
+        least
+    }
+
+    proptest! {
+        #[test]
+        fn whoever_was_connected_stays_so_at_any_clearance(
+            places in proptest::collection::vec(proptest::array::uniform3(0.0f32..9.0), 2..40),
+            clearances in proptest::collection::vec(proptest::option::of(0.0f32..2.0), 780),
+            room in 0usize..300,
+        ) {
+            let nodes: Vec<Point> = places.iter().map(|&p| Point::from(p)).collect();
+            let pairs = (0..nodes.len() as u16).flat_map(|a| (0..a).map(move |b| (b, a)));
+            let edges: Vec<Edge> = pairs
+                .zip(clearances)
+                .filter_map(|((a, b), c)| c.map(|clearance_m| Edge { a, b, clearance_m }))
+                .collect();
+            let parts: std::collections::BTreeSet<u16> = reached(nodes.len(), &edges, -1.0).into_iter().collect();
+            let forest = nodes.len() - parts.len();
+            let kept = cap(&nodes, &edges, room);
+            prop_assert_eq!(kept.is_some(), room >= forest.min(edges.len()));
+            let Some(kept) = kept else { return Ok(()) };
+            prop_assert_eq!(kept.len(), room.min(edges.len()));
+            prop_assert!(kept.iter().all(|edge| edges.contains(edge)));
+            for required_m in [-1.0, 0.1, 0.3, 0.55, 0.8, 1.2, 1.7] {
+                prop_assert_eq!(
+                    reached(nodes.len(), &kept, required_m),
+                    reached(nodes.len(), &edges, required_m)
+                );
+            }
+        }
+    }
+}
