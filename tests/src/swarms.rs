@@ -18,8 +18,7 @@ const VEHICLES: usize = 32;
 pub const WAYPOINTS: usize = 64;
 const GATES: usize = 128;
 const PIECES: usize = 2048;
-/// What is kept between centres, metres; the schedule keeps [`STRAY_M`] more.
-pub const SAFETY_M: f32 = 1.5;
+/// The schedule keeps this much more between centres than the safety distance, metres.
 const STRAY_M: f32 = 0.5;
 
 /// The plan of a swarm with a board's capacities.
@@ -55,59 +54,69 @@ impl Random {
 
 /// Boxes of free space that overlap.
 #[derive(Debug)]
-struct Space(Vec<(Point, Point)>);
+struct Space {
+    boxes: Vec<(Point, Point)>,
+    /// Longest edge of its roadmap, metres.
+    edge_max_m: f32,
+}
 
 impl Space {
     fn random(rng: &mut Random) -> Self {
         let height = rng.uniform(1.0, 3.0);
-        match rng.below(3) {
+        let boxes = match rng.below(13) {
             // A room, every other one high.
-            0 => {
+            0..4 => {
                 let height = if rng.one_in(2) { rng.uniform(3.0, 32.0) } else { height };
                 let size = Point::new(rng.uniform(8.0, 35.0), rng.uniform(8.0, 35.0), height);
-                Self(vec![(Point::zeros(), size)])
+                vec![(Point::zeros(), size)]
             }
-            1 => {
+            // A corridor, with side rooms or without.
+            4..8 => {
                 let (length, width) = (rng.uniform(15.0, 45.0), rng.uniform(0.5, 3.5));
                 let mut boxes = vec![(Point::zeros(), Point::new(length, width, height))];
                 for _ in 0..rng.below(3) {
                     let (at, wide) = (rng.uniform(2.0, length - 6.0), rng.uniform(1.5, 4.0));
                     boxes.push((Point::new(at, 0.0, 0.0), Point::new(at + wide, width + 5.0, height)));
                 }
-                Self(boxes)
+                boxes
             }
-            _ => {
+            // A shaft, with rooms beside it at the bottom and at the top.
+            8..12 => {
                 let size = Point::new(rng.uniform(1.0, 5.0), rng.uniform(1.0, 5.0), rng.uniform(8.0, 35.0));
-                // Rooms beside it at the bottom and at the top.
                 let (low, high) = (Point::new(-10.0, -4.0, 0.0), Point::new(10.0, 8.0, 2.0));
                 let lift = Point::new(0.0, 0.0, size.z - 2.0);
-                Self(vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)])
+                vec![(Point::zeros(), size), (low, high), (low + lift, high + lift)]
             }
-        }
+            // So long that timed segments are longer.
+            _ => {
+                let size = Point::new(rng.uniform(200.0, 1500.0), rng.uniform(2.0, 60.0), 3.0 * height);
+                return Self { boxes: vec![(Point::zeros(), size)], edge_max_m: 80.0 };
+            }
+        };
+        Self { boxes, edge_max_m: 8.0 }
     }
 
     fn small(rng: &mut Random) -> Self {
         let height = rng.uniform(0.2, 2.0);
-        if rng.one_in(2) {
-            return Self(vec![(
-                Point::zeros(),
-                Point::new(rng.uniform(4.0, 9.0), rng.uniform(4.0, 9.0), height),
-            )]);
-        }
-        let (length, width) = (rng.uniform(6.0, 11.0), rng.uniform(0.3, 2.5));
-        let at = rng.uniform(0.0, length - 3.0);
-        let room = (Point::new(at, 0.0, 0.0), Point::new(at + 3.0, width + 4.0, height));
-        Self(vec![(Point::zeros(), Point::new(length, width, height)), room])
+        let boxes = if rng.one_in(2) {
+            vec![(Point::zeros(), Point::new(rng.uniform(4.0, 9.0), rng.uniform(4.0, 9.0), height))]
+        } else {
+            let (length, width) = (rng.uniform(6.0, 11.0), rng.uniform(0.3, 2.5));
+            let at = rng.uniform(0.0, length - 3.0);
+            let room = (Point::new(at, 0.0, 0.0), Point::new(at + 3.0, width + 4.0, height));
+            vec![(Point::zeros(), Point::new(length, width, height)), room]
+        };
+        Self { boxes, edge_max_m: 8.0 }
     }
 
     fn point(&self, rng: &mut Random) -> Point {
-        let (low, high) = self.0[rng.below(self.0.len())];
+        let (low, high) = self.boxes[rng.below(self.boxes.len())];
         Point::new(rng.uniform(low.x, high.x), rng.uniform(low.y, high.y), rng.uniform(low.z, high.z))
     }
 
     fn holds(&self, p: &Point) -> bool {
         let inside = |(low, high): &(Point, Point)| (0..3).all(|a| low[a] <= p[a] && p[a] <= high[a]);
-        self.0.iter().any(inside)
+        self.boxes.iter().any(inside)
     }
 
     fn sees(&self, a: &Point, b: &Point) -> bool {
@@ -126,34 +135,49 @@ pub struct Swarm {
     mode: Mode,
     /// Separation and speeds.
     pub schedule: ScheduleConfig,
+    /// What is kept between centres, metres.
+    pub safety_m: f32,
+}
+
+/// What a swarm is drawn from.
+struct Draw {
+    space: Space,
+    vehicles: usize,
+    goals: usize,
+    /// The highest climb and descent, metres.
+    highest_m: f32,
+    safety_m: f32,
 }
 
 impl Swarm {
-    /// Any: rooms, corridors with side rooms, shafts.
+    /// Any: rooms, corridors with side rooms, shafts, far ways; now and then more vehicles than goals or fewer.
     pub fn random(rng: &mut Random) -> Self {
         let space = Space::random(rng);
-        let wanted = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
+        let vehicles = if rng.one_in(20) { 9 + rng.below(24) } else { 2 + rng.below(7) };
+        let goals = if rng.one_in(8) { 1 + rng.below(vehicles + 2).min(VEHICLES - 1) } else { vehicles };
         let highest_m = [1.5, 8.0, 30.0][rng.below(3)];
-        Self::within(&space, wanted, highest_m, rng)
+        let safety_m = if rng.one_in(2) { 1.5 } else { rng.uniform(0.8, 3.0) };
+        Self::drawn(&Draw { space, vehicles, goals, highest_m, safety_m }, rng)
     }
 
     /// A small one where vehicles often meet.
     pub fn small(count: usize, rng: &mut Random) -> Self {
         let space = Space::small(rng);
         let highest_m = [1.5, 3.0][rng.below(2)];
-        Self::within(&space, count, highest_m, rng)
+        Self::drawn(&Draw { space, vehicles: count, goals: count, highest_m, safety_m: 1.5 }, rng)
     }
 
-    fn within(space: &Space, wanted: usize, highest_m: f32, rng: &mut Random) -> Self {
-        let parked_separation_m = [1.7, 1.75, 1.9, 2.3][rng.below(4)];
+    fn drawn(draw: &Draw, rng: &mut Random) -> Self {
+        let safety_m = draw.safety_m;
+        let parked_separation_m = safety_m + [0.25, 0.25, 0.4, 0.8][rng.below(4)];
         // Between centres that stand: mostly such that a plan can be expected.
-        let apart_m = [0.6, 1.8, 2.05, 2.35, 2.6, 3.0][rng.below(6)];
+        let apart_m = safety_m + [-0.6, 0.3, 0.55, 0.85, 1.1, 1.5][rng.below(6)];
         let one_floor = rng.one_in(2);
-        let mut places = || {
+        let mut places = |wanted: usize| {
             let (mut places, mut heights): (Vec<Point>, Vec<f32>) = Default::default();
             for _ in 0..40 * wanted {
-                let place = space.point(rng);
-                let height = 0.5 + rng.uniform(0.0, 1.0) * (highest_m - 0.5);
+                let place = draw.space.point(rng);
+                let height = rng.uniform(0.5, draw.highest_m);
                 let height = if one_floor { place.z + 0.5 } else { height };
                 let ground = place - Point::new(0.0, 0.0, height);
                 let apart =
@@ -168,55 +192,52 @@ impl Swarm {
             }
             (places, heights)
         };
-        let ((mut nodes, mut climbs_m), (mut goals, mut descents_m)) = (places(), places());
-        let count = nodes.len().min(goals.len());
-        nodes.truncate(count);
-        climbs_m.truncate(count);
-        goals.truncate(count);
-        descents_m.truncate(count);
-        nodes.append(&mut goals);
-        nodes.extend((0..40 + rng.below(80)).map(|_| space.point(rng)));
+        let (mut nodes, climbs_m) = places(draw.vehicles);
+        let (goals, descents_m) = places(draw.goals);
+        let (starts, goal_count) = (nodes.len(), goals.len());
+        nodes.extend(goals);
+        nodes.extend((0..40 + rng.below(80)).map(|_| draw.space.point(rng)));
+        let one_size = rng.one_in(2);
         let mut edges = Vec::new();
         for a in 0..nodes.len() {
             for b in a + 1..nodes.len() {
                 let length = (nodes[a] - nodes[b]).norm();
-                if (0.1..8.0).contains(&length) && space.sees(&nodes[a], &nodes[b]) {
-                    edges.push(Edge { a: a as u16, b: b as u16, clearance_m: 1.0 });
+                if (0.1..draw.space.edge_max_m).contains(&length) && draw.space.sees(&nodes[a], &nodes[b]) {
+                    let clearance_m = if one_size { 1.0 } else { rng.uniform(0.6, 2.0) };
+                    edges.push(Edge { a: a as u16, b: b as u16, clearance_m });
                 }
             }
         }
         let header = RoadmapHeader {
             origin: Geodetic::default(),
             edge_min_m: 0.1,
-            edge_max_m: 8.0,
+            edge_max_m: draw.space.edge_max_m,
             tested_clearance_m: 0.0,
             max_clearance_m: 4.0,
-            starts: count as u16,
-            goals: count as u16,
+            starts: starts as u16,
+            goals: goal_count as u16,
         };
         let mut bytes = vec![0; roadmap::encoded_len(nodes.len(), edges.len(), 0).unwrap()];
         roadmap::write(&header, &nodes, &edges, &mut bytes).unwrap();
         let labelled = rng.one_in(2);
+        let last_id = 1 + rng.below(200) as u8;
         let task = |(i, &climb_m): (usize, &f32)| VehicleTask {
-            id: 1 + i as u8,
-            required_clearance_m: 0.8,
+            // Whether the higher id comes first or last is chance.
+            id: if last_id.is_multiple_of(2) { last_id + i as u8 } else { last_id + 32 - i as u8 },
+            required_clearance_m: if one_size { 0.8 } else { [0.5, 0.8, 1.0][i % 3] },
             climb_m,
-            goal: labelled.then_some(i as u16),
+            goal: (labelled && i < goal_count).then_some(i as u16),
         };
-        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
+        let tasks = climbs_m.iter().enumerate().map(task).collect();
+        let objective = if rng.one_in(3) { Objective::Makespan } else { Objective::TotalDistance };
+        let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(objective) };
         let schedule = ScheduleConfig {
-            separation_m: SAFETY_M + STRAY_M,
+            separation_m: safety_m + STRAY_M,
             parked_separation_m,
             cruise_mps: rng.uniform(0.5, 5.0),
             vertical_mps: rng.uniform(0.5, 2.0),
         };
-        Self {
-            roadmap: bytes,
-            tasks: climbs_m.iter().enumerate().map(task).collect(),
-            descents_m,
-            mode,
-            schedule,
-        }
+        Self { roadmap: bytes, tasks, descents_m, mode, schedule, safety_m }
     }
 
     /// Its plan.

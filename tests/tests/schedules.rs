@@ -1,21 +1,22 @@
 //! Random swarms, planned and then flown by progress alone: a vehicle obeys its gates and nothing else. None may come nearer
 //! to another than the safety distance, none may wait forever, and a plan that is `Ok` has a part for every vehicle.
 //!
-//! Rooms, corridors with side rooms, and shafts; climbs and descents of 0.5 m to 30 m; pads on one floor or anywhere; 2 to 32
-//! vehicles with the capacities of a board. Delays, speeds, pauses and the error of the reported progress are random.
+//! Rooms, corridors with side rooms, shafts, and ways of up to 1.5 km; climbs and descents of 0.5 m to 30 m; pads on one floor
+//! or anywhere; 2 to 32 vehicles of several sizes with the capacities of a board; safety distances of 0.8 m to 3 m. Delays, speeds,
+//! pauses and the error of the reported progress are random.
 //! `FLOCKMATE_SCHEDULES=N` flies N swarms in place of [`SWARMS`], `FLOCKMATE_SCHEDULES_FROM=SEED` begins at another seed.
 
 use std::collections::BTreeMap;
 
-use flockmate_tests::swarms::{self, Own, Plan, Random, SAFETY_M, Swarm, WAYPOINTS, end_m, place};
+use flockmate_tests::swarms::{self, Own, Plan, Random, Swarm, WAYPOINTS, end_m, place};
 use planner_core::plan::PlanError;
-use planner_core::schedule::{Flight, PROGRESS_ERROR_M, ScheduleError};
+use planner_core::schedule::{Flight, Gate, PROGRESS_ERROR_M, ScheduleError};
 use rayon::prelude::*;
 
 /// Swarms flown where nothing else is asked for.
-const SWARMS: u64 = 1200;
-/// One step of the flight, seconds.
-const STEP_S: f32 = 0.1;
+const SWARMS: u64 = 600;
+/// The fastest vehicle flies so far in one step, metres.
+const STEP_M: f32 = 0.3;
 
 /// How one vehicle disturbs the schedule.
 struct Manner {
@@ -25,17 +26,36 @@ struct Manner {
     pause: (f32, f32),
 }
 
+impl Manner {
+    fn random(rng: &mut Random) -> Self {
+        let mut drawn = |most: [f32; 3]| {
+            let most = most[rng.below(3)];
+            rng.uniform(0.0, most)
+        };
+        let (delay_s, pause_s) = (drawn([0.0, 40.0, 400.0]), drawn([0.0, 20.0, 200.0]));
+        let speed_mps = 0.2 + drawn([0.5, 4.0, 12.0]);
+        let between_m = if pause_s > 0.0 { rng.uniform(0.5, 15.0).max(0.02 * pause_s) } else { 1e9 };
+        Self { delay_s, speed_mps, pause: (pause_s, between_m) }
+    }
+}
+
+/// A gate, with the index of the flight that opens it.
+struct Awaited {
+    at_m: f32,
+    other: usize,
+    until_m: f32,
+}
+
 /// Flies a plan by progress; the error says which vehicles came too near, or are stuck.
-fn fly(plan: &Plan, owns: &[Own], rng: &mut Random) -> Result<f32, String> {
+fn fly(plan: &Plan, owns: &[Own], safety_m: f32, rng: &mut Random) -> Result<f32, String> {
     let flights = &plan.flights;
     let count = flights.len();
-    let manners: Vec<Manner> = (0..count)
-        .map(|_| Manner {
-            delay_s: if rng.one_in(2) { rng.uniform(0.0, 40.0) } else { 0.0 },
-            speed_mps: rng.uniform(0.3, 4.0),
-            pause: if rng.one_in(3) { (rng.uniform(0.0, 20.0), rng.uniform(0.5, 15.0)) } else { (0.0, 1e9) },
-        })
-        .collect();
+    let manners: Vec<Manner> = (0..count).map(|_| Manner::random(rng)).collect();
+    let step_s = STEP_M / manners.iter().map(|m| m.speed_mps).fold(0.0, f32::max);
+    let index = |id: u8| flights.iter().position(|f| f.id == id).expect("a gate names a vehicle of the plan");
+    let awaited = |g: &Gate| Awaited { at_m: g.at_m, other: index(g.id), until_m: g.until_m };
+    let gates: Vec<Vec<Awaited>> = owns.iter().map(|own| own.gates.iter().map(awaited).collect()).collect();
+    assert!(gates.iter().all(|gates| gates.is_sorted_by_key(|g| g.at_m)), "gates come along the path");
     let on_time = rng.one_in(2);
     let mut along: Vec<f32> = flights.iter().map(|f| -f.climb_m).collect();
     let (mut paused_s, mut next_pause_m) = (vec![0.0; count], vec![0.0; count]);
@@ -44,7 +64,7 @@ fn fly(plan: &Plan, owns: &[Own], rng: &mut Random) -> Result<f32, String> {
     }
     let (mut smallest, mut still) = (f32::INFINITY, 0);
     for step in 0.. {
-        let t_s = step as f32 * STEP_S;
+        let t_s = step as f32 * step_s;
         // What was reported: wrong by as much as may be; on the ground it is known.
         let reported: Vec<f32> = (0..count)
             .map(|i| match along[i] {
@@ -63,19 +83,14 @@ fn fly(plan: &Plan, owns: &[Own], rng: &mut Random) -> Result<f32, String> {
                 paused_s[i] = manners[i].pause.0;
             }
             if waits || paused_s[i] > 0.0 {
-                paused_s[i] -= STEP_S;
+                paused_s[i] -= step_s;
                 moved = true;
                 continue;
             }
-            let shut =
-                |id: u8, until_m: f32| reported[flights.iter().position(|f| f.id == id).unwrap()] < until_m;
-            let free = owns[i]
-                .gates
-                .iter()
-                .filter(|g| g.at_m >= along[i] - 1e-3 && shut(g.id, g.until_m))
-                .map(|g| g.at_m)
-                .fold(f32::INFINITY, f32::min);
-            let to_m = (along[i] + manners[i].speed_mps * STEP_S).min(free).min(end_m(flight));
+            let passed = gates[i].partition_point(|g| g.at_m < along[i] - 1e-3);
+            let shut = |g: &&Awaited| reported[g.other] < g.until_m;
+            let free = gates[i][passed..].iter().find(shut).map_or(f32::INFINITY, |g| g.at_m);
+            let to_m = (along[i] + manners[i].speed_mps * step_s).min(free).min(end_m(flight));
             if to_m > along[i] {
                 along[i] = to_m;
                 moved = true;
@@ -86,7 +101,7 @@ fn fly(plan: &Plan, owns: &[Own], rng: &mut Random) -> Result<f32, String> {
             for j in (0..i).filter(|&j| moves(i) || moves(j)) {
                 let apart = (place(&flights[i], along[i]) - place(&flights[j], along[j])).norm();
                 smallest = smallest.min(apart);
-                if apart < SAFETY_M - 1e-3 {
+                if apart < safety_m - 1e-3 {
                     let [i, j] = [i, j].map(|i| format!("vehicle {} at {} m", flights[i].id, along[i]));
                     return Err(format!("{apart:.2} m apart at {t_s:.1} s: {i}, {j}"));
                 }
@@ -153,7 +168,7 @@ fn one(seed: u64) -> Sum {
     };
     sum.makespan_s = f64::from(plan.flights.iter().map(landed_s).fold(0.0, f32::max));
     for _ in 0..2 {
-        if let Err(error) = fly(&plan, &owns, &mut rng) {
+        if let Err(error) = fly(&plan, &owns, swarm.safety_m, &mut rng) {
             sum.failures.push(format!("seed {seed}: {error}"));
             break;
         }

@@ -2,7 +2,7 @@
 //!
 //! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the pad where that is enough,
 //! stepping aside on the way ([`sipp`]) where it is not. Who cannot be fitted in goes first in the next round; when that
-//! does not help, the others leave it a head start. Rounds are bounded.
+//! does not help, the others leave it a head start; then all of it again with the shortest path first. Rounds are bounded.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -15,7 +15,7 @@ use crate::schedule::sipp::{self, Route};
 use crate::schedule::{self, Flight, PIECE_M, PIECES, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 
-/// Schedules the longest path first; who cannot be fitted in goes first in the next round, or later gets a head start.
+/// Schedules the longest path first, and where that leads to no schedule the shortest.
 pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -36,16 +36,45 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         // Cannot overflow: one entry per flight.
         let _ = (order.push(i as u16), straight.push(length));
     }
-    // Who stays on its pad comes first: it is in everybody's way. Then the longest; ties go to the higher id (P3D §3.4).
-    order.sort_unstable_by(|&a, &b| {
-        let (a, b) = (usize::from(a), usize::from(b));
-        straight[b].total_cmp(&straight[a]).then(out.flights[b].id.cmp(&out.flights[a].id))
-    });
+    let mut failed = Ok(());
+    for first in [First::Longest, First::Shortest] {
+        // Who stays on its pad comes first: it is in everybody's way. Ties go to the higher id (P3D §3.4).
+        order.sort_unstable_by(|&a, &b| {
+            let (a, b) = (usize::from(a), usize::from(b));
+            let (goals, ids) =
+                ([a, b].map(|i| out.flights[i].goal.is_some()), (out.flights[b].id, out.flights[a].id));
+            let longer = straight[b].total_cmp(&straight[a]);
+            let longer = if first == First::Longest { longer } else { longer.reverse() };
+            goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
+        });
+        failed = schedule_from(view, request, &mut order, ws, out);
+        if failed.is_ok() {
+            break;
+        }
+    }
+    failed
+}
+
+/// Which vehicle is scheduled first before any reordering.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum First {
+    Longest,
+    Shortest,
+}
+
+/// Schedules in this order; who cannot be fitted in goes first in the next round, or later gets a head start.
+fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>(
+    view: &RoadmapView<'_>,
+    request: &PlanRequest<'_>,
+    order: &mut Vec<u16, V>,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
     let mut failed = Ok(());
     let mut rush = Rush { count: 0, head_start_s: 0.0 };
     let reorderings = order.len().min(REORDERINGS);
     for round in 0..=reorderings + HEAD_STARTS {
-        let Err((place, error)) = schedule_round(view, request, &order, &rush, ws, out) else {
+        let Err((place, error)) = schedule_round(view, request, order, &rush, ws, out) else {
             return Ok(());
         };
         failed = Err(error);

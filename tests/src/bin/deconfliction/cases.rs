@@ -36,6 +36,8 @@ pub struct Meeting {
     time_limit_s: f32,
     /// Seeds flown at most.
     pub seeds_most: u64,
+    /// Whether the best order is looked for beside ours.
+    pub has_ideal: bool,
 }
 
 impl Meeting {
@@ -117,6 +119,7 @@ fn indoors() -> Meeting {
         safety_distance_m: 1.5,
         time_limit_s: 400.0,
         seeds_most: u64::MAX,
+        has_ideal: false,
     }
 }
 
@@ -135,6 +138,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         map: crossing_map(dir, "crossing.bt", 3.5)?,
         vehicles: crossing_vehicles(z),
         nodes: 400,
+        has_ideal: true,
         ..indoors()
     };
     // High enough to fly over a vehicle that lies somewhere on the floor.

@@ -5,6 +5,7 @@
 //! can be flown again alone. A meeting is planned once a seed; every case of it and both methods fly that plan.
 
 mod cases;
+mod ideal;
 
 use std::path::Path;
 use std::time::Instant;
@@ -71,6 +72,12 @@ struct Row {
     extra_flight: f64,
     /// Mean share by which the last landing is later than if everybody flew alone, all at once.
     extra_makespan: f64,
+    /// The same share by the schedule alone.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    planned_makespan: Option<f64>,
+    /// The same of the best schedule that a search over orders with straight and square paths finds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ideal_makespan: Option<f64>,
     /// What went wrong: seed, seconds, vehicle and what.
     #[serde(skip)]
     incidents: Vec<String>,
@@ -120,6 +127,10 @@ fn main() -> Result<()> {
                 row.extra_flight * 100.0,
                 row.extra_makespan * 100.0,
             );
+            if let (Some(planned), Some(ideal)) = (row.planned_makespan, row.ideal_makespan) {
+                let [planned, ideal] = [planned, ideal].map(|share| share * 100.0);
+                println!("    makespan by the schedule: {planned:.0} %, the ideal {ideal:.0} %");
+            }
             if row.method == METHODS[0] {
                 row.incidents.iter().for_each(|incident| println!("    {incident}"));
             }
@@ -152,12 +163,22 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
         sum.min_separation_m = sum.min_separation_m.min(row.min_separation_m);
         sum.extra_flight += row.extra_flight;
         sum.extra_makespan += row.extra_makespan;
+        for (sum, extra) in
+            [(&mut sum.planned_makespan, row.planned_makespan), (&mut sum.ideal_makespan, row.ideal_makespan)]
+        {
+            *sum = extra.map(|extra| sum.unwrap_or(0.0) + extra).or(*sum);
+        }
         sum.flights += row.flights;
         sum.incidents.extend(row.incidents);
     }
     for sum in &mut sums {
         sum.extra_flight /= f64::from(sum.flights.max(1));
-        sum.extra_makespan /= (sum.seeds - sum.unplanned).max(1) as f64;
+        let planned = (sum.seeds - sum.unplanned).max(1) as f64;
+        sum.extra_makespan /= planned;
+        [&mut sum.planned_makespan, &mut sum.ideal_makespan]
+            .into_iter()
+            .flatten()
+            .for_each(|s| *s /= planned);
     }
     Ok(sums)
 }
@@ -177,6 +198,8 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
         min_separation_m: f64::INFINITY,
         extra_flight: 0.0,
         extra_makespan: 0.0,
+        planned_makespan: None,
+        ideal_makespan: None,
         incidents: Vec::new(),
         flights: 0,
     };
@@ -204,6 +227,11 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
     mission.schedule = apart;
+    let landings = if meeting.has_ideal { ideal::landings(&mission, &plan, &shortest) } else { None };
+    if let (Some(landings), Some(row)) = (landings, rows.first_mut()) {
+        let extra = |last_s: f32| Some(f64::from(last_s / landings.alone_s) - 1.0);
+        (row.planned_makespan, row.ideal_makespan) = (extra(landings.planned_s), extra(landings.ideal_s));
+    }
     let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
     for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases) {

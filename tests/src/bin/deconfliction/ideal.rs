@@ -1,0 +1,88 @@
+//! How early the last vehicle could land: a search over orders, with straight paths and paths of two legs at right angles.
+//!
+//! It is no planner: it knows the open map and looks at 152 orders, in each of which every vehicle takes the path that lands
+//! it first. Separation, speeds, climbs and the schedule's rules are those of the mission.
+
+use host_sim::capacity::WAYPOINTS;
+use host_sim::mission::{Mission, SwarmPlan};
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::schedule::{Flight, PIECE_M, ScheduleWorkspace, earliest_departure};
+use planner_core::segment::segment_is_clear;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+/// Orders looked at.
+const ORDERS: u64 = 152;
+
+/// When the last vehicle lands by the schedule, seconds after the start.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Landings {
+    /// If everybody flew alone.
+    pub alone_s: f32,
+    /// As planned.
+    pub planned_s: f32,
+    /// As found here.
+    pub ideal_s: f32,
+}
+
+/// The schedule of a plan beside that of flights alone and the best found here.
+pub fn landings(mission: &Mission, plan: &SwarmPlan, alone: &SwarmPlan) -> Option<Landings> {
+    let last = |plan: &SwarmPlan| plan.flights.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
+    let ideal_s = ideal_s(mission, plan)?;
+    Some(Landings { alone_s: last(alone), planned_s: last(plan), ideal_s })
+}
+
+fn landed_s(mission: &Mission, flight: &Flight<WAYPOINTS>) -> f32 {
+    let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
+    flight.depart_s + over_goal_s + flight.descent_m / mission.schedule.vertical_mps
+}
+
+/// The flights of a vehicle: straight, or with a corner where one coordinate of start and goal is that of each.
+fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<WAYPOINTS>>> {
+    let waypoints = flight.path.waypoints();
+    let (from, to) = (waypoints.first()?.position, waypoints.last()?.position);
+    let (x_first, y_first) = (Point::new(to.x, from.y, from.z), Point::new(from.x, to.y, from.z));
+    let index = mission.index_of(flight.id).ok()?;
+    let required_m = mission.tasks[index].required_clearance_m;
+    let grid = mission.map.grid();
+    let mut all = Vec::new();
+    for corners in [vec![from, to], vec![from, x_first, to], vec![from, y_first, to]] {
+        if !corners.windows(2).all(|leg| segment_is_clear(&grid, &leg[0], &leg[1], required_m)) {
+            continue;
+        }
+        let mut path = Path::new();
+        corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
+        path.label(flight.climb_m / mission.schedule.vertical_mps, mission.schedule.cruise_mps);
+        all.push(Flight { path, depart_s: 0.0, piece_m: PIECE_M, ..flight.clone() });
+    }
+    Some(all)
+}
+
+fn ideal_s(mission: &Mission, plan: &SwarmPlan) -> Option<f32> {
+    let choices: Vec<_> = plan.flights.iter().map(|f| flights(mission, f)).collect::<Option<_>>()?;
+    let mut ws = ScheduleWorkspace::default();
+    let mut rng = Pcg32::seed_from_u64(1);
+    let mut order: Vec<usize> = (0..choices.len()).collect();
+    let mut best_s = f32::INFINITY;
+    for _ in 0..ORDERS {
+        let mut scheduled: Vec<Flight<WAYPOINTS>> = Vec::new();
+        for &i in &order {
+            let departs = choices[i].iter().filter_map(|flight| {
+                let cfg = &mission.schedule;
+                let depart_s = earliest_departure(cfg, flight, 0.0, scheduled.iter(), &mut ws).ok()?;
+                Some(Flight { depart_s, ..flight.clone() })
+            });
+            let first = departs.min_by(|a, b| landed_s(mission, a).total_cmp(&landed_s(mission, b)));
+            scheduled.extend(first);
+        }
+        if scheduled.len() == choices.len() {
+            let last_s = scheduled.iter().map(|f| landed_s(mission, f)).fold(0.0, f32::max);
+            best_s = best_s.min(last_s);
+        }
+        for i in (1..order.len()).rev() {
+            order.swap(i, rng.next_u32() as usize % (i + 1));
+        }
+    }
+    best_s.is_finite().then_some(best_s)
+}
