@@ -72,6 +72,8 @@ pub enum ConfigError {
     NotPositive,
     /// The mission origin is not a place on earth.
     Origin,
+    /// The geofence is no box, or the vehicle's start is outside it.
+    Geofence,
 }
 
 impl<const V: usize> Config<V> {
@@ -112,7 +114,9 @@ impl<const V: usize> Config<V> {
         if self.system_id == 0 || self.own().is_none() {
             return Err(ConfigError::NotInRoster);
         }
-        if self.roster.windows(2).any(|pair| pair[0].system_id >= pair[1].system_id) {
+        if self.roster.iter().any(|e| e.system_id == 0)
+            || self.roster.windows(2).any(|pair| pair[0].system_id >= pair[1].system_id)
+        {
             return Err(ConfigError::RosterOrder);
         }
         let positive = [
@@ -130,7 +134,16 @@ impl<const V: usize> Config<V> {
         if bad || starts.into_iter().any(|c| !c.is_finite()) {
             return Err(ConfigError::NotPositive);
         }
-        if self.origin.is_valid() { Ok(()) } else { Err(ConfigError::Origin) }
+        if !self.origin.is_valid() {
+            return Err(ConfigError::Origin);
+        }
+        let start = self.own().map_or(Point::zeros(), |(_, own)| own.start);
+        let holds = |(low, high): (Point, Point)| {
+            (0..3).all(|a| {
+                low[a].is_finite() && high[a].is_finite() && low[a] <= start[a] && start[a] <= high[a]
+            })
+        };
+        if self.geofence.is_none_or(holds) { Ok(()) } else { Err(ConfigError::Geofence) }
     }
 }
 

@@ -146,13 +146,16 @@ impl Planner<'_> {
 fn failure(error: &PlanError) -> PlanFailure {
     match error {
         PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
+        PlanError::Config(_) | PlanError::BadTask(_) | PlanError::BadDescent(_) | PlanError::SameGoal(_) => {
+            PlanFailure::Invalid
+        }
         PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
         | PlanError::SwarmFull
         | PlanError::Path(..)
         | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
             PlanFailure::Capacity
         }
-        PlanError::Schedule(_, ScheduleError::Blocked) => PlanFailure::Blocked,
+        PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => PlanFailure::Blocked,
         PlanError::Search(..) | PlanError::Assignment(_) => PlanFailure::Unreachable,
     }
 }

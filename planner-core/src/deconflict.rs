@@ -7,9 +7,9 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::Point;
 use crate::path::Path;
 use crate::schedule::Gate;
+use crate::{ConfigError, Point, all_positive};
 
 /// Which rule keeps vehicles apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +33,17 @@ pub struct DeconflictConfig {
     pub cruise_mps: f32,
     /// Braking that is counted on, m/s².
     pub accel_mps2: f32,
+}
+
+impl DeconflictConfig {
+    /// Whether all are positive and finite; the error names the first that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        all_positive(&[
+            ("safety_distance_m", self.safety_distance_m),
+            ("cruise_mps", self.cruise_mps),
+            ("accel_mps2", self.accel_mps2),
+        ])
+    }
 }
 
 /// A vehicle as last heard.

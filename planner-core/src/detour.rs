@@ -165,8 +165,8 @@ pub fn plan<const N: usize, const W: usize>(
         *obstacle = obstacle.seen_from(&here);
     }
     let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.solid(&here).touches(a, b));
-    let goal = view.header().starts + request.goal;
-    if usize::from(goal) >= view.node_count() {
+    let goal = view.header().starts.saturating_add(request.goal);
+    if request.goal >= view.header().goals {
         return Err(DetourError::Search(SearchError::BadNode(goal)));
     }
     let above = view.node(goal);

@@ -21,3 +21,15 @@ pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.
 pub type Point = nalgebra::Vector3<f32>;
+
+/// A setting that is not what it may be: its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ConfigError(pub &'static str);
+
+/// Refuses the first of these settings that is not a positive, finite number.
+pub(crate) fn all_positive(settings: &[(&'static str, f32)]) -> Result<(), ConfigError> {
+    match settings.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
+        Some((name, _)) => Err(ConfigError(name)),
+        None => Ok(()),
+    }
+}

@@ -10,8 +10,8 @@
 use heapless::Vec;
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 
-use crate::Point;
 use crate::deconflict::Advice;
+use crate::{ConfigError, Point, all_positive};
 
 /// A corner of a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,7 +33,7 @@ pub struct Waypoint {
 pub enum PathError {
     /// More than `W` waypoints.
     PathFull,
-    /// A coordinate or a clearance is NaN or infinite.
+    /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
 }
 
@@ -58,6 +58,9 @@ impl<const W: usize> Path<W> {
         let along_m = match self.waypoints.last_mut() {
             Some(last) => {
                 let along_m = last.along_m + (position - last.position).norm();
+                if !along_m.is_finite() {
+                    return Err(PathError::NotFinite);
+                }
                 if along_m == last.along_m {
                     last.clearance_m = fminf(last.clearance_m, clearance_m);
                     return Ok(());
@@ -144,7 +147,8 @@ impl<const W: usize> Path<W> {
             let direction = leg[1].position - leg[0].position;
             let share = (position - leg[0].position).dot(&direction) / direction.norm_squared();
             let length = leg[1].along_m - leg[0].along_m;
-            let along_m = (leg[0].along_m + share.clamp(0.0, 1.0) * length).clamp(low, high);
+            // Not `clamp`: it panics where the window is NaN or negative.
+            let along_m = fminf(fmaxf(leg[0].along_m + share.clamp(0.0, 1.0) * length, low), high);
             let share = ((along_m - leg[0].along_m) / length).clamp(0.0, 1.0);
             let distance = (leg[0].position + direction * share - position).norm_squared();
             if distance < best.0 {
@@ -180,6 +184,29 @@ pub struct TrackConfig {
     /// The reference is to slow from half this distance ahead of the vehicle and stop at it, metres; between walls it is
     /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner.
     pub lead_max_m: f32,
+}
+
+impl TrackConfig {
+    /// Whether all are positive and finite, and the bounds of the deviation in their order; the error names the first
+    /// that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        all_positive(&[
+            ("cruise_mps", self.cruise_mps),
+            ("climb_mps", self.climb_mps),
+            ("descend_mps", self.descend_mps),
+            ("accel_mps2", self.accel_mps2),
+            ("accel_z_mps2", self.accel_z_mps2),
+            ("response_s", self.response_s),
+            ("radius_m", self.radius_m),
+            ("deviation_min_m", self.deviation_min_m),
+            ("deviation_max_m", self.deviation_max_m),
+            ("lead_max_m", self.lead_max_m),
+        ])?;
+        if self.deviation_min_m > self.deviation_max_m {
+            return Err(ConfigError("deviation_max_m"));
+        }
+        Ok(())
+    }
 }
 
 impl Default for TrackConfig {

@@ -14,6 +14,7 @@ mod order;
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 
+use crate::ConfigError;
 use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
@@ -67,6 +68,31 @@ pub struct PlanRequest<'a> {
     pub gates_most: usize,
 }
 
+impl PlanRequest<'_> {
+    /// Whether every number is one that can be planned with, every id is one vehicle's and, labelled, every goal as well.
+    pub fn check(&self) -> Result<(), PlanError> {
+        self.schedule.check().map_err(PlanError::Config)?;
+        let good = |number: f32| number >= 0.0 && number.is_finite();
+        for (i, vehicle) in self.vehicles.iter().enumerate() {
+            let before = &self.vehicles[..i];
+            if !good(vehicle.required_clearance_m) || !good(vehicle.climb_m) {
+                return Err(PlanError::BadTask(vehicle.id));
+            }
+            if before.iter().any(|other| other.id == vehicle.id) {
+                return Err(PlanError::SameId(vehicle.id));
+            }
+            let labelled = self.mode == Mode::Labelled && vehicle.goal.is_some();
+            if labelled && before.iter().any(|other| other.goal == vehicle.goal) {
+                return Err(PlanError::SameGoal(vehicle.id));
+            }
+        }
+        match self.descents_m.iter().position(|&height_m| !good(height_m)) {
+            Some(goal) => Err(PlanError::BadDescent(goal as u16)),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Why there is no plan.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PlanError {
@@ -74,8 +100,16 @@ pub enum PlanError {
     Terminals,
     /// More vehicles or goals than `V`.
     SwarmFull,
+    /// A setting of the schedule.
+    Config(ConfigError),
+    /// Height or clearance of the vehicle with this id is negative, NaN or infinite.
+    BadTask(u8),
+    /// The height of the goal with this index over its ground is.
+    BadDescent(u16),
     /// Two vehicles have this id.
     SameId(u8),
+    /// The vehicle with this id has a goal that is another one's too.
+    SameGoal(u8),
     /// A labelled goal that is not in the roadmap, for the vehicle with this id.
     BadGoal(u8),
     /// A search failed for a reason other than "no path", for the vehicle with this id.
@@ -168,6 +202,7 @@ pub fn costs<const N: usize, const V: usize, const P: usize>(
     ws: &mut PlanWorkspace<N, V, P>,
 ) -> Result<(), PlanError> {
     let (starts, goals) = (request.vehicles.len(), request.descents_m.len());
+    request.check()?;
     let header = view.header();
     if usize::from(header.starts) != starts || usize::from(header.goals) != goals {
         return Err(PlanError::Terminals);
@@ -240,14 +275,12 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    if assigned.len() != request.vehicles.len() || usize::from(view.header().starts) != assigned.len() {
+    let header = view.header();
+    let counts = [usize::from(header.starts), usize::from(header.goals)];
+    if assigned.len() != request.vehicles.len() || counts != [assigned.len(), request.descents_m.len()] {
         return Err(PlanError::Terminals);
     }
-    for (i, vehicle) in request.vehicles.iter().enumerate() {
-        if request.vehicles[..i].iter().any(|other| other.id == vehicle.id) {
-            return Err(PlanError::SameId(vehicle.id));
-        }
-    }
+    request.check()?;
     out.flights.clear();
     for (i, (vehicle, &goal)) in request.vehicles.iter().zip(assigned).enumerate() {
         let mut path = Path::new();
@@ -279,7 +312,7 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     ws: &mut ScheduleWorkspace,
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), ScheduleError> {
-    let flight = &plan.flights[index];
+    let flight = plan.flights.get(index).ok_or(ScheduleError::BadIndex)?;
     out.goal = flight.goal;
     out.path = flight.path.clone();
     out.climb_m = flight.climb_m;

@@ -403,10 +403,10 @@ impl<'a> RoadmapView<'a> {
         self.crc
     }
 
-    /// Position of a node, metres. Panics if `node` is not below [`Self::node_count`].
+    /// Position of a node, metres; NaN where `node` is not below [`Self::node_count`].
     #[inline]
     pub fn node(&self, node: u16) -> Point {
-        node_of(&self.nodes[usize::from(node)])
+        self.nodes.get(usize::from(node)).map_or(Point::from_element(f32::NAN), node_of)
     }
 
     /// The edges out of a node, targets ascending; none for a node that does not exist.
@@ -427,7 +427,7 @@ impl<'a> RoadmapView<'a> {
         row.binary_search_by_key(&b, target_of).ok().map(|i| HalfEdge::from_bytes(&row[i]))
     }
 
-    /// Straight distance between two nodes, metres. Panics if either does not exist.
+    /// Straight distance between two nodes, metres; NaN if either does not exist.
     #[inline]
     pub fn distance_m(&self, a: u16, b: u16) -> f32 {
         libm::sqrtf((self.node(b) - self.node(a)).norm_squared())

@@ -14,8 +14,8 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::Point;
 use crate::schedule::segments_distance_sq;
+use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision to the first motion that follows it, seconds: two setpoints.
 pub const REACTION_S: f32 = 0.1;
@@ -160,6 +160,18 @@ pub struct Bounds {
     pub speed_max_mps: f32,
     /// A vehicle that nobody hears has stopped by then, seconds.
     pub silent_s: f32,
+}
+
+impl Bounds {
+    /// Whether all are positive and finite; the error names the first that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        all_positive(&[
+            ("accel_mps2", self.braking.accel_mps2),
+            ("jerk_mps3", self.braking.jerk_mps3),
+            ("speed_max_mps", self.speed_max_mps),
+            ("silent_s", self.silent_s),
+        ])
+    }
 }
 
 impl Heard<'_> {

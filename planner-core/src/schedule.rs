@@ -20,8 +20,8 @@ pub mod sipp;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-use crate::Point;
 use crate::path::Path;
+use crate::{ConfigError, Point, all_positive};
 
 /// Longest timed segment, metres: finer lets vehicles follow one another closer, coarser costs less.
 pub const PIECE_M: f32 = 1.5;
@@ -50,6 +50,18 @@ pub struct ScheduleConfig {
     pub cruise_mps: f32,
     /// Nominal speed of take-off and landing, m/s.
     pub vertical_mps: f32,
+}
+
+impl ScheduleConfig {
+    /// Whether all are positive and finite; the error names the first that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        all_positive(&[
+            ("separation_m", self.separation_m),
+            ("parked_separation_m", self.parked_separation_m),
+            ("cruise_mps", self.cruise_mps),
+            ("vertical_mps", self.vertical_mps),
+        ])
+    }
 }
 
 /// One vehicle's way from its pad to the ground below its goal.
@@ -93,9 +105,9 @@ impl<const W: usize> Flight<W> {
     pub(crate) fn pieces(&self) -> usize {
         let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
         let lengths = [self.climb_m, self.descent_m].into_iter().chain(legs);
-        let moving: u32 = lengths.map(|length_m| parts(length_m, self.piece_m)).sum();
+        let moving = lengths.map(|length_m| parts(length_m, self.piece_m)).fold(0, u32::saturating_add);
         let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
-        2 + moving as usize + holds
+        (moving as usize).saturating_add(2 + holds)
     }
 }
 
@@ -146,6 +158,8 @@ pub enum ScheduleError {
     GatesFull,
     /// No delay keeps this vehicle clear of those already scheduled.
     Blocked,
+    /// A flight or a node with an index that there is none of.
+    BadIndex,
 }
 
 /// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
@@ -464,7 +478,7 @@ pub(crate) fn merged_m<const W: usize>(
     most: usize,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
-    cut(cfg, &flights[index], &mut ws.own)?;
+    cut(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
     for merged_m in MERGED_M {
         let mut count = 0;
         each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;

@@ -39,6 +39,9 @@ const ONE: i32 = 1 << FRACTION_BITS;
 /// A clearance as wide as this, in cells, is not kept by what is touched, whatever the rounding.
 pub(crate) const WIDE_CELLS: f32 = 0.25;
 
+/// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
+pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
+
 /// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
 pub type Snapped = [i32; 3];
 
@@ -84,7 +87,8 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
     distance::is_farther_than(grid, a, b, 0.0, clearance_m)
 }
 
-/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact.
+/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact; an end beyond
+/// [`MAX_SNAPPED`] counts as touching.
 pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -> bool {
     snapped_rest_touches(grid, a, b, 0.0)
 }
@@ -99,6 +103,8 @@ pub(crate) fn snapped_rest_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snappe
         if !inside(a) || !inside(b) {
             return true;
         }
+    } else if a.iter().chain(b).any(|c| c.unsigned_abs() > MAX_SNAPPED as u32) {
+        return true;
     }
     let size = [0, 1, 2].map(|axis| (b[axis] - a[axis]).unsigned_abs());
     if size[0] >= size[1] && size[0] >= size[2] {

@@ -18,6 +18,8 @@ pub enum GridError {
     WordCount,
     /// The corner or the resolution is not finite, or the resolution is not positive.
     NotFinite,
+    /// A bit beyond the last cell of an axis is set.
+    Padding,
 }
 
 /// The longest side of a grid, in cells.
@@ -71,12 +73,35 @@ impl GridShape {
         self.min + Point::new(half(cell[0]), half(cell[1]), half(cell[2]))
     }
 
-    /// Word index and bit mask of a cell inside the grid.
+    /// Word index and bit mask of a cell inside the grid; of one outside the word is another one's or none.
     #[inline]
     pub fn address(&self, [i, j, k]: [u32; 3]) -> (usize, u64) {
         let [bx, by, _] = self.bricks();
-        let word = ((k / 4 * by + j / 4) * bx + i / 4) as usize;
+        let word = (k / 4).wrapping_mul(by).wrapping_add(j / 4).wrapping_mul(bx).wrapping_add(i / 4) as usize;
         (word, 1 << ((k % 4) * 16 + (j % 4) * 4 + i % 4))
+    }
+
+    /// Whether no bit beyond the cells is set: it would be an obstacle that no cell has.
+    fn padding_is_clear(&self, words: &[u64]) -> bool {
+        /// The first cell, the first two and the first three of a brick along each axis.
+        const LAYERS: [[u64; 3]; 3] = [
+            [0x1111_1111_1111_1111, 0x3333_3333_3333_3333, 0x7777_7777_7777_7777],
+            [0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff],
+            [0xffff, 0xffff_ffff, 0xffff_ffff_ffff],
+        ];
+        let bricks = self.bricks();
+        (0..3).filter(|&axis| self.dims[axis] % BRICK_CELLS != 0).all(|axis| {
+            let padding = !LAYERS[axis][(self.dims[axis] % BRICK_CELLS) as usize - 1];
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            (0..bricks[u]).all(|at_u| {
+                (0..bricks[v]).all(|at_v| {
+                    let mut cell = [0; 3];
+                    (cell[axis], cell[u], cell[v]) = (bricks[axis] - 1, at_u, at_v);
+                    let (word, _) = self.address(cell.map(|brick| brick * BRICK_CELLS));
+                    words[word] & padding == 0
+                })
+            })
+        })
     }
 
     fn check(&self) -> Result<(), GridError> {
@@ -108,11 +133,14 @@ pub struct VoxelGrid<'a> {
 }
 
 impl<'a> VoxelGrid<'a> {
-    /// Checks the shape against the words.
+    /// Checks the shape against the words. Work: the bricks at the upper faces.
     pub fn new(shape: GridShape, outside: Outside, words: &'a [u64]) -> Result<Self, GridError> {
         shape.check()?;
         if words.len() != shape.brick_count() {
             return Err(GridError::WordCount);
+        }
+        if !shape.padding_is_clear(words) {
+            return Err(GridError::Padding);
         }
         Ok(Self { shape, outside, words })
     }
@@ -135,9 +163,12 @@ impl<'a> VoxelGrid<'a> {
         self.words
     }
 
-    /// Whether a cell is an obstacle. Panics outside the grid.
+    /// Whether a cell is an obstacle; outside the grid as [`Outside`] says.
     #[inline]
     pub fn is_occupied(&self, cell: [u32; 3]) -> bool {
+        if (0..3).any(|axis| cell[axis] >= self.shape.dims[axis]) {
+            return self.outside == Outside::Blocked;
+        }
         let (word, mask) = self.shape.address(cell);
         self.words[word] & mask != 0
     }

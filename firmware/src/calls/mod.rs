@@ -4,6 +4,10 @@
 //! table. On the desk the same runs without counting, as a test.
 
 pub mod flight;
+pub mod limits;
+pub mod limits_routes;
+#[cfg(test)]
+mod limits_tests;
 
 /// Counts what calls cost: a board its instructions, the desk nothing.
 pub trait Meter {

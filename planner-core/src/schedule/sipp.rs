@@ -13,8 +13,8 @@ use libm::{fmaxf, fminf};
 
 use super::near::Cells;
 use super::{
-    Flight, Forbidden, Leg, OFF_PAD_S, Piece, ScheduleConfig, ScheduleError, Stops, conflict, cut,
-    first_allowed, forbid, last_allowed,
+    Flight, Forbidden, Leg, OFF_PAD_S, PIECE_M, Piece, ScheduleConfig, ScheduleError, Stops, conflict, cut,
+    first_allowed, forbid, last_allowed, parts,
 };
 use crate::Point;
 use crate::path::Path;
@@ -117,6 +117,15 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     flight: &mut Flight<W>,
 ) -> Result<(), ScheduleError> {
     if view.node_count() > N {
+        return Err(ScheduleError::PiecesFull);
+    }
+    if usize::from(route.from.max(route.to)) >= view.node_count() {
+        return Err(ScheduleError::BadIndex);
+    }
+    let vertical =
+        [flight.climb_m, flight.descent_m].map(|length_m| parts(length_m, flight.piece_m) as usize);
+    let whole = flight.piece_m >= PIECE_M && flight.piece_m.is_finite();
+    if !whole || vertical[0].max(vertical[1]) > super::PIECES {
         return Err(ScheduleError::PiecesFull);
     }
     load(cfg, route.parked, scheduled, ws)?;

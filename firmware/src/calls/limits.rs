@@ -1,0 +1,410 @@
+//! Every public call of `planner-core` at its limits and beyond: numbers that are NaN, infinite, zero, negative, huge; indices
+//! that there are none of; memory that is too small. Each gives its answer or its error; none panics.
+//!
+//! Runs on the desk and on a board. The answers are summed up, so that a test sees both give the same.
+
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
+use planner_core::frames::{self, Geodetic, Projection};
+use planner_core::path::{self, Path, TrackConfig, Tracker};
+use planner_core::prm::{self, Config, PrmError, Sampling};
+use planner_core::safety::{Bounds, Braking, Heard, Set, conflicts};
+use planner_core::segment::{self, MAX_SNAPPED};
+use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
+
+/// Numbers that break what does not look at them.
+pub(super) const HARD: [f32; 14] = [
+    0.0,
+    -0.0,
+    1.0,
+    -1.0,
+    0.25,
+    7.5,
+    f32::MIN_POSITIVE,
+    -1e-40,
+    1e7,
+    -1e19,
+    f32::MAX,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::NAN,
+];
+
+/// Hears which call comes next.
+pub trait Listener {
+    /// `name` is its file, its type if it has one, and its own name.
+    fn next(&mut self, name: &'static str);
+}
+
+/// What is told, and the sum of the answers.
+pub struct Answers<'a, L> {
+    listener: &'a mut L,
+    sum: u32,
+}
+
+impl<'a, L: Listener> Answers<'a, L> {
+    /// None yet.
+    pub fn new(listener: &'a mut L) -> Self {
+        Self { listener, sum: 0 }
+    }
+
+    /// Makes a call.
+    pub(super) fn call<T>(&mut self, name: &'static str, work: impl FnOnce() -> T) -> T {
+        self.listener.next(name);
+        work()
+    }
+
+    /// Adds an answer; every NaN is the same.
+    pub(super) fn add(&mut self, answer: f32) {
+        let bits = if answer.is_nan() { 0x7fc0_0000 } else { answer.to_bits() };
+        self.count(bits as usize);
+    }
+
+    pub(super) fn point(&mut self, answer: &Point) {
+        answer.iter().for_each(|&c| self.add(c));
+    }
+
+    pub(super) fn count(&mut self, answer: usize) {
+        self.sum = self.sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ answer as u32;
+    }
+
+    pub(super) fn is(&mut self, answer: bool) {
+        self.count(usize::from(answer));
+    }
+
+    /// The sum of all answers so far.
+    pub fn sum(&self) -> u32 {
+        self.sum
+    }
+}
+
+/// Points of hard numbers.
+pub(super) fn points() -> impl Iterator<Item = Point> {
+    let at = |i: usize| HARD[i % HARD.len()];
+    (0..HARD.len() * 3).map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
+}
+
+/// Makes all calls that need no roadmap.
+pub fn places(to: &mut Answers<'_, impl Listener>) {
+    frames(to);
+    grids(to);
+    segments(to);
+    samples(to);
+    paths(to);
+    neighbours(to);
+    sets(to);
+}
+
+fn frames(to: &mut Answers<'_, impl Listener>) {
+    for p in points() {
+        let hard = Geodetic { lat_deg: p.x.into(), lon_deg: p.y.into(), alt_m: p.z.into() };
+        let good = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
+        let valid = to.call("frames::Geodetic::is_valid", || hard.is_valid());
+        assert!(!valid || hard.lat_deg.abs() <= 90.0);
+        for (a, b) in [(good, hard), (hard, good)] {
+            let enu = to.call("frames::geodetic_to_enu", || frames::geodetic_to_enu(&a, &b));
+            to.point(&enu);
+            let back = to.call("frames::enu_to_geodetic", || frames::enu_to_geodetic(&a, &p));
+            to.add(back.alt_m as f32);
+            let apart_m = to.call("frames::haversine_m", || frames::haversine_m(&a, &b));
+            assert!(!(valid && apart_m.is_nan()), "{a:?} {b:?}");
+            for kind in [Projection::Px4, Projection::ArduPilot] {
+                let ned = to.call("frames::geodetic_to_ned", || frames::geodetic_to_ned(kind, &a, &b));
+                to.call("frames::ned_to_geodetic", || frames::ned_to_geodetic(kind, &a, &ned));
+            }
+        }
+        let swapped = to.call("frames::swap_enu_ned", || frames::swap_enu_ned(&p));
+        to.point(&swapped);
+    }
+}
+
+/// A grid of 5 × 6 × 3 cells with one obstacle.
+const SHAPE: GridShape = GridShape { dims: [5, 6, 3], min: Point::new(0.0, 0.0, 0.0), resolution_m: 0.5 };
+const WORDS: [u64; 4] = [1 << 17, 0, 0, 0];
+
+fn grids(to: &mut Answers<'_, impl Listener>) {
+    let dims = [0, 1, 4, MAX_DIM, MAX_DIM + 1, u32::MAX];
+    for i in 0..dims.len() * dims.len() {
+        let shape = GridShape { dims: [dims[i % 6], dims[i / 6], dims[(i * 5 + 1) % 6]], ..SHAPE };
+        let bricks = to.call("voxel::GridShape::bricks", || shape.bricks());
+        let count = to.call("voxel::GridShape::brick_count", || shape.brick_count());
+        assert!(bricks.iter().all(|&b| b as usize <= count.max(b as usize)));
+        to.call("voxel::GridShape::max", || shape.max());
+        let (word, mask) = to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
+        to.count(word ^ mask as usize);
+        let grid = to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
+        // Of these only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
+        assert!(grid.is_err(), "{shape:?}");
+    }
+    for hard in HARD {
+        let shape = GridShape { resolution_m: hard, ..SHAPE };
+        let grid = VoxelGrid::new(shape, Outside::Free, &WORDS);
+        assert_eq!(grid.is_ok(), hard > 0.0 && hard.is_finite());
+        for p in points() {
+            let cell = to.call("voxel::GridShape::cell_of", || shape.cell_of(&p));
+            assert!(cell.is_none_or(|cell| (0..3).all(|a| cell[a] < shape.dims[a])));
+        }
+        to.call("voxel::GridShape::center", || shape.center([u32::MAX; 3]));
+    }
+    // Bits of words that no cell has, and their neighbours that one has.
+    for (word, bit, padding) in [(1, 1, true), (1, 0, false), (2, 8, true), (2, 4, false), (0, 48, true)] {
+        let mut words = WORDS;
+        words[word] |= 1 << bit;
+        let checked = VoxelGrid::new(SHAPE, Outside::Free, &words).map(|_| ());
+        assert_eq!(checked, if padding { Err(GridError::Padding) } else { Ok(()) }, "{word} {bit}");
+    }
+    for outside in [Outside::Free, Outside::Blocked] {
+        let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
+        assert_eq!(to.call("voxel::VoxelGrid::outside", || grid.outside()), outside);
+        assert_eq!(to.call("voxel::VoxelGrid::shape", || grid.shape().dims), SHAPE.dims);
+        assert_eq!(to.call("voxel::VoxelGrid::words", || grid.words().len()), 4);
+        for cell in [[5, 0, 0], [0, 6, 0], [0, 0, 3], [u32::MAX; 3], [4, u32::MAX, 2]] {
+            let blocked = to.call("voxel::VoxelGrid::is_occupied", || grid.is_occupied(cell));
+            assert_eq!(blocked, outside == Outside::Blocked);
+        }
+        for p in points() {
+            let blocked = to.call("voxel::VoxelGrid::is_blocked_at", || grid.is_blocked_at(&p));
+            to.is(blocked);
+        }
+    }
+}
+
+fn segments(to: &mut Answers<'_, impl Listener>) {
+    for outside in [Outside::Free, Outside::Blocked] {
+        let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
+        let inside = Point::new(2.2, 2.7, 1.2);
+        for p in points() {
+            let snapped = to.call("segment::snap", || segment::snap(&SHAPE, &p));
+            for hard in HARD {
+                let clear = to.call("segment::segment_is_clear", || {
+                    segment::segment_is_clear(&grid, &p, &inside, hard)
+                });
+                assert!(!clear || (snapped.is_some() && hard >= 0.0 && hard.is_finite()));
+                let distance = [p, inside].map(|from| {
+                    to.call("distance::segment_clearance", || {
+                        segment::segment_clearance(&grid, &from, &p, hard)
+                    })
+                });
+                distance.iter().for_each(|&d| assert!(d >= 0.0 && !(d > hard.max(0.0)), "{p:?} {hard}: {d}"));
+                let alone =
+                    to.call("distance::point_clearance", || segment::point_clearance(&grid, &p, hard));
+                assert_eq!(alone.to_bits(), distance[0].to_bits());
+                to.is(clear);
+                to.add(distance[1]);
+            }
+        }
+        for cells in HARD {
+            let error = to.call("segment::snap_error_cells", || segment::snap_error_cells(cells));
+            to.add(error);
+        }
+        let edge = [MAX_SNAPPED, -MAX_SNAPPED, 0, i32::MAX, i32::MIN];
+        for i in 0..25 {
+            let (a, b) = ([edge[i % 5], 0, 1], [0, edge[i / 5], edge[(i * 3) % 5]]);
+            let touches = to
+                .call("segment::snapped_segment_touches", || segment::snapped_segment_touches(&grid, &a, &b));
+            let beyond = a.iter().chain(&b).any(|c| c.unsigned_abs() > MAX_SNAPPED as u32);
+            assert!(touches || !beyond, "{a:?} {b:?}");
+        }
+    }
+}
+
+fn samples(to: &mut Answers<'_, impl Listener>) {
+    let grid = VoxelGrid::new(SHAPE, Outside::Blocked, &WORDS).expect("a good grid");
+    let solid =
+        VoxelGrid::new(GridShape { dims: [4; 3], ..SHAPE }, Outside::Blocked, &[u64::MAX]).expect("it is");
+    let good = Config {
+        nodes: 6,
+        edge_min_m: 0.1,
+        edge_max_m: 2.0,
+        clearance_m: 0.1,
+        seed: 1,
+        sampling: Sampling::Halton,
+    };
+    let mut nodes = [Point::zeros(); 8];
+    let mut index = to.call("neighbours::Workspace::new", prm::Workspace::<8, 16>::new);
+    assert!(to.call("neighbours::Workspace::is_empty", || index.is_empty()));
+    for hard in HARD {
+        for config in [
+            Config { edge_min_m: hard, ..good },
+            Config { edge_max_m: hard, ..good },
+            Config { clearance_m: hard, ..good },
+            Config { nodes: hard as usize, ..good },
+        ] {
+            let checked = to.call("prm::Config::check", || config.check());
+            let sampled = to.call("prm::sample_nodes", || {
+                prm::sample_nodes(&grid, Some(&grid), &[], &config, &mut nodes)
+            });
+            assert!(checked.is_ok() || sampled == Err(checked.unwrap_err()));
+            let mut edges = [prm::Edge { a: 0, b: 0 }; 4];
+            let joined =
+                to.call("prm::connect", || prm::connect(&grid, &nodes[..6], &config, &mut index, &mut edges));
+            let mut pairs = 0;
+            let all = to.call("prm::connect_all_pairs", || {
+                prm::connect_all_pairs(&grid, &nodes[..6], &config, |_| pairs += 1)
+            });
+            match joined {
+                Ok(count) => assert_eq!(count, pairs),
+                Err(PrmError::RoadmapFull) => assert!(pairs > edges.len()),
+                Err(error) => assert_eq!(all, Err(error)),
+            }
+            to.count(pairs);
+        }
+    }
+    assert!(prm::sample_nodes(&solid, None, &[], &good, &mut nodes) == Err(PrmError::NoFreeSpace(0)));
+    assert!(prm::sample_nodes(&grid, None, &[Point::zeros()], &good, &mut nodes[..3]).is_err());
+    for p in points() {
+        let indexed = to.call("neighbours::Workspace::index", || index.index(&[p, Point::zeros()], &good));
+        assert_eq!(indexed.is_ok(), p.iter().all(|c| c.abs() <= 1e6));
+        let len = to.call("neighbours::Workspace::len", || index.len());
+        assert_eq!(len, if indexed.is_ok() { 2 } else { 0 });
+        // Places that there are none of have no edges.
+        for range in [0..2, 1..usize::MAX, usize::MAX..0] {
+            let found = to.call("prm::connect_range", || {
+                prm::connect_range(&grid, &index, &good, range, |_| Err(PrmError::RoadmapFull))
+            });
+            to.is(found.is_ok());
+        }
+        let square = to.call("prm::squared_length", || prm::squared_length(p.into(), [0.0; 3]));
+        to.add(square);
+        let pair = [p, Point::new(1.0, 1.0, 1.0)];
+        for (a, b) in [(0, 1), (0, 0), (0, 2), (u16::MAX, 0)] {
+            let clearance_m =
+                to.call("prm::edge_clearance", || prm::edge_clearance(&grid, &pair, prm::Edge { a, b }, p.y));
+            assert_eq!(clearance_m.is_some(), a.max(b) < 2);
+            to.add(clearance_m.unwrap_or(-1.0));
+        }
+    }
+}
+
+fn paths(to: &mut Answers<'_, impl Listener>) {
+    let mut path: Path<4> = to.call("path::Path::new", Path::new);
+    let track = TrackConfig::default();
+    let advice =
+        |scale: f32, within_m: f32| Advice { speed_scale: scale, stop_within_m: within_m, waiting_for: 0 };
+    assert!(path::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
+    assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
+    for round in 0..3 {
+        for p in points() {
+            let before = path.waypoints().len();
+            let pushed = to.call("path::Path::push", || path.push(p, p.x));
+            assert!(pushed.is_ok() || path.waypoints().len() == before);
+            assert!(pushed.is_err() || p.iter().all(|c| c.is_finite()));
+        }
+        let _ = path.push(Point::new(round as f32, 0.0, 1.0), 1.0);
+        let length_m = to.call("path::Path::length_m", || path.length_m());
+        assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
+        for (i, &hard) in HARD.iter().enumerate() {
+            let other = HARD[(i * 5 + round) % HARD.len()];
+            to.call("path::Path::label", || path.label(hard, other));
+            to.call("path::Path::label_last", || path.label_last(hard, other));
+            let at = to.call("path::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
+            let count = to.call("path::Path::points_from", || path.points_from(hard, other).take(20).count());
+            assert_eq!(count, 20);
+            let along_m = to.call("path::Path::project", || path.project(&at, hard, other));
+            to.add(along_m);
+            for dt_s in [0.05, hard] {
+                let mut tracker = Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 };
+                let reference = to
+                    .call("path::advance", || {
+                        path::advance(&track, &path, &mut tracker, &advice(hard, other), dt_s)
+                    })
+                    .expect("a path with waypoints");
+                assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
+                assert!((0.0..=length_m).contains(&tracker.along_m), "{hard} {other} {tracker:?}");
+                let waits = !(dt_s > 0.0);
+                assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
+            }
+            let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
+            let checked = to.call("path::TrackConfig::check", || config.check());
+            let good = |x: f32| x > 0.0 && x.is_finite();
+            assert_eq!(checked.is_ok(), good(hard) && good(other));
+            path::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
+        }
+        to.count(to_len(&path));
+        path = Path::new();
+        let _ = path.push(Point::zeros(), 1.0);
+    }
+    assert!(!to.call("path::Path::waypoints", || path.waypoints().is_empty()));
+}
+
+fn to_len<const W: usize>(path: &Path<W>) -> usize {
+    path.waypoints().len()
+}
+
+fn neighbours(to: &mut Answers<'_, impl Listener>) {
+    let mut path: Path<4> = Path::new();
+    let empty: Path<4> = Path::new();
+    [0.0, 4.0].iter().for_each(|&x| path.push(Point::new(x, 0.0, 1.0), 1.0).expect("two points"));
+    for (i, p) in points().enumerate() {
+        let hard = HARD[i % HARD.len()];
+        let all: Vec<Neighbour, 4> = (0..4)
+            .map(|k| Neighbour {
+                id: k,
+                rank: u16::MAX - u16::from(k),
+                position: p,
+                velocity: p * 0.5,
+                age_s: hard,
+                progress_m: (k > 1).then_some(hard),
+                ..Neighbour::default()
+            })
+            .collect();
+        let gates = [hard, p.x, -hard].map(|at_m| planner_core::schedule::Gate { at_m, id: 2, until_m: p.y });
+        for method in [Method::Off, Method::Algorithm2, Method::Priority] {
+            let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
+            for path in [&path, &empty] {
+                let own = Own { rank: 0, position: p, along_m: hard, path, detours: i % 2 == 0 };
+                let advice = to.call("deconflict::advise", || deconflict::advise(&cfg, &own, &gates, &all));
+                assert!((0.0..=1.0).contains(&advice.speed_scale), "{p:?} {hard} {advice:?}");
+                to.add(advice.stop_within_m);
+                let bad = DeconflictConfig { accel_mps2: hard, ..cfg };
+                deconflict::advise(&bad, &own, &gates, &all);
+                let checked = to.call("deconflict::DeconflictConfig::check", || bad.check());
+                assert_eq!(checked.is_ok(), hard > 0.0 && hard.is_finite());
+            }
+        }
+    }
+}
+
+fn sets(to: &mut Answers<'_, impl Listener>) {
+    for (i, p) in points().enumerate() {
+        let hard = HARD[i % HARD.len()];
+        let braking = Braking { accel_mps2: hard, jerk_mps3: p.x };
+        let stop_m = to.call("safety::Braking::stop_m", || braking.stop_m(p.y));
+        to.add(stop_m);
+        let bounds = Bounds { braking, speed_max_mps: p.y, silent_s: p.z };
+        let checked = to.call("safety::Bounds::check", || bounds.check());
+        assert!(checked.is_err() || (stop_m >= 0.0 && hard > 0.0));
+        let sane = Bounds {
+            braking: Braking { accel_mps2: 1.5, jerk_mps3: 4.0 },
+            speed_max_mps: 2.0,
+            silent_s: 45.0,
+        };
+        let ahead: Vec<Point, 12> = points().chain(points()).skip(i).take(12).collect();
+        let own = [
+            to.call("safety::Set::at", || Set::at(p)),
+            to.call("safety::Set::along", || Set::along(p, ahead.iter().copied(), hard)),
+            to.call("safety::Set::vertical", || Set::vertical(p, hard)),
+        ];
+        for bounds in [bounds, sane] {
+            let heard = Heard {
+                position: p,
+                velocity: p,
+                speed_mps: hard,
+                age_s: p.x,
+                points: &ahead[..i % 3],
+                grounded: i % 5 == 0,
+                column_to_m: (i % 2 == 0).then_some(hard),
+            };
+            let reach_m = to.call("safety::Heard::reach_m", || heard.reach_m(&bounds, hard));
+            to.add(reach_m);
+            let other = to.call("safety::Heard::set", || heard.set(&bounds, hard));
+            for own in &own {
+                let reach_m = to.call("safety::Set::reach_m", || own.reach_m());
+                to.add(reach_m);
+                let near = to.call("safety::conflicts", || conflicts(own, &other, &p, hard));
+                to.is(near);
+            }
+        }
+    }
+}
