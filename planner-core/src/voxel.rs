@@ -90,7 +90,7 @@ impl GridShape {
             [0xffff, 0xffff_ffff, 0xffff_ffff_ffff],
         ];
         let bricks = self.bricks();
-        (0..3).filter(|&axis| self.dims[axis] % BRICK_CELLS != 0).all(|axis| {
+        (0..3).filter(|&axis| !self.dims[axis].is_multiple_of(BRICK_CELLS)).all(|axis| {
             let padding = !LAYERS[axis][(self.dims[axis] % BRICK_CELLS) as usize - 1];
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             (0..bricks[u]).all(|at_u| {

@@ -80,7 +80,7 @@ fn every_public_call_of_planner_core_holds_at_its_limits() {
     let mut all = BTreeSet::new();
     public(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../planner-core/src"), &mut all);
     assert!(all.len() > 90, "{}", all.len());
-    let called: BTreeSet<String> = called.0.iter().map(|name| name.to_string()).collect();
+    let called: BTreeSet<String> = called.0.iter().copied().map(String::from).collect();
     let missing: std::vec::Vec<_> = all.difference(&called).collect();
     assert!(missing.is_empty(), "not called at their limits: {missing:?}");
     let gone: std::vec::Vec<_> = called.difference(&all).collect();
