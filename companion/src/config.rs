@@ -72,7 +72,7 @@ pub enum ConfigError {
     NotPositive,
     /// The mission origin is not a place on earth.
     Origin,
-    /// The geofence is no box, or the vehicle's start is outside it.
+    /// The geofence is no box.
     Geofence,
 }
 
@@ -137,13 +137,10 @@ impl<const V: usize> Config<V> {
         if !self.origin.is_valid() {
             return Err(ConfigError::Origin);
         }
-        let start = self.own().map_or(Point::zeros(), |(_, own)| own.start);
-        let holds = |(low, high): (Point, Point)| {
-            (0..3).all(|a| {
-                low[a].is_finite() && high[a].is_finite() && low[a] <= start[a] && start[a] <= high[a]
-            })
+        let sound = |(low, high): (Point, Point)| {
+            (0..3).all(|a| low[a].is_finite() && high[a].is_finite() && low[a] <= high[a])
         };
-        if self.geofence.is_none_or(holds) { Ok(()) } else { Err(ConfigError::Geofence) }
+        if self.geofence.is_none_or(sound) { Ok(()) } else { Err(ConfigError::Geofence) }
     }
 }
 
