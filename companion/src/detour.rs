@@ -40,8 +40,6 @@ const THING_COST: usize = 12;
 const QUIET_S: u64 = 3;
 /// A turn is claimed for this long before it is taken.
 const CLAIM: Duration = Duration::from_secs(1);
-/// The same where one is out of radio range, and others pass it on.
-const CLAIM_FAR: Duration = Duration::from_secs(8);
 /// Each blocked vehicle with a lower id is given this time to begin.
 const TURN_S: u64 = 2;
 /// After a way around was not found the next is sought so much later.
@@ -155,11 +153,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
-            State::Scheduled => {
-                self.around.blocked
-                    || !self.guidance.filter.column_clear()
-                    || (held && self.guidance.advice.stop_within_m <= 0.05)
-            }
+            State::Scheduled => self.around.blocked || (held && self.guidance.advice.stop_within_m <= 0.05),
             State::Follow => held && stands,
             State::Climb => {
                 self.guidance.filter.is_stopped() && self.telemetry.velocity.norm() < STANDING_MPS
@@ -313,9 +307,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it may fly around now.
     pub(crate) fn is_our_turn(&self) -> bool {
-        let claim = if self.neighbours.any_relayed(self.now) { CLAIM_FAR } else { CLAIM };
         self.is_due()
-            && self.around.claimed_since.is_some_and(|at| self.now - at >= claim)
+            && self.around.claimed_since.is_some_and(|at| self.now - at >= CLAIM)
             && self.neighbours.all_wait(self.now)
     }
 

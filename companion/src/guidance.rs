@@ -150,8 +150,6 @@ pub struct Guidance {
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
-    /// Progress when it turned back, metres.
-    pub turned_at_m: f32,
     /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
     linked_m: f32,
     shelter: Search,
@@ -234,7 +232,6 @@ impl Guidance {
             progress_at: Instant::ZERO,
             reported_m: f32::NEG_INFINITY,
             returning: false,
-            turned_at_m: 0.0,
             linked_m: f32::INFINITY,
             shelter: Search::default(),
             retreating: false,
@@ -374,7 +371,6 @@ impl Guidance {
         }
         let tracker = Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
         let (phase, leg) = (self.phase, self.leg.take());
-        self.turned_at_m = self.tracker.along_m;
         *path = back;
         self.begin_path(now);
         self.tracker = tracker;

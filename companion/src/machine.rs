@@ -23,7 +23,6 @@ use crate::limits::AutopilotLimits;
 use crate::margins;
 use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
 use crate::neighbours::Neighbours;
-use crate::neighbours::relay::News;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
 use crate::requests::Handshake;
@@ -104,8 +103,6 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) version_due: [bool; 2],
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
-    pub(crate) news_due: bool,
-    pub(crate) news_next: u16,
     pub(crate) radio: Budget,
     pub(crate) rates: Rates,
     pub(crate) store: Option<Store>,
@@ -169,8 +166,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             version_due: [false; 2],
             position_due: false,
             intent_due: false,
-            news_due: false,
-            news_next: 0,
             radio: Budget::default(),
             rates: Rates::default(),
             store: None,
@@ -217,10 +212,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Way made along the own path, metres.
     pub fn progress_m(&self) -> f32 {
         // What is flown around comes on top of where the plan was left.
-        let left_at_m = if self.around.flying { self.around.left_at_m.max(0.0) } else { 0.0 };
-        // So does the way back.
-        let turned_at_m = if self.guidance.returning { self.guidance.turned_at_m.max(0.0) } else { 0.0 };
-        self.guidance.progress_m(self.state, &self.scene()) + left_at_m + turned_at_m
+        let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
+        self.guidance.progress_m(self.state, &self.scene()) + left_at_m.max(0.0)
     }
 
     /// What the setpoints came to since the start.
@@ -264,7 +257,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if now >= self.next_heartbeat {
             self.next_heartbeat = now + HEARTBEAT_EVERY;
             self.heartbeat_due = [true; 2];
-            self.news_due = true;
         }
         if now >= self.next_swarm {
             self.next_swarm = now + Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
@@ -395,13 +387,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         // Its sequence number counts only if the frame decodes.
         if frame.message_id == TUNNEL_DATA::ID {
-            if let Some(news) = News::decode(frame.padded(), id) {
-                if news.mission_crc == self.config.mission_crc {
-                    let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
-                    self.neighbours.handle_news(self.now, id, &news, plan_crc);
-                }
-                return;
-            }
             let Some(intent) = Intent::decode(frame.padded(), id) else { return };
             if intent.mission_crc != self.config.mission_crc {
                 if self.config.roster.iter().any(|entry| entry.system_id == id) {

@@ -4,8 +4,6 @@
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
 //! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
-pub(crate) mod relay;
-
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
@@ -26,7 +24,7 @@ const RESTART_MS: u32 = 10_000;
 /// Heard within this time counts as heard: four positions and intents.
 const LATELY: Duration = Duration::from_millis(800);
 /// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
-/// 15 s later; this leaves it 25 s to come down.
+/// 20 s later; this leaves it 20 s to come down.
 const DEAD: Duration = Duration::from_secs(45);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 const DOWN: Duration = Duration::from_secs(75);
@@ -81,10 +79,6 @@ struct Contact {
     /// Since when it tells that it is out, and it is known where.
     out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
-    /// Whom it hears, a bit for each rank.
-    hears: u32,
-    /// When what others told of it was so.
-    relayed_at: Option<Instant>,
     /// When an intent of our mission was last heard from it.
     belongs_at: Option<Instant>,
     points: Vec<Point, POINTS>,
@@ -108,7 +102,7 @@ impl Contact {
     }
 
     fn is_dead(&self, now: Instant) -> bool {
-        self.rank != STRANGER && self.known_at().is_some_and(|at| now - at >= DEAD)
+        self.rank != STRANGER && self.heard_at.is_some_and(|at| now - at >= DEAD)
     }
 
     /// Whether it speaks, but has not known for long where it is.
@@ -142,8 +136,7 @@ impl Contact {
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
     fn waits(&self, now: Instant) -> bool {
-        let lately = self.heard_within(now, LATELY) || self.is_relayed(now);
-        self.is_out(now) || self.tells(LANDED) || (self.tells(WAITING) && lately)
+        self.is_out(now) || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
     }
 
     /// Whether it stands and is about to fly around.
@@ -156,7 +149,7 @@ impl Contact {
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
     fn comes_down(&self, now: Instant) -> bool {
-        let silent = !self.heard_within(now, SILENT) && !self.is_relayed(now);
+        let silent = !self.heard_within(now, SILENT);
         self.rank != STRANGER
             && !self.tells(GROUNDED | LANDED)
             && !self.is_out(now)
@@ -222,12 +215,7 @@ impl Contact {
             tell(place(apart_m + SWAY_M));
         } else if self.is_dead(now) {
             let down = !self.heard_within(now, DOWN);
-            let nature = if down { Nature::Lying } else { Nature::Solid };
-            self.stretch(|at| tell(column(at, nature)));
-            if self.points.is_empty() && self.relayed_at == self.position_at {
-                // Which way it flew is not known.
-                tell(place(apart_m + STRETCH_M));
-            }
+            self.stretch(|at| tell(column(at, if down { Nature::Lying } else { Nature::Solid })));
         } else {
             tell(place(apart_m + SWAY_M));
         }
@@ -316,8 +304,6 @@ impl<const V: usize> Neighbours<V> {
             flags: 0,
             out_at: None,
             hears_us_at: None,
-            hears: 0,
-            relayed_at: None,
             belongs_at: None,
             points: Vec::new(),
             column: false,
@@ -436,7 +422,6 @@ impl<const V: usize> Neighbours<V> {
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
-        contact.hears = intent.heard;
         contact.points.clone_from(&intent.points);
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;

@@ -13,7 +13,6 @@ use crate::guidance::Setpoint;
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
-use crate::neighbours::relay;
 use crate::outbox::Outgoing;
 use crate::services;
 
@@ -47,28 +46,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
             return 0;
         }
-        let news = if link == Link::Swarm { self.tell_news(out) } else { 0 };
-        let length = if news > 0 { news } else { self.answer(link, out) };
+        let length = self.answer(link, out);
         if link == Link::Swarm {
             self.radio.spend(length);
         }
         length
-    }
-
-    /// What neighbours do not hear from others, while the account has enough for answers too.
-    fn tell_news(&mut self, out: &mut [u8]) -> usize {
-        if !self.radio.is_half_full() || !core::mem::take(&mut self.news_due) {
-            return 0;
-        }
-        let plan_crc = self.plan.as_ref().map_or(0, |plan| plan.plan_crc);
-        let news = self.neighbours.news(self.now, &mut self.news_next, self.config.mission_crc, plan_crc);
-        if news.is_empty() {
-            return 0;
-        }
-        let (system, mut payload) = (self.config.system_id, [0; relay::LENGTH]);
-        let len = news.encode(system, &mut payload);
-        let header = self.outboxes[Link::Swarm as usize].header(system);
-        frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
     /// What was asked for, and what waits to be told.
