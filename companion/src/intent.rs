@@ -15,13 +15,15 @@
 //! | 20 | u32 | whom it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
-//! | 29 | 3 × u8 | 0 |
+//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
 //! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
 use heapless::Vec;
 use planner_core::Point;
+
+use crate::echo::Echo;
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
@@ -70,6 +72,8 @@ pub struct Intent {
     pub floor_m: f32,
     /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
     pub column: bool,
+    /// Whose intent it heard, and when: for the sender's measure of the delay.
+    pub echo: Option<Echo>,
     /// Points that it flies along next, as far as it will go for now; none while somebody else flies it.
     pub points: Vec<Point, POINTS>,
 }
@@ -88,7 +92,9 @@ impl Intent {
         body[16..20].copy_from_slice(&self.speed_mps.to_le_bytes());
         body[20..24].copy_from_slice(&self.heard.to_le_bytes());
         body[24..28].copy_from_slice(&self.floor_m.to_le_bytes());
-        body[28..32].copy_from_slice(&[u8::from(self.column), 0, 0, 0]);
+        let [rank, sequence, held] =
+            self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
+        body[28..32].copy_from_slice(&[u8::from(self.column), rank, sequence, held]);
         for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
             to.copy_from_slice(&value.to_le_bytes());
         }
@@ -124,6 +130,7 @@ impl Intent {
             heard: u32::from_le_bytes(word(20)),
             floor_m: float(24)?,
             column: body[28] & 1 != 0,
+            echo: body[29].checked_sub(1).map(|rank| Echo { rank, sequence: body[30], held: body[31] }),
             points,
         })
     }
@@ -146,6 +153,7 @@ mod tests {
             heard: 0x8000_0005,
             floor_m: -0.5,
             column: count == 3,
+            echo: (count > 2).then_some(Echo { rank: 254, sequence: 9, held: count as u8 }),
             points,
         }
     }

@@ -21,6 +21,7 @@ pub mod budget;
 pub mod commands;
 pub mod config;
 mod detour;
+pub mod echo;
 mod events;
 #[cfg(test)]
 mod fake_flash;

@@ -14,6 +14,7 @@ use crate::budget::{self, Budget};
 use crate::commands::{self, ACCEPTED, Command, DENIED, Pending, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::detour::{Around, Obstacles};
+use crate::echo::Sent;
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
 use crate::ftp::Ftp;
@@ -104,6 +105,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
     pub(crate) radio: Budget,
+    pub(crate) sent: Sent,
     pub(crate) rates: Rates,
     pub(crate) store: Option<Store>,
     pub(crate) parameters: Parameters,
@@ -167,6 +169,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             position_due: false,
             intent_due: false,
             radio: Budget::default(),
+            sent: Sent::default(),
             rates: Rates::default(),
             store: None,
             parameters: Parameters::default(),
@@ -394,6 +397,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.say_of(Sender::Other, true, text, [u32::from(id), 0, 0]);
                 }
                 return;
+            }
+            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.rank);
+            let delay_s = echo.and_then(|echo| self.sent.delay_s(&echo, self.now));
+            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
+                late.take(delay_s);
             }
             if self.neighbours.accept(id, frame.sequence, self.now) {
                 let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);

@@ -14,6 +14,7 @@ use planner_core::frames::{self, Geodetic};
 use planner_core::safety::Heard;
 
 use crate::config::RosterEntry;
+use crate::echo::{Echo, Lateness};
 use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
 use crate::machine::STANDING_MPS;
 use crate::telemetry::SequenceFilter;
@@ -64,6 +65,12 @@ const STANDS: Duration = Duration::from_secs(5);
 const LATE_S: f32 = 1.0;
 /// What progress may jump, metres: where a vehicle takes up its path again, its nearest point is new.
 const STRIDE_M: f32 = 1.0;
+/// For so long a vehicle that nobody hears may fly on at the top of its climb, seconds.
+const BEYOND_TOP_S: f32 = 1.2;
+/// A climb leads straight up, this little beside, metres.
+const CLIMB_BESIDE_M: f32 = 0.9;
+/// A top this little above is reached, metres.
+const TOP_M: f32 = 0.3;
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
 
@@ -79,6 +86,9 @@ struct Contact {
     /// Since when it tells that it is out, and it is known where.
     out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
+    /// Sequence number of its last intent.
+    intent_sequence: u8,
+    late: Lateness,
     /// When an intent of our mission was last heard from it.
     belongs_at: Option<Instant>,
     points: Vec<Point, POINTS>,
@@ -175,6 +185,14 @@ impl Contact {
             column(here, fallen_m, Nature::Solid);
             column(here - up(fallen_m), BELOW_M, Nature::Landing);
         }
+    }
+
+    /// Height of the top of its climb, if it climbs or is about to.
+    fn climbs_to(&self) -> Option<f32> {
+        let (top, here) = (self.points.last()?, self.state.position);
+        let beside = (top - here).xy().norm_squared();
+        let climbs = self.column && !self.tells(LANDED | OUT) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
+        (climbs && top.z > here.z + TOP_M).then_some(top.z)
     }
 
     /// Places along its path as far as it may come unheard.
@@ -304,6 +322,8 @@ impl<const V: usize> Neighbours<V> {
             flags: 0,
             out_at: None,
             hears_us_at: None,
+            intent_sequence: 0,
+            late: Lateness::default(),
             belongs_at: None,
             points: Vec::new(),
             column: false,
@@ -364,7 +384,14 @@ impl<const V: usize> Neighbours<V> {
     /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
     /// what anybody can send must not make the next true one look late. Positions carry their time instead.
     pub fn accept(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
-        self.in_roster(id).is_some_and(|at| self.contacts[at].sequence.accept(sequence, now))
+        self.in_roster(id).is_some_and(|at| {
+            let contact = &mut self.contacts[at];
+            let fresh = contact.sequence.accept(sequence, now);
+            if fresh {
+                contact.intent_sequence = sequence;
+            }
+            fresh
+        })
     }
 
     /// A neighbour's position. It is the roster's only if this vehicle's intents are of our mission; else it is a stranger's.
@@ -461,17 +488,25 @@ impl<const V: usize> Neighbours<V> {
         let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
         let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
         let mut here = contact.state.position;
-        here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { here.z };
-        let grounded = contact.tells(GROUNDED | LANDED) || lies;
+        // Unheard in its climb it may have come to the top of it, and a little further.
+        let top = contact.climbs_to().filter(|_| age_s > OLD_S && !lies);
+        here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { top.unwrap_or(here.z) };
+        let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
         let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
         let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
+        let rests = dead || top.is_some();
         let heard = Heard {
             position: here,
             velocity: contact.state.velocity,
-            speed_mps: if dead { 0.0 } else { contact.speed_mps },
+            speed_mps: if rests { 0.0 } else { contact.speed_mps },
             // Whoever flew along its points stopped on them, and rests where a reroute keeps off.
-            age_s: if dead { 0.0 } else { age_s },
-            points: if dead { &[] } else { &contact.points },
+            age_s: if rests { 0.0 } else { age_s },
+            delay_s: match (dead, top) {
+                (false, Some(_)) => BEYOND_TOP_S,
+                (true, _) => 0.0,
+                _ => contact.late.delay_s,
+            },
+            points: if rests { &[] } else { &contact.points },
             grounded,
             column_to_m: (down && !grounded).then_some(floor_m),
         };
@@ -490,6 +525,33 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
         let waits = |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT));
         self.in_roster(id).is_some_and(|at| waits(&self.contacts[at]))
+    }
+
+    /// How late the messages of `id` are.
+    pub(crate) fn lateness(&mut self, id: u8) -> Option<&mut Lateness> {
+        let at = self.in_roster(id)?;
+        Some(&mut self.contacts[at].late)
+    }
+
+    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.
+    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, apart_m: f32) -> bool {
+        let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {
+            return false;
+        };
+        let (mut below, mut from) = (false, contact.state.position);
+        let mut near = |a: Point, b: Point| {
+            let (leg, away) = ((b - a).xy(), (place - a).xy());
+            let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
+            below |= (away - leg * share).norm_squared() < apart_m * apart_m;
+        };
+        contact.stretch(|at| near(core::mem::replace(&mut from, at), at));
+        below
+    }
+
+    /// The echo of one neighbour's last intent, of each in turn.
+    pub(crate) fn echo(&self, turn: usize, now: Instant) -> Option<Echo> {
+        let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
+        Echo::new(contact.rank, contact.intent_sequence, now - contact.belongs_at?)
     }
 
     /// Whom we heard lately, a bit for each rank.

@@ -41,6 +41,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let mut payload = [0; 133];
             let len = self.intent().encode(&mut payload);
             let header = self.outboxes[at].header(system);
+            self.sent.note(header.sequence, self.now);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
@@ -195,6 +196,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             speed_mps: self.telemetry.velocity.norm(),
             floor_m: plan.map_or(self.start.z, |plan| self.guidance.ground_m(plan)),
             column,
+            echo: self.neighbours.echo(self.sent.count(), self.now),
             points,
         }
     }
@@ -217,7 +219,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (first, last) = (path.point_at(0.0), path.point_at(path.length_m()));
         let mut column = true;
         match self.state {
-            TakeOff | Climb => {
+            // On the pad too: it may lift off before it is heard again.
+            Scheduled | PadReplanning | Streaming | Engaging | Arming | TakeOff | Climb => {
                 add(setpoint);
                 first.into_iter().for_each(add);
             }

@@ -143,6 +143,8 @@ pub struct Heard<'a> {
     pub speed_mps: f32,
     /// Seconds since both were heard.
     pub age_s: f32,
+    /// How late messages are when they are heard, seconds.
+    pub delay_s: f32,
     /// Points that it flies along next; empty if somebody else flies it.
     pub points: &'a [Point],
     /// Whether it stands on the ground.
@@ -188,22 +190,27 @@ impl Heard<'_> {
             + if self.points.is_empty() { 0.0 } else { OFF_M }
     }
 
+    /// How old what it says is, seconds.
+    fn old_s(&self) -> f32 {
+        self.age_s + self.delay_s
+    }
+
     fn ball_m(&self, bounds: &Bounds) -> f32 {
-        bounds.speed_max_mps * fminf(self.age_s, bounds.silent_s)
+        bounds.speed_max_mps * fminf(self.old_s(), bounds.silent_s)
     }
 
     /// How far it flies until it has stopped.
     fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
         // It may have begun to speed up since it was heard.
-        let gained_mps = bounds.braking.accel_mps2 * (self.age_s + REACTION_S);
+        let gained_mps = bounds.braking.accel_mps2 * (self.old_s() + REACTION_S);
         let most_mps = fmaxf(self.speed_mps, bounds.speed_max_mps);
         let speed_mps = fminf(fminf(self.speed_mps + gained_mps, most_mps), 2.0 * bounds.speed_max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
-        speed_mps * (self.age_s + REACTION_S + LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
+        speed_mps * (self.old_s() + REACTION_S + LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
     }
 
     fn wider_m(&self, bounds: &Bounds) -> f32 {
-        0.5 * bounds.braking.accel_mps2 * self.age_s * self.age_s
+        0.5 * bounds.braking.accel_mps2 * self.old_s() * self.old_s()
     }
 
     /// Where it can be; with `ahead_s` also where its points lead it in so much time.

@@ -387,8 +387,9 @@ impl Guidance {
         let mut near = 0;
         for i in 0..neighbours.len() {
             let Some(mut met) = neighbours.met(i, now) else { continue };
-            if lands && met.heard.age_s > safety::FRESH_S {
-                // A landing does not wait for a vehicle that is silent: only its last place counts.
+            let silent = met.lost || met.heard.age_s > safety::FRESH_S;
+            if lands && silent {
+                // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
                 (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
@@ -409,6 +410,9 @@ impl Guidance {
             } else {
                 safety_m + STRAY_M
             };
+            if lands && silent && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
+                return Some(Found { id: met.id, yields: true, stranger: false });
+            }
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
             let away = met.heard.position - place;
             let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };

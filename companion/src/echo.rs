@@ -1,0 +1,133 @@
+//! How long the radio takes: a vehicle's intent echoes the sequence number of another one's.
+//!
+//! Who gets its own number back knows the round trip: since it sent that intent, without the time that the other one held it.
+//! Half of that is what a message takes, if both ways are alike. Clocks need not agree.
+
+use crate::time::{Duration, Instant};
+
+/// Intents remembered: three seconds of them.
+const SENT: usize = 16;
+/// Unit of the time held.
+const TICK: Duration = Duration::from_millis(10);
+/// No message counts as later than this, seconds: nobody can make another vehicle useless by echoes that are wrong.
+const LATEST_S: f32 = 1.0;
+/// Until the first echo a message counts as this late, seconds.
+const UNKNOWN_S: f32 = 0.2;
+/// A shorter delay counts by this share at each echo, a longer one at once.
+const FORGETS: f32 = 0.125;
+
+/// What an intent says of another vehicle's last intent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Echo {
+    /// Rank of that vehicle in the roster, below 255.
+    pub rank: u8,
+    /// Sequence number of its frame.
+    pub sequence: u8,
+    /// Since when it has been here, in 10 ms; at most 254.
+    pub held: u8,
+}
+
+impl Echo {
+    /// Of a frame that was heard so long ago; none if that is too long.
+    pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
+        let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
+        let held = u8::try_from(held.micros() / TICK.micros()).ok().filter(|held| *held < u8::MAX)?;
+        Some(Self { rank, sequence, held })
+    }
+}
+
+/// The own intents sent last: number and time, a ring.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Sent {
+    ring: [Option<(u8, Instant)>; SENT],
+    count: usize,
+}
+
+impl Sent {
+    pub(crate) fn note(&mut self, sequence: u8, now: Instant) {
+        self.ring[self.count % SENT] = Some((sequence, now));
+        self.count = self.count.wrapping_add(1);
+    }
+
+    /// How many were sent.
+    pub(crate) fn count(&self) -> usize {
+        self.count
+    }
+
+    /// What a message takes one way, seconds, by an echo of an own intent.
+    pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
+        let (_, sent) = self.ring.iter().flatten().find(|(sequence, _)| *sequence == echo.sequence)?;
+        let round_s = (now - *sent).secs_f32() - f32::from(echo.held) * TICK.secs_f32();
+        Some((0.5 * round_s).clamp(0.0, LATEST_S))
+    }
+}
+
+/// How late a neighbour's messages are.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Lateness {
+    /// Seconds.
+    pub(crate) delay_s: f32,
+    known: bool,
+}
+
+impl Default for Lateness {
+    fn default() -> Self {
+        Self { delay_s: UNKNOWN_S, known: false }
+    }
+}
+
+impl Lateness {
+    pub(crate) fn take(&mut self, delay_s: f32) {
+        let share = if self.known && delay_s < self.delay_s { FORGETS } else { 1.0 };
+        self.delay_s += (delay_s - self.delay_s) * share;
+        self.known = true;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn half_the_round_trip_is_the_delay(
+            ways in proptest::collection::vec(0..900_u64, 1..60),
+            held in 0..2500_u64,
+        ) {
+            let (mut sent, mut late) = (Sent::default(), Lateness::default());
+            for (i, way) in ways.iter().enumerate() {
+                let now = Instant::from_millis(i as u64 * 200);
+                sent.note(i as u8, now);
+                let echo = Echo::new(3, i as u8, Duration::from_millis(held)).unwrap();
+                let back = now + Duration::from_millis(2 * way + held);
+                let delay_s = sent.delay_s(&echo, back).unwrap();
+                prop_assert!((delay_s - *way as f32 * 1e-3).abs() < 0.01);
+                late.take(delay_s);
+                prop_assert!(late.delay_s >= delay_s - 1e-6);
+            }
+        }
+
+        #[test]
+        fn wrong_echoes_stay_bounded(echoes in proptest::collection::vec((any::<u8>(), 0..255_u8, 0..60_000_u64), 1..50)) {
+            let (mut sent, mut late) = (Sent::default(), Lateness::default());
+            for i in 0..20 {
+                sent.note(i, Instant::from_millis(u64::from(i) * 200));
+            }
+            for (sequence, held, at_ms) in echoes {
+                let echo = Echo { rank: 0, sequence, held };
+                if let Some(delay_s) = sent.delay_s(&echo, Instant::from_millis(4000 + at_ms)) {
+                    late.take(delay_s);
+                }
+                prop_assert!((0.0..=LATEST_S).contains(&late.delay_s));
+            }
+        }
+    }
+
+    #[test]
+    fn too_old_is_no_echo() {
+        assert_eq!(Echo::new(1, 2, Duration::from_millis(2550)), None);
+        assert_eq!(Echo::new(255, 2, Duration::from_millis(0)), None);
+        assert!(Echo::new(254, 2, Duration::from_millis(2540)).is_some());
+    }
+}
