@@ -111,7 +111,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_blocked: self.guidance.filter.column_blocked_for(now),
             column_clear: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
-            can_turn_back: self.guidance.along_m() > 0.0 && !self.guidance.returning,
+            can_turn_back: self.guidance.along_m() > 0.0
+                && !self.guidance.returning
+                && !self.neighbours.is_deaf(now),
             yielded: self.guidance.filter.yielded_for(now),
             hindered: self.guidance.filter.hindered_for(now),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),

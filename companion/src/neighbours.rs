@@ -533,6 +533,11 @@ impl<const V: usize> Neighbours<V> {
         Some(&mut self.contacts[at].late)
     }
 
+    /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
+    pub(crate) fn is_deaf(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
+    }
+
     /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.
     pub(crate) fn may_lie_below(&self, i: usize, place: &Point, apart_m: f32) -> bool {
         let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {

@@ -384,9 +384,15 @@ impl Guidance {
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
+        let deaf = lands && neighbours.is_deaf(now);
         let mut near = 0;
         for i in 0..neighbours.len() {
             let Some(mut met) = neighbours.met(i, now) else { continue };
+            let by_gates = met.on_plan && self.on_plan(state, scene);
+            if by_gates {
+                // The gates keep two on the plan apart, however late their messages are.
+                met.heard.delay_s = 0.0;
+            }
             let silent = met.lost || met.heard.age_s > safety::FRESH_S;
             if lands && silent {
                 // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
@@ -398,8 +404,9 @@ impl Guidance {
                 // A place that anybody may claim keeps no vehicle in the air.
                 continue;
             }
-            // Only beside its own pad, and where no path leads back to it: everywhere else there is another place.
-            let last_place = self.returning || !self.on_path;
+            // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
+            // there is another place.
+            let last_place = self.returning || !self.on_path || deaf;
             let rests = (met.heard.grounded || met.lost) && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
@@ -410,7 +417,7 @@ impl Guidance {
             } else {
                 safety_m + STRAY_M
             };
-            if lands && silent && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
+            if lands && silent && !deaf && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
                 return Some(Found { id: met.id, yields: true, stranger: false });
             }
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
@@ -422,7 +429,6 @@ impl Guidance {
             near += 1;
             let yields = self.yields_to(state, scene, &met);
             // Between two on the plan the gates keep the order.
-            let by_gates = met.on_plan && self.on_plan(state, scene);
             let ahead_s = if yields && !by_gates { ahead_s } else { 0.0 };
             let found = Found { id: met.id, yields, stranger: met.stranger };
             if near > NEAR_MOST {
