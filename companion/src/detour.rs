@@ -153,7 +153,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
-            State::Scheduled => self.around.blocked || (held && self.guidance.advice.stop_within_m <= 0.05),
+            State::Scheduled => {
+                self.around.blocked
+                    || !self.guidance.filter.column_clear()
+                    || (held && self.guidance.advice.stop_within_m <= 0.05)
+            }
             State::Follow => held && stands,
             State::Climb => {
                 self.guidance.filter.is_stopped() && self.telemetry.velocity.norm() < STANDING_MPS
