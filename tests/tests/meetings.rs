@@ -37,13 +37,12 @@ fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
     }
 }
 
-/// What is asked for is no violation that a stop would have prevented, no touch by own motion, and everybody on the ground in
-/// the end. Until off-plan meetings of many vehicles keep that too, these shares of all meetings are not to be exceeded.
-const TOO_NEAR_MOST: f32 = 0.05;
-const TOUCHES_MOST: f32 = 0.04;
+/// Nobody touches another by its own motion. Of the rest some are left: landings beside a vehicle that lies near the only
+/// place, and vehicles of one plan each that wait for one another until the time is up. These shares are not to be exceeded.
+const TOO_NEAR_MOST: f32 = 0.01;
 const STUCK_MOST: f32 = 0.03;
 /// Meetings in which no stop would have kept the distance.
-const UNAVOIDABLE_MOST: f32 = 0.11;
+const UNAVOIDABLE_MOST: f32 = 0.05;
 
 #[test]
 fn companions_that_meet_at_random_keep_apart() {
@@ -53,7 +52,7 @@ fn companions_that_meet_at_random_keep_apart() {
     let sum = meeting::summary(&outcomes);
     let share = |count: usize| count as f32 / MEETINGS as f32;
     assert!(share(sum.too_near[0]) <= TOO_NEAR_MOST, "{sum}");
-    assert!(share(sum.touches.iter().sum()) <= TOUCHES_MOST, "{sum}");
+    assert_eq!(sum.touches, [0; 2], "{sum}");
     assert!(share(sum.stuck.iter().sum()) <= STUCK_MOST, "{sum}");
     assert!(share(sum.unavoidable[0]) <= UNAVOIDABLE_MOST, "{sum}");
     let mut setpoints = SetpointStats::default();

@@ -12,7 +12,7 @@ use std::time::Duration;
 use flockmate_tests::{Guard, Profile, chromium, host_sim};
 use host_sim::report::{
     Curve, Event, Level, Limit, MapSurface, Plot, ReportData, RoadmapLines, TrackPoint, VehicleTrack,
-    vehicle_color, write,
+    page as page_of, vehicle_color,
 };
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
@@ -200,7 +200,7 @@ fn page_opens_clean_and_shows_map_paths_and_moving_vehicles() {
     let Some(chromium) = chromium() else { return };
     let dir = tempfile::tempdir().expect("a directory");
     let page = dir.path().join("report.html");
-    write(&page, &report()).expect("the page is written");
+    std::fs::write(&page, page_of(&report()).expect("a page")).expect("the page is written");
     let size = fs::metadata(&page).expect("the page is there").len();
     assert!(size < 1_500_000, "{size} bytes");
 
@@ -256,8 +256,9 @@ fn map_style_and_roadmap_change_the_picture() {
     let dir = tempfile::tempdir().expect("a directory");
     let whole = dir.path().join("whole.html");
     let bare = dir.path().join("bare.html");
-    write(&whole, &report()).expect("the page is written");
-    write(&bare, &ReportData { roadmap: None, ..report() }).expect("the page is written");
+    std::fs::write(&whole, page_of(&report()).expect("a page")).expect("the page is written");
+    let plain = page_of(&ReportData { roadmap: None, ..report() }).expect("a page");
+    std::fs::write(&bare, plain).expect("the page is written");
     let pictures =
         [(&whole, "#map=x-ray"), (&whole, "#map=off"), (&whole, "#map=solid&cut=2.5"), (&bare, "#map=off")];
     let [glass, none, solid, bare] = pictures.map(|(page, hash)| picture(&chromium, page, hash));
