@@ -630,7 +630,10 @@ impl Guidance {
             self.progress_at = now;
         }
         if self.phase == Phase::Join && (leg.length_m() < LEG_LEAST_M || self.leg_done()) {
-            (self.phase, self.leg) = (Phase::Path, None);
+            // Back up a descent it ends where that began: beside the path yet.
+            let beside_m = (target - raw).norm();
+            let joined = beside_m < LEG_LEAST_M + JOIN_MPS * TICK_S;
+            (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
         }
         reference.map_or(raw, |reference| reference.position)
     }

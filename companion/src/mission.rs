@@ -330,6 +330,8 @@ pub enum Guard {
     DetourFailed,
     /// There was none several times, and no neighbour is below.
     NoWayAround,
+    /// The same, but somebody lies below, and the path leads back to the pad.
+    NoWayOn,
     /// For the limit it waited where a vehicle lands without looking, and its own path led to no better place.
     Underneath,
     /// Standing still.
@@ -603,6 +605,7 @@ impl Guard {
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
             Self::NoWayAround => i.detours_failed >= DETOURS_TRIED && i.room_below,
+            Self::NoWayOn => i.detours_failed >= DETOURS_TRIED && i.can_turn_back,
             Self::Underneath => i.underneath > limit,
             Self::Standing => i.standing,
         }

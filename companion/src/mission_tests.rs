@@ -221,6 +221,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::DetourReady => i.detour_ready = true,
         G::DetourFailed => i.plan_failed = true,
         G::NoWayAround => (i.detours_failed, i.room_below) = (9, true),
+        G::NoWayOn => (i.detours_failed, i.can_turn_back) = (9, true),
         G::Underneath => i.underneath = long,
         G::Standing => i.standing = true,
     }

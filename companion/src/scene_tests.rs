@@ -362,6 +362,20 @@ fn every_row_has_its_scene() {
         Aborted,
         120.0,
     );
+    // It lies so near that there is no room to land either: back along the path there is.
+    scene(
+        accompanied(),
+        &|b| {
+            b.answer_detour = no_way;
+            lies(b);
+            b.until(Blocked, 5.0);
+            b.run(1.0);
+            b.neighbour = Some((Point::new(b.enu.x + 1.2, b.enu.y, 0.1), OUT | GROUNDED, 0.0, 5));
+            b.until(Follow, 120.0);
+        },
+        Aborted,
+        60.0,
+    );
     // One comes down on the first stretch of the path: there is no place before it, so it goes aside, as often as need be.
     scene(
         Bench::accompanied(two_vehicles()),

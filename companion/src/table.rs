@@ -184,6 +184,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
     info(&[Blocked],          G::PathClear,        NOW,    Follow,          A::RunPath,     "Path clear again"),
     warn(&[Blocked],          G::NoWayAround,      NOW,    Land,            A::AskLand,     "No way around: landing"),
+    warn(&[Blocked],          G::NoWayOn,          NOW,    Follow,          A::TurnBack,    "No way around, no room below: flying back"),
     warn(&[Blocked],          G::Stalled,          s(600), Land,            A::AskLand,     "Path blocked for 10 min: landing"),
     warn(&[Follow, Blocked],  G::Underneath,       s(1),   Replanning,      A::RequestAside, "Under one that lands: planning aside"),
     info(&[Blocked],          G::OurTurn,          NOW,    Replanning,      A::RequestDetour, "All others stand: planning around"),
