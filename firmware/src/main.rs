@@ -41,6 +41,7 @@ const MISSION_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
 // `memory.x` names these: each lies where it says. Their first values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
+static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
 static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
 static OWN_PLAN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
@@ -115,7 +116,20 @@ async fn work(
     );
     let aside = [(roadmap_aside, ROADMAP_ASIDE), (mission_aside, MISSION_ASIDE)];
     let aside = aside.into_iter().filter_map(|(is, text)| is.then_some(text));
-    bring_up(shell, store, known, mission.as_ref(), said, aside);
+    let own = mission.as_ref().map(|mission| mission.config(system_id));
+    let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
+    let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
+    // Made in the task's own memory: the stack has no room for it beside what making it takes.
+    let mut companion = BoardCompanion::new(config).expect("every setting was checked");
+    companion.mount(store);
+    if let Some(text) = said.crashed {
+        companion.say(true, CRASH.init(text).as_str());
+    }
+    said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
+    if is_stranger {
+        companion.say(true, STRANGER);
+    }
+    shell.start(COMPANION.init(companion));
     start_links(links, shell, known.is_none(), autopilot, swarm);
     let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
     let mut planner = Planner { roadmap, mission, system_id, files, memory };
@@ -169,33 +183,6 @@ fn find_mission(
     let mission = MissionView::parse(bytes).ok().filter(|mission| mission.fits(roadmap));
     crash::finish();
     (mission, files, false)
-}
-
-/// Puts the companion into the shell, and what is to be said into the companion. Not part of the
-/// task: what a task holds lies in its memory for good.
-#[inline(never)]
-fn bring_up(
-    shell: &Shell,
-    store: Store,
-    known: Option<u8>,
-    mission: Option<&MissionView<'_>>,
-    said: Said,
-    aside: impl Iterator<Item = &'static str>,
-) {
-    let system_id = known.unwrap_or(NO_AUTOPILOT);
-    let own = mission.map(|mission| mission.config(system_id));
-    let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
-    let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
-    let mut companion = BoardCompanion::new(config).expect("every setting was checked");
-    companion.mount(store);
-    if let Some(text) = said.crashed {
-        companion.say(true, CRASH.init(text).as_str());
-    }
-    said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
-    if is_stranger {
-        companion.say(true, STRANGER);
-    }
-    shell.start(companion);
 }
 
 fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {

@@ -44,7 +44,7 @@ type Shared<T> = Signal<CriticalSectionRawMutex, T>;
 
 /// What the tasks share.
 pub struct Shell {
-    companion: Mutex<HoldsExecutors, RefCell<Option<BoardCompanion>>>,
+    companion: Mutex<HoldsExecutors, RefCell<Option<&'static mut BoardCompanion>>>,
     /// Something may be to be sent.
     sends: [Shared<()>; 2],
     /// The companion's next step may be due earlier than thought.
@@ -185,7 +185,7 @@ impl Shell {
 
     /// Puts the companion in, before any task of links or time starts. Until then the board is
     /// alive for no longer than [`STARTS_WITHIN_MS`].
-    pub fn start(&self, companion: BoardCompanion) {
+    pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
         (0..TASKS).for_each(|task| self.seen(task));
         self.started.store(true, Ordering::Relaxed);
@@ -194,7 +194,7 @@ impl Shell {
     /// Holds the companion for the time of `work`.
     fn hold<T>(&self, work: impl FnOnce(&mut BoardCompanion) -> T) -> T {
         self.companion.lock(|held| {
-            work(held.borrow_mut().as_mut().expect("the companion is put in before any task starts"))
+            work(held.borrow_mut().as_deref_mut().expect("the companion is put in before any task starts"))
         })
     }
 

@@ -87,7 +87,7 @@ fn texts(bytes: &[u8]) -> Vec<String> {
 fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     let config = Config::new(1, Point::zeros(), Geodetic { lat_deg: 47.0, lon_deg: 8.0, alt_m: 500.0 });
     let shell: &'static Shell = Box::leak(Box::new(Shell::new()));
-    shell.start(BoardCompanion::new(config).expect("the settings are good"));
+    shell.start(Box::leak(Box::new(BoardCompanion::new(config).expect("the settings are good"))));
     let lines = [Line::default(), Line::default()];
     let mut receives = pin!(shell.receive(Link::Autopilot, End(&lines[0]), false));
     let mut transmits = pin!(shell.transmit(Link::Autopilot, End(&lines[0])));
