@@ -263,7 +263,12 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
         // Places that there are none of have no edges.
         for range in [0..2, 1..usize::MAX, usize::MAX..usize::MAX] {
             let found = to.call("prm::connect_range", || {
-                prm::connect_range(&grid, &index, &good, range, |_| Err(PrmError::RoadmapFull))
+                prm::connect_range(&grid, &index, &good, range.clone(), |_| Err(PrmError::RoadmapFull))
+            });
+            to.is(found.is_ok());
+            let full = |_: prm::Edge, _: f32| Err(PrmError::RoadmapFull);
+            let found = to.call("prm::connect_range_with", || {
+                prm::connect_range_with(&grid, &index, &good, range, |_| None, full)
             });
             to.is(found.is_ok());
         }
