@@ -26,10 +26,6 @@ const JERK_MPS3: f32 = 8.0;
 const SILENT_S: f32 = 3.0;
 /// So much of the way has to be free before the vehicle goes on, metres.
 const RESUME_M: f32 = 1.0;
-/// And so much before a vehicle that stands begins to move: less is flown before the filter sees it move.
-const START_M: f32 = 0.15;
-/// Slower than this stands, m/s.
-const START_MPS: f32 = 0.1;
 /// And for so long.
 const CLEAR: Duration = Duration::from_millis(300);
 /// The vehicle that yields waits until so many seconds of the other one's way are free.
@@ -243,11 +239,7 @@ impl Guidance {
             self.filter.back = back;
         }
         let stopped = self.filter.is_stopped();
-        let extra_m = match stopped {
-            true => RESUME_M,
-            false if self.door.velocity().norm_squared() < START_MPS * START_MPS => START_M,
-            false => 0.0,
-        };
+        let extra_m = if stopped { RESUME_M } else { 0.0 };
         let bounds = self.bounds();
         let own = match way {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
