@@ -437,7 +437,7 @@ fn what_came_of_an_earlier_request_of_the_same_number_is_not_told_of_a_later_one
         damaged[100] ^= 1;
         assert_eq!(world.upload("roadmap.bin", &damaged, 239).opcode, NAK);
         world.now = world.now + Duration::from_secs(pause);
-        // A client that was started anew counts from zero again, and hears no late answers.
+        // A client that was restarted counts from zero again, and hears no late answers.
         world.sequence = 0;
         world.heard.clear();
         assert_eq!(world.upload("roadmap.bin", &good, 239).opcode, ACK, "{pause} s later");

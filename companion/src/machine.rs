@@ -367,7 +367,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if change == Change::OriginLost {
                     self.origin_at = self.now;
-                    // It may have been started anew and know nothing of the streams we asked for. Positions that jump
+                    // It may have been restarted and know nothing of the streams we asked for. Positions that jump
                     // again and again are no reason to flood it.
                     if self.now >= self.streams_at {
                         self.ask_for_streams();
@@ -501,7 +501,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let flows = setpoints_flow(self.state);
         self.setpoint_due = flows;
         let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
-        // Steps keep their rhythm; after a long gap the rhythm starts anew instead of catching up.
+        // Steps keep their rhythm; after a long gap the rhythm restarts instead of catching up.
         let due = self.next_step + every;
         self.next_step = if due > now { due } else { now + every };
     }

@@ -20,7 +20,7 @@ use crate::machine::STANDING_MPS;
 use crate::telemetry::SequenceFilter;
 use crate::time::{Duration, Instant};
 
-/// A position older than the one held by less than this is late; by more, the sender was started anew.
+/// A position older than the one held by less than this is late; by more, the sender was restarted.
 const RESTART_MS: u32 = 10_000;
 /// Heard within this time counts as heard: four positions and intents.
 const LATELY: Duration = Duration::from_millis(800);
@@ -135,7 +135,7 @@ impl Contact {
 
     /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at
     /// `fastest_mps`. The rest comes by and by, a landing that reports the whole way at once too. Less than before is
-    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle started anew too.
+    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle that was restarted too.
     fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
         let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
         let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));

@@ -204,7 +204,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.answer_to(link, sender, Kind::Parameter, error);
     }
 
-    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion starts anew, unless the vehicle is armed.
+    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.
     pub(crate) fn restart(&mut self, command: &Command) -> u8 {
         let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
         if !asked {

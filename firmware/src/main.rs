@@ -209,7 +209,7 @@ async fn keep_time(shell: &'static Shell) {
     shell.keep_time().await
 }
 
-/// Feeds the watchdog while all is well, and starts anew when that is asked for.
+/// Feeds the watchdog while all is well, and restarts when that is asked for.
 #[task]
 async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {

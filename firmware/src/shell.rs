@@ -101,7 +101,7 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
     ear.loudest()
 }
 
-/// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it starts anew.
+/// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it restarts.
 pub const NO_AUTOPILOT: u8 = 250;
 /// An autopilot tells of itself once a second.
 const HEAR_WITHIN: Duration = Duration::from_secs(3);
@@ -239,7 +239,7 @@ impl Shell {
 
     /// Takes what a UART receives to the companion.
     ///
-    /// A board without an autopilot starts anew when it hears one, if `for_autopilot`.
+    /// A board without an autopilot restarts when it hears one, if `for_autopilot`.
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
         let mut chunk = [0; CHUNK];
         let mut ear = for_autopilot.then(Ear::new);

@@ -1,6 +1,6 @@
 //! Planning for a swarm of UAVs: maths over borrowed memory.
 //!
-//! No allocation, no I/O, no clock, no MAVLink. Lengths are metres, times seconds, angles degrees where a name says
+//! No allocation, no I/O, no clock, no protocol. Lengths are metres, times seconds, angles degrees where a name says
 //! `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission frame.
 #![no_std]
 #![forbid(unsafe_code)]

@@ -50,7 +50,7 @@ pub struct Heard {
     pub commands: Vec<(u32, f32)>,
     /// Its state as last told.
     pub state: State,
-    /// Frames missing in the row of each line, by their numbers. A companion that starts anew counts from zero, which shows too.
+    /// Frames missing in the row of each line, by their numbers. A companion that restarts counts from zero, which shows too.
     pub missing: [u32; 2],
     last: [Option<u8>; 2],
 }

@@ -38,7 +38,7 @@ pub enum Job {
 }
 
 impl Store {
-    /// What the shell is to do next, once; then [`Self::handle`] is told. Areas are erased only
+    /// What the shell is to do next, once; its result goes to [`Self::handle`]. Areas are erased only
     /// where that is allowed; a flash that stalls the processor only reads where it is forbidden.
     pub fn poll(&mut self, erasing: Erasing) -> Option<FlashRequest<'_>> {
         if self.asked {

@@ -67,14 +67,14 @@ pub fn finish() {
     change(Kept::finish);
 }
 
-/// Starts anew, as somebody asked for: there is nothing to tell.
+/// Restarts, as somebody asked for: there is nothing to tell.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
     change(Kept::ask);
     chosen::reset()
 }
 
-/// Keeps what happened, logs it and starts anew. Kept first, and logged once: what is wrong may be the log.
+/// Keeps what happened, logs it and restarts. Kept first, and logged once: what is wrong may be the log.
 fn end(text: &str) -> ! {
     cortex_m::interrupt::disable();
     let ended = change(|kept| {
@@ -90,7 +90,7 @@ fn end(text: &str) -> ! {
     chosen::reset()
 }
 
-/// Keeps where it was and starts anew. What runs above it does not go on in a program that is wrong.
+/// Keeps where it was and restarts. What runs above it does not go on in a program that is wrong.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut text = String::<200>::new();
@@ -108,7 +108,7 @@ pub fn guard() -> Range<u32> {
     end - super::GUARD_LEN..end
 }
 
-/// Keeps the program counter of a fault and starts anew.
+/// Keeps the program counter of a fault and restarts.
 pub fn faulted(pc: u32) -> ! {
     // SAFETY: registers that are read.
     let scb = unsafe { &*SCB::PTR };

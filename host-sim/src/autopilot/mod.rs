@@ -293,7 +293,7 @@ impl Autopilot {
         }
     }
 
-    /// Starts anew: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
+    /// Restarts: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
     /// falls.
     pub fn reboot(&mut self) {
         let body = &self.body;

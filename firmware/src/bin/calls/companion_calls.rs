@@ -176,7 +176,7 @@ struct Ground<'a, M> {
 }
 
 impl<M: Meter> Ground<'_, M> {
-    /// Uploads a roadmap, reads it back, sets all parameters, starts anew.
+    /// Uploads a roadmap, reads it back, sets all parameters, restarts.
     fn run(mut self) {
         self.mount();
         let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");

@@ -32,7 +32,7 @@ pub fn reset_cause() -> ResetCause {
     cause
 }
 
-/// Starts anew.
+/// Restarts.
 pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }

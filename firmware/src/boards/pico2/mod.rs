@@ -11,7 +11,7 @@
 //! refused in flight, and parameters are kept when it is over.
 //!
 //! `SYSRESETREQ` resets the processor and leaves watchdog, UARTs and all else as they are: so this
-//! board starts anew by its watchdog, which resets all of it but the oscillators.
+//! board restarts by its watchdog, which resets all of it but the oscillators.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
 use companion::store::{Fault, Layout, ReadFlash};
@@ -80,7 +80,7 @@ pub fn reset_cause() -> ResetCause {
     rp2350::reset_cause(chip, pac::WATCHDOG.reason().read().0)
 }
 
-/// Starts anew: by the watchdog, at once.
+/// Restarts: by the watchdog, at once.
 pub fn reset() -> ! {
     set_watchdog_resets();
     pac::WATCHDOG.ctrl().modify(|w| w.set_trigger(true));

@@ -26,7 +26,7 @@ pub fn reset_cause() -> ResetCause {
     ResetCause::Unknown
 }
 
-/// Starts anew.
+/// Restarts.
 pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
