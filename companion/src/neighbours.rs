@@ -535,7 +535,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
     pub(crate) fn is_deaf(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
+        self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
     }
 
     /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.

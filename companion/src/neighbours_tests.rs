@@ -250,3 +250,14 @@ proptest::proptest! {
         proptest::prop_assert_eq!(place_of(&lying), Some(250.0));
     }
 }
+
+#[test]
+fn deaf_is_who_hears_none_of_those_there_are() {
+    let at = |seconds: u64| Instant::from_millis(seconds * 1000);
+    assert!(!Neighbours::<4>::new(&[], 1, 2.0).is_deaf(at(100)), "alone there is nobody to hear");
+    let roster = [1, 2, 9].map(|system_id| RosterEntry { system_id, start: Point::zeros() });
+    let mut table = Neighbours::<4>::new(&roster, 1, 2.0);
+    table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
+    assert!(!table.is_deaf(at(12)), "one is heard");
+    assert!(table.is_deaf(at(14)));
+}
