@@ -7,6 +7,7 @@ pub mod fidelity;
 pub mod hostile;
 pub mod logs;
 pub mod meeting;
+pub mod roadmaps;
 pub mod setpoints;
 pub mod swarms;
 pub mod vehicle;

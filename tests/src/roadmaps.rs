@@ -1,0 +1,342 @@
+//! Roadmap files whose CRC is right and whose contents are not: refused, or every search on them is right and ends within
+//! its bound.
+//!
+//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must find is told by Dijkstra
+//! 1959 in f64. A search may ask about each half-edge once.
+
+use std::cell::Cell;
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, VecDeque};
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec as Few;
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use planner_core::path::Path;
+use planner_core::prm::squared_length;
+use planner_core::roadmap::{
+    Edge, HEADER_LEN, HalfEdge, LANDMARKS, RoadmapError, RoadmapHeader, RoadmapView, encoded_len,
+    write_with_landmarks,
+};
+use planner_core::schedule::sipp::{self, Route, SippWorkspace};
+use planner_core::schedule::{Flight, PIECE_M, ScheduleConfig};
+use planner_core::search::{SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row};
+
+use crate::hostile::{Bytes, Entropy};
+use crate::meeting::dice::Dice;
+
+/// Most nodes of a file: 300, and some room.
+const NODES: usize = 512;
+const HEADER: RoadmapHeader = RoadmapHeader {
+    origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
+    edge_min_m: 0.5,
+    edge_max_m: 8.0,
+    tested_clearance_m: 0.25,
+    max_clearance_m: 10.0,
+    starts: 2,
+    goals: 2,
+};
+const SCHEDULE: ScheduleConfig =
+    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+/// Clearance of vehicles that some edges are too narrow for, metres.
+const WIDE_M: f32 = 1.5;
+/// Bytes of a word, of a node, of a node's ways to the landmarks.
+const WORD: usize = 4;
+const NODE: usize = 12;
+const WAYS: usize = WORD * LANDMARKS;
+
+/// Forges files, one after the other.
+pub struct Forger {
+    original: Vec<u8>,
+    search: Box<SearchWorkspace<NODES>>,
+    sipp: Box<SippWorkspace<NODES, 8>>,
+}
+
+/// Forges one file as a fuzzer's bytes say.
+///
+/// # Panics
+/// It is accepted and a search is wrong.
+pub fn attack(data: &[u8]) {
+    let mut bytes = Bytes(data);
+    let seed = bytes.bits() % 256;
+    let _ = Forger::new(&mut Dice::new(seed)).forge(&mut bytes);
+}
+
+impl Forger {
+    /// One that forges a random roadmap.
+    ///
+    /// # Panics
+    /// A search on the roadmap itself is wrong.
+    pub fn new(dice: &mut Dice) -> Self {
+        let mut search = Box::new(SearchWorkspace::new());
+        let original = random_roadmap(dice, &mut search);
+        let mut forger = Self { original, search, sipp: Box::new(SippWorkspace::new()) };
+        forger.check(&forger.original.clone(), dice).expect("nothing is changed yet");
+        forger
+    }
+
+    /// Changes some of the roadmap's file, makes its CRC right again, and searches what is accepted.
+    ///
+    /// # Errors
+    /// Why the file is refused.
+    ///
+    /// # Panics
+    /// It is accepted and a search is wrong.
+    pub fn forge(&mut self, entropy: &mut impl Entropy) -> Result<(), RoadmapError> {
+        let mut bytes = self.original.clone();
+        if entropy.bits().is_multiple_of(8) {
+            lengthen_ways(&mut bytes);
+        } else {
+            mutate(entropy, &mut bytes);
+        }
+        let end = bytes.len() - WORD;
+        let crc = Crc::<u32>::new(&CRC_32_ISO_HDLC).checksum(&bytes[..end]);
+        bytes[end..].copy_from_slice(&crc.to_le_bytes());
+        self.check(&bytes, entropy)
+    }
+
+    fn check(&mut self, bytes: &[u8], entropy: &mut impl Entropy) -> Result<(), RoadmapError> {
+        let view = RoadmapView::parse(bytes)?;
+        read_all(&view);
+        if view.node_count() == 0 {
+            return Ok(());
+        }
+        if view.has_landmarks() {
+            landmarks_are_right(&view, bytes);
+        }
+        for required_m in [0.0, WIDE_M] {
+            let mut node = || (entropy.bits() % view.node_count() as u64) as u16;
+            let (from, to) = ([node(), node()], [node(), node()]);
+            searches_are_right(&view, from, to, required_m, &mut self.search);
+        }
+        self.routes_are_right(&view);
+        Ok(())
+    }
+
+    /// Alone in the air, the way past others is the shortest there is.
+    fn routes_are_right(&mut self, view: &RoadmapView<'_>) {
+        let (starts, goals) = (view.header().starts, view.header().goals);
+        if starts == 0 || goals == 0 {
+            return;
+        }
+        let route = Route { from: 0, to: starts, not_before_s: 0.0, parked: &[] };
+        let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
+        let mut flight = Flight::<NODES> {
+            id: 1,
+            goal: Some(0),
+            path: Path::new(),
+            climb_m: 1.5,
+            descent_m: 1.5,
+            depart_s: 0.0,
+            piece_m: PIECE_M,
+        };
+        let asked = Cell::new(0);
+        let any = |_: u16, _: &HalfEdge| {
+            asked.set(asked.get() + 1);
+            true
+        };
+        let found = sipp::route(&SCHEDULE, view, &route, any, [].iter(), &mut self.sipp, &mut flight);
+        assert!(asked.get() <= view.half_edge_count(), "{} half-edges asked about", asked.get());
+        match found {
+            Ok(()) => near(f64::from(flight.path.length_m()), way),
+            Err(error) => assert!(way.is_infinite(), "{error:?} {way}"),
+        }
+    }
+}
+
+/// A length, and what it should be, metres.
+#[track_caller]
+fn near(found: f64, way: f64) {
+    assert!(found == way || (found - way).abs() <= 1e-5 * (1.0 + way), "{found} in place of {way}");
+}
+
+/// Nodes anywhere, joined where they are near: some of them may be apart from the rest.
+fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u8> {
+    let count = 20 + dice.below(281);
+    let side_m = 4.0 * (count as f32).cbrt() * dice.real(0.5, 1.5);
+    let corner = Point::new(side_m, side_m, side_m);
+    let nodes: Vec<Point> = (0..count).map(|_| dice.point(Point::zeros(), corner)).collect();
+    let range = HEADER.edge_min_m * HEADER.edge_min_m..=HEADER.edge_max_m * HEADER.edge_max_m;
+    let mut edges = Vec::new();
+    for (a, b) in (0..count).flat_map(|a| (a + 1..count).map(move |b| (a, b))) {
+        if range.contains(&squared_length(nodes[a].into(), nodes[b].into())) && dice.chance(0.5) {
+            edges.push(Edge { a: a as u16, b: b as u16, clearance_m: dice.real(0.25, 3.25) });
+        }
+    }
+    let mut out = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
+    let written = write_with_landmarks(&HEADER, &nodes, &edges, search, &mut out);
+    assert_eq!(written, Ok(out.len()));
+    out
+}
+
+fn word(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(bytes[at..at + WORD].try_into().expect("four bytes"))
+}
+
+/// Where the header says that nodes, offsets, half-edges and ways to the landmarks end, one after the other.
+fn sizes(bytes: &[u8]) -> [usize; 5] {
+    let (nodes, half_edges) = (word(bytes, 60) as usize, word(bytes, 64) as usize);
+    [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS]
+}
+
+/// Changes one or a few words of a file: of the header, a node, an offset, a half-edge, a way to a landmark; or the
+/// ways to a landmark by a constant, which differences between neighbours do not show.
+fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
+    let sizes = sizes(bytes);
+    for _ in 0..1 + entropy.bits() % 3 {
+        let (choice, value) = (entropy.bits(), entropy.bits());
+        // Half of the changes go to the landmarks, which nothing else in the file explains.
+        let part = (choice % 8).min(sizes.len() as u64 - 1) as usize;
+        let begin: usize = sizes[..part].iter().sum();
+        let at = begin + (choice >> 32) as usize % (sizes[part] / WORD).max(1) * WORD;
+        let (old, share) = (word(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
+        let new = match (choice >> 8) % 8 {
+            0 => old ^ 1 << (value % 32),
+            1 => value as u32,
+            2 => (f32::from_bits(old) * (0.5 + share)).to_bits(),
+            3 => (f32::from_bits(old) + 4.0 * share - 2.0).to_bits(),
+            4 => old.wrapping_add((value % 3) as u32).wrapping_sub(1),
+            5 => [f32::NAN, f32::INFINITY, -0.0, 0.0, 1e30, -1.0, 16_384.0, 65_536.0][(value % 8) as usize]
+                .to_bits(),
+            6 => word(bytes, HEADER_LEN + value as usize % ((bytes.len() - HEADER_LEN) / WORD) * WORD),
+            _ => {
+                let landmarks = sizes[..4].iter().sum::<usize>();
+                let column = bytes[landmarks..landmarks + sizes[4]].as_chunks_mut::<WORD>().0;
+                for way in column.iter_mut().skip((value % 2) as usize).step_by(LANDMARKS) {
+                    *way = (f32::from_le_bytes(*way) + 60_000.0 * share).to_le_bytes();
+                }
+                continue;
+            }
+        };
+        bytes[at..at + WORD].copy_from_slice(&new.to_le_bytes());
+    }
+}
+
+/// Puts the lengths along ways of fewest edges in place of the shortest: each is a sum of edges, and many are right.
+fn lengthen_ways(bytes: &mut [u8]) {
+    let view = RoadmapView::parse(bytes).expect("nothing is changed yet");
+    let mut ways = vec![[0.0_f32; LANDMARKS]; view.node_count()];
+    let mut landmark = 0;
+    for column in 0..LANDMARKS {
+        let (mut seen, mut open) = (vec![false; ways.len()], VecDeque::from([landmark]));
+        seen[usize::from(landmark)] = true;
+        while let Some(node) = open.pop_front() {
+            for edge in view.half_edges(node) {
+                let target = usize::from(edge.target);
+                if !std::mem::replace(&mut seen[target], true) {
+                    ways[target][column] =
+                        ways[usize::from(node)][column] + view.distance_m(node, edge.target);
+                    open.push_back(edge.target);
+                }
+            }
+        }
+        let farther = |best: u16, node: u16| ways[usize::from(node)][0] > ways[usize::from(best)][0];
+        landmark = (0..ways.len() as u16).fold(0, |best, node| if farther(best, node) { node } else { best });
+    }
+    let sizes = sizes(bytes);
+    let begin: usize = sizes[..4].iter().sum();
+    let column = &mut bytes[begin..begin + sizes[4]];
+    for (stored, way) in column.as_chunks_mut::<WORD>().0.iter_mut().zip(ways.iter().flatten()) {
+        *stored = way.to_le_bytes();
+    }
+}
+
+/// Whatever was accepted can be read everywhere.
+fn read_all(view: &RoadmapView<'_>) {
+    for node in 0..view.node_count() as u16 {
+        assert!(view.node(node).iter().all(|c| c.is_finite()));
+        for edge in view.half_edges(node) {
+            assert!(view.distance_m(node, edge.target) > 0.0);
+            let back = view.edge_between(edge.target, node).expect("each edge has its opposite");
+            assert_eq!(back.clearance_m, edge.clearance_m);
+        }
+    }
+}
+
+/// Lengths of the shortest ways from a node over edges that are wide enough, in f64 (Dijkstra 1959).
+fn lengths_from(view: &RoadmapView<'_>, from: u16, required_m: f32) -> Vec<f64> {
+    let mut ways = vec![f64::INFINITY; view.node_count()];
+    ways[usize::from(from)] = 0.0;
+    // The bits of positive floats are in their order.
+    let mut open = BinaryHeap::from([(Reverse(0_u64), from)]);
+    while let Some((Reverse(bits), node)) = open.pop() {
+        let here = f64::from_bits(bits);
+        if here > ways[usize::from(node)] {
+            continue;
+        }
+        for edge in view.half_edges(node).filter(|edge| view.clears(edge, required_m)) {
+            let way = here + (view.node(edge.target) - view.node(node)).cast::<f64>().norm();
+            if way < ways[usize::from(edge.target)] {
+                ways[usize::from(edge.target)] = way;
+                open.push((Reverse(way.to_bits()), edge.target));
+            }
+        }
+    }
+    ways
+}
+
+/// The ways to the landmarks, node 0 and the node farthest from it, are as long as the file says; 0 where there is none.
+fn landmarks_are_right(view: &RoadmapView<'_>, bytes: &[u8]) {
+    let begin: usize = sizes(bytes)[..4].iter().sum();
+    let stored =
+        |node: usize, landmark: usize| f32::from_bits(word(bytes, begin + node * WAYS + landmark * WORD));
+    let farthest = (0..view.node_count())
+        .fold(0, |best, node| if stored(node, 0) > stored(best, 0) { node } else { best });
+    for (landmark, from) in [0, farthest as u16].into_iter().enumerate() {
+        for (node, way) in lengths_from(view, from, 0.0).into_iter().enumerate() {
+            near(f64::from(stored(node, landmark)), if way.is_finite() { way } else { 0.0 });
+        }
+    }
+}
+
+/// Every kind of search between four nodes finds what there is, and asks about each half-edge once at most.
+fn searches_are_right(
+    view: &RoadmapView<'_>,
+    from: [u16; 2],
+    to: [u16; 2],
+    required_m: f32,
+    ws: &mut SearchWorkspace<NODES>,
+) {
+    let asked = Cell::new(0);
+    let passable = |_: u16, edge: &HalfEdge| {
+        asked.set(asked.get() + 1);
+        view.clears(edge, required_m)
+    };
+    let bounded = |searches: usize| {
+        assert!(asked.get() <= searches * view.half_edge_count(), "{} half-edges asked about", asked.get());
+        asked.set(0);
+    };
+    let ways = from.map(|node| lengths_from(view, node, required_m));
+    let way = |i: usize, node: u16| ways[i][usize::from(node)];
+
+    let mut path = Few::<u16, NODES>::new();
+    match astar(view, from[0], to[0], passable, ws, &mut path) {
+        Ok(length_m) => {
+            near(f64::from(length_m), way(0, to[0]));
+            assert_eq!((path.first(), path.last()), (Some(&from[0]), Some(&to[0])));
+            let legs = path.windows(2).map(|leg| {
+                let edge = view.edge_between(leg[0], leg[1]).expect("a path joins nodes by edges");
+                assert!(view.clears(&edge, required_m), "{edge:?}");
+                f64::from(view.distance_m(leg[0], leg[1]))
+            });
+            near(legs.sum(), way(0, to[0]));
+        }
+        error => assert!(error == Err(SearchError::NoPath) && way(0, to[0]).is_infinite(), "{error:?}"),
+    }
+    bounded(1);
+
+    let mut row = [0.0; 2];
+    dijkstra_row(view, from[0], &to, passable, ws, &mut row).expect("the nodes exist");
+    bounded(1);
+    let mut matrix = [0.0; 4];
+    cost_matrix(view, &from, &to, passable, ws, &mut matrix).expect("the nodes exist");
+    bounded(2);
+    for (j, &node) in to.iter().enumerate() {
+        near(f64::from(row[j]), way(0, node));
+        (0..2).for_each(|i| near(f64::from(matrix[2 * i + j]), way(i, node)));
+    }
+
+    dijkstra_all(view, from[1], passable, ws).expect("the node exists");
+    bounded(1);
+    (0..view.node_count() as u16).for_each(|node| near(f64::from(ws.distance_m(node)), way(1, node)));
+}

@@ -1,0 +1,49 @@
+//! Roadmap files that somebody changed and gave the right CRC: refused, or every search is right and bounded.
+
+use std::collections::BTreeMap;
+
+use flockmate_tests::meeting::dice::Dice;
+use flockmate_tests::roadmaps::Forger;
+
+/// Files forged of one roadmap.
+const OF_ONE: usize = 50;
+
+/// `FLOCKMATE_FILES` sets how many; CI forges a few.
+#[test]
+fn forged_files_are_refused_or_searched_right() {
+    let files = std::env::var("FLOCKMATE_FILES").map_or(20_000, |count| count.parse().expect("a number"));
+    let mut dice = Dice::new(1);
+    let mut forger = Forger::new(&mut dice);
+    let mut verdicts: BTreeMap<String, usize> = BTreeMap::new();
+    for file in 0..files {
+        if file % OF_ONE == 0 {
+            forger = Forger::new(&mut dice);
+        }
+        let verdict = match forger.forge(&mut dice) {
+            Ok(()) => "searched".to_owned(),
+            // The name of the error without its numbers.
+            Err(error) => format!("{error:?}").split(['(', ' ']).next().unwrap_or_default().to_owned(),
+        };
+        *verdicts.entry(verdict).or_default() += 1;
+    }
+    println!("{files} forged files: {verdicts:?}");
+    let seen = |verdict: &str| verdicts.get(verdict).copied().unwrap_or(0);
+    assert!(seen("searched") > files / 100, "{verdicts:?}");
+    // Each check of a reader was what refused some of them.
+    for check in [
+        "Magic",
+        "Version",
+        "Length",
+        "TooManyNodes",
+        "Header",
+        "Node",
+        "Offset",
+        "Target",
+        "OneWay",
+        "EdgeClearance",
+        "EdgeLength",
+        "Landmark",
+    ] {
+        assert!(seen(check) > 0, "{check}: {verdicts:?}");
+    }
+}
