@@ -6,6 +6,8 @@
 #![no_main]
 #![expect(unsafe_code, reason = "the handler of faults, and where a static lies")]
 
+use core::fmt::Write as _;
+
 use companion::mission_file::{self, MissionError, MissionView};
 use companion::store::{ReadFlash, Store};
 use companion::{Config, Link};
@@ -47,6 +49,7 @@ static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStatic
 static OWN_PLAN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
 static MISSION_BYTES: ConstStaticCell<[u8; MISSION]> = ConstStaticCell::new([0; MISSION]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
+static REFUSED: StaticCell<String<50>> = StaticCell::new();
 
 defmt::timestamp!("{=u64:us}", embassy_time::Instant::now().as_micros());
 
@@ -102,7 +105,8 @@ async fn work(
     let mut store = Store::mount(LAYOUT, &mut flash);
     let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
     let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
-    let (mission, files, mission_aside) = find_mission(&store, &mut flash, roadmap.as_ref());
+    let FoundMission { mission, files, aside: mission_aside, refused } =
+        find_mission(&store, &mut flash, roadmap.as_ref());
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
         None => hear_system_id(&mut autopilot.0).await,
@@ -118,6 +122,8 @@ async fn work(
     let aside = aside.into_iter().filter_map(|(is, text)| is.then_some(text));
     let own = mission.as_ref().map(|mission| mission.config(system_id));
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
+    let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
+    let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
     // Made in the task's own memory: the stack has no room for it beside what making it takes.
     let mut companion = BoardCompanion::new(config).expect("every setting was checked");
@@ -128,6 +134,12 @@ async fn work(
     said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
     if is_stranger {
         companion.say(true, STRANGER);
+    }
+    if let Some(error) = refused {
+        let mut text = String::new();
+        // What has no room is left out; a test sees that all of it has.
+        let _ = write!(text, "Mission: {error}");
+        companion.say(true, REFUSED.init(text).as_str());
     }
     shell.start(COMPANION.init(companion));
     start_links(links, shell, known.is_none(), autopilot, swarm);
@@ -159,13 +171,21 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
     }
 }
 
-/// The mission, if it is one on this roadmap; a checksum of both; and whether it was set aside. It
-/// is copied: the journal it lies in moves.
-fn find_mission(
-    store: &Store,
-    flash: &mut Flash,
-    roadmap: Option<&RoadmapView<'_>>,
-) -> (Option<MissionView<'static>>, u32, bool) {
+/// What was found of a mission.
+#[derive(Default)]
+struct FoundMission {
+    /// It, if it is one on this roadmap.
+    mission: Option<MissionView<'static>>,
+    /// A checksum of both.
+    files: u32,
+    /// Whether it was set aside.
+    aside: bool,
+    /// Why it is none.
+    refused: Option<MissionError>,
+}
+
+/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves.
+fn find_mission(store: &Store, flash: &mut Flash, roadmap: Option<&RoadmapView<'_>>) -> FoundMission {
     let bytes = MISSION_BYTES.take();
     let lies = store.mission().zip(roadmap);
     let found = lies.and_then(|(r, roadmap)| {
@@ -173,16 +193,17 @@ fn find_mission(
         flash.read(r.start, bytes).ok()?;
         Some((&*bytes, roadmap))
     });
-    let Some((bytes, roadmap)) = found else { return (None, 0, false) };
+    let Some((bytes, roadmap)) = found else { return FoundMission::default() };
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = roadmap.crc() ^ sum.rotate_left(1);
     // What it crashed may be its reading, or a plan.
     if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
-        return (None, files, true);
+        return FoundMission { files, aside: true, ..FoundMission::default() };
     }
-    let mission = MissionView::parse(bytes).ok().filter(|mission| mission.fits(roadmap));
+    let read = MissionView::parse(bytes);
     crash::finish();
-    (mission, files, false)
+    let refused = read.err();
+    FoundMission { mission: read.ok().filter(|mission| mission.fits(roadmap)), files, refused, aside: false }
 }
 
 fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {

@@ -362,7 +362,7 @@ impl Mission {
             .collect();
         let mut bytes = vec![0; mission_file::encoded_len(vehicles.len(), goals.len())];
         mission_file::write(&header, &vehicles, &goals, &mut bytes)
-            .map_err(|e| anyhow!("no mission file: {}: {e:?}", scenario.path))?;
+            .map_err(|e| anyhow!("no mission file: {}: {e}", scenario.path))?;
         Ok(bytes)
     }
 }
@@ -464,6 +464,7 @@ fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyh
         let slot = goal + Point::new(i as f32, j as f32, 0.0) * SLOT_GRID_M;
         let apart = slots.iter().all(|s| (s - slot).norm() >= apart_m);
         if apart
+            && scenario.mission.geofence.as_ref().is_none_or(|fence| fence.holds(&slot))
             && segment_is_clear(&map.grid(), &goal, &slot, required_m)
             && column(map, &slot, largest_m, required_m).is_ok()
         {

@@ -10,11 +10,11 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::Point;
 use crate::path::{Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::{VehiclePlan, segments_distance_sq};
 use crate::search::{self, SearchError, SearchWorkspace};
+use crate::{ConfigError, Point};
 
 /// Coming nearer by less than this is none: a hovering vehicle sways, metres.
 const SWAY_M: f32 = 0.05;
@@ -44,6 +44,13 @@ pub enum Nature {
 }
 
 impl KeepOff {
+    /// Whether its ends are finite and its radius is finite and not negative; the error names the first that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        finite("from", &self.from)?;
+        finite("to", &self.to)?;
+        not_negative("radius_m", self.radius_m)
+    }
+
     /// The same, with no more distance than `here` has: who is too near already may fly off.
     fn seen_from(&self, here: &Point) -> Self {
         let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
@@ -136,9 +143,32 @@ pub struct DetourRequest {
     pub required_clearance_m: f32,
 }
 
+impl DetourRequest {
+    /// Whether its places are finite, and its height and clearances are finite and not negative; the error names the
+    /// first that is not.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        finite("here", &self.here)?;
+        finite("leg", &self.leg[0])?;
+        finite("leg", &self.leg[1])?;
+        not_negative("leg_clearance_m", self.leg_clearance_m)?;
+        not_negative("descent_m", self.descent_m)?;
+        not_negative("required_clearance_m", self.required_clearance_m)
+    }
+}
+
+fn finite(name: &'static str, place: &Point) -> Result<(), ConfigError> {
+    if place.iter().all(|c| c.is_finite()) { Ok(()) } else { Err(ConfigError(name)) }
+}
+
+fn not_negative(name: &'static str, number: f32) -> Result<(), ConfigError> {
+    if number >= 0.0 && number.is_finite() { Ok(()) } else { Err(ConfigError(name)) }
+}
+
 /// Why there is no way around.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum DetourError {
+    /// The request, or something to keep off, holds a number that it may not.
+    Config(ConfigError),
     /// The search found none.
     Search(SearchError),
     /// The path was refused.
@@ -160,6 +190,8 @@ pub fn plan<const N: usize, const W: usize>(
     nodes: &mut Vec<u16, W>,
     out: &mut Path<W>,
 ) -> Result<(), DetourError> {
+    request.check().map_err(DetourError::Config)?;
+    obstacles.iter().try_for_each(KeepOff::check).map_err(DetourError::Config)?;
     let here = request.here;
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
         *obstacle = obstacle.seen_from(&here);

@@ -3,7 +3,7 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentError, AssignmentWorkspace};
-use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
 use planner_core::frames::Geodetic;
 use planner_core::path::Path;
 use planner_core::plan::{
@@ -452,9 +452,21 @@ fn detours(
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
         ] {
+            let bad = [
+                to.call("detour::DetourRequest::check", || request.check()).is_err(),
+                to.call("detour::KeepOff::check", || thing.check()).is_err(),
+            ];
+            let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
+            assert!(finite(&[request.here, request.leg[0], request.leg[1]]) || bad[0]);
+            assert!((finite(&[thing.from, thing.to]) && hard >= 0.0 && hard.is_finite()) != bad[1]);
             let told = to.call("detour::plan", || {
                 detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
             });
+            assert_eq!(
+                bad.contains(&true),
+                matches!(told, Err(DetourError::Config(_))),
+                "{request:?} {thing:?}"
+            );
             assert!(
                 told.is_err()
                     || own.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()))

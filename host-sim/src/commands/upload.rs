@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail, ensure};
-use companion::mission_file::{self, MissionError, MissionView};
+use companion::mission_file::{self, MissionView};
 use companion::store::File;
 use planner_core::roadmap;
 
@@ -66,7 +66,7 @@ fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
         (File::Roadmap, board.roadmap_excess(&view))
     } else if bytes.starts_with(&mission_file::MAGIC) {
-        let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {}", why(&e)))?;
+        let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {e}"))?;
         let more = bytes.len() - view.byte_len();
         ensure!(more == 0, "no sound mission: {more} bytes follow its end");
         (File::Mission, board.mission_excess(&view))
@@ -81,21 +81,5 @@ fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
             board.name
         ),
         None => Ok(file),
-    }
-}
-
-fn why(error: &MissionError) -> String {
-    match error {
-        MissionError::Truncated => "it ends too early".to_owned(),
-        MissionError::Magic => "it does not begin as a mission file does".to_owned(),
-        MissionError::Version(version) => format!("its version {version} is not known here"),
-        MissionError::Length => "its lengths and counts contradict one another".to_owned(),
-        MissionError::Crc => "its CRC-32 does not match: it is damaged".to_owned(),
-        MissionError::Header(field) => format!("its header field {field} is out of range"),
-        MissionError::Vehicle(index) => {
-            format!("its vehicle no. {} is out of range, or twice there", index + 1)
-        }
-        MissionError::Goal(index) => format!("its goal no. {} is out of range", index + 1),
-        other => format!("its contents are not sound: {other:?}"),
     }
 }

@@ -161,6 +161,13 @@ pub struct Geofence {
     pub max: Point,
 }
 
+impl Geofence {
+    /// Whether a place is inside; its faces are.
+    pub fn holds(&self, place: &Point) -> bool {
+        (0..3).all(|axis| (self.min[axis]..=self.max[axis]).contains(&place[axis]))
+    }
+}
+
 /// One of `[[vehicles]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {

@@ -594,7 +594,7 @@ fn check_goals_apart(
 /// Nobody starts or lands outside the geofence.
 fn check_inside(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)], mission: &Mission) -> Result<()> {
     let Some(fence) = &mission.geofence else { return Ok(()) };
-    let outside = |p: &Point| (0..3).any(|axis| p[axis] < fence.min[axis] || p[axis] > fence.max[axis]);
+    let outside = |place: &Point| !fence.holds(place);
     if let Some((vehicle, spans)) = vehicles.iter().find(|(vehicle, _)| outside(&vehicle.start)) {
         let why = format!("vehicle {} starts outside mission.geofence", vehicle.id);
         return Err(table.text.error(&spans.start, why));

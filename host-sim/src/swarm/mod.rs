@@ -354,7 +354,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().config(id);
-    let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e:?}", mission.scenario.path))?;
+    let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
     // One plan may be flown by other rules and inside another fence than its mission file says.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
