@@ -35,7 +35,7 @@ use crate::waits::Waits;
 
 /// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
-/// A setpoint that is held is reported no more often.
+/// A setpoint that is held, or an EKF origin that is not used, is reported no more often.
 const HELD_EVERY: Duration = Duration::from_secs(5);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
@@ -89,8 +89,9 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
     pub(crate) now: Instant,
-    /// When a setpoint that was held may be reported again.
+    /// When a setpoint that was held, and an EKF origin that is not used, may be reported again.
     held_at: Instant,
+    far_at: Instant,
     stepped_at: Instant,
     next_step: Instant,
     next_heartbeat: Instant,
@@ -155,6 +156,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             mode_before: 0,
             now: Instant::ZERO,
             held_at: Instant::ZERO,
+            far_at: Instant::ZERO,
             stepped_at: Instant::ZERO,
             next_step: Instant::ZERO,
             next_heartbeat: Instant::ZERO,
@@ -364,6 +366,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if change == Change::OriginDoubted {
                     self.origin_at = self.origin_at.min(self.now + ORIGIN_AGAIN);
                     return self.telemetry.origin_moved;
+                }
+                if let Change::OriginFar(km) = change {
+                    if self.now >= self.far_at {
+                        self.far_at = self.now + HELD_EVERY;
+                        self.say_count(true, "EKF origin # km away: not used", [km, 0]);
+                    }
+                    return true;
                 }
                 if change == Change::OriginLost {
                     self.origin_at = self.now;

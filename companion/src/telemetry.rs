@@ -7,7 +7,8 @@
 //!
 //! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
 //! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
-//! named no other for [`DOUBT`]; then it has moved, and the mission lands.
+//! named no other for [`DOUBT`]; then it has moved, and the mission lands. An origin further than [`ORIGIN_MOST_M`] from the mission's
+//! counts as none.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
@@ -33,6 +34,9 @@ const ON_GROUND: u8 = 1;
 const JUMP_M: f32 = 1.0;
 /// More than any vehicle flown so changes its velocity between two positions, m/s.
 const JUMP_MPS: f32 = 5.0;
+/// An EKF origin further from the mission's is not used, metres: the autopilot's frame is f32, and rounds a setpoint by up to
+/// 1.4 mm at this distance, by metres on the other side of the earth.
+const ORIGIN_MOST_M: f32 = 30_000.0;
 /// No gap is longer than the mission waits for its autopilot, seconds.
 const GAP_MOST_S: f32 = 60.0;
 /// After a jump, or so long without one, the position is not used for this long; another one starts it anew. What comes first
@@ -88,6 +92,8 @@ pub enum Change {
     OriginLost,
     /// Another EKF origin was heard while armed: ask for it.
     OriginDoubted,
+    /// An EKF origin so many kilometres from the mission's is not used.
+    OriginFar(u32),
 }
 
 /// The autopilot as last heard.
@@ -236,7 +242,7 @@ impl Telemetry {
                 None => Change::None,
             },
             GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
-                Some(origin) => self.handle_origin(now, &origin),
+                Some(origin) => self.handle_origin(now, mission_origin, &origin),
                 None => Change::None,
             },
             EKF_STATUS_REPORT_DATA::ID => {
@@ -299,7 +305,12 @@ impl Telemetry {
         }
     }
 
-    fn handle_origin(&mut self, now: Instant, data: &GPS_GLOBAL_ORIGIN_DATA) -> Change {
+    fn handle_origin(
+        &mut self,
+        now: Instant,
+        mission_origin: &Geodetic,
+        data: &GPS_GLOBAL_ORIGIN_DATA,
+    ) -> Change {
         let origin = Geodetic {
             lat_deg: f64::from(data.latitude) * 1e-7,
             lon_deg: f64::from(data.longitude) * 1e-7,
@@ -317,6 +328,12 @@ impl Telemetry {
                 return Change::OriginDoubted;
             }
             self.doubted_at = None;
+        }
+        let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
+        if away_m > ORIGIN_MOST_M {
+            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+            self.settled_at = now + SETTLE;
+            return Change::OriginFar((away_m * 1e-3) as u32);
         }
         if self.ekf_origin.is_some_and(|known| known != origin) {
             // A position on its way may still be about the old one.
@@ -408,3 +425,7 @@ impl Telemetry {
 fn age(at: Option<Instant>, now: Instant) -> Duration {
     at.map_or(Duration::from_micros(u64::MAX), |at| now - at)
 }
+
+#[cfg(test)]
+#[path = "telemetry_tests.rs"]
+mod tests;
