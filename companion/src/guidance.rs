@@ -8,7 +8,8 @@
 
 mod brakes;
 mod door;
-pub(crate) mod filter;
+mod fence;
+mod filter;
 mod follower;
 mod waypoints;
 
@@ -22,7 +23,7 @@ use self::filter::Filter;
 use self::waypoints::Waypoints;
 use crate::autopilot::Kind;
 use crate::config::Config;
-use crate::limits::{AutopilotLimits, Limits, Settings};
+use crate::limits::{AutopilotLimits, Limit, Limits};
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat::{self, Search};
@@ -47,7 +48,7 @@ const DESCENDED_M: f32 = 0.2;
 /// In a climb, a descent or a join the setpoint is at most this far ahead of the vehicle, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Speed of the join to the path, m/s.
-pub(crate) const JOIN_MPS: f32 = 1.0;
+const JOIN_MPS: f32 = 1.0;
 /// Before the take-off the setpoint follows the estimate of a vehicle that stands no faster than this, m/s.
 const DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
@@ -131,6 +132,8 @@ pub struct Guidance {
     lost: bool,
     /// The autopilot flew by itself or by its pilot: setpoints followed the vehicle.
     taken: bool,
+    /// Time since a place was sent, seconds.
+    unsent_s: f32,
     /// Last advice of the neighbours.
     pub advice: Advice,
     on_path: bool,
@@ -185,12 +188,31 @@ pub struct Scene<'a, const W: usize, const G: usize> {
 
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let door = Door::new(Limits::new(config, autopilot), config.geofence);
-        let Settings { track, leg_track, deconflict } = Settings::new(config, autopilot);
+        let limits = Limits::new(config, autopilot);
+        let door = Door::new(limits, config.geofence);
+        let track = TrackConfig {
+            cruise_mps: limits.speed_mps,
+            climb_mps: autopilot.get(Limit::Climb),
+            descend_mps: autopilot.get(Limit::Descend),
+            accel_mps2: limits.accel_mps2,
+            accel_z_mps2: limits.accel_z_mps2,
+            radius_m: config.radius_m,
+            ..TrackConfig::default()
+        };
         Self {
+            leg_track: TrackConfig {
+                cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
+                climb_mps: limits.climb_mps,
+                descend_mps: limits.descend_mps,
+                ..track
+            },
             track,
-            leg_track,
-            deconflict,
+            deconflict: DeconflictConfig {
+                method: config.method,
+                safety_distance_m: config.safety_distance_m,
+                cruise_mps: config.cruise_mps,
+                accel_mps2: config.accel_mps2,
+            },
             pace: 1.0,
             door,
             phase: Phase::Hold,
@@ -201,6 +223,7 @@ impl Guidance {
             settled: true,
             lost: false,
             taken: false,
+            unsent_s: 0.0,
             advice: NOT_ASKED,
             on_path: false,
             lead_m: LEG_LEAD_M,
@@ -249,7 +272,7 @@ impl Guidance {
     /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
     pub fn hold_at(&mut self, point: Point) {
         if core::mem::take(&mut self.lost) || !self.door.is_live() {
-            self.door.reset(point);
+            self.door.begin_at(point, FOLLOWS_MPS * self.unsent_s);
             self.settle();
         }
     }
@@ -265,7 +288,7 @@ impl Guidance {
         self.reset();
         self.phase = Phase::Climb;
         if !self.door.is_live() {
-            self.door.reset(*position);
+            self.door.begin_at(*position, FOLLOWS_MPS * self.unsent_s);
         }
     }
 
@@ -437,6 +460,7 @@ impl Guidance {
         dt_s: f32,
     ) -> bool {
         let position = scene.telemetry.position;
+        self.unsent_s += dt_s;
         let asks = matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
         if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
@@ -472,13 +496,16 @@ impl Guidance {
         if known && (taken || taken_before || !self.door.is_live()) {
             // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
             if taken || !self.door.is_live() {
-                self.door.go_with(position, FOLLOWS_MPS * dt_s);
+                self.door.go_with(position, FOLLOWS_MPS * self.unsent_s, self.unsent_s);
             }
             if flies && !taken {
                 self.door.move_on(&scene.telemetry.velocity);
             }
             self.settle();
             self.lost = false;
+        }
+        if self.door.is_live() && known && !self.lost {
+            self.unsent_s = 0.0;
         }
         if !self.door.is_live() || taken {
             self.sent_acceleration = Point::zeros();
@@ -832,7 +859,8 @@ impl Guidance {
             return Setpoint::Stop(if door.is_live() { door.velocity() } else { still });
         }
         if !door.is_live() {
-            return Setpoint::Move(door.inside(scene.telemetry.position), still, still);
+            // The state is newer than the step: the next one begins where the vehicle is.
+            return Setpoint::None;
         }
         // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
         let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);

@@ -214,6 +214,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.filter.activations()
     }
 
+    /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
+    pub fn stops_urgently(&self) -> bool {
+        self.guidance.door.stops_urgently()
+    }
+
     /// Way made along the own path, metres.
     pub fn progress_m(&self) -> f32 {
         // What is flown around comes on top of where the plan was left.

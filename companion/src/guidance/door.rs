@@ -13,13 +13,15 @@
 //! - A *clock* carries the setpoint along that curve. It runs at 1, and slows to wait for a vehicle that lags, to pause,
 //!   or to stop for the safety filter. A slower clock changes nothing of the curve's shape. The speed of the clock obeys
 //!   its own limits of acceleration and jerk, so a late step, a stop and a resume are all smooth.
-//! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly.
+//! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly, beside
+//!   the geofence too ([`super::fence`]).
 //!
 //! ENU metres, seconds. Work: 2·[`MOST_N`] vector sums for each tick, at most [`TICKS`] ticks a step.
 
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
+use super::fence::Fence;
 use super::follower::{Motion, shortened};
 use crate::limits::Limits;
 
@@ -51,6 +53,10 @@ const SLOW_MPS: f32 = 0.2;
 const STANDS_MPS: f32 = 0.01;
 /// The end of a stop: speed falls by this share of itself each second.
 const TAIL_PER_S: f32 = 4.0;
+/// Share of the newest step in the velocity at which a vehicle was followed: it is reported in steps of its own.
+const FOLLOWED_SHARE: f32 = 0.25;
+/// A vehicle goes on at most so many times faster than it was followed.
+const FOLLOWED_MOST: f32 = 1.5;
 /// A raw point this little outside the fence is put inside without a word, metres.
 const FENCE_SLACK_M: f32 = 0.01;
 /// A step may exceed the speed limit by this much, metres: rounding at a kilometre from the origin.
@@ -86,7 +92,7 @@ pub struct Stats {
 #[derive(Clone, Debug)]
 pub struct Door {
     limits: Limits,
-    fence: Option<(Point, Point)>,
+    fence: Option<Fence>,
     n: usize,
     /// Newest raw point.
     raw: Point,
@@ -101,8 +107,11 @@ pub struct Door {
     /// Speed of the clock, and its change each second.
     clock: f32,
     clock_rate: f32,
-    /// Whether there is a setpoint to go on from.
+    /// Whether there is a setpoint to go on from, and whether there ever was.
     live: bool,
+    used: bool,
+    /// Velocity at which setpoints followed a vehicle that another flies.
+    followed: Point,
     /// Of the step that is being made: its length, whether the safety filter stops, whether its raw points are sound.
     dt_s: f32,
     stopping: bool,
@@ -119,7 +128,7 @@ impl Door {
     pub(crate) fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
         Self {
             limits,
-            fence,
+            fence: fence.map(Fence::new),
             n: average(&limits),
             raw: Point::zeros(),
             steps: [Point::zeros(); LEN],
@@ -130,6 +139,8 @@ impl Door {
             clock: 1.0,
             clock_rate: 0.0,
             live: false,
+            used: false,
+            followed: Point::zeros(),
             dt_s: 0.0,
             stopping: false,
             sound: true,
@@ -141,7 +152,7 @@ impl Door {
 
     /// Takes other limits; from a standstill only.
     pub(crate) fn tune(&mut self, limits: Limits, fence: Option<(Point, Point)>) {
-        (self.limits, self.fence, self.n) = (limits, fence, average(&limits));
+        (self.limits, self.fence, self.n) = (limits, fence.map(Fence::new), average(&limits));
         self.rest();
     }
 
@@ -185,6 +196,11 @@ impl Door {
         self.limits.jerk(urgent)
     }
 
+    /// Whether it is in a stop by the safety filter, or ends one.
+    pub(crate) fn stops_urgently(&self) -> bool {
+        self.live && self.stopping
+    }
+
     /// Whether the setpoint stands.
     pub(crate) fn stands(&self) -> bool {
         self.velocity().norm_squared() < STANDS_MPS * STANDS_MPS
@@ -205,26 +221,35 @@ impl Door {
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
-    /// Begins at a place, at rest: only where nothing was sent, where nobody flies by it, or where it stands.
-    pub(crate) fn reset(&mut self, place: Point) {
-        let place = if place.iter().all(|c| c.is_finite()) { place } else { self.position() };
-        self.motion = Motion::at(self.inside(place));
-        self.live = true;
+    /// Begins at a place, at rest, no further than `most_m` from what was sent last: an estimate that jumps is no motion.
+    pub(crate) fn begin_at(&mut self, place: Point, most_m: f32) {
+        let here = self.position();
+        let place = if place.iter().all(|c| c.is_finite()) { self.inside(place) } else { here };
+        let place = if self.used { here + shortened(place - here, most_m) } else { place };
+        self.motion = Motion::at(place);
+        (self.live, self.used, self.followed) = (true, true, Point::zeros());
         self.rest();
     }
 
-    /// Goes with a vehicle that another flies, no further than `most_m`: an estimate that jumps is no motion.
-    pub(crate) fn go_with(&mut self, place: Point, most_m: f32) {
-        let here = self.position();
-        let way = shortened(self.inside(place) - here, most_m);
-        self.reset(if self.live { here + way } else { place });
+    /// Goes with a vehicle that another flies, for `dt_s`, no further than `most_m`.
+    pub(crate) fn go_with(&mut self, place: Point, most_m: f32, dt_s: f32) {
+        let (here, was_live, followed) = (self.position(), self.live, self.followed);
+        self.begin_at(place, most_m);
+        if was_live && dt_s > 0.0 {
+            self.followed = followed + ((self.position() - here) / dt_s - followed) * FOLLOWED_SHARE;
+        }
     }
 
-    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back.
+    /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back. A velocity that is not
+    /// that of its places is not believed, and from what it has it can stop inside the fence.
     pub(crate) fn move_on(&mut self, velocity: &Point) {
-        let velocity = shortened(*velocity, self.limits.fastest_mps());
+        let most_mps = fminf(self.limits.fastest_mps(), FOLLOWED_MOST * self.followed.norm());
+        let velocity = shortened(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
             self.motion.velocity = velocity;
+            if let Some(fence) = &self.fence {
+                self.motion.velocity = fence.slowed(&self.motion, &self.limits);
+            }
         }
     }
 
@@ -238,18 +263,13 @@ impl Door {
     }
 
     /// The nearest place inside the fence.
-    pub(crate) fn inside(&self, mut place: Point) -> Point {
-        if let Some((low, high)) = self.fence {
-            for axis in 0..3 {
-                place[axis] = fmaxf(fminf(place[axis], high[axis]), low[axis]);
-            }
-        }
-        place
+    pub(crate) fn inside(&self, place: Point) -> Point {
+        self.fence.as_ref().map_or(place, |fence| fence.inside(place))
     }
 
     /// Whether a place may be sent.
     pub(crate) fn allows(&self, place: &Point) -> bool {
-        self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
+        (self.inside(*place) - place).norm_squared() <= FENCE_SLACK_M * FENCE_SLACK_M
     }
 
     /// Lets `dt_s` pass. Returns how many raw points are due: [`Self::push`] takes them, then [`Self::finish`] makes the
@@ -303,7 +323,8 @@ impl Door {
         }
         self.asked = acceleration;
         let before = self.motion;
-        self.motion.follow(&to, &self.limits, self.limits.jerk(self.stopping), dt_s);
+        let jerk_mps3 = self.limits.jerk(self.stopping);
+        self.motion.follow(&to, &self.limits, self.fence.as_ref(), jerk_mps3, dt_s);
         self.hold_inside();
         let step_m = (self.motion.position - before.position).norm();
         let jerk_mps3 = (self.motion.acceleration - before.acceleration).norm() / dt_s;
@@ -314,7 +335,8 @@ impl Door {
         sound
     }
 
-    /// What the follower strays from the curve does not lead out of the fence: that comes before smoothness.
+    /// The follower stops before the fence; should sums of steps of odd lengths lead out of it all the same, inside comes before
+    /// smoothness.
     fn hold_inside(&mut self) {
         let place = self.inside(self.motion.position);
         for axis in 0..3 {

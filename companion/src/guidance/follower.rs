@@ -7,13 +7,15 @@
 //!
 //! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
 //! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`RATE_SHARE`]): the
-//! limits do not make it swing.
+//! limits do not make it swing. Where what it strays from the curve would lead out of the geofence, it brakes
+//! before, by the same limits ([`super::fence`]).
 //!
 //! ENU metres, seconds. Constant work.
 
 use libm::fmaxf;
 use planner_core::Point;
 
+use super::fence::Fence;
 use crate::limits::Limits;
 
 /// Rate of the loop, as a share of jerk over acceleration: twice the rate is how fast a change of velocity dies away.
@@ -37,8 +39,15 @@ impl Motion {
         [self.position, self.velocity, self.acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()))
     }
 
-    /// Moves on by `dt_s` towards where the curve is then.
-    pub(super) fn follow(&mut self, to: &Self, limits: &Limits, jerk_mps3: f32, dt_s: f32) {
+    /// Moves on by `dt_s` towards where the curve is then, and stops before the fence.
+    pub(super) fn follow(
+        &mut self,
+        to: &Self,
+        limits: &Limits,
+        fence: Option<&Fence>,
+        jerk_mps3: f32,
+        dt_s: f32,
+    ) {
         let (velocity, before) = (self.velocity, self.acceleration);
         // Where it comes to if it takes on the curve's acceleration.
         let place = self.position + velocity * dt_s + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
@@ -48,6 +57,7 @@ impl Motion {
         let wanted = to.acceleration + (shortened(back, limits.fastest_mps()) - speed) * (2.0 * rate);
         let change = limits.within(&wanted) - before;
         let jerk = shortened(change / dt_s, jerk_mps3);
+        let jerk = fence.map_or(jerk, |fence| fence.keep(self, jerk, limits, jerk_mps3, dt_s));
         self.acceleration = before + jerk * dt_s;
         self.velocity = velocity + (before + jerk * (0.5 * dt_s)) * dt_s;
         self.position += (velocity + (before * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;

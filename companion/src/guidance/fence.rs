@@ -1,0 +1,257 @@
+//! The geofence of the door: a box that no setpoint leaves, and that the follower does not run into.
+//!
+//! A point keeps inside without a jerk if it can always still stop: in each axis the distance that a stop takes, by a part of
+//! the vehicle's acceleration and jerk, is no longer than what is left to the wall. A step that would break this is
+//! replaced, in that axis, by the nearest one that does not ([`Fence::keep`]). The part is such that all three axes can brake at
+//! once: 1/√3 of the jerk for each, 1/√2 of the acceleration across; the stop is planned with a little less, which pays for
+//! steps of finite length.
+//!
+//! ENU metres, seconds. Constant work.
+
+use libm::{fabsf, fmaxf, fminf, sqrtf};
+use planner_core::Point;
+
+use super::follower::{Motion, shortened};
+use crate::limits::Limits;
+
+/// A setpoint keeps so far inside, metres: the autopilot's frame rounds it by up to 1.4 mm, 30 km from its origin.
+const ROUNDING_M: f32 = 2e-3;
+/// The follower turns so far before the fence, metres: steps of finite length overshoot by millimetres.
+const TURNS_BEFORE_M: f32 = 0.02;
+/// Part of the jerk that an axis may take to brake, and that its stops are planned with.
+const JERK_SHARES: [f32; 2] = [0.577, 0.48];
+/// The same of the acceleration across, and upwards.
+const ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
+/// Halvings between a step that is safe and one that is not.
+const HALVINGS: usize = 8;
+
+/// A box that setpoints do not leave.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fence {
+    low: Point,
+    high: Point,
+}
+
+/// How an axis brakes.
+#[derive(Clone, Copy)]
+struct Brake {
+    accel_mps2: f32,
+    jerk_mps3: f32,
+}
+
+impl Fence {
+    /// Inside the mission's box; in the middle of one that is thinner than what is rounded.
+    pub(super) fn new((low, high): (Point, Point)) -> Self {
+        let slack = (high - low).map(|size| fminf(ROUNDING_M, 0.25 * size));
+        Self { low: low + slack, high: high - slack }
+    }
+
+    /// The nearest place inside.
+    pub(super) fn inside(&self, mut place: Point) -> Point {
+        for axis in 0..3 {
+            place[axis] = fmaxf(fminf(place[axis], self.high[axis]), self.low[axis]);
+        }
+        place
+    }
+
+    /// The velocity from which the motion can still stop inside, as near as may be to its own.
+    pub(super) fn slowed(&self, motion: &Motion, limits: &Limits) -> Point {
+        let mut velocity = motion.velocity;
+        for axis in 0..3 {
+            let place = motion.position[axis];
+            let walls = self.walls(axis, place, brake(limits, axis));
+            let is_safe = |speed: f32| walls.hold(place, speed, 0.0);
+            if !is_safe(velocity[axis]) {
+                velocity[axis] = nearest(velocity[axis], 0.0, is_safe);
+            }
+        }
+        velocity
+    }
+
+    /// The jerk nearest to the one that is wanted, of no more than `most_mps3`, after whose step the motion can still stop.
+    pub(super) fn keep(
+        &self,
+        motion: &Motion,
+        wanted: Point,
+        limits: &Limits,
+        most_mps3: f32,
+        dt_s: f32,
+    ) -> Point {
+        let mut jerk = wanted;
+        let mut brakes = [false; 3];
+        let mut hardest = Point::zeros();
+        for _ in 0..3 {
+            let mut changed = false;
+            for axis in 0..3 {
+                let (place, speed, accel) =
+                    (motion.position[axis], motion.velocity[axis], motion.acceleration[axis]);
+                let walls = self.walls(axis, place, brake(limits, axis));
+                let next = |jerk: f32| {
+                    let place = place + (speed + (accel * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
+                    let speed = speed + (accel + jerk * (0.5 * dt_s)) * dt_s;
+                    (place, speed, accel + jerk * dt_s)
+                };
+                let is_safe = |jerk: f32| {
+                    let (place, speed, accel) = next(jerk);
+                    walls.hold(place, speed, accel)
+                };
+                if brakes[axis] || is_safe(jerk[axis]) {
+                    continue;
+                }
+                (brakes[axis], changed) = (true, true);
+                // Away from the wall that it comes to, up to the acceleration that braking may take.
+                let (ahead, pace, push) = next(jerk[axis]);
+                let away = if walls.high_holds(ahead, pace, push) { 1.0 } else { -1.0 };
+                let part = JERK_SHARES[0] * most_mps3;
+                let accel_most = limits.most_mps2[axis / 2] * ACCEL_SHARES[axis / 2][0];
+                hardest[axis] = away * fmaxf(fminf(part, (accel_most - away * accel) / dt_s), -part);
+                let wanted = fmaxf(fminf(jerk[axis], part), -part);
+                jerk[axis] = nearest(wanted, hardest[axis], is_safe);
+            }
+            if !changed {
+                break;
+            }
+            share_what_is_left(&mut jerk, brakes, &motion.acceleration, limits, most_mps3, dt_s);
+        }
+        let across = (motion.acceleration + jerk * dt_s).xy().norm_squared();
+        if brakes[0] && brakes[1] && across > limits.most_mps2[0] * limits.most_mps2[0] {
+            (jerk.x, jerk.y) = (hardest.x, hardest.y);
+            let left = sqrtf(fmaxf(most_mps3 * most_mps3 - hardest.xy().norm_squared(), 0.0));
+            jerk.z = fmaxf(fminf(jerk.z, left), -left);
+        }
+        jerk
+    }
+
+    /// What bounds an axis of a motion that is at a place: what is behind a wall's last centimetres moves no nearer to it.
+    fn walls(&self, axis: usize, place: f32, brake: Brake) -> Walls {
+        let (low, high) = (self.low[axis], self.high[axis]);
+        let before_m = fminf(TURNS_BEFORE_M, 0.25 * (high - low));
+        Walls { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
+    }
+}
+
+/// Where a motion along an axis may stop.
+struct Walls {
+    low: f32,
+    high: f32,
+    brake: Brake,
+}
+
+impl Walls {
+    fn hold(&self, place: f32, speed: f32, accel: f32) -> bool {
+        self.high_holds(place, speed, accel) && place - stop_m(-speed, -accel, self.brake) >= self.low
+    }
+
+    fn high_holds(&self, place: f32, speed: f32, accel: f32) -> bool {
+        place + stop_m(speed, accel, self.brake) <= self.high
+    }
+}
+
+/// What an axis plans its stops with.
+fn brake(limits: &Limits, axis: usize) -> Brake {
+    Brake {
+        accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.most_mps2[axis / 2],
+        jerk_mps3: JERK_SHARES[1] * limits.jerk(false),
+    }
+}
+
+/// The number nearest to `wanted` that is safe, between it and `safe`.
+fn nearest(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
+    let (mut good, mut bad) = (safe, wanted);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (good + bad);
+        if is_safe(middle) {
+            good = middle;
+        } else {
+            bad = middle;
+        }
+    }
+    good
+}
+
+/// The axes that need not brake take what the others leave of the jerk and of the acceleration across.
+fn share_what_is_left(
+    jerk: &mut Point,
+    brakes: [bool; 3],
+    accel: &Point,
+    limits: &Limits,
+    most_mps3: f32,
+    dt_s: f32,
+) {
+    let other = |axis: usize| if brakes[axis] { 0.0 } else { 1.0 };
+    let free = Point::new(other(0), other(1), other(2));
+    let mut others = jerk.component_mul(&free);
+    let braking = *jerk - others;
+    let left = |braking: &Point| sqrtf(fmaxf(most_mps3 * most_mps3 - braking.norm_squared(), 0.0));
+    others = shortened(others, left(&braking));
+    if brakes[0] != brakes[1] {
+        let (axis, beside) = if brakes[0] { (0, 1) } else { (1, 0) };
+        let taken = accel[axis] + jerk[axis] * dt_s;
+        let across = limits.most_mps2[0];
+        let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
+        let next = accel[beside] + others[beside] * dt_s;
+        let next = fmaxf(fminf(next, room), -room);
+        // That comes before what is wanted upwards.
+        let most = left(&braking);
+        others[beside] = fmaxf(fminf((next - accel[beside]) / dt_s, most), -most);
+        let most = sqrtf(fmaxf(most * most - others[beside] * others[beside], 0.0));
+        others.z = fmaxf(fminf(others.z, most), -most);
+    }
+    *jerk = braking + others;
+}
+
+/// Distance until a motion stands, metres, of this speed and acceleration towards a wall: its acceleration falls to −a, stays,
+/// and ends at 0 with the speed.
+fn stop_m(speed: f32, accel: f32, brake: Brake) -> f32 {
+    let Brake { accel_mps2: most, jerk_mps3: jerk } = brake;
+    let accel = fmaxf(accel, -most);
+    // Speed that is left if the acceleration is only taken back.
+    if speed + accel * fabsf(accel) / (2.0 * jerk) <= 0.0 {
+        if speed <= 0.0 {
+            return 0.0;
+        }
+        let turns_s = (-accel - sqrtf(fmaxf(accel * accel - 2.0 * jerk * speed, 0.0))) / jerk;
+        return (speed + (accel * 0.5 + jerk * turns_s / 6.0) * turns_s) * turns_s;
+    }
+    let peak = fminf(sqrtf(fmaxf(jerk * speed + 0.5 * accel * accel, 0.0)), most);
+    let falls_s = fmaxf(accel + peak, 0.0) / jerk;
+    let reached = speed + (accel - 0.5 * jerk * falls_s) * falls_s;
+    let end = peak * peak / (2.0 * jerk);
+    let holds_s = fmaxf(reached - end, 0.0) / fmaxf(peak, 1e-6);
+    let falls_m = (speed + (accel * 0.5 - jerk * falls_s / 6.0) * falls_s) * falls_s;
+    fmaxf(falls_m + 0.5 * (reached + end) * holds_s + peak * end / (3.0 * jerk), 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The formula against small steps of the same profile.
+    #[test]
+    fn a_stop_is_as_long_as_flown() {
+        let brake = Brake { accel_mps2: 1.4, jerk_mps3: 1.9 };
+        for i in 0..200 {
+            let (speed, accel) = (-1.0 + 0.02 * i as f32, -1.4 + 0.037 * (i * 7 % 100) as f32);
+            let (mut v, mut a, mut s, mut furthest) = (speed, accel, 0.0f32, 0.0f32);
+            let dt = 5e-4;
+            for _ in 0..20_000 {
+                // As late as it may be, it takes the acceleration back.
+                let ends = v + a * fabsf(a) / (2.0 * brake.jerk_mps3) <= 0.0;
+                let next = if ends {
+                    fminf(a + brake.jerk_mps3 * dt, fmaxf(a, 0.0))
+                } else {
+                    a - brake.jerk_mps3 * dt
+                };
+                a = fmaxf(next, -brake.accel_mps2);
+                v += a * dt;
+                s += v * dt;
+                furthest = fmaxf(furthest, s);
+                if v <= 0.0 && a <= 0.0 {
+                    break;
+                }
+            }
+            let formula = stop_m(speed, accel, brake);
+            assert!(fabsf(formula - furthest) < 0.01, "{speed} {accel}: {formula} {furthest}");
+        }
+    }
+}
