@@ -16,6 +16,11 @@ const GAP_S: f32 = 0.3;
 const STILL_M: f32 = 1e-4;
 /// How fast it does so at most, and some room for rounding, m/s.
 const FOLLOWS_MPS: f32 = 15.2;
+/// Greatest jerk, m/s³, and that of a stop by the safety filter.
+const JERK_MPS3: f32 = 4.0;
+const URGENT_JERK_MPS3: f32 = 8.0;
+/// Half a unit in the last place of an f32 of three axes, for each metre.
+const ROUNDING: f32 = 1.04e-7;
 /// Of the mask: the position is ignored.
 const NO_POSITION: u16 = 0b111;
 
@@ -30,15 +35,19 @@ pub struct SetpointStats {
     pub speed_mps: f32,
     /// Change of that speed, m/s².
     pub accel_mps2: f32,
-    /// Change of that acceleration, m/s³.
+    /// Change of that acceleration, m/s³, but for what rounding may make of it.
     pub jerk_mps3: f32,
+    /// The same in stops by the safety filter.
+    pub urgent_jerk_mps3: f32,
+    /// Setpoints sent in such stops.
+    pub urgent: u64,
     /// Difference between the velocity sent and the one the positions move at, m/s.
     pub mismatch_mps: f32,
     /// Setpoints with a number that is not finite.
     pub not_finite: u64,
     /// Setpoints outside the fence.
     pub outside: u64,
-    /// Setpoints with more jerk than [`Limits::jerk_mps3`].
+    /// Setpoints with more jerk than allowed.
     pub jerky: u64,
     /// Setpoints further from the last one than [`Limits::speed_mps`] leads.
     pub jumps: u64,
@@ -49,8 +58,6 @@ pub struct SetpointStats {
 pub struct Limits {
     /// Greatest speed, m/s.
     pub speed_mps: f32,
-    /// Greatest jerk, m/s³.
-    pub jerk_mps3: f32,
     /// Corners of the fence in the autopilot's frame, metres.
     pub fence: Option<(Vector3<f32>, Vector3<f32>)>,
 }
@@ -63,6 +70,8 @@ impl SetpointStats {
         self.speed_mps = self.speed_mps.max(other.speed_mps);
         self.accel_mps2 = self.accel_mps2.max(other.accel_mps2);
         self.jerk_mps3 = self.jerk_mps3.max(other.jerk_mps3);
+        self.urgent_jerk_mps3 = self.urgent_jerk_mps3.max(other.urgent_jerk_mps3);
+        self.urgent += other.urgent;
         self.mismatch_mps = self.mismatch_mps.max(other.mismatch_mps);
         self.not_finite += other.not_finite;
         self.outside += other.outside;
@@ -75,14 +84,16 @@ impl std::fmt::Display for SetpointStats {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(
             f,
-            "{} setpoints: step {:.3} m, {:.2} m/s, {:.2} m/s², {:.1} m/s³, velocity off by {:.2} m/s; {} jumps, {} \
-             jerky, {} outside, {} not finite",
+            "{} setpoints: step {:.3} m, {:.2} m/s, {:.2} m/s², {:.1} m/s³, velocity off by {:.2} m/s; {} in stops by \
+             the safety filter: {:.1} m/s³; {} jumps, {} jerky, {} outside, {} not finite",
             self.count,
             self.step_m,
             self.speed_mps,
             self.accel_mps2,
             self.jerk_mps3,
             self.mismatch_mps,
+            self.urgent,
+            self.urgent_jerk_mps3,
             self.jumps,
             self.jerky,
             self.outside,
@@ -101,6 +112,9 @@ struct Last {
     velocity: Option<Vector3<f32>>,
     accel: Option<Vector3<f32>>,
     jerk_mps3: f32,
+    /// Setpoints since the last one in a stop by the safety filter.
+    calm: u8,
+    rounded_m: f32,
 }
 
 /// Watches one stream.
@@ -108,6 +122,12 @@ struct Last {
 pub struct SetpointCheck {
     limits: Limits,
     last: Option<Last>,
+    /// Whether the safety filter stops the vehicle now.
+    pub urgent: bool,
+    /// Whether the vehicle is believed to be flown by another: setpoints go with it.
+    pub follows: bool,
+    /// What a place was rounded by on its way to the checker, metres, beside what its own numbers show.
+    pub rounded_m: f32,
     /// What was seen.
     pub stats: SetpointStats,
     /// The first few things that were not fit: seconds and what.
@@ -117,7 +137,15 @@ pub struct SetpointCheck {
 impl SetpointCheck {
     /// Nothing seen yet.
     pub fn new(limits: Limits) -> Self {
-        Self { limits, last: None, stats: SetpointStats::default(), faults: Vec::new() }
+        Self {
+            limits,
+            last: None,
+            urgent: false,
+            follows: false,
+            rounded_m: 0.0,
+            stats: SetpointStats::default(),
+            faults: Vec::new(),
+        }
     }
 
     /// Jerk at the last setpoint, m/s³.
@@ -158,7 +186,20 @@ impl SetpointCheck {
             self.fault(at_s, format!("outside the fence: {position:?}"));
         }
         let before = self.last.filter(|last| ((at_s - last.at_s) as f32) < GAP_S);
-        let mut next = Last { at_s, dt_s: [0.0; 2], position, velocity: None, accel: None, jerk_mps3: 0.0 };
+        let calm = if self.urgent { 0 } else { before.map_or(u8::MAX, |last| last.calm.saturating_add(1)) };
+        self.stats.urgent += u64::from(self.urgent);
+        // The sums of the door are rounded like what is sent.
+        let rounded_m = self.rounded_m + 2.0 * rounding_m(data);
+        let mut next = Last {
+            at_s,
+            dt_s: [0.0; 2],
+            position,
+            velocity: None,
+            accel: None,
+            jerk_mps3: 0.0,
+            calm,
+            rounded_m,
+        };
         if let Some(before) = before {
             let dt_s = ((at_s - before.at_s) as f32).max(1e-3);
             let moved = position - before.position;
@@ -166,7 +207,7 @@ impl SetpointCheck {
             next.dt_s = [dt_s, before.dt_s[0]];
             let stats = &mut self.stats;
             let sent = Vector3::new(data.vx, data.vy, data.vz);
-            let follows = sent == Vector3::zeros() && moved.norm() > STILL_M;
+            let follows = self.follows || (sent == Vector3::zeros() && moved.norm() > STILL_M);
             let jumps = velocity.norm() > if follows { FOLLOWS_MPS } else { self.limits.speed_mps };
             if jumps {
                 stats.jumps += 1;
@@ -187,12 +228,22 @@ impl SetpointCheck {
                 stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
                 if let Some(accel_before) = before.accel {
                     let over_s = (dt_s + before.dt_s[0] + before.dt_s[1]) / 3.0;
-                    next.jerk_mps3 = ((accel - accel_before) / over_s).norm();
-                    stats.jerk_mps3 = stats.jerk_mps3.max(next.jerk_mps3);
-                    if next.jerk_mps3 > self.limits.jerk_mps3 {
+                    let shortest_s = dt_s.min(before.dt_s[0]).min(before.dt_s[1]);
+                    let rounding = 8.0 * rounded_m.max(before.rounded_m) / shortest_s.powi(3);
+                    let jerk_mps3 = (((accel - accel_before) / over_s).norm() - rounding).max(0.0);
+                    next.jerk_mps3 = jerk_mps3;
+                    // The difference reaches three setpoints back.
+                    let (worst, most_mps3) = if calm <= 3 {
+                        (&mut stats.urgent_jerk_mps3, URGENT_JERK_MPS3)
+                    } else {
+                        (&mut stats.jerk_mps3, JERK_MPS3)
+                    };
+                    *worst = worst.max(jerk_mps3);
+                    // A thousandth for the sums.
+                    if jerk_mps3 > most_mps3 * 1.001 {
                         stats.jerky += 1;
                         if !jumps {
-                            self.fault(at_s, format!("{:.1} m/s³", next.jerk_mps3));
+                            self.fault(at_s, format!("{jerk_mps3:.1} m/s³ of {most_mps3}"));
                         }
                     }
                 }
@@ -200,4 +251,9 @@ impl SetpointCheck {
         }
         self.last = Some(next);
     }
+}
+
+/// What its f32 round a place by, metres.
+pub fn rounding_m(data: &SET_POSITION_TARGET_LOCAL_NED_DATA) -> f32 {
+    ROUNDING * data.x.abs().max(data.y.abs()).max(data.z.abs())
 }

@@ -37,8 +37,6 @@ const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 7
 const STEP_MS: u64 = 25;
 /// Nobody leaves this box, metres: minimum and maximum corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
-/// Jerk of a setpoint, m/s³: the filter's stop, and what the differences of rounded positions add.
-const JERK_MPS3: f32 = 9.0;
 /// A vehicle that is faster is not stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
 /// Speed of a setpoint, m/s: nominal, and what it may run over where it catches up.
@@ -203,8 +201,7 @@ impl Member {
         let (low, high) = (ned(&FENCE.0), ned(&FENCE.1));
         let (low, high) = (low.inf(&high), low.sup(&high));
         let slack = Vector3::repeat(0.05);
-        let limits =
-            Limits { speed_mps: SPEED_MPS, jerk_mps3: JERK_MPS3, fence: Some((low - slack, high + slack)) };
+        let limits = Limits { speed_mps: SPEED_MPS, fence: Some((low - slack, high + slack)) };
         let mut autopilot = Autopilot::new(
             vehicle.kind,
             vehicle.id,
@@ -416,6 +413,7 @@ impl<'a> World<'a> {
                 break;
             }
             let (now, member) = (self.now, &mut self.members[i]);
+            member.autopilot.check.urgent = member.companion.stops_urgently();
             member.autopilot.handle_bytes(now, &buffer[..length], &mut member.bytes);
         }
         loop {

@@ -1,0 +1,219 @@
+//! Frames forged from random numbers: fields random and at their bounds, some of a message that would be believed.
+
+use companion::autopilot::Kind;
+use companion::frame::{self, Header, MAX_SENT};
+use companion::intent::POINTS;
+use companion::{AUTOPILOT, COMPONENT, Link};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
+use planner_core::Point;
+use planner_core::frames;
+
+use super::{Flight, ID, NEIGHBOUR, ORIGIN, intent};
+use crate::meeting::dice::Dice;
+
+/// Where random numbers come from: a seed, or a fuzzer's bytes, which end.
+pub trait Entropy {
+    /// The next bits.
+    fn bits(&mut self) -> u64;
+    /// Whether there are no more.
+    fn is_spent(&self) -> bool {
+        false
+    }
+}
+
+impl Entropy for Dice {
+    fn bits(&mut self) -> u64 {
+        Self::bits(self)
+    }
+}
+
+/// A fuzzer's bytes.
+#[derive(Debug)]
+pub struct Bytes<'a>(pub &'a [u8]);
+
+impl Entropy for Bytes<'_> {
+    fn bits(&mut self) -> u64 {
+        let mut word = [0; 8];
+        let length = self.0.len().min(8);
+        word[..length].copy_from_slice(&self.0[..length]);
+        self.0 = &self.0[length..];
+        u64::from_le_bytes(word)
+    }
+
+    fn is_spent(&self) -> bool {
+        self.0.is_empty()
+    }
+}
+
+impl Flight {
+    /// Gives one forged frame.
+    pub(super) fn forge(&mut self, entropy: &mut impl Entropy, links: &[Link], messages: &[u32]) {
+        let head = entropy.bits();
+        let pick = |shift: u32, count: u64| (head >> shift) % count;
+        let link = links[pick(0, links.len() as u64) as usize];
+        let message_id = messages[pick(1, messages.len() as u64) as usize];
+        let system = match pick(8, 6) {
+            0..=2 if link == Link::Autopilot => ID,
+            0 | 1 => NEIGHBOUR,
+            2 => ID,
+            3 => 1 + pick(16, 5) as u8,
+            // Any but the mission's ground station: that only signing would show.
+            _ => pick(16, 255) as u8,
+        };
+        let component = match pick(24, 4) {
+            0 => (head >> 26) as u8,
+            1 | 2 if link == Link::Autopilot => AUTOPILOT,
+            _ => COMPONENT,
+        };
+        let header = Header { system, component, sequence: (head >> 32) as u8 };
+        let mut payload = [0; 255];
+        let length = self.fill(message_id, &mut payload, entropy, (head >> 40) as u8);
+        let extra = frame::extra_crc(message_id).unwrap_or(0);
+        let mut out = [0; MAX_SENT];
+        let length = frame::encode_raw(header, message_id, extra, &payload[..length], &mut out);
+        self.report.frames += 1;
+        self.companion.handle_bytes(link, self.now, &out[..length]);
+    }
+
+    /// Fields random or at their bounds, and some of a message that would be believed.
+    fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
+        if id == TUNNEL_DATA::ID && how & 3 != 0 {
+            let mut intent = intent();
+            let bits = entropy.bits();
+            intent.system_id = if how & 8 == 0 { NEIGHBOUR } else { bits as u8 };
+            intent.flags = (bits >> 8) as u8;
+            intent.mission_crc = if how & 16 == 0 { 0xC0FFEE } else { bits as u32 };
+            intent.plan_crc = if how & 32 == 0 { 5 } else { (bits >> 16) as u32 };
+            intent.heard = (bits >> 24) as u32;
+            intent.floor_m = number(bits >> 32, 10.0);
+            intent.column = how & 64 != 0;
+            intent.progress_m = number(bits >> 40, 30.0);
+            intent.speed_mps = number(bits >> 48, 5.0);
+            for _ in 0..(bits >> 56) as usize % (POINTS + 1) {
+                let bits = entropy.bits();
+                let here = self.autopilot.position;
+                let near = |shift: u32| number(bits >> shift, 6.0);
+                let point = here + Point::new(near(0), near(16), near(32));
+                intent.points.push(point).expect("no more than fit");
+            }
+            let mut whole = [0; 133];
+            let length = intent.encode(&mut whole);
+            payload[..length].copy_from_slice(&whole[..length]);
+            return length;
+        }
+        let length = LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
+        for word in payload[..length].chunks_mut(4) {
+            let bits = entropy.bits();
+            let value = match bits % 8 {
+                0 => (bits >> 8) as u32,
+                1 => 0,
+                2 => u32::MAX,
+                3 => EDGES[(bits >> 8) as usize % EDGES.len()].to_bits(),
+                _ => number(bits >> 8, 50.0).to_bits(),
+            };
+            word.copy_from_slice(&value.to_le_bytes()[..word.len()]);
+        }
+        let near = |shift: u32, how: u8| f32::from(how.rotate_left(shift)) * 0.01 - 1.28;
+        match id {
+            // Near enough to be no jump, now and then.
+            32 if how & 3 == 0 => {
+                payload[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+                let geodetic = frames::enu_to_geodetic(&ORIGIN, &self.autopilot.position);
+                let origin = self.companion.telemetry().ekf_origin.unwrap_or(ORIGIN);
+                let ned = frames::geodetic_to_ned(self.autopilot.kind.projection(), &origin, &geodetic)
+                    .cast::<f32>();
+                for (axis, shift) in [(0, 0), (1, 3), (2, 5)] {
+                    let value = ned[axis] + near(shift, how);
+                    payload[4 + 4 * axis..8 + 4 * axis].copy_from_slice(&value.to_le_bytes());
+                }
+            }
+            33 if how & 1 == 0 => {
+                let place =
+                    self.autopilot.position + Point::new(near(0, how), near(3, how), near(5, how)) * 4.0;
+                let geodetic = frames::enu_to_geodetic(&ORIGIN, &place);
+                payload[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
+                payload[4..8].copy_from_slice(&((geodetic.lat_deg * 1e7) as i32).to_le_bytes());
+                payload[8..12].copy_from_slice(&((geodetic.lon_deg * 1e7) as i32).to_le_bytes());
+                payload[12..16].copy_from_slice(&((geodetic.alt_m * 1e3) as i32).to_le_bytes());
+            }
+            75 | 76 => {
+                let command = COMMANDS[usize::from(how) % COMMANDS.len()];
+                payload[28..30].copy_from_slice(&command.to_le_bytes());
+                payload[30] = if how & 1 == 0 { ID } else { 0 };
+                payload[31] = if how & 2 == 0 { COMPONENT } else { 0 };
+                if how & 4 == 0 {
+                    payload[..4].copy_from_slice(&f32::from(how >> 7).to_le_bytes());
+                }
+            }
+            0 => {
+                payload[5] = if self.autopilot.kind == Kind::Px4 { 12 } else { 3 };
+                if how & 1 == 0 {
+                    let mode = self.autopilot.kind.setpoint_mode();
+                    payload[..4].copy_from_slice(&mode.to_le_bytes());
+                }
+                payload[7] = if how & 2 == 0 { 4 } else { 5 };
+            }
+            20 | 21 | 23 | 110 | 111 => {
+                let at = if id == 110 {
+                    1
+                } else if id == 20 {
+                    2
+                } else if id == 23 {
+                    4
+                } else {
+                    0
+                };
+                (payload[at], payload[at + 1]) = (ID, COMPONENT);
+            }
+            _ => {}
+        }
+        length
+    }
+}
+
+/// A number of about this size.
+fn number(bits: u64, size: f32) -> f32 {
+    (f32::from(bits as u16) / 32768.0 - 1.0) * size
+}
+
+/// Messages that a companion reads, and one that it does not.
+pub(super) const READ: [u32; 20] =
+    [0, 1, 20, 21, 22, 23, 32, 33, 49, 66, 75, 76, 77, 110, 111, 193, 230, 245, 253, TUNNEL_DATA::ID];
+/// Bytes of their payloads.
+const LENGTHS: [(u32, usize); 19] = [
+    (0, 9),
+    (1, 31),
+    (20, 20),
+    (21, 2),
+    (22, 25),
+    (23, 23),
+    (32, 28),
+    (33, 28),
+    (49, 20),
+    (66, 6),
+    (75, 35),
+    (76, 33),
+    (77, 10),
+    (110, 254),
+    (111, 18),
+    (193, 26),
+    (230, 42),
+    (245, 2),
+    (253, 54),
+];
+/// Commands that do something, and some that do not.
+const COMMANDS: [u16; 12] = [20, 21, 176, 193, 246, 300, 400, 511, 512, 5004, 22, 0xFFFF];
+/// Numbers at their bounds.
+const EDGES: [f32; 10] = [
+    f32::NAN,
+    f32::INFINITY,
+    f32::NEG_INFINITY,
+    f32::MAX,
+    f32::MIN,
+    f32::MIN_POSITIVE,
+    1e30,
+    -1e-30,
+    16_777_217.0,
+    -0.0,
+];
