@@ -9,7 +9,7 @@
 mod brakes;
 mod door;
 mod fence;
-mod filter;
+pub(crate) mod filter;
 mod follower;
 mod waypoints;
 
@@ -23,7 +23,7 @@ use self::filter::Filter;
 use self::waypoints::Waypoints;
 use crate::autopilot::Kind;
 use crate::config::Config;
-use crate::limits::{AutopilotLimits, Limit, Limits};
+use crate::limits::{AutopilotLimits, Limits, Settings};
 use crate::mission::State;
 use crate::neighbours::Neighbours;
 use crate::retreat::{self, Search};
@@ -48,7 +48,7 @@ const DESCENDED_M: f32 = 0.2;
 /// In a climb, a descent or a join the setpoint is at most this far ahead of the vehicle, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Speed of the join to the path, m/s.
-const JOIN_MPS: f32 = 1.0;
+pub(crate) const JOIN_MPS: f32 = 1.0;
 /// Before the take-off the setpoint follows the estimate of a vehicle that stands no faster than this, m/s.
 const DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
@@ -188,31 +188,12 @@ pub struct Scene<'a, const W: usize, const G: usize> {
 
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let limits = Limits::new(config, autopilot);
-        let door = Door::new(limits, config.geofence);
-        let track = TrackConfig {
-            cruise_mps: limits.speed_mps,
-            climb_mps: autopilot.get(Limit::Climb),
-            descend_mps: autopilot.get(Limit::Descend),
-            accel_mps2: limits.accel_mps2,
-            accel_z_mps2: limits.accel_z_mps2,
-            radius_m: config.radius_m,
-            ..TrackConfig::default()
-        };
+        let door = Door::new(Limits::new(config, autopilot), config.geofence);
+        let Settings { track, leg_track, deconflict } = Settings::new(config, autopilot);
         Self {
-            leg_track: TrackConfig {
-                cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
-                climb_mps: limits.climb_mps,
-                descend_mps: limits.descend_mps,
-                ..track
-            },
             track,
-            deconflict: DeconflictConfig {
-                method: config.method,
-                safety_distance_m: config.safety_distance_m,
-                cruise_mps: config.cruise_mps,
-                accel_mps2: config.accel_mps2,
-            },
+            leg_track,
+            deconflict,
             pace: 1.0,
             door,
             phase: Phase::Hold,

@@ -4,11 +4,13 @@
 //! as the default of its kind. Source: PX4 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
 
 use libm::{fmaxf, fminf};
-use planner_core::Point;
+use planner_core::deconflict::DeconflictConfig;
+use planner_core::path::TrackConfig;
+use planner_core::{ConfigError, Point};
 
 use crate::autopilot::Kind;
 use crate::config::Config;
-use crate::guidance::SMOOTH_MOST_S;
+use crate::guidance::{JOIN_MPS, SMOOTH_MOST_S, filter};
 
 /// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get that.
 pub const JERK_MPS3: f32 = 4.0;
@@ -163,6 +165,54 @@ impl Limits {
     }
 }
 
+/// What guidance gives to planner-core's calls.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Settings {
+    /// Along the path.
+    pub(crate) track: TrackConfig,
+    /// Along the way to it, and in climb and descent.
+    pub(crate) leg_track: TrackConfig,
+    /// Of advice.
+    pub(crate) deconflict: DeconflictConfig,
+}
+
+impl Settings {
+    /// Those of a vehicle with these limits.
+    pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
+        let limits = Limits::new(config, autopilot);
+        let track = TrackConfig {
+            cruise_mps: limits.speed_mps,
+            climb_mps: autopilot.get(Limit::Climb),
+            descend_mps: autopilot.get(Limit::Descend),
+            accel_mps2: limits.accel_mps2,
+            accel_z_mps2: limits.accel_z_mps2,
+            radius_m: config.radius_m,
+            ..TrackConfig::default()
+        };
+        let leg_track = TrackConfig {
+            cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
+            climb_mps: limits.climb_mps,
+            descend_mps: limits.descend_mps,
+            ..track
+        };
+        let deconflict = DeconflictConfig {
+            method: config.method,
+            safety_distance_m: config.safety_distance_m,
+            cruise_mps: config.cruise_mps,
+            accel_mps2: config.accel_mps2,
+        };
+        Self { track, leg_track, deconflict }
+    }
+
+    /// Whether planner-core can work with them, those of the safety filter among them.
+    pub(crate) fn check(&self) -> Result<(), ConfigError> {
+        self.track.check()?;
+        self.leg_track.check()?;
+        self.deconflict.check()?;
+        filter::bounds(&self.track).check()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     extern crate std;
@@ -202,6 +252,7 @@ mod tests {
                 autopilot.set(parameter, near);
             }
             let l = Limits::new(&config(), &autopilot);
+            proptest::prop_assert_eq!(Settings::new(&config(), &autopilot).check(), Ok(()));
             for (value, least, most) in [
                 (l.speed_mps, 0.1, 2.0),
                 (l.climb_mps, 0.1, 1.0),

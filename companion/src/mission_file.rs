@@ -16,7 +16,10 @@ use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
 
-use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS};
+use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, holds};
+
+mod error;
+pub use error::MissionError;
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
@@ -39,36 +42,6 @@ const CRC_LEN: usize = 4;
 const FENCED: u16 = 1;
 /// Fastest speed a mission may name, m/s.
 const MAX_SPEED_MPS: f32 = 1000.0;
-
-/// Why a mission file was refused, on reading or writing.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum MissionError {
-    /// The bytes end before the header, or before the length the header gives.
-    Truncated,
-    /// The first eight bytes are not [`MAGIC`].
-    Magic,
-    /// A version this code does not know.
-    Version(u16),
-    /// The lengths and counts in the header contradict one another.
-    Length,
-    /// The CRC-32 over the file does not match.
-    Crc,
-    /// The named header field is not known, or not a finite number inside its range.
-    Header(&'static str),
-    /// The vehicle at this index has no system id, one that another has, or a number out of range.
-    Vehicle(u16),
-    /// The goal at this index has a number out of range.
-    Goal(u16),
-    /// The output buffer is smaller than the mission file; `needed` bytes would do.
-    MissionFull {
-        /// Bytes the file takes.
-        needed: usize,
-    },
-    /// More vehicles than this companion has room for.
-    RosterFull,
-    /// No vehicle of the mission has this system id.
-    NotInRoster(u8),
-}
 
 /// What all vehicles of a mission share.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -369,17 +342,32 @@ impl<'a> MissionView<'a> {
     }
 
     fn check_lists(&self) -> Result<(), MissionError> {
+        let labelled = self.header.mode == Mode::Labelled;
+        let inside = |place: &Point| self.header.geofence.as_ref().is_none_or(|fence| holds(fence, place));
         let mut seen = [false; 256];
         for (i, vehicle) in self.vehicles().enumerate() {
-            let known = core::mem::replace(&mut seen[usize::from(vehicle.task.id)], true);
+            let id = vehicle.task.id;
+            let known = core::mem::replace(&mut seen[usize::from(id)], true);
             if known || !vehicle.is_sound(self.goals.len()) {
                 return Err(MissionError::Vehicle(i as u16));
             }
+            let same = |other: &[u8; VEHICLE_LEN]| other[2..4] == self.vehicles[i][2..4];
+            if labelled && vehicle.task.goal.is_some() && self.vehicles[..i].iter().any(same) {
+                return Err(MissionError::SameGoal(id));
+            }
+            if !inside(&vehicle.start) {
+                return Err(MissionError::StartOutside(id));
+            }
         }
-        match self.goals().position(|goal| !goal.is_sound()) {
-            Some(i) => Err(MissionError::Goal(i as u16)),
-            None => Ok(()),
+        for (goal, i) in self.goals().zip(0..) {
+            if !goal.is_sound() {
+                return Err(MissionError::Goal(i));
+            }
+            if !inside(&goal.position) {
+                return Err(MissionError::GoalOutside(i));
+            }
         }
+        Ok(())
     }
 
     /// What all vehicles share.

@@ -30,7 +30,7 @@ fn header() -> MissionHeader {
 fn vehicle(id: u8, goal: Option<u16>) -> MissionVehicle {
     MissionVehicle {
         task: VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.2, goal },
-        start: Point::new(f32::from(id), 3.0, 1.5),
+        start: Point::new(0.1 * f32::from(id), 3.0, 1.5),
         radius_m: 0.3,
         speed_max_mps: 1.5,
     }
@@ -120,6 +120,11 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(vehicle_at(2, 4), &nan), MissionError::Vehicle(2)),
         (forged(vehicle_at(0, 24), &(-0.1f32).to_le_bytes()), MissionError::Vehicle(0)),
         (forged(HEADER_LEN + 3 * VEHICLE_LEN + 12, &nan), MissionError::Goal(0)),
+        (forged(vehicle_at(2, 4), &(-5.1f32).to_le_bytes()), MissionError::StartOutside(250)),
+        (
+            forged(HEADER_LEN + 3 * VEHICLE_LEN + GOAL_LEN + 8, &60.5f32.to_le_bytes()),
+            MissionError::GoalOutside(1),
+        ),
     ] {
         assert_eq!(MissionView::parse(&file).err(), Some(why));
     }
@@ -128,6 +133,37 @@ fn what_is_not_sound_is_refused_by_name() {
     let one = [vehicle(1, None)];
     assert_eq!(write(&header(), &one, &[], &mut small), Err(MissionError::MissionFull { needed }));
     assert_eq!(write(&header(), &[vehicle(1, Some(0))], &[], &mut [0; 200]), Err(MissionError::Vehicle(0)));
+}
+
+#[test]
+fn labelled_no_two_vehicles_have_one_goal() {
+    let goals = [goal(0), goal(1)];
+    let written = |mode: Mode, goal: Option<u16>| {
+        let vehicles = [vehicle(7, goal), vehicle(2, Some(1)), vehicle(250, goal)];
+        write(&MissionHeader { mode, ..header() }, &vehicles, &goals, &mut [0; 300]).map(|_| ())
+    };
+    assert_eq!(written(Mode::Labelled, Some(0)), Err(MissionError::SameGoal(250)));
+    assert_eq!(written(Mode::Labelled, Some(1)), Err(MissionError::SameGoal(2)));
+    assert_eq!(written(Mode::Labelled, None), Ok(()));
+    assert_eq!(written(Mode::Unlabelled(Objective::TotalDistance), Some(0)), Ok(()));
+}
+
+#[test]
+fn a_text_has_room_for_why_a_mission_is_refused() {
+    use std::string::ToString;
+    for error in [
+        MissionError::Version(u16::MAX),
+        MissionError::Length,
+        MissionError::Header("parked_separation_m"),
+        MissionError::Vehicle(u16::MAX),
+        MissionError::SameGoal(255),
+        MissionError::StartOutside(255),
+        MissionError::GoalOutside(u16::MAX),
+        MissionError::MissionFull { needed: usize::MAX },
+        MissionError::RosterFull,
+    ] {
+        assert!(error.to_string().len() <= 41, "{error}");
+    }
 }
 
 #[test]

@@ -10,7 +10,7 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::path::Path;
+use planner_core::path::{Path, TrackConfig};
 use planner_core::safety::{self, Bounds, Braking, REACTION_S, Set};
 use planner_core::schedule::VehiclePlan;
 
@@ -184,12 +184,13 @@ impl Filter {
     }
 }
 
-impl Guidance {
-    fn bounds(&self) -> Bounds {
-        let braking = Braking { accel_mps2: self.track.accel_mps2, jerk_mps3: JERK_MPS3 };
-        Bounds { braking, speed_max_mps: self.track.cruise_mps, silent_s: SILENT_S }
-    }
+/// What is expected of vehicles that fly as this one does.
+pub(crate) fn bounds(track: &TrackConfig) -> Bounds {
+    let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: JERK_MPS3 };
+    Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: SILENT_S }
+}
 
+impl Guidance {
     /// Compares the way ahead with all neighbours; to be called once a step, before the reference moves.
     pub(super) fn filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
@@ -240,7 +241,7 @@ impl Guidance {
         }
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_M } else { 0.0 };
-        let bounds = self.bounds();
+        let bounds = bounds(&self.track);
         let own = match way {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
             Way::Vertical { to_m, speed_mps } => {

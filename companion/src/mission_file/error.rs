@@ -1,0 +1,61 @@
+//! Why a mission file is refused, for programs and for people.
+
+use core::fmt;
+
+/// Why a mission file was refused, on reading or writing. Printed, it says so in at most 41 characters, so that a STATUSTEXT
+/// has room for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MissionError {
+    /// The bytes end before the header, or before the length the header gives.
+    Truncated,
+    /// The first eight bytes are not [`super::MAGIC`].
+    Magic,
+    /// A version this code does not know.
+    Version(u16),
+    /// The lengths and counts in the header contradict one another.
+    Length,
+    /// The CRC-32 over the file does not match.
+    Crc,
+    /// The named header field is not known, or not a finite number inside its range.
+    Header(&'static str),
+    /// The vehicle at this index has no system id, one that another has, or a number out of range.
+    Vehicle(u16),
+    /// Labelled, the vehicle with this system id has a goal that is another one's too.
+    SameGoal(u8),
+    /// The vehicle with this system id starts outside the geofence.
+    StartOutside(u8),
+    /// The goal at this index has a number out of range.
+    Goal(u16),
+    /// The goal at this index lies outside the geofence.
+    GoalOutside(u16),
+    /// The output buffer is smaller than the mission file; `needed` bytes would do.
+    MissionFull {
+        /// Bytes the file takes.
+        needed: usize,
+    },
+    /// More vehicles than this companion has room for.
+    RosterFull,
+    /// No vehicle of the mission has this system id.
+    NotInRoster(u8),
+}
+
+impl fmt::Display for MissionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated => write!(f, "it ends too early"),
+            Self::Magic => write!(f, "it does not begin as one"),
+            Self::Version(version) => write!(f, "its version {version} is not known here"),
+            Self::Length => write!(f, "its lengths contradict one another"),
+            Self::Crc => write!(f, "its CRC-32 does not match"),
+            Self::Header(field) => write!(f, "its {field} is out of range"),
+            Self::Vehicle(index) => write!(f, "vehicle no. {index} is unsound or twice"),
+            Self::SameGoal(id) => write!(f, "vehicle {id} has another one's goal"),
+            Self::StartOutside(id) => write!(f, "vehicle {id} starts outside the geofence"),
+            Self::Goal(index) => write!(f, "goal {index} is out of range"),
+            Self::GoalOutside(index) => write!(f, "goal {index} lies outside the geofence"),
+            Self::MissionFull { needed } => write!(f, "it takes {needed} bytes"),
+            Self::RosterFull => write!(f, "it has too many vehicles or goals"),
+            Self::NotInRoster(id) => write!(f, "it has no vehicle {id}"),
+        }
+    }
+}
