@@ -16,6 +16,7 @@ mod augment;
 mod reduce;
 
 use augment::Paths;
+use libm::fmaxf;
 
 /// "Not assigned", as an index.
 const NONE: u16 = u16::MAX;
@@ -232,7 +233,7 @@ pub fn bottleneck<const N: usize>(
     state.reset();
     let mut limit = f32::NEG_INFINITY;
     while let Some(largest) = augment::from_all_bottleneck(&costs, &mut state, &mut paths) {
-        limit = limit.max(largest);
+        limit = fmaxf(limit, largest);
     }
     costs.limit = limit;
     solve(&costs, ws);
@@ -275,7 +276,7 @@ fn report(costs: &Costs<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignm
         out[from] = Some(to);
         result.pairs += 1;
         result.total += f64::from(cost);
-        result.largest = result.largest.max(cost);
+        result.largest = fmaxf(result.largest, cost);
     }
     result
 }

@@ -1,10 +1,13 @@
-//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure` in QEMU.
+//! The board computes what the desk computes, bit by bit, and in how many instructions: `measure` in QEMU. So it does at the
+//! limits of every public call of planner-core, and beyond, without a panic: `limits`.
 //!
 //! QEMU counts: with `-icount shift=0` an instruction takes a nanosecond of the board's time. They are its instructions, not
 //! cycles of the chip.
 
 use std::collections::HashMap;
 
+use firmware::calls::limits::{self, Answers, Listener};
+use firmware::calls::limits_routes::{self, Lent};
 use firmware::cases::{self, Workspace};
 use flockmate_tests::{board, workspace};
 use host_sim::map::{Unknown, building};
@@ -55,6 +58,30 @@ fn the_board_computes_what_the_desk_computes() {
     for (name, limit) in LIMITS {
         assert!(counts[name] <= limit, "{name}: {} of {limit} instructions", counts[name]);
     }
+}
+
+/// Counts calls.
+struct Calls(usize);
+
+impl Listener for Calls {
+    fn next(&mut self, _name: &'static str) {
+        self.0 += 1;
+    }
+}
+
+#[test]
+fn at_its_limits_the_board_answers_as_the_desk_does() {
+    let Some(program) = board::program("limits") else { return };
+    let mut calls = Calls(0);
+    let mut answers = Answers::new(&mut calls);
+    limits::places(&mut answers);
+    let places = answers.sum();
+    let routes = limits_routes::routes(&mut answers, &mut Box::new(Lent::new()));
+    let expected = format!("limits {} {places:08x} {routes:08x?}", calls.0);
+    // Neither roadmap nor map is read.
+    let lines = board::measure(&program, &[0], &[0]);
+    println!("{}", lines.join("\n"));
+    assert_eq!(lines.first(), Some(&expected));
 }
 
 /// CRC of the plan for the whole swarm.

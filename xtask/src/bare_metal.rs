@@ -107,7 +107,7 @@ impl Board {
     /// The programs made for it.
     pub fn programs(self) -> &'static [&'static str] {
         match self {
-            Self::Qemu => &["flockmate", "measure", "calls"],
+            Self::Qemu => &["flockmate", "measure", "calls", "limits"],
             Self::NucleoH743 | Self::Pico2 => &["flockmate"],
         }
     }

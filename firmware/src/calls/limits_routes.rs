@@ -89,18 +89,27 @@ fn any(_: u16, _: &HalfEdge) -> bool {
     true
 }
 
-/// Makes all of them.
-pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) {
+/// Makes all of them; the sum of the answers after each part: files, roadmaps, searches, assignments, plans, schedules,
+/// detours.
+pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] {
     let len = files(to, &mut lent.ws.search, &mut lent.file);
+    let mut sums = [to.sum(); 7];
     let view = to
         .call("roadmap::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
         .expect("just written");
     roadmaps(to, &view);
+    sums[1] = to.sum();
     searches(to, &view, &mut lent.ws.search);
+    sums[2] = to.sum();
     assignments(to);
+    sums[3] = to.sum();
     plans(to, &view, &mut lent.ws, &mut lent.plan);
+    sums[4] = to.sum();
     schedules(to, &view, &mut lent.ws, &mut lent.plan, &mut lent.own);
+    sums[5] = to.sum();
     detours(to, &view, &mut lent.ws.search, &mut lent.own);
+    sums[6] = to.sum();
+    sums
 }
 
 /// Leaves a good file; returns its length.

@@ -213,7 +213,9 @@ fn relax_largest(
 ) {
     let columns = line.iter().zip(done).zip(distance).zip(previous);
     for (((&cost, &done), distance), previous) in columns {
-        let through = f64::from(cost).max(so_far);
+        // Not `max`: which zero it returns, if one is negative, depends on the processor.
+        let cost = f64::from(cost);
+        let through = if cost > so_far { cost } else { so_far };
         if done == 0.0 && through < *distance {
             (*distance, *previous) = (through, row);
         }

@@ -1,0 +1,45 @@
+//! Every public call of planner-core at its limits and beyond, on a board: run in QEMU, read by `tests/tests/board.rs`, which
+//! knows what the desk comes to. A call that panics is named.
+#![no_std]
+#![no_main]
+
+use core::cell::Cell;
+
+use critical_section::Mutex;
+use firmware::boards::stack;
+use firmware::calls::limits::{self, Answers, Listener};
+use firmware::calls::limits_routes::{self, Lent};
+use semihosting::println;
+use static_cell::ConstStaticCell;
+
+static LENT: ConstStaticCell<Lent> = ConstStaticCell::new(Lent::new());
+/// The call under way.
+static CALL: Mutex<Cell<&str>> = Mutex::new(Cell::new("none"));
+
+#[panic_handler]
+fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
+    println!("panic in or after {}: {info}", critical_section::with(|cs| CALL.borrow(cs).get()));
+    semihosting::process::exit(1)
+}
+
+/// Counts calls, and keeps the name of the last.
+struct Calls(usize);
+
+impl Listener for Calls {
+    fn next(&mut self, name: &'static str) {
+        self.0 += 1;
+        critical_section::with(|cs| CALL.borrow(cs).set(name));
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    let mut calls = Calls(0);
+    let mut answers = Answers::new(&mut calls);
+    limits::places(&mut answers);
+    let places = answers.sum();
+    let routes = limits_routes::routes(&mut answers, LENT.take());
+    println!("limits {} {places:08x} {routes:08x?}", calls.0);
+    println!("stack {} {}", stack::used(), stack::size());
+    semihosting::process::exit(0)
+}
