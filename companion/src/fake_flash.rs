@@ -179,7 +179,7 @@ pub fn roadmap(nodes: usize) -> Vec<u8> {
     };
     let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARKS).unwrap()];
     let mut workspace = std::boxed::Box::new(planner_core::search::SearchWorkspace::<1024>::new());
-    roadmap::write_with_landmarks(&header, &points, &edges, &mut workspace, &mut bytes).unwrap();
+    roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes).unwrap();
     bytes
 }
 

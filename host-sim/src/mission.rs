@@ -7,7 +7,7 @@ use anyhow::{anyhow, bail};
 use companion::PlanFailure;
 use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::path::PathError;
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
@@ -262,20 +262,12 @@ impl Mission {
         }
     }
 
-    /// A way around `obstacles`, each of which reaches no deeper than the ground below it.
+    /// A way around `obstacles`.
     fn detour(
         &self,
         request: &DetourRequest,
         obstacles: &mut [KeepOff],
     ) -> Result<Box<OwnPlan>, DetourError> {
-        for obstacle in obstacles.iter_mut().filter(|o| o.to.z < o.from.z) {
-            // What lies on the ground has its centre a radius above it; nothing falls through a floor.
-            let Some(ground_z) = self.map.ground_below(&obstacle.from) else { continue };
-            obstacle.to.z = obstacle.to.z.max(ground_z);
-            if obstacle.nature == Nature::Lying {
-                obstacle.from.z = obstacle.to.z;
-            }
-        }
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();

@@ -24,6 +24,8 @@ use crate::map::{BoxTree, VoxelMap};
 pub const CLEARANCE_MAX_M: f32 = 6.0;
 /// Nodes whose edges are one piece of work: a fifth of a millisecond.
 const NODES_A_PIECE: usize = 32;
+/// Numbers of each node in a file beside its place: ways to the landmarks, height over the ground.
+const COLUMNS: usize = LANDMARKS + 1;
 /// Clearances that differ by less are one, metres: the file keeps millimetres.
 const ALIKE_M: f32 = 2e-4;
 
@@ -34,6 +36,8 @@ pub struct Roadmap {
     pub nodes: Vec<Point>,
     /// Edges with their clearances.
     pub edges: Vec<Edge>,
+    /// Height of each node over the ground below it, metres; infinite where there is none.
+    pub heights_m: Vec<f32>,
 }
 
 /// How long each part took, seconds.
@@ -69,7 +73,9 @@ pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Re
         cap_s: 0.0,
         file_s: 0.0,
     };
-    Ok((Roadmap { nodes, edges }, parts))
+    let height_m = |node: &Point| map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m);
+    let heights_m = nodes.iter().map(height_m).collect();
+    Ok((Roadmap { nodes, edges, heights_m }, parts))
 }
 
 /// Terminals and free nodes.
@@ -181,7 +187,7 @@ impl Roadmap {
                 board.nodes
             );
         }
-        let bare = roadmap::encoded_len(nodes, 0, LANDMARKS).unwrap_or(usize::MAX);
+        let bare = roadmap::encoded_len(nodes, 0, COLUMNS).unwrap_or(usize::MAX);
         let an_edge = 2 * size_of::<u32>();
         let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
         let edges = cap::cap(&self.nodes, &self.edges, most)
@@ -193,11 +199,11 @@ impl Roadmap {
 /// The roadmap as the file that is uploaded to a board.
 pub fn encode(roadmap: &Roadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
-    let length =
-        roadmap::encoded_len(roadmap.nodes.len(), roadmap.edges.len(), LANDMARKS).ok_or_else(too_large)?;
+    let Roadmap { nodes, edges, heights_m } = roadmap;
+    let length = roadmap::encoded_len(nodes.len(), edges.len(), COLUMNS).ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
     let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
-    roadmap::write_with_landmarks(header, &roadmap.nodes, &roadmap.edges, &mut workspace, &mut bytes)
+    roadmap::write_with_landmarks(header, nodes, edges, heights_m, &mut workspace, &mut bytes)
         .map_err(|e: RoadmapError| anyhow!("the roadmap cannot be written: {e:?}"))?;
     Ok(bytes)
 }

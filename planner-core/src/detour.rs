@@ -3,9 +3,10 @@
 //! It is flown alone, while all others stand (`companion/src/detour.rs` waits for that), so there is no time in it: the
 //! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOff`]. It begins with
 //! the rest of the leg at hand, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
-//! something already than it should be, it only comes no nearer.
+//! something already than it should be, it only comes no nearer. A column ends at the ground, as far as the roadmap says where
+//! that is.
 //!
-//! ENU metres. Cost: two A*, each edge looked at against every [`KeepOff`].
+//! ENU metres. Cost: two A*, each edge looked at against every [`KeepOff`]; each of these against every node.
 
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
@@ -39,7 +40,7 @@ pub enum Nature {
     Solid,
     /// Somebody at `from` who comes down to `to`: not to be rested below, nor flown up to.
     Landing,
-    /// Somebody who lies on the ground below `from`: who knows the ground keeps off that place only.
+    /// Somebody who lies on the ground below `from`: where the roadmap knows the ground, that place only is kept off.
     Lying,
 }
 
@@ -55,6 +56,18 @@ impl KeepOff {
     fn seen_from(&self, here: &Point) -> Self {
         let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - SWAY_M, 0.0)), ..*self }
+    }
+
+    /// The same, no deeper than the ground below it: nothing falls through a floor. What lies is on the ground.
+    fn settled(&self, view: &RoadmapView<'_>) -> Self {
+        let falls = self.to.z < self.from.z;
+        let Some((low_m, high_m)) = view.ground_around(&self.from).filter(|_| falls) else { return *self };
+        let (mut from, mut to) = (self.from, self.to);
+        to.z = fmaxf(to.z, low_m);
+        if self.nature == Nature::Lying {
+            from.z = fmaxf(high_m, to.z);
+        }
+        Self { from, to, ..*self }
     }
 
     /// What of it is not to be flown through. One who comes down may be met half way by who flies up as fast: of its column
@@ -193,6 +206,9 @@ pub fn plan<const N: usize, const W: usize>(
     request.check().map_err(DetourError::Config)?;
     obstacles.iter().try_for_each(KeepOff::check).map_err(DetourError::Config)?;
     let here = request.here;
+    for obstacle in obstacles.iter_mut() {
+        *obstacle = obstacle.settled(view);
+    }
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
         *obstacle = obstacle.seen_from(&here);
     }

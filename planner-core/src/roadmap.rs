@@ -10,6 +10,9 @@
 //! inequality their differences bound the way between any two nodes from below, in a building better than the straight line
 //! does (ALT: Goldberg and Harrelson 2005, "Computing the Shortest Path: A* Search Meets Graph Theory").
 //!
+//! It may carry each node's height over the ground too, four bytes a node, so that a board without a map knows where something
+//! that falls comes to rest ([`RoadmapView::ground_around`]).
+//!
 //! [`RoadmapView::parse`] checks everything once, in O(nodes + half-edges · log degree); afterwards no accessor can meet
 //! an offset or a target out of range, and A* finds shortest ways, whatever the bytes were. Whether an edge is as clear as
 //! it says only the map can tell.
@@ -20,13 +23,18 @@ use crate::Point;
 use crate::frames::Geodetic;
 use crate::prm::squared_length;
 
+mod check;
+mod ground;
 mod write;
+pub use ground::GROUND_REACH_M;
 pub use write::{Edge, encoded_len, write, write_with_landmarks};
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
-/// Version this code writes and reads.
-pub const VERSION: u16 = 1;
+/// Version of a file that says how high each node is over the ground.
+pub const VERSION: u16 = 2;
+/// Version of one that does not; written and read too.
+const WITHOUT_HEIGHTS: u16 = 1;
 /// Bytes before the first node.
 pub const HEADER_LEN: usize = 72;
 /// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
@@ -45,6 +53,7 @@ pub const LANDMARKS: usize = 2;
 
 const NODE_LEN: usize = 12;
 const LANDMARKS_LEN: usize = 4 * LANDMARKS;
+const HEIGHT_LEN: usize = 4;
 const WORD_LEN: usize = 4;
 /// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFFFFFF.
 const CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
@@ -80,6 +89,8 @@ pub enum RoadmapError {
     EdgeClearance(u16),
     /// A way from this node to a landmark is beyond [`MAX_WAY_M`], or is not the one that a search over all edges finds.
     Landmark(u16),
+    /// The height of this node over the ground is NaN, negative or beyond [`MAX_WAY_M`], or this node has none and others do.
+    Height(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
     /// More than [`MAX_NODES`] nodes.
@@ -198,7 +209,7 @@ fn node_of(b: &[u8; NODE_LEN]) -> Point {
     Point::new(at(0), at(4), at(8))
 }
 
-/// A checked roadmap over borrowed bytes. Copying it copies four slices, not the roadmap.
+/// A checked roadmap over borrowed bytes. Copying it copies five slices, not the roadmap.
 #[derive(Clone, Copy, Debug)]
 pub struct RoadmapView<'a> {
     header: RoadmapHeader,
@@ -208,6 +219,8 @@ pub struct RoadmapView<'a> {
     half_edges: &'a [[u8; WORD_LEN]],
     /// One entry a node, or none.
     landmarks: &'a [[u8; LANDMARKS_LEN]],
+    /// One entry a node, or none.
+    heights: &'a [[u8; HEIGHT_LEN]],
 }
 
 impl<'a> RoadmapView<'a> {
@@ -215,7 +228,7 @@ impl<'a> RoadmapView<'a> {
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
         let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(RoadmapError::Truncated)?;
         let total = declared_len(head)?;
-        let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
+        let counts = [60, 64, 68].map(|at| u32_at(head, at) as usize);
         let body = bytes.get(..total).ok_or(RoadmapError::Truncated)?;
         let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(RoadmapError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
@@ -235,24 +248,22 @@ impl<'a> RoadmapView<'a> {
             starts: u16_at(head, 56),
             goals: u16_at(head, 58),
         };
-        header.check(node_count)?;
-        let view = Self::over(header, crc, &covered[HEADER_LEN..], node_count, half_edge_count);
+        header.check(counts[0])?;
+        let view = Self::over(header, crc, &covered[HEADER_LEN..], counts);
         view.check_graph()?;
         view.check_landmarks()?;
+        view.check_heights()?;
         Ok(view)
     }
 
-    /// The parts of a body that is as long as its counts say; nothing is checked.
-    fn over(
-        header: RoadmapHeader,
-        crc: u32,
-        body: &'a [u8],
-        node_count: usize,
-        half_edge_count: usize,
-    ) -> Self {
+    /// The parts of a body that is as long as its counts say, of nodes, half-edges and landmarks; what is left is heights.
+    /// Nothing is checked.
+    fn over(header: RoadmapHeader, crc: u32, body: &'a [u8], counts: [usize; 3]) -> Self {
+        let [node_count, half_edge_count, landmarks] = counts;
         let (nodes, rest) = body.split_at(node_count * NODE_LEN);
         let (offsets, rest) = rest.split_at((node_count + 1) * WORD_LEN);
-        let (half_edges, landmarks) = rest.split_at(half_edge_count * WORD_LEN);
+        let (half_edges, rest) = rest.split_at(half_edge_count * WORD_LEN);
+        let (landmarks, heights) = rest.split_at(node_count * landmarks * WORD_LEN);
         Self {
             header,
             crc,
@@ -260,99 +271,8 @@ impl<'a> RoadmapView<'a> {
             offsets: offsets.as_chunks().0,
             half_edges: half_edges.as_chunks().0,
             landmarks: landmarks.as_chunks().0,
+            heights: heights.as_chunks().0,
         }
-    }
-
-    /// The ways to the landmarks must be, to the bit, those that a search over all edges finds; then their differences
-    /// bound every way from below. Nothing is searched: the ways are right if that to the landmark is zero, no edge
-    /// shortens one, and each other one is the sum of an edge and of a shorter way from the edge's other end. (Along the
-    /// shorter ways one comes to the landmark, so none is too short; along the true shortest way, none is too long.)
-    fn check_landmarks(&self) -> Result<(), RoadmapError> {
-        if self.landmarks.is_empty() {
-            return Ok(());
-        }
-        let nodes = 0..self.nodes.len() as u16;
-        let (mut farthest, mut farthest_m) = (0, 0.0);
-        for node in nodes.clone() {
-            let [way_m, _] = self.ways_to_landmarks_m(node);
-            if way_m > farthest_m {
-                (farthest, farthest_m) = (node, way_m);
-            }
-        }
-        let landmarks = [0, farthest];
-        for node in nodes {
-            let here = self.ways_to_landmarks_m(node);
-            let (mut sound, mut explained) = (true, [false; LANDMARKS]);
-            for edge in self.half_edges(node) {
-                let length = self.distance_m(node, edge.target);
-                let there = self.ways_to_landmarks_m(edge.target);
-                for i in 0..LANDMARKS {
-                    let reached = there[i] > 0.0 || edge.target == landmarks[i];
-                    let way = there[i] + length;
-                    sound &= !reached || here[i] <= way && (here[i] > 0.0 || node == landmarks[i]);
-                    explained[i] |= reached && here[i] == way && there[i] < here[i];
-                }
-            }
-            for i in 0..LANDMARKS {
-                sound &= match here[i] {
-                    0.0 => true,
-                    way => way > 0.0 && way <= MAX_WAY_M && explained[i] && node != landmarks[i],
-                };
-            }
-            if !sound {
-                return Err(RoadmapError::Landmark(node));
-            }
-        }
-        Ok(())
-    }
-
-    fn check_graph(&self) -> Result<(), RoadmapError> {
-        // Ranges first: the opposite of a half-edge is looked up in a row that must already be known to be sound.
-        let mut end = 0;
-        for (i, raw) in self.offsets.iter().enumerate() {
-            let node = i.min(MAX_NODES) as u16;
-            let offset = u32::from_le_bytes(*raw) as usize;
-            if offset < end || offset > self.half_edges.len() || (i == 0 && offset != 0) {
-                return Err(RoadmapError::Offset(node));
-            }
-            end = offset;
-        }
-        if end != self.half_edges.len() {
-            return Err(RoadmapError::Offset(self.nodes.len() as u16));
-        }
-        for node in 0..self.nodes.len() as u16 {
-            if !in_range(&self.node(node)) {
-                return Err(RoadmapError::Node(node));
-            }
-            let mut previous = None;
-            for edge in self.half_edges(node) {
-                let sound = usize::from(edge.target) < self.nodes.len() && edge.target != node;
-                if !sound || previous.is_some_and(|p| p >= edge.target) {
-                    return Err(RoadmapError::Target(node));
-                }
-                previous = Some(edge.target);
-            }
-        }
-        let (least_m, most_m) = self.header.clearances();
-        for node in 0..self.nodes.len() as u16 {
-            let here = self.node(node);
-            for edge in self.half_edges(node) {
-                if self.edge_between(edge.target, node).map(|e| e.clearance_m) != Some(edge.clearance_m) {
-                    return Err(RoadmapError::OneWay(node));
-                }
-                if !(least_m..=most_m).contains(&edge.clearance_m) {
-                    return Err(RoadmapError::EdgeClearance(node));
-                }
-                let there = self.node(edge.target);
-                if (there - here).norm_squared() == 0.0 {
-                    return Err(RoadmapError::ZeroLength(node));
-                }
-                if !self.header.holds_length(&here, &there) {
-                    return Err(RoadmapError::EdgeLength(node));
-                }
-            }
-        }
-        Ok(())
     }
 
     /// Number of nodes; node indices are below it.
@@ -367,7 +287,7 @@ impl<'a> RoadmapView<'a> {
 
     /// Bytes the roadmap takes, CRC included.
     pub fn byte_len(&self) -> usize {
-        let words = self.offsets.len() + self.half_edges.len() + 1;
+        let words = self.offsets.len() + self.half_edges.len() + self.heights.len() + 1;
         HEADER_LEN + self.nodes.len() * NODE_LEN + words * WORD_LEN + self.landmarks.len() * LANDMARKS_LEN
     }
 
@@ -462,10 +382,11 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     if head[..8] != MAGIC {
         return Err(RoadmapError::Magic);
     }
-    let version = u16_at(head, 8);
-    if version != VERSION {
-        return Err(RoadmapError::Version(version));
-    }
+    let heights = match u16_at(head, 8) {
+        WITHOUT_HEIGHTS => 0,
+        VERSION => 1,
+        other => return Err(RoadmapError::Version(other)),
+    };
     let total = u32_at(head, 12) as usize;
     let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
     let landmarks = u32_at(head, 68) as usize;
@@ -476,7 +397,7 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     if node_count > MAX_NODES {
         return Err(RoadmapError::TooManyNodes);
     }
-    if encoded_len(node_count, half_edge_count / 2, landmarks) != Some(total) {
+    if encoded_len(node_count, half_edge_count / 2, landmarks + heights) != Some(total) {
         return Err(RoadmapError::Length);
     }
     Ok(total)

@@ -57,7 +57,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("schedule::sipp::route, past 9", "n states, each with its half-edges × the pieces near"),
     ("schedule::earliest_departure, past 31", "the pieces of a flight × p"),
     ("schedule::gates, past 31", "the pieces of a flight × p"),
-    ("detour::plan, 128 things", "two A*, each half-edge × things"),
+    ("detour::plan, 128 things", "two A*, each half-edge × things; things × n"),
     ("detour::plan_vehicle, 128 things", "the same"),
     ("detour::is_blocked", "w"),
     ("detour::KeepOff::holds", "constant"),

@@ -163,8 +163,12 @@ fn random_roadmap(dice: &mut Dice, search: &mut SearchWorkspace<NODES>) -> Vec<u
             edges.push(Edge { a: a as u16, b: b as u16, clearance_m: dice.real(0.25, 3.25) });
         }
     }
-    let mut out = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
-    let written = write_with_landmarks(&HEADER, &nodes, &edges, search, &mut out);
+    // Half of the files are of version 1, without heights.
+    let heights_m: Vec<f32> =
+        if dice.chance(0.5) { nodes.iter().map(|node| node.z).collect() } else { Vec::new() };
+    let columns = LANDMARKS + usize::from(!heights_m.is_empty());
+    let mut out = vec![0; encoded_len(nodes.len(), edges.len(), columns).expect("it is small")];
+    let written = write_with_landmarks(&HEADER, &nodes, &edges, &heights_m, search, &mut out);
     assert_eq!(written, Ok(out.len()));
     out
 }
@@ -173,10 +177,11 @@ fn word(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes(bytes[at..at + WORD].try_into().expect("four bytes"))
 }
 
-/// Where the header says that nodes, offsets, half-edges and ways to the landmarks end, one after the other.
-fn sizes(bytes: &[u8]) -> [usize; 5] {
+/// Bytes of header, nodes, offsets, half-edges, ways to the landmarks and heights, as the header says.
+fn sizes(bytes: &[u8]) -> [usize; 6] {
     let (nodes, half_edges) = (word(bytes, 60) as usize, word(bytes, 64) as usize);
-    [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS]
+    let heights = if bytes[8] == 2 { nodes * WORD } else { 0 };
+    [HEADER_LEN, nodes * NODE, (nodes + 1) * WORD, half_edges * WORD, nodes * WAYS, heights]
 }
 
 /// Changes one or a few words of a file: of the header, a node, an offset, a half-edge, a way to a landmark; or the
@@ -186,8 +191,9 @@ fn mutate(entropy: &mut impl Entropy, bytes: &mut [u8]) {
     for _ in 0..1 + entropy.bits() % 3 {
         let (choice, value) = (entropy.bits(), entropy.bits());
         // Half of the changes go to the landmarks, which nothing else in the file explains.
-        let part = (choice % 8).min(sizes.len() as u64 - 1) as usize;
+        let part = [0, 1, 2, 3, 4, 4, 4, 4, 5][(choice % 9) as usize];
         let begin: usize = sizes[..part].iter().sum();
+        // Where there are no heights, that is the CRC, which is made right again.
         let at = begin + (choice >> 32) as usize % (sizes[part] / WORD).max(1) * WORD;
         let (old, share) = (word(bytes, at), (value >> 40) as f32 / (1 << 24) as f32);
         let new = match (choice >> 8) % 8 {
@@ -244,7 +250,10 @@ fn lengthen_ways(bytes: &mut [u8]) {
 /// Whatever was accepted can be read everywhere.
 fn read_all(view: &RoadmapView<'_>) {
     for node in 0..view.node_count() as u16 {
-        assert!(view.node(node).iter().all(|c| c.is_finite()));
+        let at = view.node(node);
+        assert!(at.iter().all(|c| c.is_finite()));
+        assert!(view.ground_m(node).is_none_or(|ground_m| ground_m <= at.z));
+        assert!(view.ground_around(&at).is_none_or(|(low_m, high_m)| low_m <= high_m && high_m <= at.z));
         for edge in view.half_edges(node) {
             assert!(view.distance_m(node, edge.target) > 0.0);
             let back = view.edge_between(edge.target, node).expect("each edge has its opposite");

@@ -43,6 +43,7 @@ fn forged_files_are_refused_or_searched_right() {
         "EdgeClearance",
         "EdgeLength",
         "Landmark",
+        "Height",
     ] {
         assert!(seen(check) > 0, "{check}: {verdicts:?}");
     }

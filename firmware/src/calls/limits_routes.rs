@@ -80,6 +80,9 @@ const PLACES: [Point; 6] = [
     Point::new(6.0, 5.0, 2.0),
 ];
 
+/// Over the ground at 0 m; below the last node there is none.
+const HEIGHTS_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
+
 fn edges() -> Vec<Edge, 9> {
     let pairs = [(0, 4), (0, 5), (1, 4), (1, 5), (2, 4), (2, 5), (3, 4), (3, 5), (4, 5)];
     pairs.iter().map(|&(a, b)| Edge { a, b, clearance_m: 1.0 }).collect()
@@ -153,10 +156,17 @@ fn files(
     }
     assert!(roadmap::write(&HEADER, &PLACES, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
-    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &mut small, file).is_err());
+    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[], &mut small, file).is_err());
+    for hard in HARD {
+        let heights_m = [2.0, hard, 2.0, 2.0, 2.0, f32::INFINITY];
+        let written = roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &heights_m, ws, file);
+        let good = (0.0..=roadmap::MAX_WAY_M).contains(&hard) || hard == f32::INFINITY;
+        assert_eq!(written.is_ok(), good, "{hard}");
+    }
+    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[1.0; 5], ws, file).is_err());
     let len = to
         .call("write::write_with_landmarks", || {
-            roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, ws, file)
+            roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &HEIGHTS_M, ws, file)
         })
         .expect("a good roadmap");
     let mut head = [0; roadmap::HEADER_LEN];
@@ -171,7 +181,7 @@ fn files(
     for cut in 0..len {
         assert!(RoadmapView::parse(&file[..cut]).is_err());
     }
-    assert_eq!(roadmap::encoded_len(PLACES.len(), edges.len(), LANDMARKS), Some(len));
+    assert_eq!(roadmap::encoded_len(PLACES.len(), edges.len(), LANDMARKS + 1), Some(len));
     len
 }
 
@@ -198,9 +208,16 @@ fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>) {
         assert_eq!(length_m.is_finite(), there);
         let edge = to.call("roadmap::RoadmapView::edge_between", || view.edge_between(a, b));
         assert!(there || edge.is_none());
+        let ground_m = to.call("ground::RoadmapView::ground_m", || view.ground_m(a));
+        assert_eq!(ground_m, (a < 5).then_some(0.0));
         let degree = to.call("roadmap::RoadmapView::half_edges", || view.half_edges(a).count());
         assert!(usize::from(a) < nodes || degree == 0);
         to.count(degree);
+    }
+    for p in points() {
+        let around = to.call("ground::RoadmapView::ground_around", || view.ground_around(&p));
+        assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
+        to.is(around.is_some());
     }
     let edge = view.edge_between(0, 4).expect("an edge");
     for hard in HARD {

@@ -81,6 +81,8 @@ fn print(view: &RoadmapView<'_>) {
         header.origin.alt_m
     );
     say!("landmarks      {}", if view.has_landmarks() { LANDMARKS } else { 0 });
+    let grounded = (0..view.node_count() as u16).filter(|node| view.ground_m(*node).is_some()).count();
+    say!("ground         known below {grounded} nodes");
     say!("size           {} bytes, CRC-32 {:08x}", view.byte_len(), view.crc());
 }
 

@@ -28,7 +28,7 @@ pub(crate) fn encode(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) ->
 pub(crate) fn encode_with_landmarks(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Vec<u8> {
     let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS).unwrap()];
     let mut ws = SearchWorkspace::<32>::new();
-    assert_eq!(write_with_landmarks(header, nodes, edges, &mut ws, &mut out), Ok(out.len()));
+    assert_eq!(write_with_landmarks(header, nodes, edges, &[], &mut ws, &mut out), Ok(out.len()));
     out
 }
 
@@ -166,7 +166,8 @@ fn what_follows_the_roadmap_in_its_slot_is_ignored() {
 
 #[test]
 fn the_default_board_fits_its_slot() {
-    assert!(encoded_len(4096, 65536 / 2, LANDMARKS).unwrap() <= 384 * 1024);
+    // A slot of 384 kB begins with three words of 32 bytes.
+    assert!(encoded_len(4096, 65536 / 2, LANDMARKS + 1).unwrap() <= 384 * 1024 - 96);
 }
 
 #[test]
@@ -232,6 +233,58 @@ fn ways_to_landmarks_are_written_and_checked() {
         assert!(matches!(refused, Err(RoadmapError::Landmark(_))), "{wrong}: {refused:?}");
     }
     let small =
-        write_with_landmarks(&header(1, 1), &nodes, &edges, &mut SearchWorkspace::<2>::new(), &mut out);
+        write_with_landmarks(&header(1, 1), &nodes, &edges, &[], &mut SearchWorkspace::<2>::new(), &mut out);
     assert_eq!(small, Err(RoadmapError::WorkspaceTooSmall));
+}
+
+fn with_heights(heights_m: &[f32]) -> Result<Vec<u8>, RoadmapError> {
+    let (nodes, edges) = small();
+    let mut out = vec![0xa5; encoded_len(nodes.len(), edges.len(), LANDMARKS + 1).unwrap()];
+    let mut ws = SearchWorkspace::<32>::new();
+    let len = write_with_landmarks(&header(1, 1), &nodes, &edges, heights_m, &mut ws, &mut out)?;
+    out.truncate(len);
+    Ok(out)
+}
+
+#[test]
+fn heights_over_ground_are_written_and_checked() {
+    let bytes = with_heights(&[1.0, 0.25, f32::INFINITY]).unwrap();
+    assert_eq!(bytes[8], 2);
+    let view = RoadmapView::parse(&bytes).unwrap();
+    assert_eq!((view.byte_len(), view.has_landmarks()), (bytes.len(), true));
+    let grounds = [0, 1, 2, 3, u16::MAX].map(|node| view.ground_m(node));
+    assert_eq!(grounds, [Some(0.0), Some(0.75), None, None, None]);
+    for wrong in [f32::NAN, f32::NEG_INFINITY, -1.0, -1e-9, 65_537.0] {
+        assert_eq!(with_heights(&[1.0, wrong, 1.0]), Err(RoadmapError::Height(1)));
+        let mut changed = bytes.clone();
+        let at = bytes.len() - WORD_LEN - 2 * HEIGHT_LEN;
+        changed[at..at + 4].copy_from_slice(&wrong.to_le_bytes());
+        assert_eq!(RoadmapView::parse(&sealed(changed)).map(|_| ()), Err(RoadmapError::Height(1)));
+    }
+    assert_eq!(with_heights(&[1.0; 2]), Err(RoadmapError::Height(2)));
+    assert_eq!(with_heights(&[1.0; 4]), Err(RoadmapError::Height(3)));
+    // A file of version 1 says nothing of the ground.
+    let old = with_heights(&[]).unwrap();
+    let view = RoadmapView::parse(&old).unwrap();
+    assert_eq!((old[8], view.ground_m(0), view.ground_around(&Point::zeros())), (1, None, None));
+}
+
+#[test]
+fn the_ground_of_a_place_is_that_of_nodes_on_its_storey() {
+    // Two storeys, the upper floor at 4 m; nodes 0 and 1 above it, node 2 below, node 3 on the upper one but far away.
+    let places = [(0.0, 5.0, 1.0), (2.0, 6.0, 1.5), (1.0, 3.0, 3.0), (9.0, 5.0, 3.0)];
+    let nodes: Vec<Point> = places.iter().map(|&(x, z, _)| Point::new(x, 0.0, z)).collect();
+    let heights: Vec<f32> = places.iter().map(|&(.., height_m)| height_m).collect();
+    let mut out = vec![0; encoded_len(4, 0, LANDMARKS + 1).unwrap()];
+    let mut ws = SearchWorkspace::<4>::new();
+    write_with_landmarks(&header(0, 0), &nodes, &[], &heights, &mut ws, &mut out).unwrap();
+    let view = RoadmapView::parse(&out).unwrap();
+    let around = |x: f32, z: f32| view.ground_around(&Point::new(x, 0.0, z));
+    assert_eq!(around(1.0, 5.2), Some((4.0, 4.5)), "0.25 m of clearance: node 0 may be lower by 0.5 m");
+    assert_eq!(around(1.0, 5.6), Some((4.5, 4.5)));
+    assert_eq!(around(1.0, 2.0), Some((0.0, 0.0)));
+    assert_eq!(around(1.0, 3.6), None, "between the storeys");
+    assert_eq!(around(9.0, 5.0), Some((2.0, 2.0)));
+    assert_eq!(around(20.0, 5.0), None);
+    assert_eq!(view.ground_around(&Point::new(f32::NAN, 0.0, 1.0)), None);
 }

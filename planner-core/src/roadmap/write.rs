@@ -1,8 +1,9 @@
 //! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
 
 use super::{
-    CRC, HEADER_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN, RoadmapError,
-    RoadmapHeader, RoadmapView, VERSION, WORD_LEN, in_range, millimetres_down, target_of,
+    CRC, HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN,
+    RoadmapError, RoadmapHeader, RoadmapView, VERSION, WITHOUT_HEIGHTS, WORD_LEN, in_range, millimetres_down,
+    target_of,
 };
 use crate::Point;
 use crate::search::{SearchWorkspace, ways_from};
@@ -19,10 +20,10 @@ pub struct Edge {
     pub clearance_m: f32,
 }
 
-/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `landmarks` is 0, or [`LANDMARKS`] for
-/// [`write_with_landmarks`].
-pub fn encoded_len(nodes: usize, edges: usize, landmarks: usize) -> Option<usize> {
-    let a_node = landmarks.checked_add(4)?;
+/// Bytes a roadmap takes, or `None` if that does not fit the file's 32-bit length. `columns` are the numbers that each node has
+/// beside its place: 0, or [`LANDMARKS`] for [`write_with_landmarks`], and one more with heights.
+pub fn encoded_len(nodes: usize, edges: usize, columns: usize) -> Option<usize> {
+    let a_node = columns.checked_add(4)?;
     let words = nodes.checked_mul(a_node)?.checked_add(2)?.checked_add(edges.checked_mul(2)?)?;
     let bytes = words.checked_mul(WORD_LEN)?.checked_add(HEADER_LEN)?;
     u32::try_from(bytes).ok().map(|_| bytes)
@@ -44,20 +45,33 @@ pub fn write(
 
 /// As [`write`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
 /// where there are any, and the node farthest from it. Adds a search from each.
+///
+/// `heights_m` are those of the nodes over the ground, infinite where there is none; or there are none at all.
 pub fn write_with_landmarks<const N: usize>(
     header: &RoadmapHeader,
     nodes: &[Point],
     edges: &[Edge],
+    heights_m: &[f32],
     ws: &mut SearchWorkspace<N>,
     out: &mut [u8],
 ) -> Result<usize, RoadmapError> {
-    let out = write_graph(header, nodes, edges, LANDMARKS, out)?;
+    if !heights_m.is_empty() && heights_m.len() != nodes.len() {
+        return Err(RoadmapError::Height(heights_m.len().min(nodes.len()) as u16));
+    }
+    let columns = LANDMARKS + usize::from(!heights_m.is_empty());
+    let out = write_graph(header, nodes, edges, columns, out)?;
     if nodes.is_empty() {
         return Ok(seal(out));
     }
     let body = &mut out[HEADER_LEN..];
-    let (graph, rest) = body.split_at_mut(body.len() - WORD_LEN - nodes.len() * LANDMARKS_LEN);
-    let view = RoadmapView::over(*header, 0, graph, nodes.len(), 2 * edges.len());
+    let heights_len = heights_m.len() * HEIGHT_LEN;
+    let numbers = nodes.len() * LANDMARKS_LEN + heights_len;
+    let (graph, rest) = body.split_at_mut(body.len() - WORD_LEN - numbers);
+    let heights = &mut rest[nodes.len() * LANDMARKS_LEN..][..heights_len];
+    for (bytes, height_m) in heights.as_chunks_mut::<HEIGHT_LEN>().0.iter_mut().zip(heights_m) {
+        *bytes = height_m.to_le_bytes();
+    }
+    let view = RoadmapView::over(*header, 0, graph, [nodes.len(), 2 * edges.len(), 0]);
     let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
     let mut landmark = 0;
     for column in 0..LANDMARKS {
@@ -77,28 +91,31 @@ pub fn write_with_landmarks<const N: usize>(
     }
     // An edge too short to lengthen a way leaves what no reader can check.
     let body = &out[HEADER_LEN..out.len() - WORD_LEN];
-    RoadmapView::over(*header, 0, body, nodes.len(), 2 * edges.len()).check_landmarks()?;
+    let view = RoadmapView::over(*header, 0, body, [nodes.len(), 2 * edges.len(), LANDMARKS]);
+    view.check_landmarks()?;
+    view.check_heights()?;
     Ok(seal(out))
 }
 
-/// Everything but the ways to the landmarks and the CRC; the bytes of the whole roadmap are returned.
+/// Everything but the `columns` of numbers and the CRC; the bytes of the whole roadmap are returned.
 fn write_graph<'a>(
     header: &RoadmapHeader,
     nodes: &[Point],
     edges: &[Edge],
-    landmarks: usize,
+    columns: usize,
     out: &'a mut [u8],
 ) -> Result<&'a mut [u8], RoadmapError> {
     if nodes.len() > MAX_NODES {
         return Err(RoadmapError::TooManyNodes);
     }
-    let needed = encoded_len(nodes.len(), edges.len(), landmarks).ok_or(RoadmapError::Length)?;
+    let needed = encoded_len(nodes.len(), edges.len(), columns).ok_or(RoadmapError::Length)?;
     let out = out.get_mut(..needed).ok_or(RoadmapError::RoadmapFull { needed })?;
     header.check(nodes.len())?;
     check_edges(header, nodes, edges)?;
 
     let (head, rest) = out.split_at_mut(HEADER_LEN);
-    write_header(header, [nodes.len(), 2 * edges.len(), landmarks], needed, head);
+    let version = if columns > LANDMARKS { VERSION } else { WITHOUT_HEIGHTS };
+    write_header(header, version, [nodes.len(), 2 * edges.len(), columns.min(LANDMARKS)], needed, head);
     let (node_bytes, rest) = rest.split_at_mut(nodes.len() * NODE_LEN);
     let scalars = nodes.iter().flat_map(|p| [p.x, p.y, p.z]);
     for (bytes, value) in node_bytes.as_chunks_mut::<4>().0.iter_mut().zip(scalars) {
@@ -147,14 +164,14 @@ fn check_edges(header: &RoadmapHeader, nodes: &[Point], edges: &[Edge]) -> Resul
 }
 
 /// `counts` are those of nodes, half-edges and landmarks.
-fn write_header(header: &RoadmapHeader, counts: [usize; 3], total: usize, head: &mut [u8]) {
+fn write_header(header: &RoadmapHeader, version: u16, counts: [usize; 3], total: usize, head: &mut [u8]) {
     let mut at = 0;
     let mut put = |bytes: &[u8]| {
         head[at..at + bytes.len()].copy_from_slice(bytes);
         at += bytes.len();
     };
     put(&MAGIC);
-    put(&VERSION.to_le_bytes());
+    put(&version.to_le_bytes());
     put(&(HEADER_LEN as u16).to_le_bytes());
     put(&(total as u32).to_le_bytes());
     for value in [header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m] {

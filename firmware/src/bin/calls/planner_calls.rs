@@ -363,7 +363,7 @@ fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, besid
     meter.call("roadmap::write, 300", 0, || roadmap::write(&header, nodes, kept, file)).expect(good);
     let len = meter
         .call("roadmap::write_with_landmarks, 300", size_of::<Search>(), || {
-            roadmap::write_with_landmarks(&header, nodes, kept, search, file)
+            roadmap::write_with_landmarks(&header, nodes, kept, &[], search, file)
         })
         .expect(good);
     let view = RoadmapView::parse(&file[..len]).expect(good);

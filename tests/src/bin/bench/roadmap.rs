@@ -266,8 +266,15 @@ impl<'a> Ours<'a> {
         let len = roadmap::encoded_len(self.nodes.len(), self.edges.len(), LANDMARKS)
             .context("the roadmap fits 32 bits")?;
         self.bytes = vec![0; len];
-        roadmap::write_with_landmarks(&header, &self.nodes, &self.edges, &mut self.search, &mut self.bytes)
-            .map_err(named)?;
+        roadmap::write_with_landmarks(
+            &header,
+            &self.nodes,
+            &self.edges,
+            &[],
+            &mut self.search,
+            &mut self.bytes,
+        )
+        .map_err(named)?;
         Ok(start.elapsed().as_secs_f64() * 1e3)
     }
 

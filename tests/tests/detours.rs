@@ -1,0 +1,202 @@
+//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of somebody who has the map.
+//!
+//! A vehicle flies from node to node; another one fell silent above its path and lies on the ground there. With a file of
+//! version 1 the whole column below is kept off.
+
+use flockmate_tests::meeting::dice::Dice;
+use flockmate_tests::shared_data;
+use heapless::Vec as Few;
+use host_sim::capacity::BOARDS;
+use host_sim::map::{self, Unknown, VoxelMap, building};
+use host_sim::roadmap::{self, Roadmap};
+use planner_core::Point;
+use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
+use planner_core::frames::Geodetic;
+use planner_core::path::Path;
+use planner_core::prm::{Config, Sampling};
+use planner_core::roadmap::{LANDMARKS, RoadmapHeader, RoadmapView, encoded_len, write_with_landmarks};
+use planner_core::search::{SearchWorkspace, astar};
+
+/// Terminals of the roadmap: random nodes as good as any.
+const GOALS: u16 = 40;
+const CASES: usize = 400;
+const PLACES: usize = 20_000;
+/// What a companion keeps from where a vehicle lies that it does not see, metres.
+const KEPT_M: f32 = 2.5;
+/// Nobody comes nearer to it: two hulls, and twice as much again.
+const NEAREST_M: f32 = 1.2;
+/// Share of the ways around that the ground of the roadmap leaves as they are.
+const SAME_PERCENT: usize = 85;
+/// Where the ground is deeper than told, what lies there is not kept off: at most this share of the places.
+const DEEPER_PERCENT: f64 = 0.25;
+/// Capacity of a board and of the desk.
+const BOARD: usize = 4096;
+const DESK: usize = 16_384;
+
+/// A map's roadmap with the ground, as files of both versions.
+struct Files {
+    new: Vec<u8>,
+    old: Vec<u8>,
+}
+
+fn files(map: &VoxelMap, clearance_m: f32) -> Files {
+    let config = Config {
+        nodes: 2300,
+        edge_min_m: 0.5,
+        edge_max_m: 8.0,
+        clearance_m,
+        seed: 1,
+        sampling: Sampling::Uniform,
+    };
+    let (roadmap, _) = roadmap::build(map, &[], &config).expect("there is free space");
+    let roadmap = roadmap.fit(&BOARDS[0]).expect("it can be cut down");
+    let header = RoadmapHeader {
+        origin: Geodetic::default(),
+        edge_min_m: config.edge_min_m,
+        edge_max_m: config.edge_max_m,
+        tested_clearance_m: config.clearance_m,
+        max_clearance_m: roadmap::CLEARANCE_MAX_M,
+        starts: 0,
+        goals: GOALS,
+    };
+    let Roadmap { nodes, edges, .. } = &roadmap;
+    let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
+    let mut ws = Box::new(SearchWorkspace::<DESK>::new());
+    write_with_landmarks(&header, nodes, edges, &[], &mut ws, &mut old).expect("it is a roadmap");
+    Files { new: roadmap::encode(&roadmap, &header).expect("it is a roadmap"), old }
+}
+
+/// A place on a random edge.
+fn on_edge(view: &RoadmapView<'_>, dice: &mut Dice) -> Point {
+    loop {
+        let node = dice.below(view.node_count()) as u16;
+        let degree = view.half_edges(node).len();
+        if degree > 0 {
+            let edge = view.half_edges(node).nth(dice.below(degree)).expect("it has so many");
+            let (from, to) = (view.node(node), view.node(edge.target));
+            return from + (to - from) * dice.real(0.0, 1.0);
+        }
+    }
+}
+
+/// How the ground that nodes tell compares with the map's.
+fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) {
+    let [mut unknown, mut deeper, mut higher] = [0; 3];
+    let mut wide_m = 0.0;
+    for _ in 0..PLACES {
+        let place = on_edge(view, dice);
+        let truth_m = map.ground_below(&place).unwrap_or(f32::NEG_INFINITY);
+        match view.ground_around(&place) {
+            None => unknown += 1,
+            Some((low_m, high_m)) => {
+                deeper += usize::from(truth_m < low_m - 0.5);
+                higher += usize::from(truth_m > high_m + 0.5);
+                wide_m += f64::from(high_m - low_m);
+            }
+        }
+    }
+    let share = |count: usize| 100.0 * count as f64 / PLACES as f64;
+    println!(
+        "{name}: ground not told at {:.2} %, deeper than told at {:.2} %, higher at {:.2} %; lowest and highest told \
+         are {:.2} m apart in the mean",
+        share(unknown),
+        share(deeper),
+        share(higher),
+        wide_m / PLACES as f64
+    );
+    assert!(share(deeper) <= DEEPER_PERCENT, "{name}");
+}
+
+type Planned = Result<Vec<Point>, DetourError>;
+
+fn planned<const N: usize>(
+    view: &RoadmapView<'_>,
+    request: &DetourRequest,
+    thing: KeepOff,
+    ws: &mut SearchWorkspace<N>,
+) -> Planned {
+    let (mut nodes, mut path) = (Few::<u16, 64>::new(), Path::<64>::new());
+    detour::plan(view, request, &mut [thing], ws, &mut nodes, &mut path)?;
+    Ok(path.waypoints().iter().map(|w| w.position).collect())
+}
+
+fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
+    let files = files(map, clearance_m);
+    let [new, old] = [&files.new, &files.old].map(|file| RoadmapView::parse(file).expect("just written"));
+    let dice = &mut Dice::new(7);
+    grounds(name, map, &new, dice);
+    let mut board = Box::new(SearchWorkspace::<BOARD>::new());
+    let mut desk = Box::new(SearchWorkspace::<DESK>::new());
+    let [mut cases, mut same, mut found, mut found_by_old] = [0; 4];
+    let mut nearest_m = f32::INFINITY;
+    while cases < CASES {
+        let start = dice.below(new.node_count()) as u16;
+        let goal = dice.below(usize::from(GOALS)) as u16;
+        let mut nodes = Few::<u16, 64>::new();
+        let any = |_: u16, _: &planner_core::roadmap::HalfEdge| true;
+        if astar(&new, start, goal, any, &mut desk, &mut nodes).is_err() || nodes.len() < 4 {
+            continue;
+        }
+        let here = new.node(start);
+        let ahead = 1 + dice.below(nodes.len() - 2);
+        let (a, b) = (new.node(nodes[ahead]), new.node(nodes[ahead + 1]));
+        let silent = a + (b - a) * dice.real(0.0, 1.0);
+        let Some(ground_m) = map.ground_below(&silent) else { continue };
+        let lies = Point::new(silent.x, silent.y, ground_m);
+        let descent_m = map.ground_below(&new.node(goal)).map_or(1.0, |ground_m| new.node(goal).z - ground_m);
+        if (lies - here).norm() < KEPT_M + 1.0 {
+            continue;
+        }
+        cases += 1;
+        let request = DetourRequest {
+            aside: false,
+            here,
+            leg: [new.node(nodes[1]), here],
+            leg_clearance_m: 1.0,
+            goal,
+            descent_m,
+            required_clearance_m: clearance_m,
+        };
+        let deep = Point::new(silent.x, silent.y, silent.z - 60.0);
+        let column = KeepOff { from: silent, to: deep, radius_m: KEPT_M, nature: Nature::Lying };
+        let exact = KeepOff { from: lies, to: lies, ..column };
+        let by_desk = planned(&new, &request, column, &mut desk);
+        let by_board = planned(&new, &request, column, &mut board);
+        assert_eq!(by_desk, by_board, "desk and board fly other ways");
+        let by_map = planned(&new, &request, exact, &mut desk);
+        let by_old = planned(&old, &request, column, &mut board);
+        let told = |planned: &Planned| usize::from(planned.is_ok());
+        found += told(&by_map);
+        same += usize::from(by_map == by_board && by_map.is_ok());
+        found_by_old += usize::from(by_map.is_ok() && by_map == by_old);
+        let passed_m = |leg: &[Point]| {
+            let along = leg[1] - leg[0];
+            let share = ((lies - leg[0]).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
+            (leg[0] + along * share - lies).norm()
+        };
+        for passed_m in by_board.iter().flat_map(|path| path.windows(2).map(passed_m)) {
+            nearest_m = passed_m.min(nearest_m);
+        }
+    }
+    println!(
+        "{name}: of {cases} vehicles {found} find a way with the map; the same way {same} with the ground of the \
+         roadmap, {found_by_old} without; the nearest passes what lies there at {nearest_m:.2} m"
+    );
+    // Whoever is nearer to where something may lie than it should be has to come no nearer, so it may pass nearer than KEPT_M.
+    assert!(nearest_m > NEAREST_M, "{name}: {nearest_m}");
+    assert!(same * 100 >= found * SAME_PERCENT, "{name}: {same} of {found}");
+    assert!(found_by_old < same, "{name}: the ground makes no difference");
+}
+
+#[test]
+fn desk_and_board_find_the_detours_that_the_map_gives() {
+    let map = building::building(building::DEFAULT_SEED, 0.25).expect("the building");
+    detours("building", &map.voxel_map(Unknown::Blocked), 0.8);
+    for (name, resolution_m, clearance_m) in
+        [("geb079", 0.08, 0.2), ("manufacturing", 0.086_642_2, 0.3), ("maze", 0.195_32, 0.3)]
+    {
+        let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { continue };
+        let map = map::load(path.to_str().expect("UTF-8"), resolution_m).expect("a map");
+        detours(name, &map.voxel_map(Unknown::Blocked), clearance_m);
+    }
+}
