@@ -5,7 +5,6 @@ use companion::PlanFailure;
 use companion::mission_file::MissionView;
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
-use planner_core::path::Path;
 use planner_core::plan::{self, PlanError, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleError, VehiclePlan};
@@ -43,20 +42,7 @@ pub struct Own {
 impl Own {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
-        Self {
-            plan: VehiclePlan {
-                goal: None,
-                path: Path::new(),
-                climb_m: 0.0,
-                descent_m: 0.0,
-                depart_s: 0.0,
-                gates: Vec::new(),
-                plan_crc: 0,
-            },
-            obstacles: Vec::new(),
-            crowded: false,
-            nodes: Vec::new(),
-        }
+        Self { plan: VehiclePlan::new(), obstacles: Vec::new(), crowded: false, nodes: Vec::new() }
     }
 }
 

@@ -39,31 +39,26 @@ const fn roadmap_bytes(layout: &Layout) -> usize {
     (layout.slot_len - DATA_AT) as usize
 }
 
+const NUCLEO_H743: Board = Board {
+    name: "nucleo-h743",
+    nodes: 4096,
+    half_edges: 65_536,
+    vehicles: 32,
+    gates: 128,
+    roadmap_bytes: roadmap_bytes(&Layout::H743),
+};
+
 /// All boards; the first holds the most.
 pub const BOARDS: [Board; 3] = [
-    Board {
-        name: "nucleo-h743",
-        nodes: 4096,
-        half_edges: 65_536,
-        vehicles: 32,
-        gates: 128,
-        roadmap_bytes: roadmap_bytes(&Layout::H743),
-    },
-    Board {
-        name: "qemu",
-        nodes: 4096,
-        half_edges: 65_536,
-        vehicles: 32,
-        gates: 128,
-        roadmap_bytes: roadmap_bytes(&Layout::H743),
-    },
+    NUCLEO_H743,
+    Board { name: "qemu", ..NUCLEO_H743 },
     Board {
         name: "pico2",
         nodes: 2048,
         half_edges: 32_768,
         vehicles: 16,
-        gates: 128,
         roadmap_bytes: roadmap_bytes(&Layout::PICO2),
+        ..NUCLEO_H743
     },
 ];
 

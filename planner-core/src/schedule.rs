@@ -14,12 +14,18 @@
 //!
 //! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
 
+#[cfg(test)]
+pub(crate) mod checker;
 mod near;
+mod pieces;
 pub mod sipp;
+#[cfg(test)]
+mod tests;
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+use self::pieces::{cut, parts};
 use crate::path::Path;
 use crate::{ConfigError, Point, all_positive};
 
@@ -149,6 +155,21 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub plan_crc: u32,
 }
 
+impl<const W: usize, const G: usize> VehiclePlan<W, G> {
+    /// One that stays on its pad. All zeros, so a static costs .bss alone.
+    pub const fn new() -> Self {
+        Self {
+            goal: None,
+            path: Path::new(),
+            climb_m: 0.0,
+            descent_m: 0.0,
+            depart_s: 0.0,
+            gates: Vec::new(),
+            plan_crc: 0,
+        }
+    }
+}
+
 /// Why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
@@ -192,127 +213,6 @@ impl ScheduleWorkspace {
     pub const fn new() -> Self {
         Self { own: Vec::new(), other: Vec::new(), forbidden: Vec::new() }
     }
-}
-
-/// Cuts a flight into timed segments of at most `flight.piece_m`.
-///
-/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
-/// held from its beginning; each is free again when the vehicle has left it.
-fn cut<const W: usize>(
-    cfg: &ScheduleConfig,
-    flight: &Flight<W>,
-    out: &mut Vec<Piece, PIECES>,
-) -> Result<(), ScheduleError> {
-    out.clear();
-    let waypoints = flight.path.waypoints();
-    let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) else {
-        return Ok(());
-    };
-    let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
-    let stay = |at: Point, m: f32, from_s: f32, to_s: f32| Piece {
-        from: at,
-        to: at,
-        from_m: m,
-        to_m: m,
-        from_s,
-        to_s,
-        parked: true,
-    };
-    let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
-    if flight.goal.is_none() {
-        return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
-    }
-    let climb = Leg::climb(pad, first.position, first.at_s);
-    let (left_m, left_s) = climb.first_part(flight.piece_m);
-    let on_pad = stay(pad, -flight.climb_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
-    push(Piece { to_m: left_m - flight.climb_m, ..on_pad })?;
-    for piece in climb.pieces(-flight.climb_m, 0.0, flight.piece_m) {
-        push(piece)?;
-    }
-    for (i, waypoint) in waypoints.iter().enumerate() {
-        if waypoint.leave_s > waypoint.at_s {
-            let hold = stay(waypoint.position, waypoint.along_m, waypoint.at_s, waypoint.leave_s);
-            push(Piece { parked: false, ..hold })?;
-        }
-        let Some(next) = waypoints.get(i + 1) else { break };
-        let leg = Leg {
-            from: waypoint.position,
-            to: next.position,
-            length_m: next.along_m - waypoint.along_m,
-            from_s: waypoint.leave_s,
-            to_s: next.at_s,
-            stops: Stops::Anywhere,
-        };
-        for piece in leg.pieces(waypoint.along_m, next.along_m, flight.piece_m) {
-            push(piece)?;
-        }
-    }
-    let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
-    let end_m = last.along_m + flight.descent_m;
-    let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
-    let descent = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
-    for piece in descent.pieces(last.along_m, end_m, flight.piece_m) {
-        push(piece)?;
-    }
-    push(Piece { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
-}
-
-/// Where a vehicle may wait on a leg.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Stops {
-    /// Before each of its timed segments.
-    Anywhere,
-    /// Before the leg only.
-    Before,
-}
-
-/// A straight stretch flown at one speed.
-#[derive(Clone, Copy, Debug)]
-struct Leg {
-    from: Point,
-    to: Point,
-    length_m: f32,
-    from_s: f32,
-    to_s: f32,
-    stops: Stops,
-}
-
-impl Leg {
-    /// A vertical one from time 0.
-    fn climb(from: Point, to: Point, to_s: f32) -> Self {
-        Self { from, to, length_m: libm::fabsf(to.z - from.z), from_s: 0.0, to_s, stops: Stops::Before }
-    }
-
-    /// Length and duration of the first of its timed segments.
-    fn first_part(&self, piece_m: f32) -> (f32, f32) {
-        let share = 1.0 / fmaxf(parts(self.length_m, piece_m) as f32, 1.0);
-        (self.length_m * share, (self.to_s - self.from_s) * share)
-    }
-
-    /// Its timed segments; `from_m` and `to_m` are its ends along the path.
-    fn pieces(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = Piece> {
-        let parts = parts(self.length_m, piece_m);
-        let at = move |part: u32| {
-            if part == parts {
-                // The next one begins where this ends, bit by bit.
-                return (self.to, to_m, self.to_s);
-            }
-            let share = part as f32 / parts as f32;
-            let mix = |a: f32, b: f32| a + (b - a) * share;
-            (self.from + (self.to - self.from) * share, mix(from_m, to_m), mix(self.from_s, self.to_s))
-        };
-        (0..parts).map(move |part| {
-            let ((from, start_m, start_s), (to, to_m, to_s)) = (at(part), at(part + 1));
-            let (from_m, from_s) =
-                if self.stops == Stops::Before { (from_m, self.from_s) } else { (start_m, start_s) };
-            Piece { from, to, from_m, to_m, from_s, to_s, parked: false }
-        })
-    }
-}
-
-/// Timed segments of a stretch of this length; none of one without length.
-fn parts(length_m: f32, piece_m: f32) -> u32 {
-    libm::ceilf(length_m / piece_m) as u32
 }
 
 /// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
@@ -543,120 +443,4 @@ fn each_gate<const W: usize>(
         }
     }
     Ok(())
-}
-
-/// The checker of schedules: flies them at any speeds and measures.
-#[cfg(test)]
-pub(crate) mod checker {
-    extern crate std;
-
-    use std::vec::Vec as StdVec;
-
-    use super::*;
-
-    /// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the smallest distance
-    /// between two of which one moves, or who was still under way after `steps` of 50 ms.
-    pub fn fly<const W: usize>(
-        cfg: &ScheduleConfig,
-        flights: &[Flight<W>],
-        speeds: &[f32],
-        steps: usize,
-    ) -> Result<f32, StdVec<u8>> {
-        let mut ws = ScheduleWorkspace::new();
-        let gates: StdVec<Vec<Gate, 1024>> = (0..flights.len())
-            .map(|i| {
-                let mut out = Vec::new();
-                gates(cfg, flights, i, &mut ws, &mut out).unwrap();
-                out
-            })
-            .collect();
-        let end = |f: &Flight<W>| if f.goal.is_some() { f.path.length_m() + f.descent_m } else { -f.climb_m };
-        let place = |f: &Flight<W>, m: f32| {
-            let below = fmaxf(-m, fmaxf(m - f.path.length_m(), 0.0));
-            f.path.point_at(m).unwrap() - Point::new(0.0, 0.0, below)
-        };
-        let mut along: StdVec<f32> = flights.iter().map(|f| -f.climb_m).collect();
-        let mut smallest = f32::INFINITY;
-        for _ in 0..steps {
-            for i in 0..flights.len() {
-                let shut = |g: &&Gate| {
-                    let other = flights.iter().position(|f| f.id == g.id).unwrap();
-                    g.at_m >= along[i] - 0.01 && along[other] < g.until_m
-                };
-                let free = gates[i].iter().filter(shut).map(|g| g.at_m).fold(f32::INFINITY, fminf);
-                // `until_m` lies a hair beyond the end of the last piece.
-                let goal = end(&flights[i]) + if flights[i].goal.is_some() { 0.02 } else { 0.0 };
-                along[i] = fmaxf(along[i], fminf(fminf(along[i] + speeds[i] * 0.05, free), goal));
-            }
-            let moves = |i: usize| along[i] > -flights[i].climb_m && along[i] < end(&flights[i]);
-            for i in 0..flights.len() {
-                for j in (0..i).filter(|&j| moves(i) || moves(j)) {
-                    let apart = place(&flights[i], along[i]) - place(&flights[j], along[j]);
-                    smallest = fminf(smallest, apart.norm());
-                }
-            }
-            if (0..flights.len()).all(|i| along[i] >= end(&flights[i])) {
-                return Ok(smallest);
-            }
-        }
-        Err((0..flights.len()).filter(|&i| along[i] < end(&flights[i])).map(|i| flights[i].id).collect())
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    const CFG: ScheduleConfig =
-        ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
-
-    fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
-        let mut path = Path::new();
-        for &(x, y) in points {
-            path.push(Point::new(x, y, 1.5), 1.0).unwrap();
-        }
-        path.label(1.5 / CFG.vertical_mps, CFG.cruise_mps);
-        Flight { id, goal: Some(0), path, climb_m: 1.5, descent_m: 1.5, depart_s: 0.0, piece_m: PIECE_M }
-    }
-
-    fn schedule(pair: &mut [Flight<8>; 2]) -> Result<(), ScheduleError> {
-        let mut ws = ScheduleWorkspace::new();
-        let [first, second] = pair;
-        second.depart_s = earliest_departure(&CFG, second, 0.0, [&*first].into_iter(), &mut ws)?;
-        Ok(())
-    }
-
-    #[test]
-    fn far_apart_nobody_waits() {
-        let mut pair = [flight(1, &[(0.0, 0.0), (9.0, 0.0)]), flight(2, &[(0.0, 5.0), (9.0, 5.0)])];
-        schedule(&mut pair).unwrap();
-        assert_eq!(pair[1].depart_s, 0.0);
-        let apart = checker::fly(&CFG, &pair, &[2.0, 2.0], 4000).unwrap();
-        assert!((apart - 5.0).abs() < 1e-3);
-    }
-
-    #[test]
-    fn head_on_onto_each_others_pads_is_blocked() {
-        let mut pair = [flight(1, &[(0.0, 0.0), (9.0, 0.0)]), flight(2, &[(9.0, 0.0), (0.0, 0.0)])];
-        assert_eq!(schedule(&mut pair), Err(ScheduleError::Blocked));
-    }
-
-    proptest! {
-        #![proptest_config(ProptestConfig::with_cases(4000))]
-        /// Whatever the speeds, gates keep the pieces apart and let both arrive.
-        #[test]
-        fn any_speeds_keep_apart_and_arrive(
-            xs in proptest::collection::vec((0.0f32..12.0, 0.0f32..12.0), 6),
-            speeds in (0.2f32..3.0, 0.2f32..3.0),
-        ) {
-            let mut pair = [flight(1, &xs[..3]), flight(2, &xs[3..])];
-            let near = |a: (f32, f32), b: (f32, f32)| libm::hypotf(a.0 - b.0, a.1 - b.1) < CFG.separation_m;
-            prop_assume!(!near(xs[0], xs[3]) && !near(xs[2], xs[5]));
-            if schedule(&mut pair).is_ok() {
-                let apart = checker::fly(&CFG, &pair, &[speeds.0, speeds.1], 8000);
-                prop_assert!(apart.as_ref().is_ok_and(|&d| d >= CFG.parked_separation_m - 1e-3), "{apart:?} {pair:?}");
-            }
-        }
-    }
 }

@@ -37,20 +37,7 @@ pub struct Lent {
 impl Lent {
     /// Empty.
     pub const fn new() -> Self {
-        Self {
-            ws: Workspace::new(),
-            plan: Plan::new(),
-            own: VehiclePlan {
-                goal: None,
-                path: Path::new(),
-                climb_m: 0.0,
-                descent_m: 0.0,
-                depart_s: 0.0,
-                gates: Vec::new(),
-                plan_crc: 0,
-            },
-            file: [0; 512],
-        }
+        Self { ws: Workspace::new(), plan: Plan::new(), own: VehiclePlan::new(), file: [0; 512] }
     }
 }
 
@@ -390,6 +377,7 @@ fn schedules(
     plan: &mut Plan,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
+    to.call("schedule::VehiclePlan::new", || size_of_val(&VehiclePlan::<1, 1>::new()));
     to.call("schedule::ScheduleWorkspace::new", || size_of_val(&ScheduleWorkspace::new()));
     to.call("sipp::SippWorkspace::new", || size_of_val(&SippWorkspace::<1, 1>::new()));
     for index in [0, 1, 2, usize::MAX] {

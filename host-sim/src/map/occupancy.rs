@@ -180,6 +180,10 @@ impl OccupancyMap {
     /// Sets the state of a cell. Panics outside the grid.
     pub fn set(&mut self, cell: [u32; 3], state: Occupancy) {
         let (word, mask) = self.shape.address(cell);
+        self.set_bits(word, mask, state);
+    }
+
+    fn set_bits(&mut self, word: usize, mask: u64, state: Occupancy) {
         self.occupied[word] &= !mask;
         self.free[word] &= !mask;
         match state {
@@ -196,14 +200,7 @@ impl OccupancyMap {
         for &(k, z) in &zs {
             for &(j, y) in &ys {
                 for &(i, x) in &xs {
-                    let (word, mask) = (((k * by + j) * bx + i) as usize, x & y & z);
-                    self.occupied[word] &= !mask;
-                    self.free[word] &= !mask;
-                    match state {
-                        Occupancy::Unknown => {}
-                        Occupancy::Free => self.free[word] |= mask,
-                        Occupancy::Occupied => self.occupied[word] |= mask,
-                    }
+                    self.set_bits(((k * by + j) * bx + i) as usize, x & y & z, state);
                 }
             }
         }

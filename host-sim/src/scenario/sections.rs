@@ -1,4 +1,7 @@
-//! The tables of a scenario, one function each, and what must hold between them.
+//! The tables of a scenario, one function each.
+
+mod checks;
+mod simulation;
 
 use std::path::Path;
 
@@ -8,17 +11,18 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use toml::de::DeTable;
 
+use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
+use self::simulation::{deconfliction, fault, simulation};
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::{
-    Companion, Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Method, Mission,
-    Mode, Objective, Personality, Roadmap, Sampling, Scenario, Simulation, Terminals, Unbuilt, Vehicle,
+    Companion, Geofence, Map, Mission, Mode, Objective, Personality, Roadmap, Sampling, Scenario, Terminals,
+    Unbuilt, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTIONS_M, Source, Unknown};
-use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
 /// Most vehicles of a swarm: the system ids there are.
@@ -368,13 +372,6 @@ fn geofence(value: &Value<'_>) -> Result<Geofence> {
     Ok(Geofence { min, max })
 }
 
-/// What errors about a vehicle point at.
-struct VehicleSpans {
-    start: Span,
-    goal: Option<Span>,
-    table: Span,
-}
-
 fn vehicles(
     value: &Value<'_>,
     origin: Option<&Geodetic>,
@@ -449,196 +446,4 @@ fn vehicle(
 fn link(value: &Value<'_>) -> Result<LinkUrl> {
     let parsed = value.str()?.parse();
     parsed.map_err(|_| value.error("must be \"in-process\" or a URL such as \"tcp:HOST:PORT\""))
-}
-
-fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {
-    let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
-    let method = table.word("method", Method::Priority, &methods)?;
-    let safety_distance_m = table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?;
-    let separation_m = table.f32(
-        "separation_m",
-        safety_distance_m + margins::STRAY_M,
-        f64::from(safety_distance_m)..=1000.0,
-    )?;
-    let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
-    table.finish()?;
-    Ok(deconfliction)
-}
-
-fn simulation(table: &Table<'_>) -> Result<Simulation> {
-    let simulation = Simulation {
-        wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
-        gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
-        position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
-        estimator: table.word(
-            "estimator",
-            Estimator::Rtk,
-            &[("rtk", Estimator::Rtk), ("recorded", Estimator::Recorded)],
-        )?,
-        serial_baud: table.whole("serial_baud", 921_600, 1200..=100_000_000)? as u32,
-        serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
-        radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
-        radio_delay_s: table.f32("radio_delay_s", 0.05, 0.0..=60.0)?,
-        radio_range_m: table.f32("radio_range_m", 500.0, 0.0..=1e6)?,
-        time_limit_s: table.f32("time_limit_s", 600.0, 0.1..=1e6)?,
-    };
-    table.finish()?;
-    Ok(simulation)
-}
-
-fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
-    let words: Vec<(&str, &'static str)> =
-        FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
-    let kind = table.need("kind", "what happens, for example \"kill\"")?.word(&words)?;
-    let at_s = table.need("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
-    let vehicle = table.get("vehicle");
-    if let Some(value) = &vehicle
-        && !ids.contains(&(value.whole(1..=MAX_ID)? as u8))
-    {
-        return Err(value.error("is no vehicle's id"));
-    }
-    let vehicle = vehicle.map(|v| v.whole(1..=MAX_ID).map(|id| id as u8)).transpose()?;
-    let direction = table.get("direction").map(|v| v.word(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
-    let fault = Fault {
-        at_s,
-        duration_s: table.optional_f32("duration_s", 0.0..=1e6)?,
-        vehicle,
-        kind,
-        direction: direction.transpose()?.map(str::to_owned),
-        offset_m: table.get("offset_m").map(|v| point(&v)).transpose()?,
-        position: table.get("position").map(|v| point(&v)).transpose()?,
-        radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
-    };
-    table.finish()?;
-    if fault.kind == FAULT_OBSTACLE && (fault.position.is_none() || fault.radius_m.is_none()) {
-        return Err(table
-            .text
-            .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));
-    }
-    Ok(fault)
-}
-
-/// Where estimates err as recorded, margin and separation must leave room for it.
-fn check_margins(
-    text: Text<'_>,
-    span: &Span,
-    roadmap: &Roadmap,
-    deconfliction: &Deconfliction,
-    simulation: &Simulation,
-    vehicles: &[Vehicle],
-) -> Result<()> {
-    if simulation.estimator != Estimator::Recorded {
-        return Ok(());
-    }
-    let need = margins::needed(simulation, deconfliction.safety_distance_m, vehicles);
-    let missing = [
-        ("roadmap.safety_margin_m", roadmap.safety_margin_m, need.margin_m),
-        ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m),
-    ];
-    let short = missing.iter().filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
-    let lacks: Vec<String> = short
-        .map(|(key, has_m, need_m)| {
-            format!("{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes", need_m - has_m)
-        })
-        .collect();
-    if lacks.is_empty() {
-        return Ok(());
-    }
-    let hint = "docs/simulating.md adds up margin and separation; \"rtk\" errs by 0.1 m";
-    let why = format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
-    Err(text.with_hint(span, why, hint))
-}
-
-fn check_apart(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], safety_distance_m: f32) -> Result<()> {
-    for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
-        for (other, _) in &vehicles[..index] {
-            let apart = (vehicle.start - other.start).norm();
-            if apart < safety_distance_m {
-                let why = format!(
-                    "vehicles {} and {} start {apart:.2} m apart, below the safety distance of {safety_distance_m} m",
-                    other.id, vehicle.id
-                );
-                return Err(text.error(&spans.start, why));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Vehicles land below their goals: two goals too near would put two vehicles too near for good.
-fn check_goals_apart(
-    table: &Table<'_>,
-    mission: &Mission,
-    safety_distance_m: f32,
-    simulation: &Simulation,
-    vehicles: &[Vehicle],
-) -> Result<()> {
-    let goals = &mission.goals;
-    for (i, goal) in goals.iter().enumerate() {
-        for (j, other) in goals[..i].iter().enumerate() {
-            let apart = (goal - other).norm();
-            if apart < safety_distance_m {
-                let span = goal_span(table, i);
-                let why = format!(
-                    "goals {j} and {i} are {apart:.2} m apart, below the safety distance of {safety_distance_m} m"
-                );
-                let needed_m = margins::parked_separation_m(simulation, safety_distance_m, vehicles);
-                let hint = format!("vehicles that land at both need {needed_m:.2} m between them");
-                return Err(table.text.with_hint(&span, why, hint));
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Nobody starts or lands outside the geofence.
-fn check_inside(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)], mission: &Mission) -> Result<()> {
-    let Some(fence) = &mission.geofence else { return Ok(()) };
-    let outside = |place: &Point| !fence.holds(place);
-    if let Some((vehicle, spans)) = vehicles.iter().find(|(vehicle, _)| outside(&vehicle.start)) {
-        let why = format!("vehicle {} starts outside mission.geofence", vehicle.id);
-        return Err(table.text.error(&spans.start, why));
-    }
-    match mission.goals.iter().position(outside) {
-        Some(goal) => {
-            let why = format!("goal {goal} lies outside mission.geofence");
-            Err(table.text.error(&goal_span(table, goal), why))
-        }
-        None => Ok(()),
-    }
-}
-
-/// Where a goal stands in the scenario.
-fn goal_span(table: &Table<'_>, index: usize) -> Span {
-    let Some(goals) = table.get("goals") else {
-        return table.get("goals_file").map_or(table.span.clone(), |v| v.span);
-    };
-    let item = goals.items().ok().and_then(|items| items.get(index).map(|item| item.span.clone()));
-    item.unwrap_or(goals.span)
-}
-
-fn check_goals(text: Text<'_>, vehicles: &[(Vehicle, VehicleSpans)], mission: &Mission) -> Result<()> {
-    if mission.mode != Mode::Labelled {
-        return Ok(());
-    }
-    for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
-        let Some(goal) = vehicle.goal else {
-            let hint = "add `goal = N`, an index into mission.goals from 0";
-            let why = format!("vehicle {} has no goal in a labelled mission", vehicle.id);
-            return Err(text.with_hint(&spans.table, why, hint));
-        };
-        let span = spans.goal.as_ref().unwrap_or(&spans.table);
-        if goal >= mission.goals.len() {
-            let last = mission.goals.len() - 1;
-            return Err(
-                text.error(span, format!("vehicle {}: goal {goal} is beyond the last, {last}", vehicle.id))
-            );
-        }
-        if let Some((other, _)) = vehicles[..index].iter().find(|(other, _)| other.goal == Some(goal)) {
-            return Err(
-                text.error(span, format!("vehicles {} and {} have the same goal", other.id, vehicle.id))
-            );
-        }
-    }
-    Ok(())
 }

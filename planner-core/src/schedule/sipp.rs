@@ -12,9 +12,10 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use super::near::Cells;
+use super::pieces::{Leg, Stops, cut, parts};
 use super::{
-    Flight, Forbidden, Leg, OFF_PAD_S, PIECE_M, Piece, ScheduleConfig, ScheduleError, Stops, conflict, cut,
-    first_allowed, forbid, last_allowed, parts,
+    Flight, Forbidden, OFF_PAD_S, PIECE_M, Piece, ScheduleConfig, ScheduleError, conflict, first_allowed,
+    forbid, last_allowed,
 };
 use crate::Point;
 use crate::path::Path;

@@ -1,0 +1,151 @@
+//! What must hold between the tables of a scenario.
+
+use planner_core::Point;
+
+use crate::margins;
+use crate::scenario::reader::{Result, Span, Table, Text};
+use crate::scenario::{Deconfliction, Estimator, Mission, Mode, Roadmap, Simulation, Vehicle};
+
+/// What errors about a vehicle point at.
+pub(super) struct VehicleSpans {
+    pub(super) start: Span,
+    pub(super) goal: Option<Span>,
+    pub(super) table: Span,
+}
+
+/// Where estimates err as recorded, margin and separation must leave room for it.
+pub(super) fn check_margins(
+    text: Text<'_>,
+    span: &Span,
+    roadmap: &Roadmap,
+    deconfliction: &Deconfliction,
+    simulation: &Simulation,
+    vehicles: &[Vehicle],
+) -> Result<()> {
+    if simulation.estimator != Estimator::Recorded {
+        return Ok(());
+    }
+    let need = margins::needed(simulation, deconfliction.safety_distance_m, vehicles);
+    let missing = [
+        ("roadmap.safety_margin_m", roadmap.safety_margin_m, need.margin_m),
+        ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m),
+    ];
+    let short = missing.iter().filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
+    let lacks: Vec<String> = short
+        .map(|(key, has_m, need_m)| {
+            format!("{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes", need_m - has_m)
+        })
+        .collect();
+    if lacks.is_empty() {
+        return Ok(());
+    }
+    let hint = "docs/simulating.md adds up margin and separation; \"rtk\" errs by 0.1 m";
+    let why = format!("estimates as wrong as the recorded ones leave no room: {}", lacks.join("; "));
+    Err(text.with_hint(span, why, hint))
+}
+
+pub(super) fn check_apart(
+    text: Text<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+    safety_distance_m: f32,
+) -> Result<()> {
+    for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
+        for (other, _) in &vehicles[..index] {
+            let apart = (vehicle.start - other.start).norm();
+            if apart < safety_distance_m {
+                let why = format!(
+                    "vehicles {} and {} start {apart:.2} m apart, below the safety distance of {safety_distance_m} m",
+                    other.id, vehicle.id
+                );
+                return Err(text.error(&spans.start, why));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Vehicles land below their goals: two goals too near would put two vehicles too near for good.
+pub(super) fn check_goals_apart(
+    table: &Table<'_>,
+    mission: &Mission,
+    safety_distance_m: f32,
+    simulation: &Simulation,
+    vehicles: &[Vehicle],
+) -> Result<()> {
+    let goals = &mission.goals;
+    for (i, goal) in goals.iter().enumerate() {
+        for (j, other) in goals[..i].iter().enumerate() {
+            let apart = (goal - other).norm();
+            if apart < safety_distance_m {
+                let span = goal_span(table, i);
+                let why = format!(
+                    "goals {j} and {i} are {apart:.2} m apart, below the safety distance of {safety_distance_m} m"
+                );
+                let needed_m = margins::parked_separation_m(simulation, safety_distance_m, vehicles);
+                let hint = format!("vehicles that land at both need {needed_m:.2} m between them");
+                return Err(table.text.with_hint(&span, why, hint));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Nobody starts or lands outside the geofence.
+pub(super) fn check_inside(
+    table: &Table<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+    mission: &Mission,
+) -> Result<()> {
+    let Some(fence) = &mission.geofence else { return Ok(()) };
+    let outside = |place: &Point| !fence.holds(place);
+    if let Some((vehicle, spans)) = vehicles.iter().find(|(vehicle, _)| outside(&vehicle.start)) {
+        let why = format!("vehicle {} starts outside mission.geofence", vehicle.id);
+        return Err(table.text.error(&spans.start, why));
+    }
+    match mission.goals.iter().position(outside) {
+        Some(goal) => {
+            let why = format!("goal {goal} lies outside mission.geofence");
+            Err(table.text.error(&goal_span(table, goal), why))
+        }
+        None => Ok(()),
+    }
+}
+
+/// Where a goal stands in the scenario.
+fn goal_span(table: &Table<'_>, index: usize) -> Span {
+    let Some(goals) = table.get("goals") else {
+        return table.get("goals_file").map_or(table.span.clone(), |v| v.span);
+    };
+    let item = goals.items().ok().and_then(|items| items.get(index).map(|item| item.span.clone()));
+    item.unwrap_or(goals.span)
+}
+
+pub(super) fn check_goals(
+    text: Text<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+    mission: &Mission,
+) -> Result<()> {
+    if mission.mode != Mode::Labelled {
+        return Ok(());
+    }
+    for (index, (vehicle, spans)) in vehicles.iter().enumerate() {
+        let Some(goal) = vehicle.goal else {
+            let hint = "add `goal = N`, an index into mission.goals from 0";
+            let why = format!("vehicle {} has no goal in a labelled mission", vehicle.id);
+            return Err(text.with_hint(&spans.table, why, hint));
+        };
+        let span = spans.goal.as_ref().unwrap_or(&spans.table);
+        if goal >= mission.goals.len() {
+            let last = mission.goals.len() - 1;
+            return Err(
+                text.error(span, format!("vehicle {}: goal {goal} is beyond the last, {last}", vehicle.id))
+            );
+        }
+        if let Some((other, _)) = vehicles[..index].iter().find(|(other, _)| other.goal == Some(goal)) {
+            return Err(
+                text.error(span, format!("vehicles {} and {} have the same goal", other.id, vehicle.id))
+            );
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,73 @@
+//! The tables of how a mission is flown: deconfliction, simulation, faults.
+
+use super::{MAX_ID, point};
+use crate::margins;
+use crate::scenario::reader::{Result, Table};
+use crate::scenario::{Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Method, Simulation};
+
+pub(super) fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {
+    let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
+    let method = table.word("method", Method::Priority, &methods)?;
+    let safety_distance_m = table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?;
+    let separation_m = table.f32(
+        "separation_m",
+        safety_distance_m + margins::STRAY_M,
+        f64::from(safety_distance_m)..=1000.0,
+    )?;
+    let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
+    table.finish()?;
+    Ok(deconfliction)
+}
+
+pub(super) fn simulation(table: &Table<'_>) -> Result<Simulation> {
+    let simulation = Simulation {
+        wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
+        gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
+        position_noise_m: table.f32("position_noise_m", 0.0, 0.0..=100.0)?,
+        estimator: table.word(
+            "estimator",
+            Estimator::Rtk,
+            &[("rtk", Estimator::Rtk), ("recorded", Estimator::Recorded)],
+        )?,
+        serial_baud: table.whole("serial_baud", 921_600, 1200..=100_000_000)? as u32,
+        serial_corruption: table.f32("serial_corruption", 0.0, 0.0..=1.0)?,
+        radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
+        radio_delay_s: table.f32("radio_delay_s", 0.05, 0.0..=60.0)?,
+        radio_range_m: table.f32("radio_range_m", 500.0, 0.0..=1e6)?,
+        time_limit_s: table.f32("time_limit_s", 600.0, 0.1..=1e6)?,
+    };
+    table.finish()?;
+    Ok(simulation)
+}
+
+pub(super) fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
+    let words: Vec<(&str, &'static str)> =
+        FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
+    let kind = table.need("kind", "what happens, for example \"kill\"")?.word(&words)?;
+    let at_s = table.need("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
+    let vehicle = table.get("vehicle");
+    if let Some(value) = &vehicle
+        && !ids.contains(&(value.whole(1..=MAX_ID)? as u8))
+    {
+        return Err(value.error("is no vehicle's id"));
+    }
+    let vehicle = vehicle.map(|v| v.whole(1..=MAX_ID).map(|id| id as u8)).transpose()?;
+    let direction = table.get("direction").map(|v| v.word(&[("tx", "tx"), ("rx", "rx"), ("both", "both")]));
+    let fault = Fault {
+        at_s,
+        duration_s: table.optional_f32("duration_s", 0.0..=1e6)?,
+        vehicle,
+        kind,
+        direction: direction.transpose()?.map(str::to_owned),
+        offset_m: table.get("offset_m").map(|v| point(&v)).transpose()?,
+        position: table.get("position").map(|v| point(&v)).transpose()?,
+        radius_m: table.optional_f32("radius_m", 0.001..=1000.0)?,
+    };
+    table.finish()?;
+    if fault.kind == FAULT_OBSTACLE && (fault.position.is_none() || fault.radius_m.is_none()) {
+        return Err(table
+            .text
+            .error(&table.span, "a fault of kind \"obstacle\" needs position and radius_m"));
+    }
+    Ok(fault)
+}

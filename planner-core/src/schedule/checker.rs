@@ -1,0 +1,55 @@
+//! The checker of schedules: flies them at any speeds and measures.
+
+extern crate std;
+
+use std::vec::Vec as StdVec;
+
+use super::*;
+
+/// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the smallest distance
+/// between two of which one moves, or who was still under way after `steps` of 50 ms.
+pub(crate) fn fly<const W: usize>(
+    cfg: &ScheduleConfig,
+    flights: &[Flight<W>],
+    speeds: &[f32],
+    steps: usize,
+) -> Result<f32, StdVec<u8>> {
+    let mut ws = ScheduleWorkspace::new();
+    let gates: StdVec<Vec<Gate, 1024>> = (0..flights.len())
+        .map(|i| {
+            let mut out = Vec::new();
+            gates(cfg, flights, i, &mut ws, &mut out).unwrap();
+            out
+        })
+        .collect();
+    let end = |f: &Flight<W>| if f.goal.is_some() { f.path.length_m() + f.descent_m } else { -f.climb_m };
+    let place = |f: &Flight<W>, m: f32| {
+        let below = fmaxf(-m, fmaxf(m - f.path.length_m(), 0.0));
+        f.path.point_at(m).unwrap() - Point::new(0.0, 0.0, below)
+    };
+    let mut along: StdVec<f32> = flights.iter().map(|f| -f.climb_m).collect();
+    let mut smallest = f32::INFINITY;
+    for _ in 0..steps {
+        for i in 0..flights.len() {
+            let shut = |g: &&Gate| {
+                let other = flights.iter().position(|f| f.id == g.id).unwrap();
+                g.at_m >= along[i] - 0.01 && along[other] < g.until_m
+            };
+            let free = gates[i].iter().filter(shut).map(|g| g.at_m).fold(f32::INFINITY, fminf);
+            // `until_m` lies a hair beyond the end of the last piece.
+            let goal = end(&flights[i]) + if flights[i].goal.is_some() { 0.02 } else { 0.0 };
+            along[i] = fmaxf(along[i], fminf(fminf(along[i] + speeds[i] * 0.05, free), goal));
+        }
+        let moves = |i: usize| along[i] > -flights[i].climb_m && along[i] < end(&flights[i]);
+        for i in 0..flights.len() {
+            for j in (0..i).filter(|&j| moves(i) || moves(j)) {
+                let apart = place(&flights[i], along[i]) - place(&flights[j], along[j]);
+                smallest = fminf(smallest, apart.norm());
+            }
+        }
+        if (0..flights.len()).all(|i| along[i] >= end(&flights[i])) {
+            return Ok(smallest);
+        }
+    }
+    Err((0..flights.len()).filter(|&i| along[i] < end(&flights[i])).map(|i| flights[i].id).collect())
+}

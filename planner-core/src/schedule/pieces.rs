@@ -1,0 +1,128 @@
+//! Timed segments: a flight cut into stretches, each with when it is held.
+
+use heapless::Vec;
+use libm::fmaxf;
+
+use super::{Flight, OFF_PAD_S, PIECES, Piece, ScheduleConfig, ScheduleError};
+use crate::Point;
+
+/// Cuts a flight into timed segments of at most `flight.piece_m`.
+///
+/// A climb is flown in one go, and so are a descent and what follows it, the landing place. All segments of such a group are
+/// held from its beginning; each is free again when the vehicle has left it.
+pub(super) fn cut<const W: usize>(
+    cfg: &ScheduleConfig,
+    flight: &Flight<W>,
+    out: &mut Vec<Piece, PIECES>,
+) -> Result<(), ScheduleError> {
+    out.clear();
+    let waypoints = flight.path.waypoints();
+    let (Some(first), Some(last)) = (waypoints.first(), waypoints.last()) else {
+        return Ok(());
+    };
+    let pad = first.position - Point::new(0.0, 0.0, flight.climb_m);
+    let stay = |at: Point, m: f32, from_s: f32, to_s: f32| Piece {
+        from: at,
+        to: at,
+        from_m: m,
+        to_m: m,
+        from_s,
+        to_s,
+        parked: true,
+    };
+    let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
+    if flight.goal.is_none() {
+        return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
+    }
+    let climb = Leg::climb(pad, first.position, first.at_s);
+    let (left_m, left_s) = climb.first_part(flight.piece_m);
+    let on_pad = stay(pad, -flight.climb_m, f32::NEG_INFINITY, fmaxf(left_s, OFF_PAD_S));
+    push(Piece { to_m: left_m - flight.climb_m, ..on_pad })?;
+    for piece in climb.pieces(-flight.climb_m, 0.0, flight.piece_m) {
+        push(piece)?;
+    }
+    for (i, waypoint) in waypoints.iter().enumerate() {
+        if waypoint.leave_s > waypoint.at_s {
+            let hold = stay(waypoint.position, waypoint.along_m, waypoint.at_s, waypoint.leave_s);
+            push(Piece { parked: false, ..hold })?;
+        }
+        let Some(next) = waypoints.get(i + 1) else { break };
+        let leg = Leg {
+            from: waypoint.position,
+            to: next.position,
+            length_m: next.along_m - waypoint.along_m,
+            from_s: waypoint.leave_s,
+            to_s: next.at_s,
+            stops: Stops::Anywhere,
+        };
+        for piece in leg.pieces(waypoint.along_m, next.along_m, flight.piece_m) {
+            push(piece)?;
+        }
+    }
+    let ground = last.position - Point::new(0.0, 0.0, flight.descent_m);
+    let end_m = last.along_m + flight.descent_m;
+    let landed_s = last.leave_s + flight.descent_m / cfg.vertical_mps;
+    let descent = Leg { from_s: last.leave_s, to_s: landed_s, ..Leg::climb(last.position, ground, 0.0) };
+    for piece in descent.pieces(last.along_m, end_m, flight.piece_m) {
+        push(piece)?;
+    }
+    push(Piece { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
+}
+
+/// Where a vehicle may wait on a leg.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stops {
+    /// Before each of its timed segments.
+    Anywhere,
+    /// Before the leg only.
+    Before,
+}
+
+/// A straight stretch flown at one speed.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Leg {
+    pub(super) from: Point,
+    pub(super) to: Point,
+    pub(super) length_m: f32,
+    pub(super) from_s: f32,
+    pub(super) to_s: f32,
+    pub(super) stops: Stops,
+}
+
+impl Leg {
+    /// A vertical one from time 0.
+    pub(super) fn climb(from: Point, to: Point, to_s: f32) -> Self {
+        Self { from, to, length_m: libm::fabsf(to.z - from.z), from_s: 0.0, to_s, stops: Stops::Before }
+    }
+
+    /// Length and duration of the first of its timed segments.
+    pub(super) fn first_part(&self, piece_m: f32) -> (f32, f32) {
+        let share = 1.0 / fmaxf(parts(self.length_m, piece_m) as f32, 1.0);
+        (self.length_m * share, (self.to_s - self.from_s) * share)
+    }
+
+    /// Its timed segments; `from_m` and `to_m` are its ends along the path.
+    pub(super) fn pieces(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = Piece> {
+        let parts = parts(self.length_m, piece_m);
+        let at = move |part: u32| {
+            if part == parts {
+                // The next one begins where this ends, bit by bit.
+                return (self.to, to_m, self.to_s);
+            }
+            let share = part as f32 / parts as f32;
+            let mix = |a: f32, b: f32| a + (b - a) * share;
+            (self.from + (self.to - self.from) * share, mix(from_m, to_m), mix(self.from_s, self.to_s))
+        };
+        (0..parts).map(move |part| {
+            let ((from, start_m, start_s), (to, to_m, to_s)) = (at(part), at(part + 1));
+            let (from_m, from_s) =
+                if self.stops == Stops::Before { (from_m, self.from_s) } else { (start_m, start_s) };
+            Piece { from, to, from_m, to_m, from_s, to_s, parked: false }
+        })
+    }
+}
+
+/// Timed segments of a stretch of this length; none of one without length.
+pub(super) fn parts(length_m: f32, piece_m: f32) -> u32 {
+    libm::ceilf(length_m / piece_m) as u32
+}
