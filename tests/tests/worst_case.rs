@@ -78,6 +78,7 @@ fn the_board_needs_no_more_than_the_table_says() {
         let (count, bytes) = line.trim_end_matches(" |").split_once(" | ").expect("four columns");
         let most = bounds::parsed(count).expect("a count");
         let seen = calls[*name];
+        println!("{name}: {} instructions of {count}, {} bytes", seen.instructions, seen.bytes);
         assert!(
             seen.instructions as f64 <= most * SLACK + 100.0,
             "{name}: {} of {most} instructions",
