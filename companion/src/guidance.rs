@@ -559,6 +559,19 @@ impl Guidance {
         sound
     }
 
+    /// What the safety filter finds at this moment: the vehicle that it stops for, 0 for none. Nothing changes by it.
+    pub fn ask_filter<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) -> u8 {
+        let before = self.filter;
+        self.filter(state, scene, neighbours, now);
+        core::mem::replace(&mut self.filter, before).blocker()
+    }
+
     /// The raw point is where the setpoint stands: going on begins with a way from there.
     fn settle(&mut self) {
         self.settled = true;

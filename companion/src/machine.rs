@@ -214,6 +214,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.filter.activations()
     }
 
+    /// What the safety filter finds at this moment, as each step asks it: the vehicle that it stops for, 0 for none. Nothing
+    /// changes by it; its cost is counted so.
+    pub fn ask_filter(&mut self, now: Instant) -> u8 {
+        let scene = Scene {
+            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
+            telemetry: &self.telemetry,
+            rank: self.rank,
+            id: self.config.system_id,
+            detours: self.around.flying,
+        };
+        self.guidance.ask_filter(self.state, &scene, &self.neighbours, now)
+    }
+
     /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
     pub fn stops_urgently(&self) -> bool {
         self.guidance.door.stops_urgently()

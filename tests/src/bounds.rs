@@ -95,6 +95,8 @@ pub const BOUNDS: &[(&str, &str)] = &[
         "the same; 160 legs against what is out, 96 columns of what comes down",
     ),
     ("Companion::handle_timeout, else", "the same"),
+    ("a control step, 32 near", "the same as `Companion::handle_timeout`"),
+    ("Companion::ask_filter, 32 near", "v, and 6 neighbours × 9 × 9 legs"),
     ("Companion::handle_plan", "w and g copied"),
     ("Companion::detour", "v × 16 places"),
     ("Companion::poll_transmit", "one frame"),

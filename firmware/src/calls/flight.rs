@@ -25,6 +25,10 @@ pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 /// The same where most have left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
+/// The same where all are near and off the plan, and few are in the way: the safety filter looks at all of them.
+pub const NEAR_STEP: &str = "a control step, 32 near";
+/// The safety filter alone, which is part of each of them.
+pub const FILTER: &str = "Companion::ask_filter, 32 near";
 /// Any other, and what else is due.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
@@ -151,21 +155,7 @@ pub fn fly<M: Meter>(
 ) -> usize {
     let mut rng = Pcg32::seed_from_u64(seed);
     let hard = is_hard(seed);
-    let mut flight = Flight {
-        companion,
-        meter,
-        now: Instant::ZERO,
-        place: Point::new(0.0, 0.0, 9.0),
-        target: None,
-        mode: 0,
-        armed: false,
-        sequences: [0; 256],
-        others: Vec::new(),
-        plan,
-    };
-    // Far away, and past every gate.
-    let far = || Other { place: Point::new(300.0, 0.0, 0.0), flags: AIR, progress_m: 1e3, silent: false };
-    flight.others.extend((0..VEHICLES).map(|_| far()));
+    let mut flight = Flight::on_pad(plan, companion, meter);
     flight.take_off();
     for (i, other) in flight.others.iter_mut().enumerate() {
         let (flags, silent) = match seed % 4 {
@@ -197,11 +187,61 @@ pub fn fly<M: Meter>(
             }
             flight.tell_all(&mut rng, |other| !other.silent);
         }
+        let (now, companion) = (flight.now, &mut *flight.companion);
+        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
         flight.tick(if hard { HARD_STEP } else { STEP }, STEP_TIME);
     }
     STEPS
 }
 
+/// One flight among neighbours that are near but seldom in the way, the safety filter alone counted by `meter`: in full flight,
+/// and stopped, when it looks further ahead.
+///
+/// # Panics
+/// The companion does not take off: the script is wrong.
+pub fn filter<M: Meter>(
+    seed: u64,
+    plan: &VehiclePlan<WAYPOINTS, GATES>,
+    companion: &mut BoardCompanion,
+    meter: &mut M,
+) {
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut flight = Flight::on_pad(plan, companion, meter);
+    flight.take_off();
+    for round in 0..ROUNDS {
+        for i in 0..flight.others.len() {
+            flight.others[i].place = flight.place + far_away();
+            flight.others[i].flags = FILTERED[below(&mut rng, FILTERED.len())];
+        }
+        if round % 2 == 1 {
+            flight.others[0].place = flight.place;
+        }
+        flight.tell_all(&mut rng, |_| true);
+        for _ in 0..4 {
+            flight.tick(OTHER_STEP, STEP_TIME);
+        }
+        let (nearest_m, furthest_m) = (uniform(&mut rng, 3.0, 12.0), uniform(&mut rng, 6.0, 24.0));
+        for i in 0..flight.others.len() {
+            let way = anywhere(&mut rng, 1.0);
+            let away_m = uniform(&mut rng, nearest_m, nearest_m.max(furthest_m) + 0.1);
+            flight.others[i].place = flight.place + way * (away_m / way.norm().max(0.01));
+        }
+        flight.tell_all(&mut rng, |_| true);
+        let (now, companion) = (flight.now, &mut *flight.companion);
+        flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
+        // The whole step beside them; and time passes, so that what they say next is new.
+        flight.tick(NEAR_STEP, STEP_TIME);
+    }
+}
+
+/// Where nobody is in anybody's way.
+fn far_away() -> Point {
+    Point::new(300.0, 0.0, 0.0)
+}
+
+/// Rounds of a flight in which the filter is counted.
+const ROUNDS: usize = 40;
+const FILTERED: [u8; 4] = [AIR, AIR | intent::DETOURS, intent::FLYING, intent::FLYING | intent::OUT];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Flags of a neighbour, and whether it falls silent.
 const EASY: [(u8, bool); 4] = [
@@ -213,7 +253,28 @@ const EASY: [(u8, bool); 4] = [
 const HARD: [(u8, bool); 4] =
     [(intent::FLYING, false), (intent::FLYING | intent::OUT, false), (AIR, true), (intent::FLYING, true)];
 
-impl<M: Meter> Flight<'_, M> {
+impl<'a, M: Meter> Flight<'a, M> {
+    /// On its pad, all others far away, and past every gate.
+    fn on_pad(
+        plan: &'a VehiclePlan<WAYPOINTS, GATES>,
+        companion: &'a mut BoardCompanion,
+        meter: &'a mut M,
+    ) -> Self {
+        let far = || Other { place: far_away(), flags: AIR, progress_m: 1e3, silent: false };
+        Self {
+            companion,
+            meter,
+            now: Instant::ZERO,
+            place: Point::new(0.0, 0.0, 9.0),
+            target: None,
+            mode: 0,
+            armed: false,
+            sequences: [0; 256],
+            others: (0..VEHICLES).map(|_| far()).collect(),
+            plan,
+        }
+    }
+
     fn flies(&self) -> bool {
         use companion::State::*;
         matches!(self.companion.state(), Follow | Blocked | Replanning)
@@ -397,25 +458,41 @@ fn put(to: &mut [u8], numbers: &[f32]) {
 mod tests {
     use super::*;
 
-    struct Counts(usize);
+    #[derive(Default)]
+    struct Counts {
+        steps: usize,
+        filtered: usize,
+    }
 
     impl Meter for Counts {
         fn call<T>(&mut self, name: &'static str, _bytes: usize, work: impl FnOnce() -> T) -> T {
-            self.0 += usize::from(name == STEP || name == HARD_STEP);
+            self.steps += usize::from(name == STEP || name == HARD_STEP);
+            self.filtered += usize::from(name == FILTER);
             work()
         }
     }
 
     #[test]
+    fn the_filter_is_counted_in_flight() {
+        let mut meter = Counts::default();
+        for seed in 0..10 {
+            let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
+            let mut companion = BoardCompanion::new(config()).expect("the settings are good");
+            filter(seed, &plan, &mut companion, &mut meter);
+        }
+        assert_eq!(meter.filtered, 10 * ROUNDS);
+    }
+
+    #[test]
     fn most_steps_of_a_flight_are_flown() {
-        let mut meter = Counts(0);
+        let mut meter = Counts::default();
         let mut flown = 0;
         for seed in 0..10 {
             let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
             let mut companion = BoardCompanion::new(config()).expect("the settings are good");
             flown += fly(seed, &plan, &mut companion, &mut meter);
         }
-        assert_eq!(meter.0, flown);
+        assert_eq!(meter.steps, flown);
         assert!(flown > 8 * STEPS, "{flown}");
     }
 }

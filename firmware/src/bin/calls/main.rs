@@ -24,6 +24,8 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
     semihosting::process::exit(1)
 }
 
+/// Flights in which the safety filter is counted.
+const FILTERED: u64 = 100;
 /// Most rows.
 const ROWS: usize = 96;
 
@@ -53,6 +55,7 @@ fn main() -> ! {
     planner_calls::run(&mut meter);
     companion_calls::run(&mut meter);
     fly(&mut meter);
+    filter(&mut meter);
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
     }
@@ -76,5 +79,15 @@ fn fly(meter: &mut Instructions) {
             println!("steps {steps:?}");
             return;
         }
+    }
+}
+
+/// The safety filter alone.
+#[inline(never)]
+fn filter(meter: &mut Instructions) {
+    for seed in 0..FILTERED {
+        let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
+        let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
+        flight::filter(seed, &plan, &mut companion, meter);
     }
 }
