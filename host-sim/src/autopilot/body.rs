@@ -38,8 +38,8 @@ pub struct Sense {
     pub heading: f32,
     /// The body touches the ground.
     pub touching: bool,
-    /// Height of the body over its resting place, metres (the distance sensor).
-    pub height: f32,
+    /// Height of the body over its resting place as the distance sensor shows it, metres; infinite without one.
+    pub distance: f32,
     /// Home, ENU metres.
     pub home: Point,
     /// Charge left, 0 to 1.
@@ -156,7 +156,7 @@ impl Body {
             acceleration: state.acceleration,
             heading: state.heading_rad,
             touching: state.touching,
-            height: self.height,
+            distance: if self.config.distance_sensor { self.height } else { f32::INFINITY },
             home: self.home_enu,
             battery: state.battery,
         }

@@ -69,6 +69,8 @@ pub struct Config {
     pub position_noise_m: f32,
     /// How good its estimate is.
     pub estimator: Estimator,
+    /// Whether PX4 lands by a distance sensor, as the recorded ones did: it crawls over its last metre.
+    pub distance_sensor: bool,
     /// Seed of gusts and noise.
     pub seed: u64,
     /// UTC at boot, microseconds since 1970.
@@ -101,6 +103,7 @@ impl Default for Config {
             gust_mps: 0.0,
             position_noise_m: 0.0,
             estimator: Estimator::Perfect,
+            distance_sensor: false,
             seed: 1,
             boot_unix_us: 1_767_225_600_000_000,
             estimator_ready_s: 40.0,

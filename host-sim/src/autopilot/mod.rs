@@ -42,6 +42,7 @@ pub mod port;
 pub mod px4;
 mod routing;
 pub mod server;
+mod shaping;
 pub mod telemetry;
 pub mod vehicle;
 pub mod wire;
@@ -190,10 +191,7 @@ impl Autopilot {
         if order.lift {
             let gains = self.firmware.gains();
             let mut velocity = sense.velocity;
-            if order.demand.position.z.is_nan() {
-                // PX4 controls a rate of climb by the change of its height, which has less bias (`z_deriv`).
-                velocity.z = sense.height_rate;
-            }
+            velocity.z += order.demand.height_rate_share * (sense.height_rate - velocity.z);
             body.vehicle.control(&order.demand, gains, &sense.position, &velocity, dt_s);
         }
         body.demand = armed.then_some(order.demand);

@@ -113,6 +113,8 @@ pub struct Demand {
     pub lift_off: f32,
     /// Least thrust as a share of the weight.
     pub thrust_min: f32,
+    /// Share of the change of the height in the rate of climb that is controlled, 0 to 1; the rest is the estimated velocity.
+    pub height_rate_share: f32,
 }
 
 /// Gains and bounds, from the parameters of the same name.
@@ -371,6 +373,7 @@ mod tests {
             descend_max: 1.5,
             lift_off: f32::NAN,
             thrust_min: 0.15,
+            height_rate_share: 0.0,
         }
     }
 

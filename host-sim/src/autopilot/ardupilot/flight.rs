@@ -3,10 +3,11 @@
 use planner_core::Point;
 
 use super::params::Tuning;
-use super::reference::{Reference, approach};
+use super::reference::Reference;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, micros};
 use crate::autopilot::body::Sense;
+use crate::autopilot::shaping::approach;
 use crate::autopilot::vehicle::Demand;
 
 const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
@@ -35,6 +36,7 @@ pub(super) fn nothing(tuning: &Tuning) -> Demand {
         descend_max: 1.5 * tuning.speed_down.max(tuning.stick_sink),
         lift_off: f32::NAN,
         thrust_min: 0.15,
+        height_rate_share: 0.0,
     }
 }
 

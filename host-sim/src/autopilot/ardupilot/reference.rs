@@ -8,6 +8,7 @@ use planner_core::Point;
 
 use super::params::Tuning;
 use super::setpoint::Goal;
+use crate::autopilot::shaping::approach;
 
 /// Share of the acceleration that corrections of position may use.
 const CORRECTION: f32 = 0.5;
@@ -66,15 +67,6 @@ fn scaled(x: f32, y: f32, length: impl Fn(f32) -> f32) -> (f32, f32) {
     }
     let factor = length(norm) / norm;
     (x * factor, y * factor)
-}
-
-/// Rate at which an error is closed: proportional near zero, and no faster than can be stopped (`sqrt_controller`).
-pub(super) fn approach(error: f32, gain: f32, limit: f32) -> f32 {
-    let linear = limit / (gain * gain);
-    if error.abs() <= linear {
-        return error * gain;
-    }
-    libm::copysignf(libm::sqrtf(2.0 * limit * (error.abs() - 0.5 * linear)), error)
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use planner_core::Point;
 
 use super::params::Tuning;
 use super::{Commander, Mode, ReturnLeg, Sense};
+use crate::autopilot::shaping::Ramp;
 use crate::autopilot::vehicle::Demand;
 
 /// A demand to climb is one that asks for more than this above the present height, metres, or for more than
@@ -14,7 +15,11 @@ const CLIMB_MPS: f32 = 0.05;
 const ARRIVED_M: f32 = 0.5;
 /// Faster than this it was not seen to sink in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its height, which
 /// is also what it controls there; the velocity it reported meanwhile went up to 1.6.
-const LAND_MPS: f32 = 1.25;
+const LAND_MPS: f32 = 1.3;
+/// Share of `MPC_LAND_CRWL` that it was seen to crawl at: 0.22 of 0.3 m/s.
+const CRAWL_SHARE: f32 = 0.75;
+/// Seconds that the measured distance to the ground is late: it crawls from 0.85 m on, not from `MPC_LAND_ALT3`.
+const DISTANCE_LAG_S: f32 = 0.2;
 /// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
 const BRAKE_MPS2: f32 = 3.0;
 
@@ -34,6 +39,7 @@ pub(super) fn nothing(tuning: &Tuning) -> Demand {
         lift_off: f32::NAN,
         // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
         thrust_min: 0.245,
+        height_rate_share: 0.0,
     }
 }
 
@@ -46,6 +52,7 @@ impl Commander {
         self.hold.y += sense.velocity.y * speed / (2.0 * BRAKE_MPS2);
         self.hold_heading = sense.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
+        self.descent = None;
         if mode == Mode::Takeoff {
             (self.hold.x, self.hold.y) = (sense.position.x, sense.position.y);
         }
@@ -105,17 +112,37 @@ impl Commander {
         }
     }
 
-    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`; heights
-    /// are above home, as it has no rangefinder.
-    fn landing(&self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`, these heights
+    /// above home; and crawls (`MPC_LAND_CRWL`) once a distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the
+    /// rate is smooth (`MPC_JERK_AUTO`).
+    fn landing(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
         let [high, low] = tuning.land_slow_below;
         let height = sense.position.z - sense.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
-        let sink = tuning.land_speed + share * (tuning.auto_down - tuning.land_speed);
-        let sink = sink.min(LAND_MPS);
-        let position = Point::new(self.hold.x, self.hold.y, f32::NAN);
-        let velocity = Point::new(f32::NAN, f32::NAN, -sink);
-        Demand { position, velocity, descend_max: sink.max(0.0), ..held }
+        let mut sink = LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
+        if sense.distance - sense.velocity.z * DISTANCE_LAG_S < tuning.land_crawl_below {
+            sink = CRAWL_SHARE * tuning.land_crawl_speed;
+        }
+        let descent = match &mut self.descent {
+            Some((at_us, ramp)) => {
+                let dt = sense.now_us.saturating_sub(core::mem::replace(at_us, sense.now_us)) as f32 * 1e-6;
+                ramp.advance(sink, tuning.auto_acceleration_down, tuning.auto_jerk, dt);
+                *ramp
+            }
+            begin => {
+                let ramp = Ramp { rate: -sense.velocity.z, change: 0.0 };
+                *begin = Some((sense.now_us, ramp));
+                ramp
+            }
+        };
+        Demand {
+            position: Point::new(self.hold.x, self.hold.y, f32::NAN),
+            velocity: Point::new(f32::NAN, f32::NAN, -descent.rate),
+            acceleration: Point::new(f32::NAN, f32::NAN, -descent.change),
+            // A change of the height has less bias than the velocity (`z_deriv`).
+            height_rate_share: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
+            ..held
+        }
     }
 
     fn returning(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {

@@ -24,6 +24,7 @@ pub use self::firmware::Px4;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
 use super::body::{Integral, Order, Sense};
+use super::shaping::Ramp;
 use super::vehicle::Demand;
 
 /// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
@@ -147,6 +148,8 @@ pub struct Commander {
     takeoff_up: f32,
     cruise: Option<f32>,
     leg: ReturnLeg,
+    /// Rate of sinking in Land, as of when.
+    descent: Option<(u64, Ramp)>,
     position_ok: bool,
 }
 
@@ -177,6 +180,7 @@ impl Commander {
             takeoff_up: f32::NAN,
             cruise: None,
             leg: ReturnLeg::Descend,
+            descent: None,
             position_ok: true,
         }
     }

@@ -59,6 +59,8 @@ const DEFAULTS: &[(&str, Value)] = &[
     ("MPC_JERK_MAX", Real(8.0)),
     ("MPC_LAND_ALT1", Real(10.0)),
     ("MPC_LAND_ALT2", Real(5.0)),
+    ("MPC_LAND_ALT3", Real(1.0)),
+    ("MPC_LAND_CRWL", Real(0.3)),
     ("MPC_LAND_SPEED", Real(0.7)),
     ("MPC_THR_HOVER", Real(0.5)),
     ("MPC_THR_MAX", Real(1.0)),
@@ -124,6 +126,10 @@ pub struct Tuning {
     pub auto_down: f32,
     pub land_speed: f32,
     pub land_slow_below: [f32; 2],
+    pub land_crawl_speed: f32,
+    pub land_crawl_below: f32,
+    pub auto_jerk: f32,
+    pub auto_acceleration_down: f32,
     pub takeoff_speed: f32,
     pub takeoff_ramp_s: f32,
     pub takeoff_height: f32,
@@ -162,6 +168,10 @@ impl Tuning {
             auto_down: params.real("MPC_Z_V_AUTO_DN"),
             land_speed: params.real("MPC_LAND_SPEED"),
             land_slow_below: [params.real("MPC_LAND_ALT1"), params.real("MPC_LAND_ALT2")],
+            land_crawl_speed: params.real("MPC_LAND_CRWL"),
+            land_crawl_below: params.real("MPC_LAND_ALT3"),
+            auto_jerk: params.real("MPC_JERK_AUTO").max(0.5),
+            auto_acceleration_down: params.real("MPC_ACC_DOWN_MAX").max(0.5),
             takeoff_speed: params.real("MPC_TKO_SPEED"),
             takeoff_ramp_s: params.real("MPC_TKO_RAMP_T"),
             takeoff_height: params.real("MIS_TAKEOFF_ALT"),
@@ -202,6 +212,9 @@ mod tests {
         for value in
             [t.auto_up, t.auto_down, t.takeoff_speed, t.takeoff_ramp_s, t.takeoff_height, t.land_trigger_s]
         {
+            assert!(value > 0.0);
+        }
+        for value in [t.land_crawl_speed, t.land_crawl_below, t.auto_jerk, t.auto_acceleration_down] {
             assert!(value > 0.0);
         }
         for value in

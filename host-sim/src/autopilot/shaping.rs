@@ -1,0 +1,54 @@
+//! How autopilots approach what is asked for within limits on acceleration and jerk.
+
+/// Rate at which an error is closed: proportional near zero, and no faster than can be stopped (`sqrt_controller`).
+pub fn approach(error: f32, gain: f32, limit: f32) -> f32 {
+    let linear = limit / (gain * gain);
+    if error.abs() <= linear {
+        return error * gain;
+    }
+    libm::copysignf(libm::sqrtf(2.0 * limit * (error.abs() - 0.5 * linear)), error)
+}
+
+/// How fast a ramp closes what is left of it at its end, 1/s.
+const EASE_PER_S: f32 = 6.0;
+
+/// A rate that changes within limits, as PX4's `VelocitySmoothing` changes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ramp {
+    /// m/s.
+    pub rate: f32,
+    /// Its change, m/s².
+    pub change: f32,
+}
+
+impl Ramp {
+    /// One step of `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
+    pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
+        let wanted = approach(rate - self.rate, EASE_PER_S, jerk).clamp(-change, change);
+        self.change += (wanted - self.change).clamp(-jerk * dt, jerk * dt);
+        self.rate += self.change * dt;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_arrives_within_its_limits_and_hardly_overshoots() {
+        let mut ramp = Ramp { rate: 0.0, change: 0.0 };
+        let (mut most, mut fastest, mut arrived_s) = (0.0_f32, 0.0_f32, 0.0);
+        for step in 0..2000_u16 {
+            let before = ramp.change;
+            ramp.advance(1.5, 3.0, 4.0, 0.004);
+            most = most.max(ramp.change);
+            fastest = fastest.max(ramp.rate);
+            assert!((ramp.change - before).abs() <= 4.0 * 0.004 + 1e-6);
+            if ramp.rate < 1.4 {
+                arrived_s = f32::from(step) * 0.004;
+            }
+        }
+        assert!(most <= 3.0 && fastest < 1.6, "{most} {fastest}");
+        assert!((0.9..1.8).contains(&arrived_s) && (ramp.rate - 1.5).abs() < 0.01, "{arrived_s} {ramp:?}");
+    }
+}
