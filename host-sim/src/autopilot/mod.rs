@@ -352,9 +352,10 @@ impl Autopilot {
         self.body.height_error_rate = height_rate;
     }
 
-    /// Where it believes to be, ENU metres.
-    pub fn estimate(&self) -> Point {
-        self.body.sense().position
+    /// Where it believes to be and how fast it believes to move, ENU metres and m/s.
+    pub fn estimate(&self) -> [Point; 2] {
+        let sense = self.body.sense();
+        [sense.position, sense.velocity]
     }
 
     /// Moves the EKF origin and says so, as an estimator that resets does.

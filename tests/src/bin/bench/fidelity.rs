@@ -1,10 +1,12 @@
 //! Simulated autopilots beside the recorded ones: recorded setpoints replayed, estimates compared.
 //!
-//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded errors of the estimate, "theirs" what is
-//! allowed. Flights in which a person or a failsafe took the vehicle are printed and not rated: each error of theirs adds up in
-//! what follows.
+//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded errors of the estimate, "theirs"
+//! what is allowed. Flights in which a person or a failsafe took the vehicle are printed and not rated: each error of theirs adds up
+//! in what follows.
 
-use flockmate_tests::fidelity::{Comparison, Difference, Estimator, RUNS, Recording, allowed_m, recordings};
+use flockmate_tests::fidelity::{
+    Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
+};
 
 use crate::Row;
 
@@ -18,16 +20,26 @@ const TWINS: [[(&str, usize); 2]; 3] = [
 /// A row a plain flight; prints what makes it up.
 pub fn rows() -> Vec<Row> {
     println!(
-        "RMS / greatest difference, metres: under the recorded errors of the estimate, and (whole) without"
+        "RMS / greatest difference, metres: under the recorded errors of the estimate; without errors; without errors and with"
     );
     println!(
-        "{:20} {:>13} {:>13} {:>13} {:>13} {:>15}",
-        "recorded flight", "whole", "in Follow", "height up", "height down", "without errors"
+        "the accelerations as they were sent, which answer the recorded errors; and by how much the errors move these two"
+    );
+    println!(
+        "{:20} {:>13} {:>13} {:>13} {:>13} {:>14} {:>13} {:>14}",
+        "recorded flight",
+        "whole",
+        "in Follow",
+        "height up",
+        "height down",
+        "without errors",
+        "as sent",
+        "errors move"
     );
     let mut rows = Vec::new();
     for recording in RUNS.iter().flat_map(|run| recordings(run)) {
-        let (c, without) = (recording.compare(Estimator::Recorded), recording.compare(Estimator::Perfect));
-        print(&recording, &c, &without.whole);
+        let c = recording.compare(Estimator::Recorded, Correction::Simulated);
+        print(&recording, &c);
         let Some(allowed_m) = allowed_m(&recording) else { continue };
         rows.push(Row {
             name: format!("{} {}", recording.run, recording.vehicle),
@@ -53,10 +65,14 @@ pub fn rows() -> Vec<Row> {
     rows
 }
 
-fn print(recording: &Recording, c: &Comparison, without: &Difference) {
+fn print(recording: &Recording, c: &Comparison) {
     print!("{:20}", format!("{} {}", recording.run, recording.vehicle));
-    for part in [&c.whole, &c.follow, &c.lift_off, &c.landing, without] {
-        print!("   {:>4.2} / {:>4.2}", part.rms, part.max);
+    let without = |correction| recording.compare(Estimator::Perfect, correction).whole;
+    let [closed, sent] = [Correction::Simulated, Correction::Recorded].map(without);
+    for part in [&c.whole, &c.follow, &c.lift_off, &c.landing, &closed, &sent] {
+        let Difference { rms, max } = part;
+        print!("   {rms:>4.2} / {max:>4.2}");
     }
-    println!();
+    let [closed, sent] = [Correction::Simulated, Correction::Recorded].map(|k| recording.moved(k));
+    println!("   {closed:>4.2},  {sent:>4.2}");
 }

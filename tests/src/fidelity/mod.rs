@@ -1,0 +1,235 @@
+//! How nearly a simulated autopilot flies what a real one flew: recorded setpoints and commands are replayed into it, and where it
+//! believes to be is compared with the recorded *estimate*, from arming to disarming.
+//!
+//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate moves the vehicle: a replay either
+//! imposes the recorded errors (estimate minus truth) on the simulated estimate, or flies without any. And the companion answered
+//! that wandering in the accelerations it sent: a replay either sends those, or what the same law sends beside the simulated vehicle
+//! ([`Correction`]).
+//!
+//! The recordings are `data/flights/*.csv` of the shared data, described by the README beside them. Positions are NED
+//! metres about the vehicle's EKF origin, times are seconds of the wall clock.
+
+mod read;
+mod replay;
+
+use host_sim::autopilot::Personality;
+use nalgebra::Vector3;
+use planner_core::frames::Geodetic;
+
+use self::read::read;
+use crate::shared_data;
+
+/// The recorded runs.
+pub const RUNS: [&str; 15] = [
+    "a_demo",
+    "a_lobby",
+    "px4_c1_demo",
+    "px4_d4_lobby",
+    "x_drift_demo",
+    "x_drift_demo_1",
+    "x_rearm_lobby",
+    "ap_b_demo",
+    "ap_b_lobby",
+    "ap_c1_demo",
+    "ap_d1_demo",
+    "apx_drift_demo",
+    "apx_landearly_lobby",
+    "apx_rearm_lobby",
+    "f_ppa",
+];
+/// What is wrong with the simulated estimate in a replay.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Estimator {
+    /// Nothing.
+    Perfect,
+    /// What was wrong with the recorded one.
+    Recorded,
+}
+
+/// Whose estimate the accelerations of the replayed setpoints answer.
+///
+/// The companion of the recordings added to each setpoint of PX4 an acceleration back to its reference, in proportion to what the
+/// *recorded* estimate was beside it. What a real estimator wandered is in those accelerations: replayed as they are, they push a
+/// vehicle that did not wander.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Correction {
+    /// The recorded one: the setpoints as they were sent.
+    Recorded,
+    /// The simulated one: the same law about the vehicle that flies now. Nothing of the recorded estimate is left.
+    Simulated,
+}
+
+/// One recorded row that says where something was or shall be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sample {
+    /// Seconds.
+    pub t_s: f64,
+    /// NED about the EKF origin, metres.
+    pub position: Vector3<f64>,
+    /// NED, m/s.
+    pub velocity: Vector3<f64>,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Setpoint {
+    t_s: f64,
+    mask: u16,
+    position: [f32; 3],
+    velocity: [f32; 3],
+    acceleration: [f32; 3],
+    yaw: f32,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+enum Message {
+    /// System, component, command and its parameters.
+    Command(u8, u8, u16, [f32; 7]),
+    /// GUID_TIMEOUT.
+    GuidedTimeout(f32),
+}
+
+/// One vehicle's recorded flight.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// Name of the run.
+    pub run: String,
+    /// System id.
+    pub vehicle: u8,
+    /// What flew it.
+    pub autopilot: Personality,
+    /// Its EKF origin.
+    pub origin: Geodetic,
+    /// What it believed.
+    pub estimate: Vec<Sample>,
+    /// Where it was.
+    pub truth: Vec<Sample>,
+    /// First arming that held, and disarming, seconds.
+    pub armed_s: (f64, f64),
+    /// From where the mission followed its path, and from where it landed, seconds.
+    pub follow_s: (f64, f64),
+    setpoints: Vec<Setpoint>,
+    messages: Vec<(f64, Message)>,
+}
+
+/// What a plain flight may differ by under the recorded errors, RMS metres; `None` where a person or a failsafe took the vehicle.
+pub fn allowed_m(recording: &Recording) -> Option<f64> {
+    match recording.run.as_str() {
+        "a_demo" => Some(0.45),
+        "a_lobby" | "x_rearm_lobby" => Some(0.30),
+        // Vehicle 2 landed from 24 m, past the speed at which its estimator said it sank.
+        "f_ppa" => match recording.vehicle {
+            1 => Some(0.45),
+            2 => None,
+            _ => Some(0.15),
+        },
+        "ap_b_demo" | "ap_b_lobby" | "ap_c1_demo" | "apx_rearm_lobby" | "apx_landearly_lobby" => Some(0.15),
+        _ => None,
+    }
+}
+
+/// Reads the vehicles of a run; empty, with a line that says so, where the shared data are absent.
+///
+/// # Panics
+/// A recording that is there and cannot be read.
+pub fn recordings(run: &str) -> Vec<Recording> {
+    let Some(path) = shared_data(&format!("flights/{run}.csv")) else { return Vec::new() };
+    let vehicles = if run == "f_ppa" { 3 } else { 1 };
+    (1..=vehicles).map(|vehicle| read(&path, run, vehicle)).collect()
+}
+
+impl Recording {
+    /// The estimates between arming and disarming.
+    pub fn flown(&self) -> impl Iterator<Item = &Sample> {
+        self.estimate.iter().filter(|s| (self.armed_s.0..=self.armed_s.1).contains(&s.t_s))
+    }
+
+    /// Estimate less setpoint, at the times of the estimates in Follow counted from its begin.
+    fn tracking(&self) -> Vec<(f64, Vector3<f64>)> {
+        let mut later = self.setpoints.as_slice();
+        let mut errors = Vec::new();
+        for seen in self.estimate.iter().filter(|s| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1) {
+            while later.len() > 1 && later[1].t_s <= seen.t_s {
+                later = &later[1..];
+            }
+            let asked = Vector3::from(later[0].position.map(f64::from));
+            errors.push((seen.t_s - self.follow_s.0, seen.position - asked));
+        }
+        errors
+    }
+
+    /// How differently another recorded flight of the same mission kept to its setpoints: RMS, metres.
+    pub fn spread(&self, other: &Self) -> f64 {
+        let (own, others) = (self.tracking(), other.tracking());
+        let (mut squares, mut n, mut at) = (0.0, 0_u32, 0);
+        for (t_s, error) in &own {
+            while at + 1 < others.len() && others[at + 1].0 <= *t_s {
+                at += 1;
+            }
+            if at + 1 < others.len() {
+                squares += (others[at].1 - error).norm_squared();
+                n += 1;
+            }
+        }
+        (squares / f64::from(n)).sqrt()
+    }
+
+    /// How far the recorded errors alone move a replay: RMS, metres. So far a replay without them is off the recording, however
+    /// well the autopilot is simulated.
+    pub fn moved(&self, correction: Correction) -> f64 {
+        let [with, without] =
+            [Estimator::Recorded, Estimator::Perfect].map(|errors| self.replay(errors, correction));
+        Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
+    }
+
+    /// Replays and compares.
+    pub fn compare(&self, estimator: Estimator, correction: Correction) -> Comparison {
+        let simulated = self.replay(estimator, correction);
+        let pairs: Vec<_> = self.flown().zip(&simulated).collect();
+        let apart = |(a, b): &(&Sample, &Sample)| (a.position - b.position).norm();
+        let in_follow = |s: &Sample| s.t_s >= self.follow_s.0 && s.t_s < self.follow_s.1;
+        let height = |(a, b): &(&Sample, &Sample)| (a.position.z - b.position.z).abs();
+        let part = |pick: &dyn Fn(&Sample) -> bool, of: &dyn Fn(&(&Sample, &Sample)) -> f64| {
+            Difference::of(pairs.iter().filter(|(a, _)| pick(a)).map(of))
+        };
+        Comparison {
+            whole: part(&|_| true, &apart),
+            follow: part(&in_follow, &apart),
+            lift_off: part(&|s| s.t_s < self.follow_s.0, &height),
+            landing: part(&|s| s.t_s >= self.follow_s.1, &height),
+        }
+    }
+}
+
+/// Root mean square and maximum, metres; NaN where nothing was compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Difference {
+    /// Root of the mean square.
+    pub rms: f64,
+    /// Greatest.
+    pub max: f64,
+}
+
+impl Difference {
+    fn of(values: impl Iterator<Item = f64>) -> Self {
+        let (mut squares, mut max, mut n) = (0.0, f64::NAN, 0_u32);
+        for value in values {
+            squares += value * value;
+            max = value.max(max);
+            n += 1;
+        }
+        Self { rms: (squares / f64::from(n)).sqrt(), max }
+    }
+}
+
+/// Simulated against recorded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Comparison {
+    /// From arming to disarming.
+    pub whole: Difference,
+    /// While the mission followed its path.
+    pub follow: Difference,
+    /// Height alone, from arming to the path.
+    pub lift_off: Difference,
+    /// Height alone, from the landing's command to disarming.
+    pub landing: Difference,
+}

@@ -1,0 +1,206 @@
+//! Flies a recording's setpoints and commands again.
+
+use companion::frame::{self, Header};
+use host_sim::autopilot::{Autopilot, Config, Personality};
+use mavlink::dialects::ardupilotmega::{
+    MavFrame, MavParamType, PARAM_SET_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
+};
+use nalgebra::Vector3;
+use planner_core::Point;
+
+use super::{Correction, Estimator, Message, Recording, Sample, Setpoint};
+
+/// Simulated seconds for each second of the wall clock: PX4's SIH was recorded 0.4 to 1.1 % slow.
+const PX4_CLOCK: f64 = 0.9925;
+const STEP_S: f64 = 0.004;
+/// Simulated time before the first record, seconds: ArduCopter has booted and has its position by then.
+const WARM_UP_S: f64 = 8.0;
+const COMMAND_LONG: (u32, u8) = (76, 152);
+/// The law of the companion that was recorded (8314848, `guidance::correction`): acceleration for each metre and for each m/s beside
+/// the reference, 1/s² and 1/s, and its bound, m/s². Of the recorded estimate it gives the recorded accelerations to 0.02 m/s².
+const HOLD_PER_S2: f64 = 3.0;
+const DAMP_PER_S: f64 = 1.5;
+const HOLD_MOST_MPS2: f64 = 1.5;
+/// Its reference changed speed by less, m/s².
+const CHANGE_MOST_MPS2: f64 = 2.0;
+
+impl Recording {
+    /// Where it stood before it armed, by its estimate, NED.
+    fn start(&self) -> Vector3<f64> {
+        let before =
+            || self.estimate.iter().filter(|s| s.t_s < self.armed_s.0 && s.t_s > self.armed_s.0 - 1.0);
+        before().map(|s| s.position).sum::<Vector3<f64>>() / before().count().max(1) as f64
+    }
+
+    fn config(&self) -> Config {
+        let ned = self.start();
+        Config {
+            personality: self.autopilot,
+            world_origin: self.origin,
+            ekf_origin: self.origin,
+            start: Point::new(ned.y as f32, ned.x as f32, -ned.z as f32),
+            estimator_ready_s: 1.0,
+            distance_sensor: true,
+            ..Config::default()
+        }
+    }
+
+    /// What the estimator had wrong, estimated minus true: ENU metres and m/s at the times of the truth.
+    pub fn errors(&self) -> Vec<(f64, Point, Point)> {
+        let enu = |v: Vector3<f64>| Point::new(v.y as f32, v.x as f32, -v.z as f32);
+        let mut errors = Vec::new();
+        let mut later = self.estimate.as_slice();
+        for truth in &self.truth {
+            while later.len() > 1 && later[1].t_s <= truth.t_s {
+                later = &later[1..];
+            }
+            let [a, b, ..] = later else { break };
+            if a.t_s > truth.t_s || b.t_s - a.t_s > 0.3 {
+                continue;
+            }
+            let share = (truth.t_s - a.t_s) / (b.t_s - a.t_s);
+            let position = a.position.lerp(&b.position, share) - truth.position;
+            let velocity = a.velocity.lerp(&b.velocity, share) - truth.velocity;
+            errors.push((truth.t_s, enu(position), enu(velocity)));
+        }
+        errors
+    }
+
+    /// Flies the recorded setpoints and commands: estimates at the times of the recorded ones from arming to disarming.
+    ///
+    /// # Panics
+    /// None for a recording that was read.
+    pub fn replay(&self, estimator: Estimator, correction: Correction) -> Vec<Sample> {
+        let errors = if estimator == Estimator::Recorded { self.errors() } else { Vec::new() };
+        let mut errors = errors.iter().peekable();
+        let (mut first, mut last) = (None, (0.0, Point::zeros()));
+        let config = self.config();
+        let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
+        autopilot.land_on_stream_loss();
+        let ground_m = config.start.z - config.vehicle.radius_m;
+        let clock = if self.autopilot == Personality::Px4 { PX4_CLOCK } else { 1.0 };
+        let (mut setpoints, mut messages) =
+            (self.setpoints.iter().peekable(), self.messages.iter().peekable());
+        let (mut sequence, mut buffer) = (0_u8, [0; 512]);
+        let begin_s = self.armed_s.0 - 4.0;
+        // What was set before the part that is replayed.
+        while let Some((_, message)) = messages.next_if(|(t_s, _)| *t_s < begin_s) {
+            feed_message(&mut autopilot, message, &mut sequence);
+        }
+        while setpoints.next_if(|s| s.t_s < begin_s).is_some() {}
+        let mut last_setpoint: Option<Setpoint> = None;
+        let mut flown = Vec::new();
+        for seen in self.flown() {
+            let due_us = |t_s: f64| ((WARM_UP_S + (t_s - begin_s) * clock) * 1e6) as u64;
+            while autopilot.time_us() < due_us(seen.t_s) {
+                let now_us = autopilot.time_us();
+                while let Some((_, message)) = messages.next_if(|(t_s, _)| due_us(*t_s) <= now_us) {
+                    feed_message(&mut autopilot, message, &mut sequence);
+                }
+                while let Some(setpoint) = setpoints.next_if(|s| due_us(s.t_s) <= now_us) {
+                    let mut sent = *setpoint;
+                    if let (Correction::Simulated, Some(last)) = (correction, last_setpoint) {
+                        corrected(&mut sent, &last, &autopilot);
+                    }
+                    last_setpoint = Some(*setpoint);
+                    feed_setpoint(&mut autopilot, &sent, &mut sequence);
+                }
+                while let Some((t_s, position, velocity)) = errors.next_if(|e| due_us(e.0) <= now_us) {
+                    let zero: Point = *first.get_or_insert(*position);
+                    let (was_s, was) = core::mem::replace(&mut last, (*t_s, *position));
+                    let rate = (position.z - was.z) / (t_s - was_s).max(0.02) as f32;
+                    let rate = if t_s - was_s < 0.2 { rate } else { 0.0 };
+                    autopilot.set_estimate_error(&(position - zero), velocity, rate);
+                }
+                autopilot.step(STEP_S as f32, ground_m);
+                while autopilot.poll_transmit(&mut buffer) > 0 {}
+            }
+            let [position, velocity] = autopilot.estimate().map(|enu| ned(&enu));
+            flown.push(Sample { t_s: seen.t_s, position, velocity });
+        }
+        flown
+    }
+}
+
+fn ned(enu: &Point) -> Vector3<f64> {
+    Vector3::new(f64::from(enu.y), f64::from(enu.x), -f64::from(enu.z))
+}
+
+/// Gives a setpoint the acceleration across that the recorded companion would have sent beside the simulated vehicle: the change of
+/// its reference's speed, and the way back to it. Where it sent none (on the ground, under a pilot) there is none.
+fn corrected(setpoint: &mut Setpoint, last: &Setpoint, autopilot: &Autopilot) {
+    let [north, east, _] = setpoint.acceleration;
+    if north == 0.0 && east == 0.0 {
+        return;
+    }
+    let wide = |v: [f32; 3]| Vector3::from(v.map(f64::from));
+    let [position, velocity] = autopilot.estimate().map(|enu| ned(&enu));
+    let mut off = (wide(setpoint.position) - position) * HOLD_PER_S2
+        + (wide(setpoint.velocity) - velocity) * DAMP_PER_S;
+    off.z = 0.0;
+    off *= HOLD_MOST_MPS2 / off.norm().max(HOLD_MOST_MPS2);
+    let (speed, was) = (wide(setpoint.velocity).norm(), wide(last.velocity).norm());
+    let change = (speed - was) / (setpoint.t_s - last.t_s).max(0.02);
+    let along = wide(setpoint.velocity) / speed.max(0.01);
+    let sent = off + along * change.clamp(-CHANGE_MOST_MPS2, CHANGE_MOST_MPS2);
+    (setpoint.acceleration[0], setpoint.acceleration[1]) = (sent.x as f32, sent.y as f32);
+}
+
+fn send(autopilot: &mut Autopilot, bytes: &[u8], sequence: &mut u8) {
+    autopilot.handle_bytes(bytes);
+    *sequence = sequence.wrapping_add(1);
+}
+
+fn feed_message(autopilot: &mut Autopilot, message: &Message, sequence: &mut u8) {
+    let mut buffer = [0; 300];
+    let length = match message {
+        Message::Command(system, component, command, params) => {
+            let mut payload = [0; 33];
+            for (k, param) in params.iter().enumerate() {
+                payload[4 * k..4 * k + 4].copy_from_slice(&param.to_le_bytes());
+            }
+            payload[28..30].copy_from_slice(&command.to_le_bytes());
+            (payload[30], payload[31]) = (1, 1);
+            let header = Header { system: *system, component: *component, sequence: *sequence };
+            frame::encode_raw(header, COMMAND_LONG.0, COMMAND_LONG.1, &payload, &mut buffer)
+        }
+        Message::GuidedTimeout(value) => {
+            let header = Header { system: 1, component: 191, sequence: *sequence };
+            let set = PARAM_SET_DATA {
+                param_value: *value,
+                target_system: 1,
+                target_component: 1,
+                param_id: "GUID_TIMEOUT".into(),
+                param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+            };
+            frame::encode(header, &set, &mut buffer)
+        }
+    };
+    send(autopilot, &buffer[..length], sequence);
+}
+
+fn feed_setpoint(autopilot: &mut Autopilot, setpoint: &Setpoint, sequence: &mut u8) {
+    let message = SET_POSITION_TARGET_LOCAL_NED_DATA {
+        time_boot_ms: (autopilot.time_us() / 1000) as u32,
+        target_system: 1,
+        target_component: 1,
+        // The companion knows no other.
+        coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
+        type_mask: PositionTargetTypemask::from_bits_truncate(setpoint.mask),
+        x: setpoint.position[0],
+        y: setpoint.position[1],
+        z: setpoint.position[2],
+        vx: setpoint.velocity[0],
+        vy: setpoint.velocity[1],
+        vz: setpoint.velocity[2],
+        afx: setpoint.acceleration[0],
+        afy: setpoint.acceleration[1],
+        afz: setpoint.acceleration[2],
+        yaw: setpoint.yaw,
+        yaw_rate: 0.0,
+    };
+    let mut buffer = [0; 300];
+    let header = Header { system: 1, component: 191, sequence: *sequence };
+    let length = frame::encode(header, &message, &mut buffer);
+    send(autopilot, &buffer[..length], sequence);
+}
