@@ -19,8 +19,7 @@ const CLEARANCES_M: [f32; 3] = [0.3, 0.8, 1.2];
 const SOURCES: u16 = 40;
 /// What a path may lengthen by: in the median, and at the 95th percentile.
 const MEDIAN: f32 = 1.03;
-/// Beyond 15 % is the hall `manufacturing` at 1.2 m alone, by 16.9 %.
-const MOST: f32 = 1.17;
+const MOST: f32 = 1.15;
 
 fn config(nodes: usize) -> Config {
     Config { nodes, edge_min_m: 0.5, edge_max_m: 8.0, clearance_m: 0.2, seed: 1, sampling: Sampling::Uniform }
@@ -86,9 +85,8 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
 }
 
 /// Builds a roadmap and cuts it down for a board.
-fn holds(name: &str, map: &VoxelMap, nodes: usize, board: &Board) -> usize {
+fn holds(name: &str, map: &VoxelMap, config: Config, board: &Board) {
     let began = Instant::now();
-    let config = config(nodes);
     let (all, parts) = roadmap::build(map, &[], &config).expect("there is free space");
     let built = began.elapsed();
     let count = all.edges.len();
@@ -105,15 +103,19 @@ fn holds(name: &str, map: &VoxelMap, nodes: usize, board: &Board) -> usize {
     assert!(board.roadmap_excess(&all).is_some(), "{name}: it fits as it is");
     assert_eq!(board.roadmap_excess(&kept), None, "{name}");
     paths_stay_short(name, &all, &kept);
-    count
 }
 
+/// `FLOCKMATE_CAPS` sets the roadmaps a map.
 #[test]
 fn scanned_maps_fit_and_paths_stay_short() {
+    let seeds: u64 = std::env::var("FLOCKMATE_CAPS").map_or(1, |count| count.parse().expect("a number"));
     for (name, resolution_m) in [("geb079", 0.08), ("manufacturing", 0.086_642_2), ("maze", 0.195_32)] {
         let Some(path) = shared_data(&format!("maps3d/{name}.bt")) else { return };
         let map = map::load(path.to_str().unwrap(), resolution_m).unwrap().voxel_map(Unknown::Blocked);
-        holds(name, &map, 2300, &BOARDS[0]);
+        // What cuts down was chosen by the first seed.
+        for seed in 1..=seeds {
+            holds(name, &map, Config { seed, ..config(2300) }, &BOARDS[0]);
+        }
     }
 }
 

@@ -4,13 +4,14 @@
 //!    way whose narrowest edge is as wide as that of the widest way there is (Hu 1961). So whatever clearance is
 //!    required, who could reach whom before still can.
 //! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the room.
-//! 3. *Far.* The rest of the room goes to the edges that most of the shortest paths from [`SOURCES`] nodes lead over: the
-//!    fewer paths lose an edge, the less they lengthen.
+//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`SOURCES`] nodes lose most by: the number of
+//!    paths over an edge, times how much longer the way around it is over the edges kept so far. Half of them are chosen
+//!    first, since what is around the others is shorter then.
 //!
 //! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those of each class of
 //! required clearances ([`CLASSES_M`]).
 //!
-//! Cost: edges · log edges, and a search a source and class, on all cores.
+//! Cost: edges · log edges, a search a source and class, and a short one a node, class and round, on all cores.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -23,9 +24,13 @@ use rayon::prelude::*;
 pub const CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
 /// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer the usual ones; measured on
 /// the scanned maps of `tests/tests/boards_hold.rs`.
-const NEAR_SHARE: f32 = 0.6;
+const NEAR_SHARE: f32 = 0.65;
 /// Nodes from which shortest paths are counted.
 const SOURCES: usize = 64;
+/// Rounds in which the far edges are chosen; a third one gains a tenth of what the second does.
+const ROUNDS: usize = 2;
+/// A way around an edge is looked for up to so many times its length; one that is longer counts as that.
+const AROUND: f32 = 1.5;
 
 /// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
 pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
@@ -39,18 +44,15 @@ pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
     let near = (room as f32 * NEAR_SHARE) as usize;
     let rows = rows(nodes.len(), edges, &lengths);
     let ranks = ranks(&rows, edges.len());
-    let usage = usage(&rows, edges.len());
-    let mut keep = |count: usize, order: &dyn Fn(usize) -> u32| {
-        let mut others: Vec<usize> = (0..edges.len()).filter(|&i| !kept[i]).collect();
-        others.sort_by(|&a, &b| {
-            order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b))
-        });
-        for i in others.into_iter().take(count) {
-            kept[i] = true;
-        }
-    };
-    keep(near, &|i| ranks[i]);
-    keep(room - near, &|i| u32::MAX - usage[i]);
+    keep(&mut kept, near, &lengths, |i| ranks[i]);
+    let usages: Vec<Vec<u32>> = classes().map(|class| usage(&rows, edges.len(), class)).collect();
+    let far = room - near;
+    for round in 0..ROUNDS {
+        let losses = losses(&rows, &usages, &kept);
+        // The bits of floats that are not negative are in their order.
+        let most = far * (round + 1) / ROUNDS - far * round / ROUNDS;
+        keep(&mut kept, most, &lengths, |i| Reverse(losses[i].to_bits()));
+    }
     Some(edges.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(edge, _)| *edge).collect())
 }
 
@@ -123,16 +125,82 @@ fn widest_forest(nodes: usize, edges: &[Edge]) -> Vec<bool> {
     kept
 }
 
+/// Keeps so many more of the edges, the first in an order; of equal ones the shortest.
+fn keep<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn(usize) -> O) {
+    let mut others: Vec<usize> = (0..kept.len()).filter(|&i| !kept[i]).collect();
+    others.sort_by(|&a, &b| order(a).cmp(&order(b)).then(lengths[a].total_cmp(&lengths[b])).then(a.cmp(&b)));
+    for i in others.into_iter().take(count) {
+        kept[i] = true;
+    }
+}
+
+/// The classes of vehicles, as [`Out::class`] has them.
+fn classes() -> impl Iterator<Item = u8> {
+    1..=CLASSES_M.len() as u8
+}
+
+/// For each edge that is not kept how much longer the shortest paths over it become, metres, in the mean over all paths of a
+/// class; the sum over the classes. `usages` are the paths over each edge, of each class.
+fn losses(rows: &[Vec<Out>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
+    let is_kept = |out: &&Out| kept[out.edge as usize];
+    let kept_rows: Vec<Vec<Out>> =
+        rows.iter().map(|row| row.iter().filter(is_kept).copied().collect()).collect();
+    let mut losses = vec![0.0; kept.len()];
+    for (class, usage) in classes().zip(usages) {
+        let all = usage.iter().map(|&paths| f64::from(paths)).sum::<f64>().max(1.0) as f32;
+        let found: Vec<Vec<(u32, f32)>> = (0..rows.len())
+            .into_par_iter()
+            .map(|node| {
+                let is_wanted = |out: &&Out| {
+                    usize::from(out.to) > node && usage[out.edge as usize] > 0 && !kept[out.edge as usize]
+                };
+                let wanted: Vec<&Out> = rows[node].iter().filter(is_wanted).collect();
+                let Some(longest) = wanted.last() else { return Vec::new() };
+                let ways_m = ways_within(node, &kept_rows, class, AROUND * longest.length_m);
+                let loss = |out: &&Out| {
+                    let around_m = ways_m[usize::from(out.to)].min(AROUND * out.length_m);
+                    // Rounding alone can make it less than nothing.
+                    let longer_m = (around_m - out.length_m).max(0.0);
+                    (out.edge, usage[out.edge as usize] as f32 / all * longer_m)
+                };
+                wanted.iter().map(loss).collect()
+            })
+            .collect();
+        for (edge, loss) in found.into_iter().flatten() {
+            losses[edge as usize] += loss;
+        }
+    }
+    losses
+}
+
+/// Lengths of the shortest ways from a node over edges of at least a class, as far as they are no longer than `most_m`.
+fn ways_within(source: usize, rows: &[Vec<Out>], class: u8, most_m: f32) -> Vec<f32> {
+    let mut way_m = vec![f32::INFINITY; rows.len()];
+    let mut waiting = BinaryHeap::from([(Reverse(0_u32), source)]);
+    way_m[source] = 0.0;
+    while let Some((Reverse(bits), node)) = waiting.pop() {
+        let here_m = f32::from_bits(bits);
+        if here_m > way_m[node] {
+            continue;
+        }
+        for out in rows[node].iter().filter(|out| out.class >= class) {
+            let (to, there_m) = (usize::from(out.to), here_m + out.length_m);
+            if there_m < way_m[to] && there_m <= most_m {
+                way_m[to] = there_m;
+                waiting.push((Reverse(there_m.to_bits()), to));
+            }
+        }
+    }
+    way_m
+}
+
 /// For each edge the number of shortest paths that lead over it, of those from [`SOURCES`] nodes to all others, of vehicles
-/// of each class.
-fn usage(rows: &[Vec<Out>], edges: usize) -> Vec<u32> {
+/// of a class.
+fn usage(rows: &[Vec<Out>], edges: usize, class: u8) -> Vec<u32> {
     let sources = SOURCES.min(rows.len());
-    let searches: Vec<Vec<(u32, u32)>> = (0..sources * CLASSES_M.len())
+    let searches: Vec<Vec<(u32, u32)>> = (0..sources)
         .into_par_iter()
-        .map(|job| {
-            let (source, class) = (job / CLASSES_M.len(), job % CLASSES_M.len() + 1);
-            paths_from(source * rows.len() / sources, rows, class as u8)
-        })
+        .map(|source| paths_from(source * rows.len() / sources, rows, class))
         .collect();
     let mut usage = vec![0; edges];
     for (edge, paths) in searches.into_iter().flatten() {
