@@ -252,7 +252,9 @@ impl Guidance {
 
     /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
     pub fn hold_at(&mut self, point: Point) {
-        if core::mem::take(&mut self.lost) || !self.door.is_live() {
+        // Where places are sent again it brakes from the last one.
+        let lost = core::mem::take(&mut self.lost) && self.unsent_s > 0.0;
+        if lost || !self.door.is_live() {
             self.door.begin_at(point, FOLLOWS_MPS * self.unsent_s);
             self.settle();
         }
@@ -485,7 +487,7 @@ impl Guidance {
             self.settle();
             self.lost = false;
         }
-        if self.door.is_live() && known && !self.lost {
+        if self.door.is_live() && known && state != State::PositionLost {
             self.unsent_s = 0.0;
         }
         if !self.door.is_live() || taken {
