@@ -46,6 +46,10 @@ const TURN_S: u64 = 2;
 const RETRY_S: u64 = 10;
 /// Standing and waiting while all others stand for this long is a dead end: whoever is waited for has found no way around.
 const DEAD_END: Duration = Duration::from_secs(30);
+/// After no place to land was found aside, the next is sought so much later.
+const ASIDE_AGAIN_S: u64 = 60;
+/// What is sought this near to where it was sought before is sought from the same place, metres.
+const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
 /// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
@@ -90,6 +94,17 @@ impl Obstacles {
     }
 }
 
+/// What a way around is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Aim {
+    /// To fly to the goal.
+    Goal,
+    /// To be out from under a vehicle that lands.
+    Aside,
+    /// To land where nobody lies.
+    Landing,
+}
+
 /// What is known of the way ahead.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Around {
@@ -101,12 +116,17 @@ pub(crate) struct Around {
     pub(crate) flying: bool,
     /// That path, or the one asked for, leads aside only, out from under a vehicle that lands.
     pub(crate) aside: bool,
+    /// And it lands at the end of that.
+    pub(crate) lands: bool,
     /// Progress on the plan when it was left for a way around, metres.
     pub(crate) left_at_m: f32,
     /// The way around asked for has come.
     pub(crate) ready: bool,
-    /// Ways around not found in a row.
+    /// Ways around not found since somebody moved.
     pub(crate) failed: u8,
+    /// Ways around not found from here, whoever moved between, and how far along the path that is.
+    pub(crate) failed_here: u8,
+    pub(crate) failed_at_m: f32,
     /// Ways around on which it did not move, in a row.
     pub(crate) fruitless: u8,
     /// When no way aside was found.
@@ -230,7 +250,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let stuck =
             self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
-        let astray = self.around.left && (!self.around.flying || aside);
+        let astray = self.around.left && (!self.around.flying || aside) && !self.around.lands;
         let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
         let stopped = self.guidance.filter.blocked_for(now) > STUCK;
         self.around.blocked =
@@ -317,8 +337,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Asks the shell for a way around, or just aside.
-    pub(crate) fn request_detour(&mut self, aside: bool) {
-        self.around.aside = aside;
+    pub(crate) fn request_detour(&mut self, aim: Aim) {
+        self.around.aside = aim != Aim::Goal;
+        self.around.lands = aim == Aim::Landing;
         self.obstacles.requested = self.obstacles.known.len();
         self.guidance.trapped_since = None;
         self.plan_failure = None;
@@ -343,7 +364,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.obstacles.known.iter().for_each(|obstacle| tell(*obstacle));
         self.neighbours.places(self.now, apart_m + MARGIN_M, &mut tell);
         if self.around.aside {
-            self.neighbours.landing_columns(self.now, apart_m + retreat::BESIDE_M, tell);
+            self.neighbours.landing_columns(self.now, apart_m + retreat::BESIDE_M, &mut tell);
+        }
+        if self.around.lands {
+            self.neighbours.lands_on(apart_m + MARGIN_M, tell);
         }
         Some(DetourRequest {
             aside: self.around.aside,
@@ -374,9 +398,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let stuck = self.around.flying && self.now - self.guidance.progress_at() > STUCK;
         let fruitless = if stuck { self.around.fruitless.saturating_add(1) } else { 0 };
-        let Around { aside, left_at_m, .. } = self.around;
+        let Around { aside, lands, left_at_m, .. } = self.around;
         let flying = Around { left: true, flying: true, ready: true, ..Around::default() };
-        self.around = Around { aside, left_at_m, fruitless, ..flying };
+        self.around = Around { aside, lands, left_at_m, fruitless, ..flying };
         self.neighbours.avoid(self.now);
         self.obstacles.avoided = self.obstacles.requested;
     }
@@ -387,8 +411,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.around.aside {
             self.around.no_way_aside_at = Some(self.now);
         } else {
+            let along_m = self.guidance.along_m();
+            if (along_m - self.around.failed_at_m).abs() > HERE_M {
+                (self.around.failed_here, self.around.failed_at_m) = (0, along_m);
+            }
             self.around.failed = self.around.failed.saturating_add(1);
+            self.around.failed_here = self.around.failed_here.saturating_add(1);
         }
+    }
+
+    /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
+    pub(crate) fn can_land_aside(&self) -> bool {
+        let retries = |at: Instant| self.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
+        self.guidance.along_m() >= 0.0
+            && self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
+            && !self.neighbours.is_deaf(self.now)
+            && self.around.no_way_aside_at.is_none_or(retries)
     }
 
     /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.

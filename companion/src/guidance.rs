@@ -11,6 +11,7 @@ mod door;
 mod fence;
 pub(crate) mod filter;
 mod follower;
+mod hold;
 mod waypoints;
 
 use planner_core::Point;
@@ -20,6 +21,7 @@ use planner_core::schedule::VehiclePlan;
 
 use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
+use self::hold::Hold;
 use self::waypoints::Waypoints;
 use crate::autopilot::Kind;
 use crate::config::Config;
@@ -144,6 +146,10 @@ pub struct Guidance {
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: Filter,
+    /// Whether it holds its place for others to pass.
+    pub(crate) hold: Hold,
+    /// Whether that has changed, and nobody was told yet.
+    pub(crate) turned: bool,
     /// Whether a descent goes back up its column.
     up: bool,
     /// Its path leads out of the geofence from here.
@@ -211,6 +217,8 @@ impl Guidance {
             setpoint_m: 0.0,
             stops_at_m: f32::NEG_INFINITY,
             filter: Filter::default(),
+            hold: Hold::default(),
+            turned: false,
             up: false,
             fenced: false,
             progress_m: 0.0,
@@ -506,7 +514,15 @@ impl Guidance {
         if self.leg.is_none() {
             self.up = up;
         }
-        let moves = goes || (self.back_to_m.is_some() && !urgent);
+        let wanted = goes || (self.back_to_m.is_some() && !urgent);
+        let holds = !wanted
+            && self.on_path
+            && matches!(self.phase, Phase::Path | Phase::Join)
+            && setpoints_hold(state)
+            && self.door.stands();
+        let yields = self.filter.yields() || state != State::Follow;
+        self.turned |= self.hold.step(holds, yields, neighbours.latest_s(), now);
+        let moves = wanted && !self.hold.binds(now);
         if !moves && self.door.stands() && !self.settled {
             if let (Some(path), Phase::Path) = (path, self.phase) {
                 let near_m = self.tracker.along_m;
@@ -911,4 +927,10 @@ pub fn setpoints_flow(state: State) -> bool {
             | Disarm
             | LandingHeld
     )
+}
+
+/// Whether a vehicle that stands in this state stays there until it decides otherwise.
+fn setpoints_hold(state: State) -> bool {
+    use State::*;
+    matches!(state, Follow | Paused | Alone | Blocked | Replanning)
 }

@@ -114,6 +114,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_turn_back: self.guidance.along_m() > 0.0
                 && !self.guidance.returning
                 && !self.neighbours.is_deaf(now),
+            can_land_aside: self.can_land_aside(),
+            lands_aside: self.around.lands,
+            aside_reached: follow
+                && self.around.flying
+                && self.around.lands
+                && self.guidance.is_at_end(&scene)
+                && standing,
             yielded: self.guidance.filter.yielded_for(now),
             hindered: self.guidance.filter.hindered_for(now),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
@@ -122,7 +129,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             blocked: self.around.blocked,
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
-            detours_failed: self.around.failed.saturating_add(self.around.fruitless),
+            detours_failed: self.around.failed_here.saturating_add(self.around.fruitless),
             underneath: self.underneath(),
             standing,
         }

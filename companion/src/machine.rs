@@ -13,7 +13,7 @@ use crate::autopilot::Kind;
 use crate::budget::{self, Budget};
 use crate::commands::{self, ACCEPTED, Command, DENIED, Pending, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::config::{Config, ConfigError, PlanFailure};
-use crate::detour::{Around, Obstacles};
+use crate::detour::{Aim, Around, Obstacles};
 use crate::echo::Sent;
 use crate::events::{Event, Link};
 use crate::frame::{Counters, Frame, Framer};
@@ -521,6 +521,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.held_at = now + HELD_EVERY;
             self.say(true, "Setpoint out of limits: holding");
         }
+        self.intent_due |= core::mem::take(&mut self.guidance.turned);
         self.name_who_never_starts();
         self.look_around();
         self.run_table();
@@ -631,11 +632,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::AskDisarm | Action::CancelStart => self.retry_at = now,
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
-            Action::RequestDetour => self.request_detour(false),
+            Action::RequestDetour => self.request_detour(Aim::Goal),
             Action::RequestAside => {
                 self.guidance.brake();
-                self.request_detour(true);
+                // On its way back it was to land already.
+                let lands = self.guidance.returning;
+                self.request_detour(if lands { Aim::Landing } else { Aim::Aside });
             }
+            Action::RequestLanding => self.request_detour(Aim::Landing),
             Action::MissDetour => self.miss_detour(PlanFailure::Late),
             Action::FlyDetour => {
                 self.guidance.begin_path(now);

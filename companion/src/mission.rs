@@ -306,6 +306,12 @@ pub enum Guard {
     Yielded,
     /// The safety filter has kept this vehicle from going on for the limit.
     Hindered,
+    /// The same, and it does not: a place aside may yet be sought.
+    NoRoomHere,
+    /// There is no place aside to land at.
+    NoPlaceAside,
+    /// It stands at the place aside where it is to land.
+    AsideReached,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
     /// Battery charge below the configured limit, and no neighbour below.
@@ -375,6 +381,8 @@ pub enum Action {
     RequestDetour,
     /// Ask the shell for a way aside, from here.
     RequestAside,
+    /// Ask the shell for a way aside, from here, to land there.
+    RequestLanding,
     /// Give the shell up, this time.
     MissDetour,
     /// Fly it.
@@ -493,6 +501,12 @@ pub struct Inputs {
     pub column_clear: Duration,
     /// On its path, and not on the way back yet.
     pub can_turn_back: bool,
+    /// A place aside to land at may be sought.
+    pub can_land_aside: bool,
+    /// The way aside asked for, or flown, leads to where it is to land.
+    pub lands_aside: bool,
+    /// It stands at the end of that.
+    pub aside_reached: bool,
     /// It comes down in any case: the battery is nearly empty, or it does not know where it would hold.
     pub must_land: bool,
     /// Time for which the safety filter has made it yield.
@@ -513,7 +527,7 @@ pub struct Inputs {
     pub our_turn: bool,
     /// The way around has come.
     pub detour_ready: bool,
-    /// Ways around that were not found, in a row.
+    /// Ways around that were not found from where it stands.
     pub detours_failed: u8,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
     pub underneath: Duration,
@@ -522,7 +536,7 @@ pub struct Inputs {
 }
 
 /// So many ways around that are not found are enough.
-const DETOURS_TRIED: u8 = 4;
+const DETOURS_TRIED: u8 = 3;
 
 pub(crate) const NOW: Duration = Duration::from_millis(0);
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
@@ -589,6 +603,9 @@ impl Guard {
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.column_blocked >= limit && i.offboard && i.can_turn_back,
+            Self::NoRoomHere => i.column_blocked >= limit && i.offboard && i.can_land_aside,
+            Self::NoPlaceAside => i.plan_failed && i.lands_aside,
+            Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear >= limit,
             Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
             Self::Yielded => i.yielded >= limit,

@@ -146,7 +146,21 @@ impl Contact {
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
     fn waits(&self, now: Instant) -> bool {
-        self.is_out(now) || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
+        self.is_out(now)
+            || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
+            || self.lands(now)
+    }
+
+    /// Whether it flew around and comes down at the end of that.
+    fn lands(&self, now: Instant) -> bool {
+        let down = self.points.last().is_some_and(|low| low.z < self.state.position.z);
+        let beside = self.state.velocity.xy().norm();
+        self.tells(DETOURS)
+            && !self.tells(GROUNDED)
+            && self.column
+            && down
+            && beside < STANDING_MPS
+            && self.heard_within(now, LATELY)
     }
 
     /// Whether it stands and is about to fly around.
@@ -235,6 +249,9 @@ impl Contact {
             let down = !self.heard_within(now, DOWN);
             self.stretch(|at| tell(column(at, if down { Nature::Lying } else { Nature::Solid })));
         } else {
+            if self.lands(now) {
+                tell(column(here, Nature::Solid));
+            }
             tell(place(apart_m + SWAY_M));
         }
     }
@@ -533,6 +550,11 @@ impl<const V: usize> Neighbours<V> {
         Some(&mut self.contacts[at].late)
     }
 
+    /// How late the messages of those that are heard are at most, seconds.
+    pub(crate) fn latest_s(&self) -> f32 {
+        self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.late.delay_s))
+    }
+
     /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
     pub(crate) fn is_deaf(&self, now: Instant) -> bool {
         self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
@@ -644,6 +666,15 @@ impl<const V: usize> Neighbours<V> {
         let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
             contact.columns(now, apart_m, tell);
+        }
+    }
+
+    /// Where a vehicle that lands may come down within `apart_m` of one that is there: it may fly over that, and not end there.
+    pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
+            let from = contact.state.position;
+            let to = from + Point::new(0.0, 0.0, SKY_M);
+            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Landing });
         }
     }
 

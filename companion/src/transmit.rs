@@ -42,6 +42,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let len = self.intent().encode(&mut payload);
             let header = self.outboxes[at].header(system);
             self.sent.note(header.sequence, self.now);
+            if self.guidance.hold.is_on() {
+                self.guidance.hold.note(self.now);
+            }
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
@@ -236,6 +239,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Follow | Paused | Alone | Blocked | Replanning | Stopping => {
                 column = false;
                 add(setpoint);
+                if self.guidance.hold.is_on() {
+                    return (points, column);
+                }
                 let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);
                 let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));

@@ -124,6 +124,11 @@ impl Filter {
         self.back
     }
 
+    /// Whether it stops the vehicle for one that goes first.
+    pub(super) fn yields(&self) -> bool {
+        self.yields
+    }
+
     /// For which vehicle it stops; 0 for none.
     pub(crate) fn blocker(&self) -> u8 {
         if self.is_stopped() { self.blocker } else { 0 }
@@ -227,7 +232,8 @@ impl Guidance {
             _ => Way::Stands,
         };
         if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
-            (self.filter.column_clear, self.filter.column_since, self.filter.held_since) = (true, None, None);
+            (self.filter.column_clear, self.filter.column_since) = (true, None);
+            self.filter.held_since = self.filter.held_since.filter(|_| state == State::Replanning);
         }
         if matches!(way, Way::Stands) {
             self.filter.reset();

@@ -1,0 +1,55 @@
+//! A vehicle that stands says that it will go on standing, so that others may pass it closely.
+//!
+//! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to fly since. Two that stopped
+//! for one another would therefore never go on. So a vehicle that was stopped reports no way ahead of its setpoint, and does
+//! not move before the others have heard of a way again: [`SPAN`] after it last reported none, and the time that its messages
+//! take. The vehicle that yields reports so at once, the other one only when it has stood for a while ([`PATIENCE`]), so that
+//! it goes first.
+//!
+//! ENU metres.
+
+use crate::time::{Duration, Instant};
+
+/// Longer than a report counts, and than three of them in a row are lost.
+const SPAN: Duration = Duration::from_millis(1000);
+/// A vehicle that yields stands for so long before it says that it holds.
+const SOON: Duration = Duration::from_millis(300);
+/// A vehicle that goes first gives the others this long to stand.
+const PATIENCE: Duration = Duration::from_secs(4);
+
+/// Whether a vehicle holds its place.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hold {
+    since: Option<Instant>,
+    on: bool,
+    /// When others were last told so, and how late they hear it.
+    told_at: Option<Instant>,
+    late: Duration,
+}
+
+impl Hold {
+    /// One step of a vehicle that stands and is not to move, or does not; `yields` if another one goes first. Messages are
+    /// `late_s` late. Returns whether it begins or ends to hold.
+    pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
+        self.late = Duration::from_micros((late_s * 1e6) as u64);
+        self.since = self.since.or(Some(now)).filter(|_| stands);
+        let patience = if yields { SOON } else { PATIENCE };
+        let on = self.since.is_some_and(|since| now - since >= patience || self.on);
+        core::mem::replace(&mut self.on, on) != on
+    }
+
+    /// Whether it says so.
+    pub(crate) fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// It was said.
+    pub(crate) fn note(&mut self, now: Instant) {
+        self.told_at = Some(now);
+    }
+
+    /// Whether others may still count on it.
+    pub(super) fn binds(&self, now: Instant) -> bool {
+        self.told_at.is_some_and(|at| now < (at + SPAN) + self.late)
+    }
+}
