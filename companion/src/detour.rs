@@ -423,9 +423,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
     pub(crate) fn can_land_aside(&self) -> bool {
         let retries = |at: Instant| self.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
-        self.guidance.along_m() >= 0.0
-            && self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
-            && !self.neighbours.is_deaf(self.now)
+        self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
+            && (!self.neighbours.is_deaf(self.now) || self.neighbours.all_rest())
             && self.around.no_way_aside_at.is_none_or(retries)
     }
 

@@ -515,9 +515,10 @@ impl Guidance {
             self.up = up;
         }
         let wanted = goes || (self.back_to_m.is_some() && !urgent);
-        let holds = !wanted
+        let back_up = up && self.leg_done();
+        let holds = (!wanted || back_up)
             && self.on_path
-            && matches!(self.phase, Phase::Path | Phase::Join)
+            && matches!(self.phase, Phase::Path | Phase::Join | Phase::Descent)
             && setpoints_hold(state)
             && self.door.stands();
         let yields = self.filter.yields() || state != State::Follow;

@@ -97,6 +97,8 @@ struct Contact {
     floor_m: f32,
     /// How fast it was when its position was heard, m/s.
     speed_mps: f32,
+    /// Whether its plan is ours, whether it follows it or not.
+    shares_plan: bool,
     /// When it was last known to move.
     moved_at: Instant,
     /// The furthest it can have come, metres along its path, and when that was.
@@ -265,6 +267,8 @@ pub(crate) struct Met<'a> {
     pub(crate) stranger: bool,
     /// Whether it follows the shared plan.
     pub(crate) on_plan: bool,
+    /// Whether it knows that plan.
+    pub(crate) shares_plan: bool,
     /// Whether it has stood for a while.
     pub(crate) stands: bool,
     /// Whether it stands until another vehicle moves.
@@ -346,6 +350,7 @@ impl<const V: usize> Neighbours<V> {
             column: false,
             floor_m: f32::NAN,
             speed_mps: 0.0,
+            shares_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
             avoided: None,
@@ -457,7 +462,8 @@ impl<const V: usize> Neighbours<V> {
         // It is no stranger.
         self.keep_strangers(|c| c.id != intent.system_id);
         let contact = &mut self.contacts[at];
-        let shared = intent.flags & ON_PLAN != 0 && plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        let shared = intent.flags & ON_PLAN != 0 && contact.shares_plan;
         (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
         let out = contact.tells(OUT) && contact.position_at.is_some();
@@ -531,6 +537,7 @@ impl<const V: usize> Neighbours<V> {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
+            shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
             stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),

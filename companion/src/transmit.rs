@@ -231,6 +231,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 add(here);
                 add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
             }
+            _ if self.guidance.hold.is_on() => {
+                column = false;
+                add(setpoint);
+            }
             Follow if self.guidance.descends() => {
                 add(setpoint);
                 last.into_iter()
@@ -239,9 +243,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Follow | Paused | Alone | Blocked | Replanning | Stopping => {
                 column = false;
                 add(setpoint);
-                if self.guidance.hold.is_on() {
-                    return (points, column);
-                }
                 let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);
                 let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));

@@ -19,6 +19,8 @@ use crate::{ConfigError, Point};
 
 /// Coming nearer by less than this is none: a hovering vehicle sways, metres.
 const SWAY_M: f32 = 0.05;
+/// The same of a way that is planned: rounding. The safety filter allows no more.
+const NEARER_M: f32 = 0.002;
 
 /// A stretch to stay away from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -53,9 +55,9 @@ impl KeepOff {
     }
 
     /// The same, with no more distance than `here` has: who is too near already may fly off.
-    fn seen_from(&self, here: &Point) -> Self {
+    fn seen_from(&self, here: &Point, nearer_m: f32) -> Self {
         let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
-        Self { radius_m: fminf(self.radius_m, fmaxf(now_m - SWAY_M, 0.0)), ..*self }
+        Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
     /// The same, no deeper than the ground below it: nothing falls through a floor. What lies is on the ground.
@@ -114,7 +116,7 @@ pub fn is_blocked<const W: usize>(
     obstacle: &KeepOff,
 ) -> bool {
     let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
-    let obstacle = obstacle.seen_from(here);
+    let obstacle = obstacle.seen_from(here, SWAY_M);
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
     let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
@@ -210,7 +212,7 @@ pub fn plan<const N: usize, const W: usize>(
         *obstacle = obstacle.settled(view);
     }
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
-        *obstacle = obstacle.seen_from(&here);
+        *obstacle = obstacle.seen_from(&here, NEARER_M);
     }
     let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.solid(&here).touches(a, b));
     let goal = view.header().starts.saturating_add(request.goal);

@@ -51,7 +51,7 @@ const WAITS_M: f32 = 0.5;
 /// What kept the vehicle from going on within this time still does.
 const LATELY: Duration = Duration::from_millis(500);
 /// A landing that waited for so long needs no more room than the hulls.
-const LANDS_LATE: Duration = Duration::from_secs(60);
+const LANDS_LATE: Duration = Duration::from_secs(40);
 /// A vehicle that flew on for so long was not kept from going on.
 const FREE: Duration = Duration::from_secs(5);
 /// The vehicle that yields in a descent flies back up after this.
@@ -252,7 +252,9 @@ impl Guidance {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
             Way::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
-                let fly_m = speed_mps * REACTION_S + bounds.braking.stop_m(speed_mps) + extra_m;
+                let stop_m = if stopped { 0.0 } else { self.door.braking_m(true) };
+                let braking_m = bounds.braking.stop_m(speed_mps).max(stop_m);
+                let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
                 let down = to_m < position.z;
                 let reference_m = self.door.position().z;
                 let end_m = if down {
@@ -453,7 +455,8 @@ impl Guidance {
         scene: &Scene<'_, W, G>,
         met: &Met<'_>,
     ) -> bool {
-        let on_plan = self.on_plan(state, scene);
+        // Of two with different plans neither follows the other one's.
+        let on_plan = self.on_plan(state, scene) && met.shares_plan;
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;
         }

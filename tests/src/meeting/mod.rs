@@ -37,6 +37,8 @@ const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 7
 const STEP_MS: u64 = 25;
 /// Nobody leaves this box, metres: minimum and maximum corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
+/// A vehicle that has heard nobody for so long is deaf, seconds: it has stopped, and lands after 20 s.
+const DEAF_S: f32 = 20.0;
 /// A vehicle that is faster is not stopped, m/s.
 const MOVES_MPS: f32 = 0.7;
 /// Speed of a setpoint, m/s: nominal, and what it may run over where it catches up.
@@ -150,7 +152,7 @@ pub fn fly(scene: &Scene, traced: bool) -> Outcome {
             next += 1;
         }
         world.step();
-        let seen: Vec<_> = world.members.iter().map(Member::seen).collect();
+        let seen: Vec<_> = world.members.iter().map(|member| member.seen(now_s)).collect();
         let heard = |a: usize, b: usize| world.members[a].heard[b].clone();
         oracle.observe(&seen, heard, |place| floor_z(&scene.vehicles, place), step % 2 == 0);
         if traced && step % 20 == 0 {
@@ -241,7 +243,8 @@ impl Member {
         }
     }
 
-    fn seen(&self) -> Seen {
+    fn seen(&self, now_s: f32) -> Seen {
+        let lately = |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_S);
         let lands = self.autopilot.flown() == Flown::Commanded
             && self.autopilot.mode == self.autopilot.kind.land_mode();
         Seen {
@@ -250,6 +253,7 @@ impl Member {
             airborne: self.autopilot.is_airborne(),
             own: !self.dead && self.autopilot.armed && self.autopilot.flown() != Flown::Other,
             lands,
+            deaf: !self.heard.iter().any(lately),
         }
     }
 
@@ -582,7 +586,7 @@ fn around(request: &DetourRequest, keep: &[KeepOff], own: &Plan) -> Option<Plan>
     let clear = |from: Point, to: Point| {
         keep.iter().all(|k| {
             let now_m = oracle::distance((here, here), (k.from, k.to));
-            let apart_m = k.radius_m.min((now_m - 0.05).max(0.0));
+            let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
             let solid = if k.nature == Nature::Landing { (k.from, k.from) } else { (k.from, k.to) };
             oracle::distance((from, to), solid) >= apart_m
         })

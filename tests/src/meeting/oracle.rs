@@ -148,6 +148,8 @@ pub struct Seen {
     pub own: bool,
     /// It lands by its autopilot, as its companion commanded.
     pub lands: bool,
+    /// It has heard nobody for so long that it has to come down where it is.
+    pub deaf: bool,
 }
 
 /// Two vehicles that came too near.
@@ -320,8 +322,9 @@ impl Oracle {
     fn stopped(&self, vehicle: usize, warned: Option<usize>, step: usize) -> Point {
         let track = &self.tracks[vehicle];
         let Some(warned) = warned.filter(|warned| *warned < step) else { return track[step].position };
-        if track[warned..=step].iter().any(|seen| !seen.own) {
-            // Somebody else took it: its companion could not have stopped it.
+        if track[warned..=step].iter().any(|seen| !seen.own || (seen.deaf && seen.lands)) {
+            // Somebody else took it: its companion could not have stopped it. Nor could a vehicle stay up for good that
+            // hears nobody any more.
             return track[step].position;
         }
         let speed = track[warned].velocity.norm();
