@@ -97,6 +97,8 @@ struct Contact {
     floor_m: f32,
     /// How fast it was when its position was heard, m/s.
     speed_mps: f32,
+    /// Top of its pad's climb, by the roster.
+    start: Option<Point>,
     /// Whether its plan is ours, whether it follows it or not.
     shares_plan: bool,
     /// When it was last known to move.
@@ -249,7 +251,10 @@ impl Contact {
             tell(place(apart_m + SWAY_M));
         } else if self.is_dead(now) {
             let down = !self.heard_within(now, DOWN);
-            self.stretch(|at| tell(column(at, if down { Nature::Lying } else { Nature::Solid })));
+            let nature = if down { Nature::Lying } else { Nature::Solid };
+            self.stretch(|at| tell(column(at, nature)));
+            // An autopilot that was left alone may also have flown back to its pad.
+            self.start.into_iter().for_each(|start| tell(column(start, nature)));
         } else {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));
@@ -277,6 +282,8 @@ pub(crate) struct Met<'a> {
     pub(crate) lost: bool,
     /// What its set follows from.
     pub(crate) heard: Heard<'a>,
+    /// Where it was last heard, if its set is that of a climb since: it may not have begun that.
+    pub(crate) low: Option<Point>,
 }
 
 /// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
@@ -309,7 +316,9 @@ impl<const V: usize> Neighbours<V> {
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id != own_id {
                 // A roster of at most V entries fits.
-                let _ = table.add(entry.system_id, rank as u16);
+                if let Some(at) = table.add(entry.system_id, rank as u16) {
+                    table.contacts[at].start = Some(entry.start);
+                }
             }
         }
         table.roster = table.contacts.len();
@@ -350,6 +359,7 @@ impl<const V: usize> Neighbours<V> {
             column: false,
             floor_m: f32::NAN,
             speed_mps: 0.0,
+            start: None,
             shares_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
@@ -542,6 +552,7 @@ impl<const V: usize> Neighbours<V> {
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
             stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
             heard,
+            low: top.map(|_| contact.state.position),
         })
     }
 

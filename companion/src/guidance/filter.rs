@@ -14,7 +14,7 @@ use planner_core::path::{Path, TrackConfig};
 use planner_core::safety::{self, Bounds, Braking, REACTION_S, Set};
 use planner_core::schedule::VehiclePlan;
 
-use super::{Guidance, Scene};
+use super::{Guidance, Phase, Scene};
 use crate::mission::State;
 use crate::neighbours::{Met, Neighbours};
 use crate::telemetry::Telemetry;
@@ -34,6 +34,8 @@ const AHEAD_S: f32 = 3.0;
 const NEAR_MOST: usize = 6;
 /// What two vehicles in the air overshoot their stops together, metres; the schedule leaves 0.5 m for it and for the rest.
 const STRAY_M: f32 = 0.25;
+/// What this vehicle alone strays from its path, metres.
+const STRAYS_M: f32 = 0.1;
 /// Before a vehicle that the roster does not name it stands no longer than this; then it goes on slowly.
 const STRANGER: Duration = Duration::from_secs(10);
 /// How fast.
@@ -352,7 +354,10 @@ impl Guidance {
         back: bool,
     ) -> Set {
         let velocity_mps = telemetry.velocity.norm();
-        let along_m = self.setpoint_m;
+        // Beside the path it flies straight to where it goes on.
+        let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.settled);
+        let join = path.point_at(self.tracker.along_m).filter(|_| joins);
+        let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
         let reference_mps = self.door.velocity().norm();
         let speed_mps = reference_mps.max(velocity_mps - SWAY_MPS);
         let braking_m = bounds.braking.stop_m(speed_mps).max(self.door.braking_m(true));
@@ -362,13 +367,14 @@ impl Guidance {
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
             let behind = points[..next].iter().rev().map(|w| w.position);
-            return Set::along(here, core::iter::once(here).chain(behind), fly_m);
+            return Set::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
         }
         // It stops for its gates in any case.
-        let fly_m = fly_m.min((self.stops_at_m - along_m).max(0.0));
+        let join_m = join.map_or(0.0, |join| (join - here).norm());
+        let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
         let ahead = points[next..].iter().map(|w| w.position);
-        Set::along(here, core::iter::once(here).chain(ahead), fly_m)
+        Set::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
     }
 
     /// The first neighbour whose set meets `own`.
@@ -410,11 +416,15 @@ impl Guidance {
             let last_place = self.returning || !self.on_path || deaf;
             let rests = (met.heard.grounded || met.lost) && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
+            let by_plan = met.on_plan && self.on_plan(state, scene);
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
-            } else if met.heard.grounded || (met.stands && met.on_plan && self.on_plan(state, scene)) {
+            } else if (met.heard.grounded || met.stands) && by_plan {
                 // Past a vehicle that waits the schedule leads as near as that and what both stray.
                 safety_m
+            } else if met.heard.grounded {
+                // Straight down, or past it.
+                safety_m + if lands { 0.0 } else { STRAYS_M }
             } else {
                 safety_m + STRAY_M
             };
@@ -436,7 +446,8 @@ impl Guidance {
                 return Some(found);
             }
             let other = met.heard.set(bounds, ahead_s);
-            if safety::conflicts(own, &other, &met.heard.position, apart_m) {
+            let low = |low: Point| safety::conflicts(own, &Set::at(low), &low, apart_m);
+            if safety::conflicts(own, &other, &met.heard.position, apart_m) || met.low.is_some_and(low) {
                 return Some(found);
             }
         }
