@@ -164,6 +164,8 @@ pub struct Guidance {
     shelter: Search,
     /// Whether it keeps out from under a vehicle that comes down.
     pub retreating: bool,
+    /// How far ahead it waits, for the neighbours' sake, metres.
+    waits_m: f32,
     /// Where it goes back to.
     back_to_m: Option<f32>,
     /// No place along its path is better.
@@ -228,6 +230,7 @@ impl Guidance {
             linked_m: f32::INFINITY,
             shelter: Search::default(),
             retreating: false,
+            waits_m: f32::INFINITY,
             back_to_m: None,
             nowhere: false,
             trapped_since: None,

@@ -68,6 +68,7 @@ impl Guidance {
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }
+        self.waits_m = advice.stop_within_m;
         self.back_to_m = to_m.filter(|to_m| *to_m < along_m);
         self.nowhere = nowhere;
     }

@@ -335,7 +335,7 @@ impl Guidance {
         };
         if matches!(state, State::Follow | State::Blocked | State::Replanning)
             && id != 0
-            && self.advice.stop_within_m < WAITS_M
+            && self.advice.stop_within_m.min(self.waits_m) < WAITS_M
             && !scene.plan.is_some_and(gate)
         {
             self.filter.hinder(now);
