@@ -92,6 +92,8 @@ struct Contact {
     /// When an intent of our mission was last heard from it.
     belongs_at: Option<Instant>,
     points: Vec<Point, POINTS>,
+    /// How far from the first of them they lead, metres.
+    extent_m: f32,
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
     column: bool,
     floor_m: f32,
@@ -356,6 +358,7 @@ impl<const V: usize> Neighbours<V> {
             late: Lateness::default(),
             belongs_at: None,
             points: Vec::new(),
+            extent_m: 0.0,
             column: false,
             floor_m: f32::NAN,
             speed_mps: 0.0,
@@ -483,6 +486,9 @@ impl<const V: usize> Neighbours<V> {
             contact.hears_us_at = Some(now);
         }
         contact.points.clone_from(&intent.points);
+        let from = intent.points.first().copied().unwrap_or_default();
+        let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
+        contact.extent_m = libm::sqrtf(intent.points.iter().fold(0.0, most));
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m =
@@ -540,6 +546,7 @@ impl<const V: usize> Neighbours<V> {
                 _ => contact.late.delay_s,
             },
             points: if rests { &[] } else { &contact.points },
+            extent_m: contact.extent_m,
             grounded,
             column_to_m: (down && !grounded).then_some(floor_m),
         };

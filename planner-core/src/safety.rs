@@ -147,6 +147,8 @@ pub struct Heard<'a> {
     pub delay_s: f32,
     /// Points that it flies along next; empty if somebody else flies it.
     pub points: &'a [Point],
+    /// How far from the first of them they lead at most, metres.
+    pub extent_m: f32,
     /// Whether it stands on the ground.
     pub grounded: bool,
     /// Height down to which its column counts, metres; none while it stays on its points.
@@ -185,9 +187,14 @@ impl Heard<'_> {
         if self.age_s > FRESH_S {
             return self.ball_m(bounds);
         }
-        self.along_m(bounds, ahead_s)
-            + self.wider_m(bounds)
-            + if self.points.is_empty() { 0.0 } else { OFF_M }
+        let along_m = self.along_m(bounds, ahead_s);
+        let Some(first) = self.points.first() else { return along_m + self.wider_m(bounds) };
+        let first_sq = (first - self.position).norm_squared();
+        if first_sq < OFF_M * OFF_M {
+            // On its points, and no further than those lead.
+            return fminf(along_m + OFF_M, sqrtf(first_sq) + self.extent_m);
+        }
+        along_m + self.wider_m(bounds) + OFF_M
     }
 
     /// How old what it says is, seconds.

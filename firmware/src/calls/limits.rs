@@ -401,6 +401,7 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
                 age_s: p.x,
                 delay_s: 0.3,
                 points: &ahead[..i % 3],
+                extent_m: hard,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),
             };

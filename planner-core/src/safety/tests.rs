@@ -71,6 +71,7 @@ proptest! {
             age_s,
             delay_s: 0.0,
             points: &path,
+            extent_m: extent_m(&path),
             grounded: false,
             column_to_m: None,
         };
@@ -84,6 +85,34 @@ proptest! {
             prop_assert!((place - path[0]).norm() <= reach_m + 0.01);
         }
     }
+
+    #[test]
+    fn no_set_reaches_further_than_its_bound(
+        path in points(8), beside in points(2), by_m in 0.0_f32..2.0, speed_mps in 0.0_f32..2.0, age_s in 0.0_f32..2.0,
+        ahead_s in 0.0_f32..4.0,
+    ) {
+        prop_assume!(beside.len() > 1 && (beside[1] - beside[0]).norm() > 0.1);
+        let way = (beside[1] - beside[0]).normalize();
+        let position = path[0] + way * by_m;
+        let heard = Heard {
+            position,
+            velocity: way * speed_mps,
+            speed_mps,
+            age_s,
+            delay_s: 0.2,
+            points: &path,
+            extent_m: extent_m(&path),
+            grounded: false,
+            column_to_m: None,
+        };
+        let set = heard.set(&BOUNDS, ahead_s);
+        prop_assert!(set.reach_m() <= heard.reach_m(&BOUNDS, ahead_s) + 0.01);
+    }
+}
+
+/// How far from the first of them points lead.
+fn extent_m(points: &[Point]) -> f32 {
+    points.iter().map(|p| (p - points[0]).norm()).fold(0.0, f32::max)
 }
 
 /// A vehicle that flies along a polyline and stops where its set conflicts.
@@ -173,6 +202,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     age_s: now_s - at_s,
                     delay_s: 0.0,
                     points: &other.path[next..],
+                    extent_m: extent_m(&other.path[next..]),
                     grounded: false,
                     column_to_m: None,
                 };
