@@ -52,6 +52,11 @@ impl Budget {
         self.left > 0
     }
 
+    /// Whether half of what may be saved up is left, as of the last question whether a frame may go out.
+    pub(crate) fn is_half_full(&self) -> bool {
+        self.left > i64::from(SAVED / 2) * BYTE
+    }
+
     /// A frame went out.
     pub fn spend(&mut self, bytes: usize) {
         self.left -= bytes.min(MAX_SENT) as i64 * BYTE;

@@ -24,6 +24,7 @@ use crate::limits::AutopilotLimits;
 use crate::margins;
 use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
 use crate::neighbours::Neighbours;
+use crate::neighbours::relay::Relay;
 use crate::outbox::{Outbox, Outgoing};
 use crate::parameters::Parameters;
 use crate::requests::Handshake;
@@ -105,6 +106,9 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) version_due: [bool; 2],
     pub(crate) position_due: bool,
     pub(crate) intent_due: bool,
+    /// What others do not hear may be passed on again, beginning with this rank.
+    pub(crate) relay_due: bool,
+    pub(crate) relay_next: u16,
     pub(crate) radio: Budget,
     pub(crate) sent: Sent,
     pub(crate) rates: Rates,
@@ -170,6 +174,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             version_due: [false; 2],
             position_due: false,
             intent_due: false,
+            relay_due: false,
+            relay_next: 0,
             radio: Budget::default(),
             sent: Sent::default(),
             rates: Rates::default(),
@@ -280,6 +286,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if now >= self.next_heartbeat {
             self.next_heartbeat = now + HEARTBEAT_EVERY;
             self.heartbeat_due = [true; 2];
+            self.relay_due = true;
         }
         if now >= self.next_swarm {
             self.next_swarm = now + Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
@@ -417,6 +424,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         // Its sequence number counts only if the frame decodes.
         if frame.message_id == TUNNEL_DATA::ID {
+            if let Some(relay) = Relay::decode(frame.padded(), id) {
+                let ours = self.plan.as_ref().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
+                if ours && relay.mission_crc == self.config.mission_crc {
+                    self.neighbours.handle_relay(self.now, id, &relay);
+                }
+                return;
+            }
             let Some(intent) = Intent::decode(frame.padded(), id) else { return };
             if intent.mission_crc != self.config.mission_crc {
                 if self.config.roster.iter().any(|entry| entry.system_id == id) {

@@ -4,6 +4,8 @@
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
 //! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
+pub(crate) mod relay;
+
 use heapless::Vec;
 use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
@@ -71,6 +73,8 @@ const BEYOND_TOP_S: f32 = 1.2;
 const CLIMB_BESIDE_M: f32 = 0.9;
 /// A top this little above is reached, metres.
 const TOP_M: f32 = 0.3;
+/// Further away than any vehicle.
+const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
 
@@ -86,6 +90,12 @@ struct Contact {
     /// Since when it tells that it is out, and it is known where.
     out_at: Option<Instant>,
     hears_us_at: Option<Instant>,
+    /// Whom it hears, a bit for each rank.
+    hears: u32,
+    /// Its progress as others passed it on, metres.
+    relayed_m: Option<f32>,
+    /// When that was so.
+    relayed_at: Option<Instant>,
     /// Sequence number of its last intent.
     intent_sequence: u8,
     late: Lateness,
@@ -118,7 +128,7 @@ impl Contact {
     }
 
     fn is_dead(&self, now: Instant) -> bool {
-        self.rank != STRANGER && self.heard_at.is_some_and(|at| now - at >= DEAD)
+        self.rank != STRANGER && self.known_at().is_some_and(|at| now - at >= DEAD)
     }
 
     /// Whether it speaks, but has not known for long where it is.
@@ -179,7 +189,7 @@ impl Contact {
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
     fn comes_down(&self, now: Instant) -> bool {
-        let silent = !self.heard_within(now, SILENT);
+        let silent = !self.heard_within(now, SILENT) && !self.is_far(now);
         self.rank != STRANGER
             && !self.tells(GROUNDED | LANDED)
             && !self.is_out(now)
@@ -274,6 +284,8 @@ pub(crate) struct Met<'a> {
     pub(crate) stranger: bool,
     /// Whether it follows the shared plan.
     pub(crate) on_plan: bool,
+    /// Whether it does so out of range, as others report.
+    pub(crate) far: bool,
     /// Whether it knows that plan.
     pub(crate) shares_plan: bool,
     /// Whether it has stood for a while.
@@ -354,6 +366,9 @@ impl<const V: usize> Neighbours<V> {
             flags: 0,
             out_at: None,
             hears_us_at: None,
+            hears: 0,
+            relayed_m: None,
+            relayed_at: None,
             intent_sequence: 0,
             late: Lateness::default(),
             belongs_at: None,
@@ -485,6 +500,7 @@ impl<const V: usize> Neighbours<V> {
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
+        contact.hears = intent.heard;
         contact.points.clone_from(&intent.points);
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
@@ -495,24 +511,30 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
+    /// Every neighbour whose position or progress was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
     /// whether it is in the way ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
         for contact in &self.contacts {
-            if let Some(at) = contact.position_at {
-                let state = Neighbour {
-                    age_s: (now - at).secs_f32(),
-                    rank: contact.rank,
-                    grounded: contact.state.grounded || contact.is_dead(self.clear_at),
-                    out: contact.is_out_since(self.clear_at),
-                    detours: contact.tells(DETOURS),
-                    ..contact.state
-                };
-                // As many slots as contacts.
-                let _ = self.heard.push(state);
+            let progress_m = contact.progress_m(now);
+            let placed_at = contact.position_at;
+            if placed_at.is_none() && progress_m.is_none() {
+                continue;
             }
+            let state = Neighbour {
+                // Of one that was never heard itself only the progress is known.
+                position: placed_at.map_or(NOWHERE, |_| contact.state.position),
+                age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
+                rank: contact.rank,
+                progress_m,
+                grounded: contact.state.grounded || contact.is_dead(self.clear_at),
+                out: contact.is_out_since(self.clear_at),
+                detours: contact.tells(DETOURS),
+                ..contact.state
+            };
+            // As many slots as contacts.
+            let _ = self.heard.push(state);
         }
         &self.heard
     }
@@ -523,7 +545,8 @@ impl<const V: usize> Neighbours<V> {
         let age_s = (now - contact.position_at?).secs_f32();
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let unplaced_for = now - contact.position_at?;
-        let dead = (contact.is_dead(now) || unplaced_for >= DEAD) && !contact.points.is_empty();
+        let unplaced = unplaced_for >= DEAD && !contact.is_far(now);
+        let dead = (contact.is_dead(now) || unplaced) && !contact.points.is_empty();
         let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
         let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
         let mut here = contact.state.position;
@@ -554,6 +577,7 @@ impl<const V: usize> Neighbours<V> {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
+            far: contact.is_far(now),
             shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
@@ -672,7 +696,10 @@ impl<const V: usize> Neighbours<V> {
     /// There is another plan: what was found, and who was flown around, does not count any more.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
-        self.contacts.iter_mut().for_each(|contact| (contact.avoided, contact.furthest) = (None, None));
+        for contact in &mut self.contacts {
+            (contact.avoided, contact.furthest) = (None, None);
+            (contact.relayed_m, contact.relayed_at) = (None, None);
+        }
     }
 
     /// Where the other vehicles of the roster are while they stand, those out of the plan among them.

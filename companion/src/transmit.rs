@@ -13,6 +13,7 @@ use crate::guidance::Setpoint;
 use crate::intent::{self, Intent};
 use crate::machine::Companion;
 use crate::mission::State;
+use crate::neighbours::relay;
 use crate::outbox::Outgoing;
 use crate::services;
 
@@ -50,11 +51,29 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
             return 0;
         }
-        let length = self.answer(link, out);
+        let relayed = if link == Link::Swarm { self.pass_on(out) } else { 0 };
+        let length = if relayed > 0 { relayed } else { self.answer(link, out) };
         if link == Link::Swarm {
             self.radio.spend(length);
         }
         length
+    }
+
+    /// What neighbours do not hear from others, while the account has enough for answers too.
+    fn pass_on(&mut self, out: &mut [u8]) -> usize {
+        if !self.radio.is_half_full() || !core::mem::take(&mut self.relay_due) {
+            return 0;
+        }
+        let plan_crc = self.plan.as_ref().map_or(0, |plan| plan.plan_crc);
+        let crc = self.config.mission_crc;
+        let relay = self.neighbours.relay(self.now, &mut self.relay_next, crc, plan_crc);
+        if relay.is_empty() {
+            return 0;
+        }
+        let mut payload = [0; relay::LENGTH];
+        let len = relay.encode(self.config.system_id, &mut payload);
+        let header = self.outboxes[Link::Swarm as usize].header(self.config.system_id);
+        frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
     /// What was asked for, and what waits to be told.

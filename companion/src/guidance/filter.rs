@@ -396,6 +396,10 @@ impl Guidance {
         for i in 0..neighbours.len() {
             let Some(mut met) = neighbours.met(i, now) else { continue };
             let by_gates = met.on_plan && self.on_plan(state, scene);
+            if met.far && (by_gates || lands) {
+                // Not within radio range, and where the plan has it.
+                continue;
+            }
             if by_gates {
                 // The gates keep two on the plan apart, however late their messages are.
                 met.heard.delay_s = 0.0;
