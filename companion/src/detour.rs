@@ -48,6 +48,9 @@ const RETRY_S: u64 = 10;
 const DEAD_END: Duration = Duration::from_secs(30);
 /// After no place to land was found aside, the next is sought so much later.
 const ASIDE_AGAIN_S: u64 = 60;
+/// So many ways around that are not found are enough, or one less in this time, seconds.
+const DETOURS_TRIED: u8 = 4;
+const GIVES_UP_S: u64 = 45;
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
@@ -124,9 +127,10 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found since somebody moved.
     pub(crate) failed: u8,
-    /// Ways around not found from here, whoever moved between, and how far along the path that is.
+    /// Ways around not found from here, whoever moved between; how far along the path that is, and since when.
     pub(crate) failed_here: u8,
     pub(crate) failed_at_m: f32,
+    pub(crate) failed_since: Instant,
     /// Ways around on which it did not move, in a row.
     pub(crate) fruitless: u8,
     /// When no way aside was found.
@@ -415,6 +419,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if (along_m - self.around.failed_at_m).abs() > HERE_M {
                 (self.around.failed_here, self.around.failed_at_m) = (0, along_m);
             }
+            if self.around.failed_here == 0 {
+                self.around.failed_since = self.now;
+            }
             self.around.failed = self.around.failed.saturating_add(1);
             self.around.failed_here = self.around.failed_here.saturating_add(1);
         }
@@ -426,6 +433,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
             && (!self.neighbours.is_deaf(self.now) || self.neighbours.all_rest())
             && self.around.no_way_aside_at.is_none_or(retries)
+    }
+
+    /// Whether enough ways around were not found: while nobody moved, or for a while from here whoever moved.
+    pub(crate) fn gives_up(&self) -> bool {
+        let Around { failed, fruitless, failed_here, failed_since, .. } = self.around;
+        let long = self.now - failed_since >= Duration::from_secs(GIVES_UP_S);
+        failed.saturating_add(fruitless) >= DETOURS_TRIED || (failed_here >= DETOURS_TRIED - 1 && long)
     }
 
     /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.

@@ -129,7 +129,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             blocked: self.around.blocked,
             our_turn: self.is_our_turn(),
             detour_ready: self.around.ready,
-            detours_failed: self.around.failed_here.saturating_add(self.around.fruitless),
+            no_way_around: self.gives_up(),
             underneath: self.underneath(),
             standing,
         }

@@ -527,16 +527,13 @@ pub struct Inputs {
     pub our_turn: bool,
     /// The way around has come.
     pub detour_ready: bool,
-    /// Ways around that were not found from where it stands.
-    pub detours_failed: u8,
+    /// No way around was found, often enough.
+    pub no_way_around: bool,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
     pub underneath: Duration,
     /// Slower than a hovering vehicle sways.
     pub standing: bool,
 }
-
-/// So many ways around that are not found are enough.
-const DETOURS_TRIED: u8 = 3;
 
 pub(crate) const NOW: Duration = Duration::from_millis(0);
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
@@ -621,8 +618,8 @@ impl Guard {
             Self::OurTurn => i.our_turn,
             Self::DetourReady => i.detour_ready,
             Self::DetourFailed => i.plan_failed,
-            Self::NoWayAround => i.detours_failed >= DETOURS_TRIED && i.room_below,
-            Self::NoWayOn => i.detours_failed >= DETOURS_TRIED && i.can_turn_back,
+            Self::NoWayAround => i.no_way_around && i.room_below,
+            Self::NoWayOn => i.no_way_around && i.can_turn_back,
             Self::Underneath => i.underneath > limit,
             Self::Standing => i.standing,
         }
