@@ -455,6 +455,7 @@ impl Guidance {
     ) -> bool {
         let position = scene.telemetry.position;
         self.unsent_s += dt_s;
+        let advised_at_m = self.tracker.along_m;
         let asks = matches!(state, State::Scheduled | State::Follow | State::Blocked | State::Replanning);
         if let Some(plan) = scene.plan.filter(|_| asks) {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
@@ -545,8 +546,13 @@ impl Guidance {
             false => 0.0,
         };
         let mut blocked = false;
+        // Where it stops stays where it is, however many raw points this step takes.
+        let stops_at_m = advised_at_m + advice.stop_within_m;
         self.fenced &= !moves;
         for _ in 0..self.door.begin(Pace { share, urgent }, dt_s) {
+            if self.phase == Phase::Path && !self.is_algorithm2() {
+                advice.stop_within_m = (stops_at_m - self.tracker.along_m).max(0.0);
+            }
             let raw = match scene.plan {
                 Some(plan) if moves => {
                     self.next_raw(state, scene, plan, &advice, neighbours, now, &mut blocked)

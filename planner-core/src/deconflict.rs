@@ -107,7 +107,7 @@ const LOOKS: usize = 16;
 const LOOK_EVERY_S: f32 = 0.25;
 
 /// A reference this little beyond a gate still stands at it: rounding must not carry it through.
-const AT_GATE_M: f32 = 0.01;
+const AT_GATE_M: f32 = 0.25;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
 /// each gate within reach, and for each neighbour without a plan [`LOOKS`] points of the own path.
