@@ -47,7 +47,7 @@ const RETRY_S: u64 = 10;
 /// Standing and waiting while all others stand for this long is a dead end: whoever is waited for has found no way around.
 const DEAD_END: Duration = Duration::from_secs(30);
 /// After no place to land was found aside, the next is sought so much later.
-const ASIDE_AGAIN_S: u64 = 60;
+const ASIDE_AGAIN_S: u64 = 70;
 /// So many ways around that are not found are enough, or one less in this time, seconds.
 const DETOURS_TRIED: u8 = 4;
 const GIVES_UP_S: u64 = 45;

@@ -449,9 +449,27 @@ fn every_row_has_its_scene() {
             // Back over its pad there is no room either.
             b.neighbour = Some((START - Point::new(1.35, 0.0, 1.35), FLYING | ON_PLAN, 0.0, 5));
             b.until(LandingHeld, 120.0);
-            b.run(65.0);
+            // Nor aside.
+            b.answer_detour = no_way;
+            b.run(85.0);
             assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
             b.neighbour = Some((Point::new(8.0, 30.0, 1.5), FLYING | ON_PLAN, 0.0, 5));
+        },
+        Aborted,
+        30.0,
+    );
+    // Over its pad is no room, but aside there is.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Follow, 20.0);
+            b.run(2.0);
+            back(b);
+            b.neighbour = Some((START - Point::new(1.35, 0.0, 1.35), FLYING | ON_PLAN, 0.0, 5));
+            b.until(LandingHeld, 120.0);
+            b.until(Follow, 25.0);
+            b.until(Land, 60.0);
+            assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
         },
         Aborted,
         30.0,

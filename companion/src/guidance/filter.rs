@@ -427,8 +427,8 @@ impl Guidance {
                 // Past a vehicle that waits the schedule leads as near as that and what both stray.
                 safety_m
             } else if met.heard.grounded {
-                // Straight down, or past it.
-                safety_m + if lands { 0.0 } else { STRAYS_M }
+                let vertical = lands || state == State::Climb || self.descends();
+                safety_m + if vertical { 0.0 } else { STRAYS_M }
             } else {
                 safety_m + STRAY_M
             };
