@@ -16,7 +16,7 @@
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
-//! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it |
+//! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it; the setpoint alone while it holds its place |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
