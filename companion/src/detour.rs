@@ -59,6 +59,8 @@ const STUCK: Duration = Duration::from_secs(20);
 const KEPT: Duration = Duration::from_secs(20);
 /// An abort whose end the autopilot does not tell is over by then.
 const SETTLED: Duration = Duration::from_secs(5);
+/// On its pad a vehicle that nobody hears for so long waits like one that waits for others.
+const UNHEARD: Duration = Duration::from_secs(10);
 /// A position older than this is vague.
 const FRESH: Duration = Duration::from_secs(2);
 /// What a vehicle may stray from its path, metres: a path that comes nearer to what lies there by that much is blocked.
@@ -174,12 +176,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn is_held(&self) -> bool {
+        let now = self.now;
         let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
             State::Scheduled => {
                 self.around.blocked
                     || !self.guidance.filter.column_clear()
+                    || self.neighbours.silence(now, self.entered_at) >= UNHEARD
                     || (held && self.guidance.advice.stop_within_m <= 0.05)
             }
             State::Follow => held && stands,

@@ -114,6 +114,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             can_turn_back: self.guidance.along_m() > 0.0
                 && !self.guidance.returning
                 && !self.neighbours.is_deaf(now),
+            pad_taken: match follow && self.guidance.returning && self.guidance.descends() {
+                true => self.guidance.filter.hindered_for(now),
+                false => Duration::default(),
+            },
             can_land_aside: self.can_land_aside(),
             lands_aside: self.around.lands,
             aside_reached: follow

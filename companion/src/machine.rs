@@ -133,7 +133,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             start,
             framers: [Framer::new(), Framer::new()],
             outboxes: [Outbox::default(), Outbox::default()],
-            telemetry: Telemetry::new(),
+            telemetry: Telemetry::new(config.mission_crc == 0),
             neighbours: Neighbours::new(
                 &config.roster,
                 config.system_id,

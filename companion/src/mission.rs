@@ -308,6 +308,8 @@ pub enum Guard {
     Hindered,
     /// The same, and it does not: a place aside may yet be sought.
     NoRoomHere,
+    /// Back over its pad the descent has been stopped for the limit: a place aside may be sought.
+    PadTaken,
     /// There is no place aside to land at.
     NoPlaceAside,
     /// It stands at the place aside where it is to land.
@@ -501,6 +503,8 @@ pub struct Inputs {
     pub column_clear: Duration,
     /// On its path, and not on the way back yet.
     pub can_turn_back: bool,
+    /// Time for which something has stopped the descent to its pad.
+    pub pad_taken: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,
     /// The way aside asked for, or flown, leads to where it is to land.
@@ -601,6 +605,7 @@ impl Guard {
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.column_blocked >= limit && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.column_blocked >= limit && i.offboard && i.can_land_aside,
+            Self::PadTaken => i.pad_taken >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear >= limit,

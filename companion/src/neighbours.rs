@@ -542,14 +542,19 @@ impl<const V: usize> Neighbours<V> {
     /// Contact `i` as the safety filter sees it; none if its place was never heard.
     pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
         let contact = self.contacts.get(i)?;
-        let age_s = (now - contact.position_at?).secs_f32();
+        let placed_s = (now - contact.position_at?).secs_f32();
+        let told_s = contact.belongs_at.map_or(f32::INFINITY, |at| (now - at).secs_f32());
+        // Where positions are lost, an intent says as well where it is: at its setpoint.
+        let by_intent = placed_s > OLD_S && told_s < OLD_S && !contact.points.is_empty();
+        let age_s = if by_intent { told_s } else { placed_s };
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let unplaced_for = now - contact.position_at?;
         let unplaced = unplaced_for >= DEAD && !contact.is_far(now);
         let dead = (contact.is_dead(now) || unplaced) && !contact.points.is_empty();
         let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
         let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
-        let mut here = contact.state.position;
+        let at = contact.points.first().filter(|_| by_intent);
+        let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
         let top = contact.climbs_to().filter(|_| age_s > OLD_S && !lies);
         here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { top.unwrap_or(here.z) };

@@ -448,12 +448,29 @@ fn every_row_has_its_scene() {
             b.until(Follow, 25.0);
             // Back over its pad there is no room either.
             b.neighbour = Some((START - Point::new(1.35, 0.0, 1.35), FLYING | ON_PLAN, 0.0, 5));
-            b.until(LandingHeld, 120.0);
             // Nor aside.
             b.answer_detour = no_way;
+            b.until(LandingHeld, 120.0);
             b.run(85.0);
             assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
             b.neighbour = Some((Point::new(8.0, 30.0, 1.5), FLYING | ON_PLAN, 0.0, 5));
+        },
+        Aborted,
+        30.0,
+    );
+    // Nor on its way up.
+    scene(
+        Bench::accompanied(two_vehicles()),
+        &|b| {
+            b.until(Climb, 20.0);
+            b.run(2.0);
+            b.neighbour = Some((Point::new(b.enu.x - 1.0, b.enu.y, 0.0), GROUNDED | OUT, 0.0, 5));
+            b.run(0.3);
+            land(b);
+            b.until(LandingHeld, 8.0);
+            b.until(Follow, 25.0);
+            b.until(Land, 60.0);
+            assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
         },
         Aborted,
         30.0,
@@ -466,9 +483,7 @@ fn every_row_has_its_scene() {
             b.run(2.0);
             back(b);
             b.neighbour = Some((START - Point::new(1.35, 0.0, 1.35), FLYING | ON_PLAN, 0.0, 5));
-            b.until(LandingHeld, 120.0);
-            b.until(Follow, 25.0);
-            b.until(Land, 60.0);
+            b.until(Land, 120.0);
             assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
         },
         Aborted,

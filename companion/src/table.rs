@@ -180,6 +180,7 @@ pub static TABLE: &[Row] = &[
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
     info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
     warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
+    warn(&[Follow],           G::PadTaken,         s(20),  Replanning,      A::RequestLanding, "No room to land: seeking a place aside"),
     info(&[Follow],           G::AsideReached,     NOW,    Land,            A::AskLand,     "Landing aside"),
     warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
     warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),

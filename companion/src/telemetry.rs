@@ -116,6 +116,8 @@ pub struct Telemetry {
     pub battery_percent: i8,
     /// Height above home in metres, as ArduCopter's NAV_TAKEOFF counts it.
     pub above_home_m: f32,
+    /// Whether there is no mission whose origin the EKF's is compared with.
+    anywhere: bool,
     /// EKF origin, once heard.
     pub ekf_origin: Option<Geodetic>,
     /// The origin that was last used while armed.
@@ -149,8 +151,9 @@ pub struct Telemetry {
 
 impl Telemetry {
     /// Nothing heard.
-    pub fn new() -> Self {
-        Self { battery_percent: -1, ..Self::default() }
+    /// A board without a mission takes an EKF origin anywhere.
+    pub fn new(anywhere: bool) -> Self {
+        Self { battery_percent: -1, anywhere, ..Self::default() }
     }
 
     /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
@@ -330,7 +333,7 @@ impl Telemetry {
             self.doubted_at = None;
         }
         let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
-        if away_m > ORIGIN_MOST_M {
+        if away_m > ORIGIN_MOST_M && !self.anywhere {
             (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
             self.settled_at = now + SETTLE;
             return Change::OriginFar((away_m * 1e-3) as u32);

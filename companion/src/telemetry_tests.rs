@@ -19,7 +19,7 @@ fn frame<M: MessageData>(message: &M, sequence: u8) -> Frame {
 }
 
 fn heard(kind: Kind, origin: Geodetic, latitude: i32, longitude: i32, altitude: i32) -> (Telemetry, Change) {
-    let mut telemetry = Telemetry { kind: Some(kind), ..Telemetry::new() };
+    let mut telemetry = Telemetry { kind: Some(kind), ..Telemetry::new(false) };
     let data = GPS_GLOBAL_ORIGIN_DATA { latitude, longitude, altitude };
     let change = telemetry.handle(Instant::ZERO, &origin, &frame(&data, 0));
     (telemetry, change)
