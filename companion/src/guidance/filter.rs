@@ -34,6 +34,8 @@ const AHEAD_S: f32 = 3.0;
 const NEAR_MOST: usize = 6;
 /// What two vehicles in the air overshoot their stops together, metres; the schedule leaves 0.5 m for it and for the rest.
 const STRAY_M: f32 = 0.25;
+/// So much lower than below pad and goal the ground between may be, less than a storey, metres.
+const LOWER_M: f32 = 2.0;
 /// What this vehicle alone strays from its path, metres.
 const STRAYS_M: f32 = 0.1;
 /// Before a vehicle that the roster does not name it stands no longer than this; then it goes on slowly.
@@ -213,6 +215,10 @@ impl Guidance {
         };
         let position = &scene.telemetry.position;
         let ground_m = self.ground_m(plan).min(position.z);
+        // Between pad and goal the ground may be lower than below either.
+        let lands = matches!(state, State::Land | State::LandingHeld);
+        let between = lands && self.on_path && !self.reached_end(&plan.path);
+        let ground_m = if between { ground_m - LOWER_M } else { ground_m };
         let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
             State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
