@@ -37,10 +37,6 @@ fn nobody_is_stopped_who_passes_at_the_scheduled_separation() {
     }
 }
 
-/// Nobody touches another by its own motion. Of the rest some are left: landings beside a vehicle that lies near the only
-/// place, and vehicles of one plan each that wait for one another until the time is up. These shares are not to be exceeded.
-const TOO_NEAR_MOST: f32 = 0.01;
-const STUCK_MOST: f32 = 0.03;
 /// Meetings in which no stop would have kept the distance.
 const UNAVOIDABLE_MOST: f32 = 0.05;
 
@@ -50,11 +46,9 @@ fn companions_that_meet_at_random_keep_apart() {
         (1..=MEETINGS).into_par_iter().map(|seed| meeting::fly(&scene::scene(seed), false)).collect();
     report(&outcomes);
     let sum = meeting::summary(&outcomes);
-    let share = |count: usize| count as f32 / MEETINGS as f32;
-    assert!(share(sum.too_near[0]) <= TOO_NEAR_MOST, "{sum}");
-    assert_eq!(sum.touches, [0; 2], "{sum}");
-    assert!(share(sum.stuck.iter().sum()) <= STUCK_MOST, "{sum}");
-    assert!(share(sum.unavoidable[0]) <= UNAVOIDABLE_MOST, "{sum}");
+    // Of 10 000 some are left: `docs/safety.md`.
+    assert_eq!((sum.too_near[0], sum.touches, sum.stuck), (0, [0; 2], [0; 2]), "{sum}");
+    assert!(sum.unavoidable[0] as f32 <= UNAVOIDABLE_MOST * sum.meetings[0] as f32, "{sum}");
     let mut setpoints = SetpointStats::default();
     outcomes.iter().for_each(|outcome| setpoints.merge(&outcome.setpoints));
     println!("{setpoints}");
