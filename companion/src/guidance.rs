@@ -526,7 +526,8 @@ impl Guidance {
             && setpoints_hold(state)
             && self.door.stands();
         let yields = self.filter.yields() || state != State::Follow;
-        self.turned |= self.hold.step(holds, yields, neighbours.latest_s(), now);
+        let late_s = if holds { neighbours.latest_s() } else { 0.0 };
+        self.turned |= self.hold.step(holds, yields, late_s, now);
         let moves = wanted && !self.hold.binds(now);
         if !moves && self.door.stands() && !self.settled {
             if let (Some(path), Phase::Path) = (path, self.phase) {

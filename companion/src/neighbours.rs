@@ -128,7 +128,9 @@ impl Contact {
     }
 
     fn is_dead(&self, now: Instant) -> bool {
-        self.rank != STRANGER && self.known_at().is_some_and(|at| now - at >= DEAD)
+        // Most are heard.
+        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= DEAD);
+        self.rank != STRANGER && silent(self.heard_at) && silent(self.known_at())
     }
 
     /// Whether it speaks, but has not known for long where it is.
@@ -169,13 +171,11 @@ impl Contact {
 
     /// Whether it flew around and comes down at the end of that.
     fn lands(&self, now: Instant) -> bool {
-        let down = self.points.last().is_some_and(|low| low.z < self.state.position.z);
-        let beside = self.state.velocity.xy().norm();
         self.tells(DETOURS)
             && !self.tells(GROUNDED)
             && self.column
-            && down
-            && beside < STANDING_MPS
+            && self.points.last().is_some_and(|low| low.z < self.state.position.z)
+            && self.state.velocity.xy().norm_squared() < STANDING_MPS * STANDING_MPS
             && self.heard_within(now, LATELY)
     }
 
@@ -543,10 +543,10 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
         let contact = self.contacts.get(i)?;
         let placed_s = (now - contact.position_at?).secs_f32();
-        let told_s = contact.belongs_at.map_or(f32::INFINITY, |at| (now - at).secs_f32());
         // Where positions are lost, an intent says as well where it is: at its setpoint.
-        let by_intent = placed_s > OLD_S && told_s < OLD_S && !contact.points.is_empty();
-        let age_s = if by_intent { told_s } else { placed_s };
+        let told_at = contact.belongs_at.filter(|_| placed_s > OLD_S && !contact.points.is_empty());
+        let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < OLD_S);
+        let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let unplaced_for = now - contact.position_at?;
         let unplaced = unplaced_for >= DEAD && !contact.is_far(now);

@@ -106,8 +106,8 @@ const LOOKS: usize = 16;
 /// Time of flight from one look to the next, seconds.
 const LOOK_EVERY_S: f32 = 0.25;
 
-/// A reference this little beyond a gate still stands at it: rounding must not carry it through.
-const AT_GATE_M: f32 = 0.25;
+/// A reference this little beyond a gate still stands at it: what overruns a stop is not to carry it through, metres.
+const AT_GATE_M: f32 = 0.1;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
 /// each gate within reach, and for each neighbour without a plan [`LOOKS`] points of the own path.
@@ -156,9 +156,7 @@ fn priority<const W: usize>(
         own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * LOOK_EVERY_S;
     let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - AT_GATE_M)..];
     for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
-        let passed = neighbours
-            .iter()
-            .find(|n| n.id == gate.id)
+        let passed = by_id(neighbours, gate.id)
             .is_some_and(|n| n.out || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m));
         if !passed {
             stop(fmaxf(gate.at_m - own.along_m, 0.0), gate.id);
@@ -175,6 +173,12 @@ fn priority<const W: usize>(
     let allowed_mps = sqrtf(2.0 * cfg.accel_mps2 * fmaxf(advice.stop_within_m, 0.0));
     advice.speed_scale = fminf(allowed_mps / cfg.cruise_mps, 1.0);
     advice
+}
+
+/// The neighbour of an id: most come sorted by it.
+fn by_id(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
+    let sorted = neighbours.binary_search_by_key(&id, |n| n.id).ok();
+    sorted.map(|at| &neighbours[at]).or_else(|| neighbours.iter().find(|n| n.id == id))
 }
 
 /// The own path ahead, as far as it is looked at: the points where this vehicle will be, one after each look.

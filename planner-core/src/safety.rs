@@ -189,10 +189,12 @@ impl Heard<'_> {
         }
         let along_m = self.along_m(bounds, ahead_s);
         let Some(first) = self.points.first() else { return along_m + self.wider_m(bounds) };
-        let first_sq = (first - self.position).norm_squared();
-        if first_sq < OFF_M * OFF_M {
+        let away = (first - self.position).abs();
+        // No less than the distance, and no square root.
+        let first_m = away.x + away.y + away.z;
+        if first_m < OFF_M {
             // On its points, and no further than those lead.
-            return fminf(along_m + OFF_M, sqrtf(first_sq) + self.extent_m);
+            return fminf(along_m + OFF_M, first_m + self.extent_m);
         }
         along_m + self.wider_m(bounds) + OFF_M
     }

@@ -31,7 +31,9 @@ impl Hold {
     /// One step of a vehicle that stands and is not to move, or does not; `yields` if another one goes first. Messages are
     /// `late_s` late. Returns whether it begins or ends to hold.
     pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
-        self.late = Duration::from_micros((late_s * 1e6) as u64);
+        if stands {
+            self.late = Duration::from_micros((late_s * 1e6) as u64);
+        }
         self.since = self.since.or(Some(now)).filter(|_| stands);
         let patience = if yields { SOON } else { PATIENCE };
         let on = self.since.is_some_and(|since| now - since >= patience || self.on);
