@@ -109,8 +109,6 @@ struct Contact {
     floor_m: f32,
     /// How fast it was when its position was heard, m/s.
     speed_mps: f32,
-    /// Top of its pad's climb, by the roster.
-    start: Option<Point>,
     /// Whether its plan is ours, whether it follows it or not.
     shares_plan: bool,
     /// When it was last known to move.
@@ -265,8 +263,6 @@ impl Contact {
             let down = !self.heard_within(now, DOWN);
             let nature = if down { Nature::Lying } else { Nature::Solid };
             self.stretch(|at| tell(column(at, nature)));
-            // An autopilot that was left alone may also have flown back to its pad.
-            self.start.into_iter().for_each(|start| tell(column(start, nature)));
         } else {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));
@@ -330,9 +326,7 @@ impl<const V: usize> Neighbours<V> {
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id != own_id {
                 // A roster of at most V entries fits.
-                if let Some(at) = table.add(entry.system_id, rank as u16) {
-                    table.contacts[at].start = Some(entry.start);
-                }
+                let _ = table.add(entry.system_id, rank as u16);
             }
         }
         table.roster = table.contacts.len();
@@ -377,7 +371,6 @@ impl<const V: usize> Neighbours<V> {
             column: false,
             floor_m: f32::NAN,
             speed_mps: 0.0,
-            start: None,
             shares_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
