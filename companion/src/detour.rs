@@ -50,7 +50,7 @@ const DEAD_END: Duration = Duration::from_secs(30);
 const ASIDE_AGAIN_S: u64 = 70;
 /// So many ways around that are not found are enough, or one less in this time, seconds.
 const DETOURS_TRIED: u8 = 4;
-const GIVES_UP_S: u64 = 45;
+const GIVES_UP_S: u64 = 150;
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
