@@ -719,7 +719,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Where a vehicle that lands may come down within `apart_m` of one that is there: it may fly over that, and not end there.
+    /// Where a landing would end within `apart_m` of a vehicle that is there: flying over it is
+    /// allowed, ending there is not.
     pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;
@@ -728,7 +729,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as near beside it.
+    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as
+    /// near beside it.
     pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;

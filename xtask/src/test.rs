@@ -31,7 +31,9 @@ fn steps(args: &Args) -> Result<()> {
         ]))
     })?;
     if args.quick {
-        return step("host tests", || shell::run(cargo().args(["test", "--workspace", "--locked"])));
+        return step("host tests", || {
+            shell::run(cargo().args(["test", "--workspace", "--no-fail-fast", "--locked"]))
+        });
     }
     let mut firmware = None;
     step("boards", || {
@@ -52,7 +54,8 @@ fn steps(args: &Args) -> Result<()> {
     step("release build", || shell::run(cargo().args(["build", "--release", "--locked", "-p", "host-sim"])))?;
     step("host tests", || {
         let mut tests = cargo();
-        tests.args(["test", "--workspace", "--locked"]).env("RUST_TEST_THREADS", tests_at_once().to_string());
+        tests.args(["test", "--workspace", "--no-fail-fast", "--locked"]);
+        tests.env("RUST_TEST_THREADS", tests_at_once().to_string());
         if let Some(python) = &python {
             tests.env("FLOCKMATE_PYTHON", python);
         }
