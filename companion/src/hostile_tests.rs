@@ -3,6 +3,7 @@
 extern crate std;
 use std::vec::Vec;
 
+use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA};
 use planner_core::Point;
 
@@ -10,6 +11,7 @@ use super::tests::assert_no_gap;
 use super::*;
 use crate::autopilot::Kind;
 use crate::fake_px4::*;
+use crate::frame::Frame;
 use crate::intent::Intent;
 use crate::px4;
 

@@ -1,36 +1,31 @@
 //! The companion itself: routes frames in, runs the mission table, makes frames out.
 
+mod frames;
+mod steps;
+
 use heapless::Deque;
-use mavlink::MessageData;
-use mavlink::dialects::ardupilotmega::{
-    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
-    PARAM_VALUE_DATA, TUNNEL_DATA,
-};
 use planner_core::Point;
 use planner_core::schedule::VehiclePlan;
 
 use crate::autopilot::Kind;
-use crate::budget::{self, Budget};
-use crate::commands::{self, ACCEPTED, Command, DENIED, Pending, Repeats, TEMPORARILY_REJECTED, UNSUPPORTED};
+use crate::budget::Budget;
+use crate::commands::{Pending, Repeats};
 use crate::config::{Config, ConfigError, PlanFailure};
-use crate::detour::{Aim, Around, Obstacles};
+use crate::detour::{Around, Obstacles};
 use crate::echo::Sent;
 use crate::events::{Event, Link};
-use crate::frame::{Counters, Frame, Framer};
+use crate::frame::{Counters, Framer};
 use crate::ftp::Ftp;
-use crate::guidance::{Guidance, Scene, Stats, setpoints_flow};
-use crate::intent::Intent;
+use crate::guidance::{Guidance, Scene, Stats};
 use crate::limits::AutopilotLimits;
-use crate::margins;
-use crate::mission::{self, Action, Guard, Interrupted, Row, State, To};
+use crate::mission::{Interrupted, State};
 use crate::neighbours::Neighbours;
-use crate::neighbours::relay::Relay;
-use crate::outbox::{Outbox, Outgoing};
+use crate::outbox::Outbox;
 use crate::parameters::Parameters;
 use crate::requests::Handshake;
-use crate::senders::{Kind as AnswerKind, Rates, Sender};
-use crate::store::{Erasing, Store};
-use crate::telemetry::{Change, Telemetry};
+use crate::senders::Rates;
+use crate::store::Store;
+use crate::telemetry::Telemetry;
 use crate::time::{Duration, Instant};
 use crate::waits::Waits;
 
@@ -194,7 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether setpoints are to go out, one each 50 ms.
     pub fn streams(&self) -> bool {
-        setpoints_flow(self.state)
+        self.state.streams_setpoints()
     }
 
     /// The autopilot as last heard.
@@ -346,365 +341,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - place).norm() < 0.1);
         finite && (begins || plan.goal.is_none())
-    }
-
-    /// Returns whether the mission table should be looked at.
-    fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
-        let sender = self.sender(link, frame);
-        if let Some(command) = commands::read(frame, self.config.system_id) {
-            if sender != Sender::GroundStation && command.acts() {
-                self.deny(link, sender, &command);
-                return false;
-            }
-            let now = self.now;
-            let (result, relevant) = match self.repeats.answered(frame, now) {
-                Some(result) => (result, false),
-                None => {
-                    let result = self.handle_command(link, sender, &command);
-                    self.repeats.remember(frame, result, now);
-                    (result, true)
-                }
-            };
-            if let Some(result) = result {
-                let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-                self.answer_to(link, sender, AnswerKind::Ack, ack);
-            }
-            return relevant;
-        }
-        if self.serve(link, sender, frame) {
-            return false;
-        }
-        match link {
-            Link::Autopilot => {
-                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
-                    return false;
-                }
-                if frame.message_id == PARAM_VALUE_DATA::ID {
-                    self.handle_limit(frame);
-                    return false;
-                }
-                let change = self.telemetry.handle(self.now, &self.config.origin, frame);
-                if let Some(ack) = self.telemetry.ack.take() {
-                    self.handle_ack(&ack);
-                }
-                self.handshake.watch(self.state, &self.telemetry);
-                if change == Change::OriginDoubted {
-                    self.origin_at = self.origin_at.min(self.now + ORIGIN_AGAIN);
-                    return self.telemetry.origin_moved;
-                }
-                if let Change::OriginFar(km) = change {
-                    if self.now >= self.far_at {
-                        self.far_at = self.now + HELD_EVERY;
-                        self.say_count(true, "EKF origin # km away: not used", [km, 0]);
-                    }
-                    return true;
-                }
-                if change == Change::OriginLost {
-                    self.origin_at = self.now;
-                    // It may have been restarted and know nothing of the streams we asked for. Positions that jump
-                    // again and again are no reason to flood it.
-                    if self.now >= self.streams_at {
-                        self.ask_for_streams();
-                    }
-                }
-                change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
-            }
-            Link::Swarm => {
-                self.handle_neighbour(frame);
-                false
-            }
-        }
-    }
-
-    fn handle_neighbour(&mut self, frame: &Frame) {
-        let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
-        let id = frame.system;
-        if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
-            return;
-        }
-        // Its sequence number counts only if the frame decodes.
-        if frame.message_id == TUNNEL_DATA::ID {
-            if let Some(relay) = Relay::decode(frame.padded(), id) {
-                let ours = self.plan.as_ref().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
-                if ours && relay.mission_crc == self.config.mission_crc {
-                    self.neighbours.handle_relay(self.now, id, &relay);
-                }
-                return;
-            }
-            let Some(intent) = Intent::decode(frame.padded(), id) else { return };
-            if intent.mission_crc != self.config.mission_crc {
-                if self.config.roster.iter().any(|entry| entry.system_id == id) {
-                    let text = "Vehicle # has another mission file";
-                    self.say_of(Sender::Other, true, text, [u32::from(id), 0, 0]);
-                }
-                return;
-            }
-            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.rank);
-            let delay_s = echo.and_then(|echo| self.sent.delay_s(&echo, self.now));
-            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
-                late.take(delay_s);
-            }
-            if self.neighbours.accept(id, frame.sequence, self.now) {
-                let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
-                self.neighbours.handle_intent(
-                    self.now,
-                    self.rank,
-                    &intent,
-                    self.config.mission_crc,
-                    plan_crc,
-                );
-            }
-        } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
-            self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
-        }
-    }
-
-    /// Answers a command of a sender whose commands do not count.
-    fn deny(&mut self, link: Link, sender: Sender, command: &Command) {
-        if command.to_us {
-            let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
-            self.answer_to(link, sender, AnswerKind::Ack, ack);
-        }
-        let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
-        self.say_of(sender, true, "Command # denied, not a ground station: #/#", numbers);
-    }
-
-    /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
-    fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
-        let (before, known) = (self.pending, self.obstacles.count());
-        let inputs = self.inputs();
-        let result = match commands::apply(&mut self.pending, self.state, &inputs, command) {
-            Some(result) => result,
-            None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
-            None if command.command == commands::EXCLUDE => self.exclude(command),
-            None if command.command == commands::RESTART
-                && (command.to_component || command.param2 == 1.0) =>
-            {
-                self.restart(command)
-            }
-            // To all components: another one's.
-            None if !command.to_component => return None,
-            None => UNSUPPORTED,
-        };
-        let restarts = command.command == commands::RESTART && result == ACCEPTED;
-        if restarts || self.pending != before || self.obstacles.count() != known {
-            self.log_command(sender, command);
-        }
-        command.to_us.then_some(result)
-    }
-
-    fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
-        if !self.may_answer(link, sender, AnswerKind::Message) {
-            return TEMPORARILY_REJECTED;
-        }
-        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
-            return TEMPORARILY_REJECTED;
-        }
-        if message == HEARTBEAT_DATA::ID as f32 {
-            self.heartbeat_due[link as usize] = true;
-        } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
-            self.version_due[link as usize] = true;
-        } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
-            self.position_due = self.telemetry.position_at.is_some();
-        } else {
-            return DENIED;
-        }
-        if link == Link::Swarm {
-            self.radio.spend(budget::POSITION);
-        }
-        ACCEPTED
-    }
-
-    /// One step of the control loop: reference, table, and what is asked for again.
-    fn step(&mut self) {
-        let now = self.now;
-        if self.untuned && self.erasing() == Erasing::Allowed {
-            self.tune();
-        }
-        self.watch_estimate();
-        let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
-        self.stepped_at = now;
-        let scene = Scene {
-            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
-            telemetry: &self.telemetry,
-            rank: self.rank,
-            id: self.config.system_id,
-            detours: self.around.flying,
-        };
-        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s) && now >= self.held_at {
-            self.held_at = now + HELD_EVERY;
-            self.say(true, "Setpoint out of limits: holding");
-        }
-        self.intent_due |= core::mem::take(&mut self.guidance.turned);
-        self.name_who_never_starts();
-        self.look_around();
-        self.run_table();
-        self.repeat_requests();
-        let flows = setpoints_flow(self.state);
-        self.setpoint_due = flows;
-        let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
-        // Steps keep their rhythm; after a long gap the rhythm restarts instead of catching up.
-        let due = self.next_step + every;
-        self.next_step = if due > now { due } else { now + every };
-    }
-
-    /// Compares the estimate's bound with what the margin leaves, and sets the pace.
-    fn watch_estimate(&mut self) {
-        let (now, config) = (self.now, &self.config);
-        let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
-        // The best that a receiver can do was weighed when the margin was chosen.
-        let pace = match bound_m <= margins::ESTIMATE_M {
-            true => 1.0,
-            false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
-        };
-        let before = core::mem::replace(&mut self.guidance.pace, pace);
-        self.vague_since = if pace > 0.0 { None } else { self.vague_since.or(Some(now)) };
-        let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
-        if kind(before) == kind(pace) || !setpoints_flow(self.state) {
-            return;
-        }
-        // Whole centimetres, rounded up; more than a hundred metres is not known.
-        let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
-        let room_m = margins::room_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
-        let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
-        let (warning, text) = match kind(pace) {
-            2 => (false, "Estimate within # cm again"),
-            1 => (true, "Estimate within # cm, margin # cm: slower"),
-            _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
-            _ => (true, "Estimate within # cm, margin # cm: stopping"),
-        };
-        self.say_count(warning, text, [cm, room_cm]);
-    }
-
-    fn run_table(&mut self) {
-        for _ in 0..ROWS_AT_ONCE {
-            let inputs = self.inputs();
-            let Some(row) = mission::update(self.state, &inputs) else { return };
-            self.take(row);
-        }
-    }
-
-    fn take(&mut self, row: &'static Row) {
-        let (from, now) = (self.state, self.now);
-        let to = match row.to {
-            To::State(to) => to,
-            To::Interrupted => self.interrupted.target(from),
-        };
-        self.interrupted.note(from, to);
-        self.state = to;
-        self.entered_at = now;
-        if row.guard == Guard::StartCommanded {
-            self.started_at = now;
-            self.mode_before = self.telemetry.custom_mode;
-        }
-        if to == State::PilotControl && from != State::PilotReturned {
-            self.pilot_since = now;
-        }
-        let ends = matches!(to, State::Aborted | State::Done)
-            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
-        self.pending.state_changed(row.guard, to, ends);
-        self.handshake.state_changed(from, to);
-        self.act(from, to, row);
-        if !row.text.is_empty() {
-            let text = Outgoing::Text { warning: row.warning, text: row.text };
-            self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
-        }
-        if let Some(text) = self.interrupted.text(from, to) {
-            self.say(false, text);
-        }
-        // Full only if the shell does not drain: then the newest is lost.
-        let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
-        let _ = self.events.push_back(changed);
-        // The step that the new state needs is due now.
-        if setpoints_flow(to) && !setpoints_flow(from) {
-            self.next_step = now;
-        }
-    }
-
-    fn act(&mut self, from: State, to: State, row: &Row) {
-        let now = self.now;
-        self.mark_place(to);
-        let position = self.telemetry.position;
-        match row.action {
-            Action::None | Action::ForgetStart => {}
-            Action::Connect => self.ask_for_streams(),
-            Action::RequestPlan => {
-                self.plan = None;
-                self.plan_failure = None;
-                self.around = Around { left: self.around.left, ..Around::default() };
-                self.obstacles.avoided = 0;
-                self.neighbours.forget_plan();
-                self.guidance.reset();
-                let _ = self.events.push_back(Event::PlanRequested);
-            }
-            Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
-            Action::HoldHere => self.guidance.hold_at(position),
-            Action::HoldOver => self.retry_at = now,
-            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
-            Action::AskLand => self.ask_land(from),
-            Action::AskDisarm if to == State::Disarm => self.retry_at = now + DISARM_AFTER,
-            Action::AskDisarm | Action::CancelStart => self.retry_at = now,
-            Action::BeginClimb => self.guidance.begin_climb(&position),
-            Action::RunPath => self.guidance.run(now),
-            Action::RequestDetour => self.request_detour(Aim::Goal),
-            Action::RequestAside => {
-                self.guidance.brake();
-                // On its way back it was to land already.
-                let lands = self.guidance.returning;
-                self.request_detour(if lands { Aim::Landing } else { Aim::Aside });
-            }
-            Action::RequestLanding => self.request_detour(Aim::Landing),
-            Action::MissDetour => self.miss_detour(PlanFailure::Late),
-            Action::FlyDetour => {
-                self.guidance.begin_path(now);
-                self.guidance.aside = self.around.aside;
-            }
-            Action::BrakeOnPath => self.guidance.brake(),
-            Action::Rejoin => self.go_on(from, to),
-            Action::TurnBack => {
-                if let Some(plan) = &mut self.plan {
-                    self.guidance.turn_back(&mut plan.path, now);
-                    // Off the shared plan: neighbours keep clear of us as of a stranger.
-                    plan.gates.clear();
-                    core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
-                }
-            }
-        }
-    }
-
-    fn ask_land(&mut self, from: State) {
-        use State::*;
-        self.retry_at = self.now;
-        let position = self.telemetry.position;
-        match from {
-            Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
-                self.guidance.brake();
-            }
-            // Off the path, or not known to be on it: the reference may be beyond a wall.
-            _ => self.guidance.hold_at(position),
-        }
-    }
-
-    /// Goes on in the state that was interrupted.
-    fn go_on(&mut self, from: State, to: State) {
-        let (now, position) = (self.now, self.telemetry.position);
-        match to {
-            State::TakeOff => self.retry_at = now,
-            State::Land => self.ask_land(from),
-            _ => {
-                let climbs = matches!(self.interrupted.beneath(to), State::TakeOff | State::Climb);
-                if let Some(plan) = &self.plan {
-                    self.guidance.go_on(plan, climbs, &position, now);
-                }
-                if to == State::Blocked {
-                    // Until it was looked at again.
-                    (self.around.blocked, self.around.in_the_way) = (true, true);
-                }
-                if !matches!(to, State::Climb | State::Follow) {
-                    self.guidance.brake();
-                }
-            }
-        }
     }
 }
 

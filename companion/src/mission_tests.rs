@@ -5,6 +5,7 @@ use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
 
+use super::guard::HEARD;
 use super::*;
 use crate::table::*;
 use Action as A;

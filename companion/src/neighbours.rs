@@ -4,6 +4,8 @@
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
 //! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
+mod contact;
+mod places;
 pub(crate) mod relay;
 
 use heapless::Vec;
@@ -11,10 +13,10 @@ use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
-use planner_core::detour::{KeepOff, Nature};
 use planner_core::frames::{self, Geodetic};
 use planner_core::safety::Heard;
 
+use self::contact::Contact;
 use crate::config::RosterEntry;
 use crate::echo::{Echo, Lateness};
 use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
@@ -77,200 +79,6 @@ const TOP_M: f32 = 0.3;
 const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
-
-#[derive(Clone, Debug)]
-struct Contact {
-    id: u8,
-    rank: u16,
-    sequence: SequenceFilter,
-    heard_at: Option<Instant>,
-    position_at: Option<Instant>,
-    boot_ms: u32,
-    flags: u8,
-    /// Since when it tells that it is out, and it is known where.
-    out_at: Option<Instant>,
-    hears_us_at: Option<Instant>,
-    /// Whom it hears, a bit for each rank.
-    hears: u32,
-    /// Its progress as others passed it on, metres.
-    relayed_m: Option<f32>,
-    /// When that was so.
-    relayed_at: Option<Instant>,
-    /// Sequence number of its last intent.
-    intent_sequence: u8,
-    late: Lateness,
-    /// When an intent of our mission was last heard from it.
-    belongs_at: Option<Instant>,
-    points: Vec<Point, POINTS>,
-    /// How far from the first of them they lead, metres.
-    extent_m: f32,
-    /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
-    column: bool,
-    floor_m: f32,
-    /// How fast it was when its position was heard, m/s.
-    speed_mps: f32,
-    /// Whether its plan is ours, whether it follows it or not.
-    shares_plan: bool,
-    /// When it was last known to move.
-    moved_at: Instant,
-    /// The furthest it can have come, metres along its path, and when that was.
-    furthest: Option<(f32, Instant)>,
-    /// Where it rested when a way around was planned.
-    avoided: Option<Point>,
-    state: Neighbour,
-}
-
-impl Contact {
-    fn heard_within(&self, now: Instant, span: Duration) -> bool {
-        self.heard_at.is_some_and(|at| now - at < span)
-    }
-
-    fn is_dead(&self, now: Instant) -> bool {
-        // Most are heard.
-        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= DEAD);
-        self.rank != STRANGER && silent(self.heard_at) && silent(self.known_at())
-    }
-
-    /// Whether it speaks, but has not known for long where it is.
-    fn is_vague(&self) -> bool {
-        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= SILENT)
-    }
-
-    fn tells(&self, flag: u8) -> bool {
-        self.flags & flag != 0
-    }
-
-    fn is_out(&self, now: Instant) -> bool {
-        self.tells(OUT) || self.is_dead(now)
-    }
-
-    /// Whether it is out, and was when it was last looked at what is in the way.
-    fn is_out_since(&self, at: Instant) -> bool {
-        self.out_at.is_some_and(|since| since <= at) || self.is_dead(at)
-    }
-
-    /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at
-    /// `fastest_mps`. The rest comes by and by, a landing that reports the whole way at once too. Less than before is
-    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle that was restarted too.
-    fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
-        let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
-        let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
-        let late_m = believed_m + fastest_mps * LATE_S + STRIDE_M;
-        self.furthest = Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
-        believed_m
-    }
-
-    /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
-    fn waits(&self, now: Instant) -> bool {
-        self.is_out(now)
-            || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
-            || self.lands(now)
-    }
-
-    /// Whether it flew around and comes down at the end of that.
-    fn lands(&self, now: Instant) -> bool {
-        self.tells(DETOURS)
-            && !self.tells(GROUNDED)
-            && self.column
-            && self.points.last().is_some_and(|low| low.z < self.state.position.z)
-            && self.state.velocity.xy().norm_squared() < STANDING_MPS * STANDING_MPS
-            && self.heard_within(now, LATELY)
-    }
-
-    /// Whether it stands and is about to fly around.
-    fn claims(&self, now: Instant) -> bool {
-        self.tells(BLOCKED)
-            && !self.waits(now)
-            && self.heard_within(now, LATELY)
-            && self.state.velocity.norm() < STANDING_MPS
-    }
-
-    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
-    fn comes_down(&self, now: Instant) -> bool {
-        let silent = !self.heard_within(now, SILENT) && !self.is_far(now);
-        self.rank != STRANGER
-            && !self.tells(GROUNDED | LANDED)
-            && !self.is_out(now)
-            && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
-    }
-
-    /// The columns it may come down in.
-    fn columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let here = self.state.position;
-        let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
-        let mut column = |from: Point, below_m: f32, nature: Nature| {
-            tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
-        };
-        if !self.heard_within(now, SILENT) {
-            return self.stretch(|place| column(place, COLUMN_M, Nature::Landing));
-        }
-        let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
-        let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
-        if age_s < OLD_S {
-            column(here, (BELOW_M + fallen_m).min(COLUMN_M), Nature::Landing);
-        } else {
-            // It may be anywhere down to there by now, and comes down from there.
-            column(here, fallen_m, Nature::Solid);
-            column(here - up(fallen_m), BELOW_M, Nature::Landing);
-        }
-    }
-
-    /// Height of the top of its climb, if it climbs or is about to.
-    fn climbs_to(&self) -> Option<f32> {
-        let (top, here) = (self.points.last()?, self.state.position);
-        let beside = (top - here).xy().norm_squared();
-        let climbs = self.column && !self.tells(LANDED | OUT) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
-        (climbs && top.z > here.z + TOP_M).then_some(top.z)
-    }
-
-    /// Places along its path as far as it may come unheard.
-    fn stretch(&self, mut tell: impl FnMut(Point)) {
-        let (mut at, mut left_m) = (self.state.position, STRETCH_M);
-        tell(at);
-        for next in &self.points {
-            let leg_m = (next - at).norm();
-            let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
-            for step in 1..=steps {
-                let along_m = step as f32 * STRETCH_STEP_M;
-                tell(at + (next - at) * (along_m / leg_m));
-            }
-            if leg_m >= left_m {
-                break;
-            }
-            left_m -= leg_m;
-            at = *next;
-            tell(at);
-        }
-    }
-
-    /// Where it may be from now on, with `margin_m` beyond `apart_m`.
-    fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let here = self.state.position;
-        let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
-        let column = |from: Point, nature: Nature| {
-            let to = from - Point::new(0.0, 0.0, COLUMN_M);
-            KeepOff { from, to, radius_m: apart_m + VAGUE_M, nature }
-        };
-        if self.tells(GROUNDED) && self.tells(OUT) && self.is_vague() {
-            tell(column(here, Nature::Lying));
-        } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
-            tell(place(apart_m));
-        } else if self.tells(OUT) {
-            tell(column(here, Nature::Solid));
-            // Where it is it may not be come near from above or the side, whatever its column leaves.
-            tell(place(apart_m + SWAY_M));
-        } else if self.is_dead(now) {
-            let down = !self.heard_within(now, DOWN);
-            let nature = if down { Nature::Lying } else { Nature::Solid };
-            self.stretch(|at| tell(column(at, nature)));
-        } else {
-            if self.lands(now) {
-                tell(column(here, Nature::Solid));
-            }
-            tell(place(apart_m + SWAY_M));
-        }
-    }
-}
 
 /// A neighbour as the safety filter sees it.
 #[derive(Clone, Copy, Debug)]
@@ -607,21 +415,6 @@ impl<const V: usize> Neighbours<V> {
         self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
     }
 
-    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.
-    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, apart_m: f32) -> bool {
-        let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {
-            return false;
-        };
-        let (mut below, mut from) = (false, contact.state.position);
-        let mut near = |a: Point, b: Point| {
-            let (leg, away) = ((b - a).xy(), (place - a).xy());
-            let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
-            below |= (away - leg * share).norm_squared() < apart_m * apart_m;
-        };
-        contact.stretch(|at| near(core::mem::replace(&mut from, at), at));
-        below
-    }
-
     /// The echo of one neighbour's last intent, of each in turn.
     pub(crate) fn echo(&self, turn: usize, now: Instant) -> Option<Echo> {
         let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
@@ -671,26 +464,6 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.is_empty()
     }
 
-    /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
-    /// is far enough.
-    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
-        let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
-        let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
-        if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, apart_m, tell);
-        }
-    }
-
-    /// Everybody who was out at `at` was looked at, and nobody is in the way.
-    pub fn found_clear(&mut self, at: Instant) {
-        self.clear_at = at;
-    }
-
-    /// Whether that was found at `at` or later.
-    pub fn is_clear_since(&self, at: Instant) -> bool {
-        self.clear_at >= at
-    }
-
     /// There is another plan: what was found, and who was flown around, does not count any more.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
@@ -700,56 +473,11 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
-    pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
-        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
-    }
-
-    /// Where vehicles that land without looking may come nearer than `apart_m`.
-    pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
-    }
-
-    /// The same of contact `i`.
-    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
-        let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
-        if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.columns(now, apart_m, tell);
-        }
-    }
-
-    /// Where a landing would end within `apart_m` of a vehicle that is there: flying over it is
-    /// allowed, ending there is not.
-    pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
-            let from = contact.state.position;
-            let to = from + Point::new(0.0, 0.0, SKY_M);
-            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Landing });
-        }
-    }
-
-    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as
-    /// near beside it.
-    pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
-            let from = contact.state.position;
-            let to = from + Point::new(0.0, 0.0, SKY_M);
-            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Solid });
-        }
-    }
-
     /// Whether a neighbour of the roster was heard within `span`, and one told that it hears us.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
-    }
-
-    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
-    pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
-        let under = |p: &Point| p.z < position.z && (p - position).xy().norm() < within_m;
-        self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 
     /// Whether every other vehicle of the roster told that it has landed or is out; true where there is none.

@@ -6,7 +6,6 @@ use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
 use crate::autopilot::Kind;
 use crate::events::Link;
 use crate::frame::Frame;
-use crate::guidance::setpoints_flow;
 use crate::limits::AutopilotLimits;
 use crate::machine::{Companion, DISARM_AFTER, ORIGIN_AGAIN};
 use crate::mission::State;
@@ -153,7 +152,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Begins to read what the autopilot's parameters allow. In flight the limits stay as they are.
     fn ask_for_limits(&mut self) {
-        if setpoints_flow(self.state) || self.telemetry.armed {
+        if self.state.streams_setpoints() || self.telemetry.armed {
             return;
         }
         self.autopilot_limits = AutopilotLimits::default_of(self.kind());
@@ -193,7 +192,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 changed |= self.autopilot_limits.set(limit, value);
             }
         }
-        if changed && !setpoints_flow(self.state) {
+        if changed && !self.state.streams_setpoints() {
             self.guidance.tune(&self.config, &self.autopilot_limits);
         }
     }

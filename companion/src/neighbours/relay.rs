@@ -22,7 +22,8 @@
 
 use heapless::Vec;
 
-use super::{Contact, LATELY, Neighbours};
+use super::contact::Contact;
+use super::{LATELY, Neighbours};
 use crate::time::{Duration, Instant};
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).

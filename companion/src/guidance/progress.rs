@@ -1,0 +1,159 @@
+//! How far the vehicle has come along its flight, and which parts of it are flown.
+
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::schedule::VehiclePlan;
+
+use super::{
+    ARRIVED_M, AT_END_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, STANDING_MPS, Scene,
+    WINDOW_EDGE_M,
+};
+use crate::mission::State;
+
+/// Arc length of the nearest point of the path; its end, if that is as near as counts as there.
+pub(super) fn nearest_m<const W: usize>(path: &Path<W>, place: &Point, near_m: f32, window_m: f32) -> f32 {
+    let (along_m, length_m) = (path.project(place, near_m, window_m), path.length_m());
+    if length_m - along_m < AT_END_M { length_m } else { along_m.max(0.0) }
+}
+
+impl Guidance {
+    /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the
+    /// descent. It never falls on one path.
+    pub fn progress_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {
+        self.flown_m(state, scene).max(self.reported_m)
+    }
+
+    pub(super) fn flown_m<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+    ) -> f32 {
+        let Some(plan) = scene.plan else { return 0.0 };
+        let (path, z) = (&plan.path, scene.telemetry.position.z);
+        let length_m = path.length_m();
+        let end_z = path.point_at(length_m).map_or(0.0, |p| p.z);
+        let start_z = path.point_at(0.0).map_or(0.0, |p| p.z);
+        if matches!(state, State::Disarm | State::Done) && self.reached_end(path) {
+            // A metre beyond the ground, so that every gate on this flight opens.
+            return length_m + plan.descent_m + 1.0;
+        }
+        match self.phase {
+            Phase::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
+            Phase::Path | Phase::Descent
+                if self.reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
+            {
+                length_m + (end_z - z).clamp(0.0, plan.descent_m)
+            }
+            _ if self.on_path => {
+                let behind = self.track.lead_max_m * 2.0;
+                let seen =
+                    path.project(&scene.telemetry.position, self.tracker.along_m - behind * 0.5, behind);
+                // Off its reference by less than counts as arrived, it has come as far as gates ask of one that waits.
+                let at = path.point_at(self.tracker.along_m);
+                let arrived = at.is_some_and(|at| (at - scene.telemetry.position).norm() < ARRIVED_M);
+                let least = if arrived { self.tracker.along_m - REPORTED_SHORT_M } else { f32::NEG_INFINITY };
+                seen.max(least).min(self.tracker.along_m)
+            }
+            _ => -plan.climb_m,
+        }
+    }
+
+    /// Whether the shared plan's path was flown to its end.
+    pub fn at_goal<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        !self.returning && !self.aside && scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    }
+
+    /// Whether the reference has come to the end of the path.
+    pub fn is_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        scene.plan.is_some_and(|plan| self.reached_end(&plan.path))
+    }
+
+    pub(super) fn reached_end<const W: usize>(&self, path: &Path<W>) -> bool {
+        self.on_path && self.tracker.along_m >= path.length_m()
+    }
+
+    /// Height of the ground below the vehicle, as far as the plan says, metres.
+    pub(crate) fn ground_m<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>) -> f32 {
+        let pad_m = plan.path.point_at(0.0).map_or(0.0, |p| p.z - plan.climb_m);
+        let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
+        match self.on_path {
+            true if self.reached_end(&plan.path) => end_m,
+            true => pad_m.min(end_m),
+            false => pad_m,
+        }
+    }
+
+    pub fn climb_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let top = self.leg.as_ref().and_then(|leg| leg.waypoints().last());
+        self.phase == Phase::Climb
+            && self.leg_done()
+            && top.is_some_and(|top| {
+                let apart = self.door.position() - scene.telemetry.position;
+                // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
+                (self.door.position().z - top.position.z).abs() < CLIMBED_M
+                    && self.stands()
+                    && apart.norm() < 2.0 * ARRIVED_M
+                    && apart.z.abs() < CLIMBED_M
+            })
+    }
+
+    /// Whether the path and the guided descent are flown.
+    pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        if self.is_algorithm2() {
+            let stands = self.stands() && scene.telemetry.velocity.norm() < STANDING_MPS;
+            return stands && self.on_path && self.waypoints.completed() && !self.aside;
+        }
+        let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
+        let Some(low) = leg.waypoints().last() else { return false };
+        self.phase == Phase::Descent
+            && !self.up
+            && self.leg_done()
+            && (scene.telemetry.position.z - low.position.z < DESCENDED_M
+                || self.guided_m(plan.descent_m) == 0.0)
+    }
+
+    /// Whether it stands at the end of the path and nobody keeps it from landing.
+    pub(super) fn stands_at_end<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+        let Some(plan) = scene.plan else { return false };
+        self.reached_end(&plan.path)
+            && !self.is_algorithm2()
+            && !self.aside
+            && self.stands()
+            && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
+                (end - scene.telemetry.position).norm() < ARRIVED_M
+                    && (end - self.door.position()).norm() < ARRIVED_M
+            })
+            && scene.telemetry.velocity.norm() < STANDING_MPS
+            && (self.advice.stop_within_m > plan.descent_m || self.returning)
+    }
+
+    /// Whether the vehicle is within `window_m` of its place along the path, and the straight way to the nearest point of
+    /// the path stays inside the leg's clearance.
+    pub fn near_path<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, window_m: f32) -> bool {
+        let Some(plan) = scene.plan else { return false };
+        let position = &scene.telemetry.position;
+        let along_m = plan.path.project(position, self.tracker.along_m, window_m);
+        if let (true, Some(first)) = (self.tracker.along_m <= 0.0, plan.path.waypoints().first()) {
+            // Over its pad, on the way up.
+            let away = position - first.position;
+            if (-plan.climb_m - ARRIVED_M..0.0).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+                return true;
+            }
+        }
+        if let (Phase::Descent, Some(last)) = (self.phase, plan.path.waypoints().last()) {
+            let away = position - last.position;
+            if (-plan.descent_m - ARRIVED_M..ARRIVED_M).contains(&away.z) && away.xy().norm() < ARRIVED_M {
+                return true;
+            }
+        }
+        if (along_m - self.tracker.along_m).abs() > window_m - WINDOW_EDGE_M {
+            return false;
+        }
+        let leg = plan.path.waypoints().iter().find(|w| w.along_m >= along_m && w.along_m > 0.0);
+        let (Some(leg), Some(nearest)) = (leg, plan.path.point_at(along_m)) else { return false };
+        // The hull is free where it is, and within the leg's clearance of the nearest point: the straight way between is if it
+        // leaves that ball nowhere else.
+        let free_m2 = leg.clearance_m * leg.clearance_m - self.track.radius_m * self.track.radius_m;
+        (nearest - position).norm_squared() <= free_m2
+    }
+}

@@ -1,0 +1,173 @@
+//! The next raw point: along the path, or along the straight leg of a climb, a join or a descent.
+
+use planner_core::Point;
+use planner_core::deconflict::Advice;
+use planner_core::path::{self, Path, Reference, Tracker};
+use planner_core::schedule::VehiclePlan;
+
+use super::door::TICK_S;
+use super::{FENCE_MARGIN_M, Guidance, JOIN_MPS, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
+use crate::mission::State;
+use crate::neighbours::Neighbours;
+use crate::retreat;
+use crate::time::Instant;
+
+impl Guidance {
+    /// The next raw point.
+    #[expect(clippy::too_many_arguments, reason = "what a step knows")]
+    pub(super) fn next_raw<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        plan: &VehiclePlan<W, G>,
+        advice: &Advice,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        blocked: &mut bool,
+    ) -> Point {
+        let path = &plan.path;
+        let raw = self.door.raw();
+        if core::mem::replace(&mut self.settled, false) && self.phase == Phase::Path {
+            (self.phase, self.leg) = (Phase::Join, None);
+        }
+        if self.phase == Phase::Climb && state != State::Climb && self.leg_done() {
+            (self.phase, self.leg) = (Phase::Join, None);
+        }
+        if self.phase == Phase::Path && state == State::Follow && self.stands_at_end(scene) {
+            (self.phase, self.leg) = (Phase::Descent, None);
+            self.progress_at = now;
+        }
+        let target = match self.phase {
+            Phase::Hold => return raw,
+            Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
+            Phase::Join => path.point_at(self.tracker.along_m),
+            Phase::Descent => path.point_at(path.length_m()).map(|end| {
+                Point::new(raw.x, raw.y, if self.up { end.z } else { end.z - self.guided_m(plan.descent_m) })
+            }),
+            Phase::Path if self.is_algorithm2() => {
+                return self.next_to_waypoint(path, &scene.telemetry.position, advice).unwrap_or(raw);
+            }
+            Phase::Path => return self.next_on_path(path, advice, neighbours, now, blocked).unwrap_or(raw),
+        };
+        let Some(target) = target else { return raw };
+        if self.leg.is_none() {
+            let mut leg = Path::new();
+            // Room for both.
+            let _ = leg.push(raw, f32::INFINITY.min(self.track.lead_max_m));
+            let _ = leg.push(target, f32::INFINITY.min(self.track.lead_max_m));
+            (self.leg, self.leg_tracker) = (Some(leg), Tracker::default());
+        }
+        let Some(leg) = &self.leg else { return raw };
+        let advice = Advice::FREE;
+        let reference = path::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
+        self.lead_m = LEG_LEAD_M;
+        if self.phase == Phase::Descent && self.leg_tracker.speed_mps > 0.0 {
+            self.progress_at = now;
+        }
+        if self.phase == Phase::Join && (leg.length_m() < LEG_LEAST_M || self.leg_done()) {
+            // Back up a descent it ends where that began: beside the path yet.
+            let beside_m = (target - raw).norm();
+            let joined = beside_m < LEG_LEAST_M + JOIN_MPS * TICK_S;
+            (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
+        }
+        reference.map_or(raw, |reference| reference.position)
+    }
+
+    /// The next raw point on the path, back from below a vehicle that comes down where it has to.
+    pub(super) fn next_on_path<const V: usize, const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        advice: &Advice,
+        neighbours: &mut Neighbours<V>,
+        now: Instant,
+        blocked: &mut bool,
+    ) -> Option<Point> {
+        let mut advice = *advice;
+        if let Some(to_m) = self.back_to_m {
+            let safety_m = self.deconflict.safety_distance_m;
+            let near = neighbours.at(now);
+            // The filter has looked that way since the step before.
+            let free = self.filter.looks_back() && !self.filter.is_stopped();
+            if !free {
+                advice.stop_within_m = 0.0;
+            } else if let Some(place) = retreat::step(path, &mut self.tracker, to_m, near, safety_m, TICK_S) {
+                return Some(place);
+            } else {
+                *blocked = true;
+                advice.stop_within_m = 0.0;
+            }
+        }
+        // Where the path leaves the geofence, it stops before it.
+        let speed = self.tracker.speed_mps.max(0.0);
+        let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
+        let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
+        if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+            advice.stop_within_m = advice.stop_within_m.min(braking_m);
+            self.fenced = true;
+        }
+        let Reference { position, lead_m, .. } =
+            path::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
+        self.lead_m = lead_m;
+        Some(position)
+    }
+
+    /// The next raw point by Algorithm 2: straight to the current waypoint, at the speed advised.
+    pub(super) fn next_to_waypoint<const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        position: &Point,
+        advice: &Advice,
+    ) -> Option<Point> {
+        let (raw, before) = (self.door.raw(), self.waypoints);
+        let target = self.waypoints.next(path, position);
+        let mut advice = *advice;
+        match target {
+            None => advice.speed_scale = 0.0,
+            Some(target) if self.leg.is_none() || self.waypoints != before => {
+                let mut leg = Path::new();
+                // Room for both.
+                let _ = leg.push(raw, self.track.lead_max_m);
+                let _ = leg.push(target, self.track.lead_max_m);
+                let course = |leg: &Path<2>| match leg.waypoints() {
+                    [from, to] => (to.position - from.position) / (to.along_m - from.along_m),
+                    _ => Point::zeros(),
+                };
+                // Of its speed it keeps what leads to the new waypoint.
+                let kept = self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
+                let speed_mps = self.leg_tracker.speed_mps * kept;
+                (self.leg, self.leg_tracker) = (Some(leg), Tracker { along_m: 0.0, speed_mps });
+            }
+            Some(_) => {}
+        }
+        let leg = self.leg.as_ref()?;
+        let speed = self.leg_tracker.speed_mps.max(0.0);
+        let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
+        let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + LEG_LEAST_M;
+        if leg.point_at(ahead_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+            advice.stop_within_m = braking_m;
+            self.fenced = true;
+        }
+        let reference = path::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
+        self.lead_m = LEG_LEAD_M;
+        self.tracker.speed_mps = self.leg_tracker.speed_mps;
+        let length_m = path.length_m();
+        self.tracker.along_m = if self.waypoints.completed() {
+            length_m
+        } else {
+            let seen_m = path.project(&reference.position, self.tracker.along_m, SETTLE_WINDOW_M);
+            seen_m.max(self.tracker.along_m).min((length_m - LEG_LEAST_M).max(0.0))
+        };
+        Some(reference.position)
+    }
+
+    /// Whether the straight way is flown by the raw point.
+    pub(super) fn leg_done(&self) -> bool {
+        self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
+    }
+
+    /// How far down the setpoint leads, metres. At the end of the path and free to land it goes straight down, not lower than
+    /// the margin kept to obstacles: only from there the autopilot lands by itself, which the wind may carry off.
+    pub(super) fn guided_m(&self, descent_m: f32) -> f32 {
+        libm::fmaxf(descent_m - self.low_m, 0.0)
+    }
+}

@@ -1,0 +1,379 @@
+//! What the rows of the table ask, and the snapshot that they ask it of.
+
+use crate::time::Duration;
+
+pub(crate) const FRESH: Duration = Duration::from_millis(500);
+
+/// What must hold for a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Guard {
+    /// HEARTBEAT was heard within the last second and a half.
+    AutopilotHeard,
+    /// HEARTBEAT is older than the limit.
+    NoHeartbeat,
+    /// A position is known, not older than half a second.
+    PositionKnown,
+    /// The position is older than the limit.
+    NoPosition,
+    /// The position jumped, or the EKF origin moved, within the last second.
+    PositionJumped,
+    /// Motors on and off the ground.
+    FoundFlying,
+    /// The plan has come.
+    PlanReady,
+    /// There will be no plan.
+    PlanFailed,
+    /// There will be no plan, for want of the mission's roadmap.
+    RoadmapBad,
+    /// MISSION_START was commanded, and the estimate's bound fits into the margin.
+    StartCommanded,
+    /// MISSION_START, and no goal is left for this vehicle.
+    StartWithoutGoal,
+    /// MISSION_START, but not at the start point.
+    StartElsewhere,
+    /// MISSION_START, but the motors are armed.
+    StartArmed,
+    /// MISSION_START, but the battery charge is below the configured limit.
+    StartBatteryLow,
+    /// MISSION_START, but outside the configured volume.
+    StartOutside,
+    /// A fresh position, away from the start point.
+    AwayFromStart,
+    /// Battery charge below the configured limit.
+    ChargeLow,
+    /// Outside the configured volume.
+    Outside,
+    /// MISSION_START, and for the limit, in which it may first be reported, the estimate's bound is worse than the margin leaves.
+    StartVague,
+    /// The estimate's bound has been worse than the margin leaves at a crawl for the limit.
+    EstimateVague,
+    /// The EKF origin moved while armed.
+    OriginMoved,
+    /// The schedule's take-off is due, and the neighbours leave room.
+    GatesOpen,
+    /// The state has lasted as long as the limit.
+    Elapsed,
+    /// The mode is the one that follows setpoints: Offboard (PX4) or Guided (ArduCopter).
+    Offboard,
+    /// The mode is neither the one before nor the one we asked for, and the autopilot reports no failsafe.
+    ModeTaken,
+    /// The mode is not ours, and the autopilot reports `MAV_STATE_CRITICAL`.
+    FailsafeActs,
+    /// Motors on.
+    Armed,
+    /// Motors off.
+    Disarmed,
+    /// Motors off, at the goal.
+    DisarmedAtGoal,
+    /// Motors on, and the state has lasted as long as the limit.
+    StaysArmed,
+    /// Motors off, the autopilot is heard, and the state has lasted as long as the limit.
+    StaysDisarmed,
+    /// The same, and the start is only paused.
+    StaysDisarmedPaused,
+    /// Arming was accepted, but the armed bit did not come.
+    ArmedUnseen,
+    /// Arming was requested and not answered.
+    ArmingUnanswered,
+    /// Motors on, and off the ground or moving up or down.
+    InAir,
+    /// The same, in Offboard or Guided that this companion entered, without setpoints.
+    Unattended,
+    /// Disarming was refused, and no mode lands the vehicle.
+    DisarmRefused,
+    /// In the air, or of an autopilot that needs no command to take off.
+    LiftedOff,
+    /// At the altitude of the start point.
+    ClimbDone,
+    /// At the end of the path, and the neighbours leave room to land.
+    PathDone,
+    /// No progress along the path for the limit.
+    Stalled,
+    /// DO_PAUSE_CONTINUE 0.
+    PauseCommanded,
+    /// DO_PAUSE_CONTINUE 1.
+    ResumeCommanded,
+    /// A fresh position, and the way back to the path is free.
+    BackOnPath,
+    /// A fresh position, but elsewhere than where it stopped on the path.
+    BackOffPath,
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, and the way back to the interrupted state is free.
+    ResumedOnPath,
+    /// Offboard or Guided, DO_PAUSE_CONTINUE 1, but too far from the path.
+    ResumedOffPath,
+    /// DO_PAUSE_CONTINUE 0, and the state has lasted as long as the limit.
+    PausedOnPad,
+    /// NAV_LAND.
+    LandCommanded,
+    /// NAV_LAND, motors on, in Offboard or Guided.
+    LandUnattended,
+    /// NAV_RETURN_TO_LAUNCH.
+    ReturnCommanded,
+    /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
+    ReturnInClimb,
+    /// The safety filter finds another vehicle in the column to the ground.
+    LandingBlocked,
+    /// It has found none for the limit.
+    LandingClear,
+    /// It has found one for the limit, and the path leads back to the pad.
+    NoRoomToLand,
+    /// Before the take-off: the column above has not been free for the limit.
+    ColumnBlocked,
+    /// The safety filter has made this vehicle yield for the limit.
+    Yielded,
+    /// The safety filter has kept this vehicle from going on for the limit.
+    Hindered,
+    /// The same, and it does not: a place aside may yet be sought.
+    NoRoomHere,
+    /// Back over its pad the descent has been stopped for the limit: a place aside may be sought.
+    PadTaken,
+    /// There is no place aside to land at.
+    NoPlaceAside,
+    /// It stands at the place aside where it is to land.
+    AsideReached,
+    /// Battery charge below half of the configured limit.
+    BatteryCritical,
+    /// Battery charge below the configured limit, and no neighbour below.
+    BatteryLow,
+    /// Outside the configured volume, and no neighbour below.
+    OutsideGeofence,
+    /// Of the neighbours that fly, none was heard for the limit.
+    NeighboursSilent,
+    /// A neighbour was heard within the last second.
+    NeighbourHeard,
+    /// On the ground after a flight or in the mode that lands, and at rest.
+    OnGround,
+    /// Something that left the plan is in the way, or we left it ourselves.
+    PathBlocked,
+    /// Nothing is in the way any more.
+    PathClear,
+    /// The path is blocked, all others stand, and it is this vehicle's turn.
+    OurTurn,
+    /// The way around has come.
+    DetourReady,
+    /// There is no way around.
+    DetourFailed,
+    /// There was none several times, and no neighbour is below.
+    NoWayAround,
+    /// The same, but somebody lies below, and the path leads back to the pad.
+    NoWayOn,
+    /// For the limit it waited where a vehicle lands without looking, and its own path led to no better place.
+    Underneath,
+    /// Standing still.
+    Standing,
+}
+
+/// What the guards look at: a snapshot of the vehicle, the commands and the plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// Time in the state.
+    pub in_state: Duration,
+    /// Time since the autopilot's last HEARTBEAT.
+    pub heartbeat_age: Duration,
+    /// Time since the last usable position.
+    pub position_age: Duration,
+    /// The position jumped lately.
+    pub jumped: bool,
+    /// Time without progress along the path.
+    pub stalled: Duration,
+    /// Time in the state without any neighbour heard; zero when all have landed.
+    pub neighbour_age: Duration,
+    /// A neighbour was heard within the last second.
+    pub neighbour_heard: bool,
+    /// A plan is held.
+    pub plan_ready: bool,
+    /// The shell has none.
+    pub plan_failed: bool,
+    /// The shell has none because the roadmap is missing or not the mission's.
+    pub roadmap_bad: bool,
+    /// The plan has a goal.
+    pub has_goal: bool,
+    /// Near the pad below the start point, in height too.
+    pub at_start: bool,
+    /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
+    pub imprecise: bool,
+    /// Time for which it has not even fitted at a crawl.
+    pub vague: Duration,
+    /// The EKF origin moved while armed.
+    pub origin_moved: bool,
+    /// MISSION_START holds.
+    pub start: bool,
+    /// DO_PAUSE_CONTINUE 0 holds.
+    pub pause: bool,
+    /// DO_PAUSE_CONTINUE 1 holds.
+    pub resume: bool,
+    /// NAV_LAND holds.
+    pub land: bool,
+    /// NAV_RETURN_TO_LAUNCH holds.
+    pub turn_back: bool,
+    /// The climb is not done: it goes on after the interruption.
+    pub in_climb: bool,
+    /// Motors on.
+    pub armed: bool,
+    /// Arming was accepted, and the armed bit is overdue.
+    pub armed_unseen: bool,
+    /// Arming was requested as often as allowed, and not answered.
+    pub arming_unanswered: bool,
+    /// Disarming was refused.
+    pub disarm_refused: bool,
+    /// The setpoint mode was entered for this mission and not left since.
+    pub ours: bool,
+    /// The mode is the one that lands.
+    pub landing: bool,
+    /// The mode is Offboard or Guided.
+    pub offboard: bool,
+    /// The mode is neither the one before nor the one asked for.
+    pub mode_foreign: bool,
+    /// `MAV_STATE_CRITICAL` or worse.
+    pub critical: bool,
+    /// The landing detector says ground.
+    pub on_ground: bool,
+    /// The landing detector said air since the motors were armed.
+    pub flown: bool,
+    /// Moves up or down.
+    pub vertical: bool,
+    /// Motors on, and the landing detector says air.
+    pub airborne: bool,
+    /// The landing detector says air, or nobody waits for that.
+    pub lifted_off: bool,
+    /// The neighbours leave room to go.
+    pub gates_open: bool,
+    /// At the altitude of the start.
+    pub climb_done: bool,
+    /// At the end of the path with room to land.
+    pub path_done: bool,
+    /// The path was flown to the goal.
+    pub at_goal: bool,
+    /// The way back to the path is free.
+    pub near_path: bool,
+    /// Time that the column to the ground, or before take-off to the top, was not free of other vehicles.
+    pub column_blocked: Duration,
+    /// Time that it was.
+    pub column_clear: Duration,
+    /// On its path, and not on the way back yet.
+    pub can_turn_back: bool,
+    /// Time for which something has stopped the descent to its pad.
+    pub pad_taken: Duration,
+    /// A place aside to land at may be sought.
+    pub can_land_aside: bool,
+    /// The way aside asked for, or flown, leads to where it is to land.
+    pub lands_aside: bool,
+    /// It stands at the end of that.
+    pub aside_reached: bool,
+    /// It comes down in any case: the battery is nearly empty, or it does not know where it would hold.
+    pub must_land: bool,
+    /// Time for which the safety filter has made it yield.
+    pub yielded: Duration,
+    /// Time for which the safety filter has kept it from going on.
+    pub hindered: Duration,
+    /// Battery charge below the configured limit.
+    pub battery_low: bool,
+    /// Battery charge below half of it.
+    pub battery_critical: bool,
+    /// No neighbour is in the column to the ground.
+    pub room_below: bool,
+    /// Outside the geofence.
+    pub outside: bool,
+    /// The path is blocked.
+    pub blocked: bool,
+    /// All others stand, and it is this vehicle's turn to fly around.
+    pub our_turn: bool,
+    /// The way around has come.
+    pub detour_ready: bool,
+    /// No way around was found, often enough.
+    pub no_way_around: bool,
+    /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
+    pub underneath: Duration,
+    /// Slower than a hovering vehicle sways.
+    pub standing: bool,
+}
+
+/// HEARTBEAT comes at 1 Hz: one late is not yet silence.
+pub(super) const HEARD: Duration = Duration::from_millis(1500);
+
+impl Guard {
+    /// Whether it holds, and has held for `limit`.
+    pub fn holds(self, i: &Inputs, limit: Duration) -> bool {
+        match self {
+            Self::AutopilotHeard => i.heartbeat_age < HEARD,
+            Self::NoHeartbeat => i.heartbeat_age > limit,
+            Self::PositionKnown => i.position_age < FRESH,
+            Self::NoPosition => i.position_age > limit,
+            Self::PositionJumped => i.jumped,
+            Self::FoundFlying => i.airborne,
+            Self::PlanReady => i.plan_ready,
+            Self::PlanFailed => i.plan_failed,
+            Self::RoadmapBad => i.roadmap_bad,
+            Self::StartCommanded => i.start && !i.imprecise,
+            Self::StartWithoutGoal => i.start && !i.has_goal,
+            Self::StartElsewhere => i.start && !i.at_start,
+            Self::StartArmed => i.start && i.armed,
+            Self::StartBatteryLow => i.start && i.battery_low,
+            Self::StartOutside => i.start && i.outside,
+            Self::AwayFromStart => i.position_age < FRESH && !i.at_start,
+            Self::ChargeLow => i.battery_low,
+            Self::Outside => i.outside,
+            Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
+            Self::EstimateVague => i.vague > limit,
+            Self::OriginMoved => i.origin_moved,
+            Self::GatesOpen => i.gates_open,
+            Self::Elapsed => i.in_state >= limit,
+            Self::Offboard => i.offboard,
+            Self::ModeTaken => i.mode_foreign && !i.critical,
+            Self::FailsafeActs => i.mode_foreign && i.critical,
+            Self::Armed => i.armed,
+            Self::Disarmed => !i.armed,
+            Self::DisarmedAtGoal => !i.armed && i.at_goal,
+            Self::StaysArmed => i.armed && i.in_state >= limit,
+            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD,
+            Self::StaysDisarmedPaused => {
+                !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD && i.start && i.pause
+            }
+            Self::ArmedUnseen => i.armed_unseen,
+            Self::ArmingUnanswered => i.arming_unanswered,
+            Self::InAir => i.armed && (i.airborne || i.vertical),
+            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < HEARD,
+            Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
+            Self::LiftedOff => i.lifted_off,
+            Self::ClimbDone => i.climb_done,
+            Self::PathDone => i.path_done,
+            Self::Stalled => i.stalled >= limit,
+            Self::PauseCommanded => i.pause,
+            Self::ResumeCommanded => i.resume,
+            Self::BackOnPath => i.position_age < FRESH && i.near_path,
+            Self::BackOffPath => i.position_age < FRESH && !i.near_path,
+            Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
+            Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
+            Self::PausedOnPad => i.pause && i.in_state >= limit,
+            Self::LandCommanded => i.land,
+            Self::LandUnattended => i.land && i.armed && i.offboard,
+            Self::ReturnCommanded => i.turn_back,
+            Self::ReturnInClimb => i.turn_back && i.in_climb,
+            Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
+            Self::NoRoomToLand => i.column_blocked >= limit && i.offboard && i.can_turn_back,
+            Self::NoRoomHere => i.column_blocked >= limit && i.offboard && i.can_land_aside,
+            Self::PadTaken => i.pad_taken >= limit && i.can_land_aside,
+            Self::NoPlaceAside => i.plan_failed && i.lands_aside,
+            Self::AsideReached => i.aside_reached,
+            Self::LandingClear => i.column_clear >= limit,
+            Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
+            Self::Yielded => i.yielded >= limit,
+            Self::Hindered => i.hindered >= limit,
+            Self::BatteryCritical => i.battery_critical,
+            Self::BatteryLow => i.battery_low && i.room_below,
+            Self::OutsideGeofence => i.outside && i.room_below,
+            Self::NeighboursSilent => i.neighbour_age > limit,
+            Self::NeighbourHeard => i.neighbour_heard,
+            Self::OnGround => i.on_ground && !i.vertical && (i.flown || i.landing),
+            Self::PathBlocked => i.blocked,
+            Self::PathClear => !i.blocked,
+            Self::OurTurn => i.our_turn,
+            Self::DetourReady => i.detour_ready,
+            Self::DetourFailed => i.plan_failed,
+            Self::NoWayAround => i.no_way_around && i.room_below,
+            Self::NoWayOn => i.no_way_around && i.can_turn_back,
+            Self::Underneath => i.underneath > limit,
+            Self::Standing => i.standing,
+        }
+    }
+}

@@ -1,0 +1,202 @@
+//! One vehicle as it was last heard, and where it may be since.
+
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::Neighbour;
+use planner_core::detour::{KeepOff, Nature};
+
+use super::*;
+
+#[derive(Clone, Debug)]
+pub(super) struct Contact {
+    pub(super) id: u8,
+    pub(super) rank: u16,
+    pub(super) sequence: SequenceFilter,
+    pub(super) heard_at: Option<Instant>,
+    pub(super) position_at: Option<Instant>,
+    pub(super) boot_ms: u32,
+    pub(super) flags: u8,
+    /// Since when it tells that it is out, and it is known where.
+    pub(super) out_at: Option<Instant>,
+    pub(super) hears_us_at: Option<Instant>,
+    /// Whom it hears, a bit for each rank.
+    pub(super) hears: u32,
+    /// Its progress as others passed it on, metres.
+    pub(super) relayed_m: Option<f32>,
+    /// When that was so.
+    pub(super) relayed_at: Option<Instant>,
+    /// Sequence number of its last intent.
+    pub(super) intent_sequence: u8,
+    pub(super) late: Lateness,
+    /// When an intent of our mission was last heard from it.
+    pub(super) belongs_at: Option<Instant>,
+    pub(super) points: Vec<Point, POINTS>,
+    /// How far from the first of them they lead, metres.
+    pub(super) extent_m: f32,
+    /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
+    pub(super) column: bool,
+    pub(super) floor_m: f32,
+    /// How fast it was when its position was heard, m/s.
+    pub(super) speed_mps: f32,
+    /// Whether its plan is ours, whether it follows it or not.
+    pub(super) shares_plan: bool,
+    /// When it was last known to move.
+    pub(super) moved_at: Instant,
+    /// The furthest it can have come, metres along its path, and when that was.
+    pub(super) furthest: Option<(f32, Instant)>,
+    /// Where it rested when a way around was planned.
+    pub(super) avoided: Option<Point>,
+    pub(super) state: Neighbour,
+}
+
+impl Contact {
+    pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
+        self.heard_at.is_some_and(|at| now - at < span)
+    }
+
+    pub(super) fn is_dead(&self, now: Instant) -> bool {
+        // Most are heard.
+        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= DEAD);
+        self.rank != STRANGER && silent(self.heard_at) && silent(self.known_at())
+    }
+
+    /// Whether it speaks, but has not known for long where it is.
+    pub(super) fn is_vague(&self) -> bool {
+        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= SILENT)
+    }
+
+    pub(super) fn tells(&self, flag: u8) -> bool {
+        self.flags & flag != 0
+    }
+
+    pub(super) fn is_out(&self, now: Instant) -> bool {
+        self.tells(OUT) || self.is_dead(now)
+    }
+
+    /// Whether it is out, and was when it was last looked at what is in the way.
+    pub(super) fn is_out_since(&self, at: Instant) -> bool {
+        self.out_at.is_some_and(|since| since <= at) || self.is_dead(at)
+    }
+
+    /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at
+    /// `fastest_mps`. The rest comes by and by, a landing that reports the whole way at once too. Less than before is
+    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle that was restarted too.
+    pub(super) fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
+        let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
+        let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
+        let late_m = believed_m + fastest_mps * LATE_S + STRIDE_M;
+        self.furthest = Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
+        believed_m
+    }
+
+    /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
+    pub(super) fn waits(&self, now: Instant) -> bool {
+        self.is_out(now)
+            || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
+            || self.lands(now)
+    }
+
+    /// Whether it flew around and comes down at the end of that.
+    pub(super) fn lands(&self, now: Instant) -> bool {
+        self.tells(DETOURS)
+            && !self.tells(GROUNDED)
+            && self.column
+            && self.points.last().is_some_and(|low| low.z < self.state.position.z)
+            && self.state.velocity.xy().norm_squared() < STANDING_MPS * STANDING_MPS
+            && self.heard_within(now, LATELY)
+    }
+
+    /// Whether it stands and is about to fly around.
+    pub(super) fn claims(&self, now: Instant) -> bool {
+        self.tells(BLOCKED)
+            && !self.waits(now)
+            && self.heard_within(now, LATELY)
+            && self.state.velocity.norm() < STANDING_MPS
+    }
+
+    /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
+    pub(super) fn comes_down(&self, now: Instant) -> bool {
+        let silent = !self.heard_within(now, SILENT) && !self.is_far(now);
+        self.rank != STRANGER
+            && !self.tells(GROUNDED | LANDED)
+            && !self.is_out(now)
+            && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
+    }
+
+    /// The columns it may come down in.
+    pub(super) fn columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let here = self.state.position;
+        let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
+        let mut column = |from: Point, below_m: f32, nature: Nature| {
+            tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
+        };
+        if !self.heard_within(now, SILENT) {
+            return self.stretch(|place| column(place, COLUMN_M, Nature::Landing));
+        }
+        let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
+        let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
+        if age_s < OLD_S {
+            column(here, (BELOW_M + fallen_m).min(COLUMN_M), Nature::Landing);
+        } else {
+            // It may be anywhere down to there by now, and comes down from there.
+            column(here, fallen_m, Nature::Solid);
+            column(here - up(fallen_m), BELOW_M, Nature::Landing);
+        }
+    }
+
+    /// Height of the top of its climb, if it climbs or is about to.
+    pub(super) fn climbs_to(&self) -> Option<f32> {
+        let (top, here) = (self.points.last()?, self.state.position);
+        let beside = (top - here).xy().norm_squared();
+        let climbs = self.column && !self.tells(LANDED | OUT) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
+        (climbs && top.z > here.z + TOP_M).then_some(top.z)
+    }
+
+    /// Places along its path as far as it may come unheard.
+    pub(super) fn stretch(&self, mut tell: impl FnMut(Point)) {
+        let (mut at, mut left_m) = (self.state.position, STRETCH_M);
+        tell(at);
+        for next in &self.points {
+            let leg_m = (next - at).norm();
+            let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
+            for step in 1..=steps {
+                let along_m = step as f32 * STRETCH_STEP_M;
+                tell(at + (next - at) * (along_m / leg_m));
+            }
+            if leg_m >= left_m {
+                break;
+            }
+            left_m -= leg_m;
+            at = *next;
+            tell(at);
+        }
+    }
+
+    /// Where it may be from now on, with `margin_m` beyond `apart_m`.
+    pub(super) fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let here = self.state.position;
+        let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
+        let column = |from: Point, nature: Nature| {
+            let to = from - Point::new(0.0, 0.0, COLUMN_M);
+            KeepOff { from, to, radius_m: apart_m + VAGUE_M, nature }
+        };
+        if self.tells(GROUNDED) && self.tells(OUT) && self.is_vague() {
+            tell(column(here, Nature::Lying));
+        } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
+            tell(place(apart_m));
+        } else if self.tells(OUT) {
+            tell(column(here, Nature::Solid));
+            // Where it is it may not be come near from above or the side, whatever its column leaves.
+            tell(place(apart_m + SWAY_M));
+        } else if self.is_dead(now) {
+            let down = !self.heard_within(now, DOWN);
+            let nature = if down { Nature::Lying } else { Nature::Solid };
+            self.stretch(|at| tell(column(at, nature)));
+        } else {
+            if self.lands(now) {
+                tell(column(here, Nature::Solid));
+            }
+            tell(place(apart_m + SWAY_M));
+        }
+    }
+}
