@@ -11,6 +11,7 @@ use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::Method;
+use planner_core::file::FileError;
 use planner_core::frames::Geodetic;
 use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
@@ -99,7 +100,7 @@ fn in_range(point: &Point) -> bool {
 
 impl MissionHeader {
     fn check(&self) -> Result<(), MissionError> {
-        let refuse = |name| Err(MissionError::Header(name));
+        let refuse = |name| Err(FileError::Header(name).into());
         if !self.origin.is_valid() {
             return refuse("origin");
         }
@@ -213,7 +214,7 @@ pub fn write(
 ) -> Result<usize, MissionError> {
     let (Ok(vehicle_count), Ok(goal_count)) = (u16::try_from(vehicles.len()), u16::try_from(goals.len()))
     else {
-        return Err(MissionError::Length);
+        return Err(FileError::Length.into());
     };
     let needed = encoded_len(vehicles.len(), goals.len());
     let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
@@ -278,27 +279,27 @@ impl<'a> MissionView<'a> {
     /// # Errors
     /// Names the first thing that is not sound.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, MissionError> {
-        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(MissionError::Truncated)?;
+        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
         if head[..8] != MAGIC {
-            return Err(MissionError::Magic);
+            return Err(FileError::Magic.into());
         }
         let u16_at = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
         let u32_at = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
         let ground_stations = match u16_at(8) {
             WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
             VERSION => [head[28], head[29], head[30], head[31]],
-            other => return Err(MissionError::Version(other)),
+            other => return Err(FileError::Version(other).into()),
         };
         let total = u32_at(12) as usize;
         let (vehicle_count, goal_count) = (usize::from(u16_at(24)), usize::from(u16_at(26)));
         if usize::from(u16_at(10)) != HEADER_LEN || encoded_len(vehicle_count, goal_count) != total {
-            return Err(MissionError::Length);
+            return Err(FileError::Length.into());
         }
-        let body = bytes.get(..total).ok_or(MissionError::Truncated)?;
-        let (covered, stored) = body.split_last_chunk::<CRC_LEN>().ok_or(MissionError::Truncated)?;
+        let body = bytes.get(..total).ok_or(FileError::Truncated)?;
+        let (covered, stored) = body.split_last_chunk::<CRC_LEN>().ok_or(FileError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
         if CRC.checksum(covered) != crc {
-            return Err(MissionError::Crc);
+            return Err(FileError::Crc.into());
         }
         let f64_at = |at: usize| f64::from_bits(u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32);
         let header = MissionHeader {
@@ -307,13 +308,13 @@ impl<'a> MissionView<'a> {
                 0 => Mode::Labelled,
                 1 => Mode::Unlabelled(Objective::TotalDistance),
                 2 => Mode::Unlabelled(Objective::Makespan),
-                _ => return Err(MissionError::Header("mode")),
+                _ => return Err(FileError::Header("mode").into()),
             },
             method: match head[21] {
                 0 => Method::Off,
                 1 => Method::Algorithm2,
                 2 => Method::Priority,
-                _ => return Err(MissionError::Header("method")),
+                _ => return Err(FileError::Header("method").into()),
             },
             origin: Geodetic { lat_deg: f64_at(32), lon_deg: f64_at(40), alt_m: f64_at(48) },
             cruise_mps: f32_at(head, 56),
@@ -327,7 +328,7 @@ impl<'a> MissionView<'a> {
             geofence: match u16_at(22) {
                 0 => None,
                 FENCED => Some((point_at(head, 76), point_at(head, 88))),
-                _ => return Err(MissionError::Header("flags")),
+                _ => return Err(FileError::Header("flags").into()),
             },
             ground_stations,
         };
@@ -336,7 +337,7 @@ impl<'a> MissionView<'a> {
         let view = Self { header, crc, vehicles: vehicles.as_chunks().0, goals: goals.as_chunks().0 };
         view.check_lists()?;
         if u16_at(8) == VERSION && view.vehicles().any(|v| ground_stations.contains(&v.task.id)) {
-            return Err(MissionError::Header("ground_stations"));
+            return Err(FileError::Header("ground_stations").into());
         }
         Ok(view)
     }

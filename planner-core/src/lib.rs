@@ -8,6 +8,7 @@
 pub mod assignment;
 pub mod deconflict;
 pub mod detour;
+pub mod file;
 pub mod frames;
 pub mod path;
 pub mod plan;

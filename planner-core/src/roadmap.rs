@@ -20,6 +20,7 @@
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 
 use crate::Point;
+use crate::file::FileError;
 use crate::frames::Geodetic;
 use crate::prm::squared_length;
 
@@ -61,18 +62,8 @@ const CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 /// Why a roadmap was refused, on reading or writing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RoadmapError {
-    /// The bytes end before the header, or before the length the header gives.
-    Truncated,
-    /// The first eight bytes are not [`MAGIC`].
-    Magic,
-    /// A version this code does not know.
-    Version(u16),
-    /// The lengths and counts in the header contradict one another.
-    Length,
-    /// The CRC-32 over the file does not match.
-    Crc,
-    /// The named header field is not a finite number inside its range.
-    Header(&'static str),
+    /// The bytes are no whole file.
+    File(FileError),
     /// This node is NaN, infinite or beyond [`MAX_COORDINATE_M`].
     Node(u16),
     /// The row of this node is out of order or beyond the half-edges.
@@ -110,6 +101,12 @@ pub enum RoadmapError {
     Duplicate(u16, u16),
 }
 
+impl From<FileError> for RoadmapError {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
+    }
+}
+
 /// What a roadmap says about itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadmapHeader {
@@ -132,7 +129,7 @@ pub struct RoadmapHeader {
 
 impl RoadmapHeader {
     fn check(&self, node_count: usize) -> Result<(), RoadmapError> {
-        let refuse = |name| Err(RoadmapError::Header(name));
+        let refuse = |name| Err(FileError::Header(name).into());
         if !self.origin.is_valid() {
             return refuse("origin");
         }
@@ -226,14 +223,14 @@ pub struct RoadmapView<'a> {
 impl<'a> RoadmapView<'a> {
     /// Checks a roadmap at the start of `bytes`; what follows its length is ignored, so a whole flash slot can be given.
     pub fn parse(bytes: &'a [u8]) -> Result<Self, RoadmapError> {
-        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(RoadmapError::Truncated)?;
+        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
         let total = declared_len(head)?;
         let counts = [60, 64, 68].map(|at| u32_at(head, at) as usize);
-        let body = bytes.get(..total).ok_or(RoadmapError::Truncated)?;
-        let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(RoadmapError::Truncated)?;
+        let body = bytes.get(..total).ok_or(FileError::Truncated)?;
+        let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(FileError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
         if CRC.checksum(covered) != crc {
-            return Err(RoadmapError::Crc);
+            return Err(FileError::Crc.into());
         }
         let header = RoadmapHeader {
             origin: Geodetic {
@@ -380,25 +377,25 @@ impl<'a> RoadmapView<'a> {
 /// It is no roadmap, of another version, or its counts are not those of such a length.
 pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
     if head[..8] != MAGIC {
-        return Err(RoadmapError::Magic);
+        return Err(FileError::Magic.into());
     }
     let heights = match u16_at(head, 8) {
         WITHOUT_HEIGHTS => 0,
         VERSION => 1,
-        other => return Err(RoadmapError::Version(other)),
+        other => return Err(FileError::Version(other).into()),
     };
     let total = u32_at(head, 12) as usize;
     let (node_count, half_edge_count) = (u32_at(head, 60) as usize, u32_at(head, 64) as usize);
     let landmarks = u32_at(head, 68) as usize;
     let sound = half_edge_count % 2 == 0 && (landmarks == 0 || landmarks == LANDMARKS);
     if usize::from(u16_at(head, 10)) != HEADER_LEN || !sound {
-        return Err(RoadmapError::Length);
+        return Err(FileError::Length.into());
     }
     if node_count > MAX_NODES {
         return Err(RoadmapError::TooManyNodes);
     }
     if encoded_len(node_count, half_edge_count / 2, landmarks + heights) != Some(total) {
-        return Err(RoadmapError::Length);
+        return Err(FileError::Length.into());
     }
     Ok(total)
 }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use flockmate_tests::meeting::dice::Dice;
 use flockmate_tests::roadmaps::Forger;
+use planner_core::roadmap::RoadmapError;
 
 /// Files forged of one roadmap.
 const OF_ONE: usize = 50;
@@ -22,7 +23,13 @@ fn forged_files_are_refused_or_searched_right() {
         let verdict = match forger.forge(&mut dice) {
             Ok(()) => "searched".to_owned(),
             // The name of the error without its numbers.
-            Err(error) => format!("{error:?}").split(['(', ' ']).next().unwrap_or_default().to_owned(),
+            Err(error) => {
+                let name = match error {
+                    RoadmapError::File(error) => format!("{error:?}"),
+                    error => format!("{error:?}"),
+                };
+                name.split(['(', ' ']).next().unwrap_or_default().to_owned()
+            }
         };
         *verdicts.entry(verdict).or_default() += 1;
     }

@@ -2,22 +2,14 @@
 
 use core::fmt;
 
+use planner_core::file::FileError;
+
 /// Why a mission file was refused, on reading or writing. Printed, it says so in at most 41 characters, so that a STATUSTEXT
 /// has room for it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MissionError {
-    /// The bytes end before the header, or before the length the header gives.
-    Truncated,
-    /// The first eight bytes are not [`super::MAGIC`].
-    Magic,
-    /// A version this code does not know.
-    Version(u16),
-    /// The lengths and counts in the header contradict one another.
-    Length,
-    /// The CRC-32 over the file does not match.
-    Crc,
-    /// The named header field is not known, or not a finite number inside its range.
-    Header(&'static str),
+    /// The bytes are no whole file.
+    File(FileError),
     /// The vehicle at this index has no system id, one that another has, or a number out of range.
     Vehicle(u16),
     /// Labelled, the vehicle with this system id has a goal that is another one's too.
@@ -42,12 +34,7 @@ pub enum MissionError {
 impl fmt::Display for MissionError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Truncated => write!(f, "it ends too early"),
-            Self::Magic => write!(f, "it does not begin as one"),
-            Self::Version(version) => write!(f, "its version {version} is not known here"),
-            Self::Length => write!(f, "its lengths contradict one another"),
-            Self::Crc => write!(f, "its CRC-32 does not match"),
-            Self::Header(field) => write!(f, "its {field} is out of range"),
+            Self::File(error) => error.fmt(f),
             Self::Vehicle(index) => write!(f, "vehicle no. {index} is unsound or twice"),
             Self::SameGoal(id) => write!(f, "vehicle {id} has another one's goal"),
             Self::StartOutside(id) => write!(f, "vehicle {id} starts outside the geofence"),
@@ -57,5 +44,11 @@ impl fmt::Display for MissionError {
             Self::RosterFull => write!(f, "it has too many vehicles or goals"),
             Self::NotInRoster(id) => write!(f, "it has no vehicle {id}"),
         }
+    }
+}
+
+impl From<FileError> for MissionError {
+    fn from(error: FileError) -> Self {
+        Self::File(error)
     }
 }

@@ -96,12 +96,7 @@ pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
 /// What is wrong with a file.
 fn why(error: &RoadmapError) -> String {
     match error {
-        RoadmapError::Truncated => "it ends too early".to_owned(),
-        RoadmapError::Magic => "it does not begin as a roadmap file does".to_owned(),
-        RoadmapError::Version(version) => format!("its version {version} is not known here"),
-        RoadmapError::Length => "its lengths and counts contradict one another".to_owned(),
-        RoadmapError::Crc => "its CRC-32 does not match: it is damaged".to_owned(),
-        RoadmapError::Header(field) => format!("its header field {field} is out of range"),
+        RoadmapError::File(error) => error.to_string(),
         other => format!("its contents are not sound: {other:?}"),
     }
 }

@@ -187,14 +187,14 @@ fn bad_input_is_refused_by_name() {
     assert_eq!(refuse(|_, _, edges| edges[1].clearance_m = 0.248), RoadmapError::EdgeClearance(2));
     assert_eq!(refuse(|_, nodes, _| nodes[1] *= 16.0), RoadmapError::EdgeLength(0));
     assert_eq!(refuse(|header, _, _| header.edge_min_m = 2.0), RoadmapError::EdgeLength(2));
-    assert_eq!(refuse(|header, _, _| header.edge_max_m = 101.0), RoadmapError::Header("edge_max_m"));
+    assert_eq!(refuse(|header, _, _| header.edge_max_m = 101.0), FileError::Header("edge_max_m").into());
     assert_eq!(
         refuse(|_, _, edges| edges.push(Edge { a: 1, b: 0, clearance_m: 0.7 })),
         RoadmapError::Duplicate(0, 1)
     );
-    assert_eq!(refuse(|header, _, _| header.goals = 3), RoadmapError::Header("terminals"));
-    assert_eq!(refuse(|header, _, _| header.origin.lat_deg = f64::NAN), RoadmapError::Header("origin"));
-    assert_eq!(refuse(|header, _, _| header.edge_max_m = 0.4), RoadmapError::Header("edge_max_m"));
+    assert_eq!(refuse(|header, _, _| header.goals = 3), FileError::Header("terminals").into());
+    assert_eq!(refuse(|header, _, _| header.origin.lat_deg = f64::NAN), FileError::Header("origin").into());
+    assert_eq!(refuse(|header, _, _| header.edge_max_m = 0.4), FileError::Header("edge_max_m").into());
     let (nodes, edges) = small();
     let full = write(&header(1, 1), &nodes, &edges, &mut [0; 143]);
     assert_eq!(full, Err(RoadmapError::RoadmapFull { needed: 144 }));

@@ -6,6 +6,7 @@ use super::{
     target_of,
 };
 use crate::Point;
+use crate::file::FileError;
 use crate::search::{SearchWorkspace, ways_from};
 
 /// An undirected edge to be written.
@@ -108,7 +109,7 @@ fn write_graph<'a>(
     if nodes.len() > MAX_NODES {
         return Err(RoadmapError::TooManyNodes);
     }
-    let needed = encoded_len(nodes.len(), edges.len(), columns).ok_or(RoadmapError::Length)?;
+    let needed = encoded_len(nodes.len(), edges.len(), columns).ok_or(FileError::Length)?;
     let out = out.get_mut(..needed).ok_or(RoadmapError::RoadmapFull { needed })?;
     header.check(nodes.len())?;
     check_edges(header, nodes, edges)?;

@@ -1,0 +1,33 @@
+//! What can be wrong with any of our files: a magic number, a version, lengths, a header and a CRC-32 are common to all.
+
+use core::fmt;
+
+/// Why bytes are not a whole file, whatever the file holds. Printed, it says so in at most 41 characters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FileError {
+    /// The bytes end before the header, or before the length the header gives.
+    Truncated,
+    /// The first eight bytes are not the magic number.
+    Magic,
+    /// A version this code does not know.
+    Version(u16),
+    /// The lengths and counts in the header contradict one another.
+    Length,
+    /// The CRC-32 over the file does not match.
+    Crc,
+    /// The named header field is not known, or not a finite number inside its range.
+    Header(&'static str),
+}
+
+impl fmt::Display for FileError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Truncated => write!(f, "it ends too early"),
+            Self::Magic => write!(f, "it does not begin as one"),
+            Self::Version(version) => write!(f, "its version {version} is not known here"),
+            Self::Length => write!(f, "its lengths contradict one another"),
+            Self::Crc => write!(f, "its CRC-32 does not match: it is damaged"),
+            Self::Header(field) => write!(f, "its {field} is out of range"),
+        }
+    }
+}
