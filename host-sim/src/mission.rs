@@ -1,5 +1,7 @@
 //! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request every companion plans.
 
+mod places;
+
 use std::sync::OnceLock;
 use std::time::Instant;
 
@@ -11,20 +13,17 @@ use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::path::PathError;
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
-use planner_core::prm::Config;
-use planner_core::roadmap::{MAX_EDGE_M, RoadmapHeader, RoadmapView};
+use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
 use planner_core::search::SearchWorkspace;
-use planner_core::segment::segment_is_clear;
 
 use crate::capacity::{Board, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
-use crate::map::column::{ColumnError, column, nearest_column};
 use crate::map::{self, ClearanceField, VoxelMap};
 use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
-use crate::roadmap::{self, Parts, Roadmap};
-use crate::scenario::{self, Scenario, Terminals};
+use crate::roadmap::{self, Roadmap};
+use crate::scenario::{self, Scenario};
 use crate::swarm::member::DeskCompanion;
 
 /// The plan of a swarm with the desk's capacities.
@@ -39,8 +38,6 @@ pub const ACCEL_MPS2: f32 = 1.5;
 pub const VERTICAL_MPS: f32 = 1.0;
 /// Share of the cruise speed that corners, braking and gusts leave over a flight.
 const PACE: f32 = 0.9;
-/// Spacing of the places tried as slots around a single goal, metres.
-const SLOT_GRID_M: f32 = 0.25;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
@@ -107,8 +104,8 @@ impl Mission {
             cruise_mps: PACE * scenario.mission.cruise_mps,
             vertical_mps: VERTICAL_MPS,
         };
-        let goals = goals(&scenario, &map, &schedule)?;
-        let tasks = tasks(&scenario, &map)?;
+        let goals = places::goals(&scenario, &map, &schedule)?;
+        let tasks = places::tasks(&scenario, &map)?;
         let largest_m = scenario.largest_radius_m();
         let descents_m = goals
             .iter()
@@ -117,7 +114,7 @@ impl Mission {
                 // The slots around a single goal stand where that stands.
                 let places = &scenario.mission.goal_places;
                 let place = places.get(i).or(places.first());
-                height_over_ground(&scenario, &map, &format!("goal {i}"), place, goal, largest_m)
+                places::height_over_ground(&scenario, &map, &format!("goal {i}"), place, goal, largest_m)
             })
             .collect::<anyhow::Result<_>>()?;
         if let Some(Board { name, vehicles, .. }) =
@@ -128,7 +125,7 @@ impl Mission {
                 scenario.path
             );
         }
-        let (mut roadmap, header, parts) = build(&scenario, &map, &goals)?;
+        let (mut roadmap, header, parts) = places::build(&scenario, &map, &goals)?;
         timing.roadmap_parts = parts;
         let capping = Instant::now();
         if let Some(board) = board {
@@ -369,161 +366,4 @@ fn planner_mode(mission: &scenario::Mission) -> Mode {
         (_, scenario::Objective::Total) => Mode::Unlabelled(Objective::TotalDistance),
         (_, scenario::Objective::Makespan) => Mode::Unlabelled(Objective::Makespan),
     }
-}
-
-/// Height of a start or goal over where a vehicle of this radius stands below it; its column has the required clearance.
-fn height_over_ground(
-    scenario: &Scenario,
-    map: &VoxelMap,
-    what: &str,
-    place: Option<&String>,
-    point: &Point,
-    radius_m: f32,
-) -> anyhow::Result<f32> {
-    let required_m = radius_m + scenario.roadmap.safety_margin_m;
-    let error = match column(map, point, radius_m, required_m) {
-        Ok(ground_m) => return Ok(point.z - ground_m - radius_m),
-        Err(error) => error,
-    };
-    let at = format!("{}: [{}, {}, {}]", place.unwrap_or(&scenario.path), point.x, point.y, point.z);
-    let why = match error {
-        ColumnError::NotFree => {
-            format!("{what} is not free: {at} lies in an obstacle, in unknown space or outside the map")
-        }
-        ColumnError::NoGround => format!("{what} has no ground below it: {at} is over nothing"),
-        ColumnError::UnknownBelow { top_m } => {
-            format!(
-                "{what} has no ground below it: {at} is over unknown space, which reaches up to {top_m:.2} m"
-            )
-        }
-        ColumnError::TooLow { ground_m } => bail!(
-            "{what} is too low: {at} is {:.2} m above the ground, less than the radius of {radius_m} m\n\
-             hint: give it a height of at least {:.2} m",
-            point.z - ground_m,
-            ground_m + radius_m
-        ),
-        ColumnError::TooNear { place, distance_m, unknown } => {
-            let obstacle = if unknown { "unknown space" } else { "an obstacle" };
-            format!(
-                "{what} has too little room between it and the ground: {at} needs {required_m:.2} m around its column, \
-                 and {obstacle} at [{:.2}, {:.2}, {:.2}] is {distance_m:.2} m from it",
-                place.x, place.y, place.z
-            )
-        }
-    };
-    match nearest_column(map, point, radius_m, required_m) {
-        Some(place) => {
-            bail!("{why}\nhint: the nearest place that would do is [{}, {}, {}]", place.x, place.y, place.z)
-        }
-        None => {
-            bail!("{why}\nhint: no place near it would do; `host-sim map info` shows the map's extent")
-        }
-    }
-}
-
-fn tasks(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<Vec<VehicleTask>> {
-    let task = |(i, vehicle): (usize, &scenario::Vehicle)| {
-        let place = scenario.vehicle_places.get(i);
-        let what = format!("start of vehicle {}", vehicle.id);
-        Ok(VehicleTask {
-            id: vehicle.id,
-            required_clearance_m: vehicle.radius_m + scenario.roadmap.safety_margin_m,
-            climb_m: height_over_ground(scenario, map, &what, place, &vehicle.start, vehicle.radius_m)?,
-            goal: vehicle.goal.map(|goal| goal as u16),
-        })
-    };
-    scenario.vehicles.iter().enumerate().map(task).collect()
-}
-
-/// The scenario's goals; a single goal becomes slots around it, as many as vehicles, far enough apart to land in.
-fn goals(scenario: &Scenario, map: &VoxelMap, schedule: &ScheduleConfig) -> anyhow::Result<Vec<Point>> {
-    let given = &scenario.mission.goals;
-    if scenario.mission.mode != scenario::Mode::SingleGoal {
-        return Ok(given.clone());
-    }
-    let (goal, wanted) = (given[0], scenario.vehicles.len());
-    let (largest_m, required_m) = (scenario.largest_radius_m(), scenario.required_clearance_m());
-    // Vehicles that stand on two of them must not keep each other from landing.
-    let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
-    // As many discs of half the spacing as fit a circle, with room to spare for walls.
-    let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
-    let steps = (reach_m / SLOT_GRID_M) as i32;
-    let mut offsets: Vec<(i32, i32)> =
-        (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
-    offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
-    let mut slots: Vec<Point> = Vec::new();
-    for (i, j) in offsets {
-        let slot = goal + Point::new(i as f32, j as f32, 0.0) * SLOT_GRID_M;
-        let apart = slots.iter().all(|s| (s - slot).norm() >= apart_m);
-        if apart
-            && scenario.mission.geofence.as_ref().is_none_or(|fence| fence.holds(&slot))
-            && segment_is_clear(&map.grid(), &goal, &slot, required_m)
-            && column(map, &slot, largest_m, required_m).is_ok()
-        {
-            slots.push(slot);
-            if slots.len() == wanted {
-                return Ok(slots);
-            }
-        }
-    }
-    bail!(
-        "no room at the single goal: {}: only {} of {wanted} vehicles find a place {apart_m} m apart in sight of it\n\
-         hint: a goal with {reach_m:.0} m of free floor around it has room for all; fewer vehicles or a smaller \
-         deconfliction.safety_distance_m need less",
-        scenario.mission.goal_places.first().unwrap_or(&scenario.path),
-        slots.len()
-    )
-}
-
-/// Shortest and longest edge, metres; shares are of the map's longest side.
-fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32)> {
-    let settings = &scenario.roadmap;
-    let size_m = (map.shape.max() - map.shape.min).max();
-    let metres = |share: Option<f32>, metres: f32| share.map_or(metres, |share| share * size_m);
-    let min_m = metres(settings.edge_min_share, settings.edge_min_m);
-    let max_m = metres(settings.edge_max_share, settings.edge_max_m);
-    if !(min_m < max_m && max_m <= MAX_EDGE_M) {
-        bail!(
-            "roadmap edges cannot be from {min_m} to {max_m} m long: {}: the map's longest side is {size_m} m, \
-             and the longest edge must be above the shortest and at most {MAX_EDGE_M} m",
-            scenario.path
-        );
-    }
-    Ok((min_m, max_m))
-}
-
-fn build(
-    scenario: &Scenario,
-    map: &VoxelMap,
-    goals: &[Point],
-) -> anyhow::Result<(Roadmap, RoadmapHeader, Parts)> {
-    let starts = scenario.vehicles.iter().map(|v| v.start);
-    let terminals: Vec<Point> = starts.chain(goals.iter().copied()).collect();
-    let settings = &scenario.roadmap;
-    // Tested for the smallest vehicle; a larger one leaves out the edges whose clearance is too small for it.
-    let smallest_m = scenario.vehicles.iter().map(|v| v.radius_m).fold(f32::INFINITY, f32::min);
-    let (edge_min_m, edge_max_m) = edge_lengths(scenario, map)?;
-    let config = Config {
-        nodes: settings.nodes as usize,
-        edge_min_m,
-        edge_max_m,
-        clearance_m: smallest_m + settings.safety_margin_m,
-        seed: scenario.seed,
-        sampling: settings.sampling,
-    };
-    let (mut roadmap, parts) = roadmap::build(map, &terminals, &config)?;
-    if settings.terminals == Terminals::Apart {
-        let is_terminal = |node: u16| usize::from(node) < terminals.len();
-        roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
-    }
-    let header = RoadmapHeader {
-        origin: scenario.map.origin,
-        edge_min_m: config.edge_min_m,
-        edge_max_m: config.edge_max_m,
-        tested_clearance_m: config.clearance_m,
-        max_clearance_m: roadmap::CLEARANCE_MAX_M,
-        starts: scenario.vehicles.len() as u16,
-        goals: goals.len() as u16,
-    };
-    Ok((roadmap, header, parts))
 }

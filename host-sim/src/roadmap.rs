@@ -11,6 +11,7 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use planner_core::Point;
+use planner_core::frames::Geodetic;
 use planner_core::prm::{self, Config, PrmError, Workspace};
 use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapError, RoadmapHeader};
 use planner_core::search::SearchWorkspace;
@@ -193,6 +194,19 @@ impl Roadmap {
         let edges = cap::cap(&self.nodes, &self.edges, most)
             .ok_or_else(|| anyhow!("the roadmap does not fit {name}: {most} edges do not connect it"))?;
         Ok(Self { edges, ..self })
+    }
+}
+
+/// The header of the file of a roadmap that was built like this.
+pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> RoadmapHeader {
+    RoadmapHeader {
+        origin,
+        edge_min_m: config.edge_min_m,
+        edge_max_m: config.edge_max_m,
+        tested_clearance_m: config.clearance_m,
+        max_clearance_m: CLEARANCE_MAX_M,
+        starts,
+        goals,
     }
 }
 

@@ -14,13 +14,11 @@
 //!
 //! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
 
-#[cfg(test)]
-pub(crate) mod checker;
 mod near;
 mod pieces;
 pub mod sipp;
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};

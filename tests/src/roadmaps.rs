@@ -1,8 +1,8 @@
 //! Roadmap files whose CRC is right and whose contents are not: refused, or every search on them is right and ends within
 //! its bound.
 //!
-//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must find is told by Dijkstra
-//! 1959 in f64. A search may ask about each half-edge once.
+//! One body ([`Forger::forge`]) serves the fuzzer ([`attack`]) and the test. What a search must find comes from
+//! Dijkstra 1959 in f64. A search may ask about each half-edge once.
 
 use std::cell::Cell;
 use std::cmp::Reverse;

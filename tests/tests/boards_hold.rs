@@ -10,7 +10,7 @@ use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{Config, Sampling};
-use planner_core::roadmap::{RoadmapHeader, RoadmapView};
+use planner_core::roadmap::RoadmapView;
 use planner_core::search::{SearchWorkspace, dijkstra_all};
 use planner_core::voxel::GridShape;
 
@@ -26,16 +26,7 @@ fn config(nodes: usize) -> Config {
 }
 
 fn file(roadmap: &Roadmap, config: &Config) -> Vec<u8> {
-    let header = RoadmapHeader {
-        origin: Geodetic::default(),
-        edge_min_m: config.edge_min_m,
-        edge_max_m: config.edge_max_m,
-        tested_clearance_m: config.clearance_m,
-        max_clearance_m: roadmap::CLEARANCE_MAX_M,
-        starts: 0,
-        goals: 0,
-    };
-    roadmap::encode(roadmap, &header).expect("it is a roadmap")
+    roadmap::encode(roadmap, &roadmap::header(config, Geodetic::default(), 0, 0)).expect("it is a roadmap")
 }
 
 /// Lengths of the shortest ways from a node to all others.

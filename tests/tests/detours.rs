@@ -14,7 +14,7 @@ use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
 use planner_core::frames::Geodetic;
 use planner_core::path::Path;
 use planner_core::prm::{Config, Sampling};
-use planner_core::roadmap::{LANDMARKS, RoadmapHeader, RoadmapView, encoded_len, write_with_landmarks};
+use planner_core::roadmap::{LANDMARKS, RoadmapView, encoded_len, write_with_landmarks};
 use planner_core::search::{SearchWorkspace, astar};
 
 /// Terminals of the roadmap: random nodes as good as any.
@@ -50,15 +50,7 @@ fn files(map: &VoxelMap, clearance_m: f32) -> Files {
     };
     let (roadmap, _) = roadmap::build(map, &[], &config).expect("there is free space");
     let roadmap = roadmap.fit(&BOARDS[0]).expect("it can be cut down");
-    let header = RoadmapHeader {
-        origin: Geodetic::default(),
-        edge_min_m: config.edge_min_m,
-        edge_max_m: config.edge_max_m,
-        tested_clearance_m: config.clearance_m,
-        max_clearance_m: roadmap::CLEARANCE_MAX_M,
-        starts: 0,
-        goals: GOALS,
-    };
+    let header = roadmap::header(&config, Geodetic::default(), 0, GOALS);
     let Roadmap { nodes, edges, .. } = &roadmap;
     let mut old = vec![0; encoded_len(nodes.len(), edges.len(), LANDMARKS).expect("it is small")];
     let mut ws = Box::new(SearchWorkspace::<DESK>::new());

@@ -1,23 +1,21 @@
-//! The calls on roadmaps, assignments, plans and schedules at their limits and beyond.
+//! The calls on plans, schedules and detours at their limits and beyond, after those on the roadmap that they need.
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::assignment::{self, AssignmentError, AssignmentWorkspace};
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
-use planner_core::frames::Geodetic;
 use planner_core::path::Path;
 use planner_core::plan::{
     self, Goals, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
-use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
+use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
 use planner_core::schedule::{self, Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
-use planner_core::search::{self, SearchError, SearchWorkspace, WithLengths};
+use planner_core::search::SearchWorkspace;
 
 use super::limits::{Answers, HARD, Listener, points};
+use super::limits_graph::{self as graph, INDICES, NODES, PLACES, any};
 
-/// Capacities: nodes, vehicles, waypoints, timed segments, gates.
-const NODES: usize = 8;
+/// Capacities: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
 const WAYPOINTS: usize = 8;
 const PIECES: usize = 256;
@@ -47,51 +45,19 @@ impl Default for Lent {
     }
 }
 
-const HEADER: RoadmapHeader = RoadmapHeader {
-    origin: Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 },
-    edge_min_m: 0.5,
-    edge_max_m: 9.0,
-    tested_clearance_m: 0.0,
-    max_clearance_m: 2.0,
-    starts: 2,
-    goals: 2,
-};
-
-/// Two starts, two goals opposite, two nodes between.
-const PLACES: [Point; 6] = [
-    Point::new(0.0, 0.0, 2.0),
-    Point::new(0.0, 6.0, 2.0),
-    Point::new(12.0, 6.0, 2.0),
-    Point::new(12.0, 0.0, 2.0),
-    Point::new(6.0, 1.0, 2.0),
-    Point::new(6.0, 5.0, 2.0),
-];
-
-/// Over the ground at 0 m; below the last node there is none.
-const HEIGHTS_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
-
-fn edges() -> Vec<Edge, 9> {
-    let pairs = [(0, 4), (0, 5), (1, 4), (1, 5), (2, 4), (2, 5), (3, 4), (3, 5), (4, 5)];
-    pairs.iter().map(|&(a, b)| Edge { a, b, clearance_m: 1.0 }).collect()
-}
-
-fn any(_: u16, _: &HalfEdge) -> bool {
-    true
-}
-
 /// Makes all of them; the sum of the answers after each part: files, roadmaps, searches, assignments, plans, schedules,
 /// detours.
 pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] {
-    let len = files(to, &mut lent.ws.search, &mut lent.file);
+    let len = graph::files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 7];
     let view = to
         .call("roadmap::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
         .expect("just written");
-    roadmaps(to, &view);
+    graph::roadmaps(to, &view);
     sums[1] = to.sum();
-    searches(to, &view, &mut lent.ws.search);
+    graph::searches(to, &view, &mut lent.ws.search);
     sums[2] = to.sum();
-    assignments(to);
+    graph::assignments(to);
     sums[3] = to.sum();
     plans(to, &view, &mut lent.ws, &mut lent.plan);
     sums[4] = to.sum();
@@ -100,189 +66,6 @@ pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] 
     detours(to, &view, &mut lent.ws.search, &mut lent.own);
     sums[6] = to.sum();
     sums
-}
-
-/// Leaves a good file; returns its length.
-fn files(
-    to: &mut Answers<'_, impl Listener>,
-    ws: &mut SearchWorkspace<NODES>,
-    file: &mut [u8; 512],
-) -> usize {
-    let all = [0, 1, 7, u32::MAX as usize / 4, usize::MAX / 8, usize::MAX];
-    for i in 0..all.len() * all.len() {
-        let len =
-            to.call("write::encoded_len", || roadmap::encoded_len(all[i % 6], all[i / 6], all[(i * 7) % 6]));
-        assert!(len.is_none_or(|len| len <= u32::MAX as usize));
-    }
-    let edges = edges();
-    for hard in HARD {
-        for header in [
-            RoadmapHeader { edge_min_m: hard, ..HEADER },
-            RoadmapHeader { edge_max_m: hard, ..HEADER },
-            RoadmapHeader { tested_clearance_m: hard, ..HEADER },
-            RoadmapHeader { max_clearance_m: hard, ..HEADER },
-            RoadmapHeader { starts: hard as u16, goals: u16::MAX, ..HEADER },
-            RoadmapHeader { origin: Geodetic { lat_deg: hard.into(), ..HEADER.origin }, ..HEADER },
-        ] {
-            let written = to.call("write::write", || roadmap::write(&header, &PLACES, &edges, file));
-            // What was written can be read.
-            let read = written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
-            assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
-            to.is(written.is_ok());
-        }
-        let with = [Edge { clearance_m: hard, ..edges[0] }];
-        to.is(roadmap::write(&HEADER, &PLACES, &with, file).is_ok());
-    }
-    for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
-        assert!(roadmap::write(&HEADER, &PLACES, &[Edge { a, b, clearance_m: 1.0 }], file).is_err());
-    }
-    for p in points() {
-        let mut places = PLACES;
-        places[5] = p;
-        to.is(roadmap::write(&HEADER, &places, &edges, file).is_ok());
-    }
-    assert!(roadmap::write(&HEADER, &PLACES, &edges, &mut file[..100]).is_err());
-    let mut small = SearchWorkspace::<2>::new();
-    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[], &mut small, file).is_err());
-    for hard in HARD {
-        let heights_m = [2.0, hard, 2.0, 2.0, 2.0, f32::INFINITY];
-        let written = roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &heights_m, ws, file);
-        let good = (0.0..=roadmap::MAX_WAY_M).contains(&hard) || hard == f32::INFINITY;
-        assert_eq!(written.is_ok(), good, "{hard}");
-    }
-    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[1.0; 5], ws, file).is_err());
-    let len = to
-        .call("write::write_with_landmarks", || {
-            roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &HEIGHTS_M, ws, file)
-        })
-        .expect("a good roadmap");
-    let mut head = [0; roadmap::HEADER_LEN];
-    head.copy_from_slice(&file[..roadmap::HEADER_LEN]);
-    assert_eq!(to.call("roadmap::declared_len", || roadmap::declared_len(&head)), Ok(len));
-    for at in 0..head.len() {
-        let mut head = head;
-        head[at] ^= 0xff;
-        let told = to.call("roadmap::declared_len", || roadmap::declared_len(&head));
-        assert!(told == Ok(len) || told.is_err());
-    }
-    for cut in 0..len {
-        assert!(RoadmapView::parse(&file[..cut]).is_err());
-    }
-    assert_eq!(roadmap::encoded_len(PLACES.len(), edges.len(), LANDMARKS + 1), Some(len));
-    len
-}
-
-/// Indices of nodes: good ones and ones that there are none of.
-const INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
-
-fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>) {
-    let nodes = to.call("roadmap::RoadmapView::node_count", || view.node_count());
-    let half_edges = to.call("roadmap::RoadmapView::half_edge_count", || view.half_edge_count());
-    assert_eq!((nodes, half_edges), (6, 18));
-    let bytes = to.call("roadmap::RoadmapView::byte_len", || view.byte_len());
-    to.count(bytes);
-    assert!(to.call("roadmap::RoadmapView::has_landmarks", || view.has_landmarks()));
-    assert_eq!(to.call("roadmap::RoadmapView::header", || *view.header()), HEADER);
-    assert_eq!(to.call("roadmap::RoadmapView::origin", || *view.origin()), HEADER.origin);
-    let crc = to.call("roadmap::RoadmapView::crc", || view.crc());
-    to.count(crc as usize);
-    for i in 0..INDICES.len() * INDICES.len() {
-        let (a, b) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
-        let there = usize::from(a.max(b)) < nodes;
-        let place = to.call("roadmap::RoadmapView::node", || view.node(a));
-        assert_eq!(place.iter().all(|c| c.is_finite()), usize::from(a) < nodes);
-        let length_m = to.call("roadmap::RoadmapView::distance_m", || view.distance_m(a, b));
-        assert_eq!(length_m.is_finite(), there);
-        let edge = to.call("roadmap::RoadmapView::edge_between", || view.edge_between(a, b));
-        assert!(there || edge.is_none());
-        let ground_m = to.call("ground::RoadmapView::ground_m", || view.ground_m(a));
-        assert_eq!(ground_m, (a < 5).then_some(0.0));
-        let degree = to.call("roadmap::RoadmapView::half_edges", || view.half_edges(a).count());
-        assert!(usize::from(a) < nodes || degree == 0);
-        to.count(degree);
-    }
-    for p in points() {
-        let around = to.call("ground::RoadmapView::ground_around", || view.ground_around(&p));
-        assert!(around.is_none_or(|(low_m, high_m)| low_m == 0.0 && high_m == 0.0 && p.z >= 0.0));
-        to.is(around.is_some());
-    }
-    let edge = view.edge_between(0, 4).expect("an edge");
-    for hard in HARD {
-        let clears = to.call("roadmap::RoadmapView::clears", || view.clears(&edge, hard));
-        assert_eq!(clears, hard < 1.0, "{hard}");
-    }
-}
-
-fn searches(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut SearchWorkspace<NODES>) {
-    let fresh = to.call("search::SearchWorkspace::new", SearchWorkspace::<NODES>::new);
-    let mut way: Vec<u16, WAYPOINTS> = Vec::new();
-    for node in INDICES {
-        // Before the first search nothing is reached.
-        assert!(to.call("search::SearchWorkspace::distance_m", || fresh.distance_m(node)).is_infinite());
-        assert!(to.call("search::SearchWorkspace::path_to", || fresh.path_to(node, &mut way)).is_err());
-    }
-    let mut small = SearchWorkspace::<2>::new();
-    let mut lengths = [0.0; 18];
-    assert!(WithLengths::new(*view, &mut lengths[..17]).is_err());
-    let with =
-        to.call("search::WithLengths::new", || WithLengths::new(*view, &mut lengths)).expect("18 half-edges");
-    for i in 0..INDICES.len() * INDICES.len() {
-        let (a, b) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
-        let there = usize::from(a.max(b)) < view.node_count();
-        let found = to.call("search::astar", || search::astar(view, a, b, any, ws, &mut way));
-        assert_eq!(found.is_ok(), there);
-        assert_eq!(search::astar(&with, a, b, any, ws, &mut way), found);
-        to.add(found.unwrap_or(-1.0));
-        let closed = search::astar(view, a, b, |_, _| false, ws, &mut way);
-        assert_eq!(closed.is_ok(), there && a == b);
-        let mut short: Vec<u16, 1> = Vec::new();
-        assert!(a == b || search::astar(view, a, b, any, ws, &mut short).is_err());
-        assert!(search::astar(view, a, b, any, &mut small, &mut way).is_err());
-        let all = to.call("search::dijkstra_all", || search::dijkstra_all(view, a, any, ws));
-        assert_eq!(all.is_ok(), usize::from(a) < view.node_count());
-        let mut row = [0.0; 2];
-        let told =
-            to.call("search::dijkstra_row", || search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row));
-        assert_eq!(told.is_ok(), there);
-        assert_eq!(
-            search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row[..1]),
-            Err(SearchError::OutputLength)
-        );
-        let mut costs = [0.0; 4];
-        let told = to
-            .call("search::cost_matrix", || search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs));
-        assert_eq!(told.is_ok(), there);
-        assert!(search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs[..3]).is_err());
-    }
-    assert_eq!(search::cost_matrix(view, &[], &[1], any, ws, &mut []), Ok(()));
-}
-
-fn assignments(to: &mut Answers<'_, impl Listener>) {
-    let mut ws = to.call("assignment::AssignmentWorkspace::new", AssignmentWorkspace::<3>::new);
-    let mut out = [None; 3];
-    let mut both = |costs: &[f32], rows: usize, cols: usize, out: &mut [Option<u16>]| {
-        let total = to.call("assignment::assign", || assignment::assign(costs, rows, cols, &mut ws, out));
-        let most =
-            to.call("assignment::bottleneck", || assignment::bottleneck(costs, rows, cols, &mut ws, out));
-        assert_eq!(total.map(|a| a.pairs), most.map(|a| a.pairs));
-        to.add(most.map_or(-1.0, |a| a.largest));
-        total
-    };
-    for i in 0..HARD.len() * HARD.len() {
-        let (a, b) = (HARD[i / HARD.len()], HARD[i % HARD.len()]);
-        let costs = [a, b, a, b, a, 1.0, 2.0, b, a];
-        let bad = costs.iter().any(|c| c.is_nan() || *c == f32::NEG_INFINITY);
-        for (rows, cols) in [(3, 3), (1, 3), (3, 1), (2, 3)] {
-            let found = both(&costs[..rows * cols], rows, cols, &mut out[..rows]);
-            assert!(found.is_ok() || bad, "{costs:?}");
-        }
-    }
-    let costs = [1.0; 16];
-    assert_eq!(both(&costs, 4, 4, &mut out).unwrap_err(), AssignmentError::WorkspaceTooSmall);
-    assert_eq!(both(&costs[..9], 3, 3, &mut out[..2]).unwrap_err(), AssignmentError::OutputLength);
-    assert_eq!(both(&costs[..8], 3, 3, &mut out).unwrap_err(), AssignmentError::Shape);
-    assert!(both(&[], 0, 0, &mut []).is_err() && both(&[], 3, 0, &mut out).is_err());
-    assert!(both(&costs, usize::MAX, 2, &mut out).is_err());
 }
 
 const SCHEDULE: ScheduleConfig =

@@ -5,6 +5,7 @@
 
 pub mod flight;
 pub mod limits;
+mod limits_graph;
 pub mod limits_routes;
 #[cfg(test)]
 mod limits_tests;

@@ -11,7 +11,7 @@ use super::*;
 use crate::Point;
 use crate::frames::Geodetic;
 use crate::roadmap::{self, Edge, RoadmapHeader};
-use crate::schedule::checker;
+use crate::schedule::tests::checker;
 
 const SCHEDULE: ScheduleConfig =
     ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };

@@ -1,4 +1,4 @@
-//! The ground below nodes, and what it tells of the ground below a place.
+//! The ground below nodes, and the ground below any place, found from the nodes around it.
 //!
 //! The desk writes with each node how high it is over the first obstacle below it. Between a node and its ground all is free,
 //! so a place beside it at a height between the two is on the same storey. A node that is lower than the place may be below
@@ -9,7 +9,7 @@ use libm::{fmaxf, fminf};
 use super::{MAX_WAY_M, RoadmapError, RoadmapView};
 use crate::Point;
 
-/// Nodes this near, across, tell the ground below a place, metres.
+/// Nodes this near, across, show the ground below a place, metres.
 pub const GROUND_REACH_M: f32 = 3.0;
 /// So many of them at most, the nearest. Fewer know too little where the floor has edges, more see it too wide to leave a way;
 /// measured by `tests/tests/detours.rs`.
@@ -22,7 +22,7 @@ impl RoadmapView<'_> {
         height_m.is_finite().then(|| self.node(node).z - height_m)
     }
 
-    /// The lowest and the highest ground that the nodes around a place tell of its storey, metres; `None` where none does.
+    /// The lowest and the highest ground that the nodes around a place have on its storey, metres; `None` where none has any.
     /// O(nodes).
     pub fn ground_around(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;

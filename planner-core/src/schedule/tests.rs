@@ -1,3 +1,5 @@
+pub(crate) mod checker;
+
 use super::*;
 use proptest::prelude::*;
 
