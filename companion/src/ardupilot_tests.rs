@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::{MavCmd, TIMESYNC_DATA};
 
 use super::*;
 use crate::ardupilot;
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 
 /// A bench in the middle of its path.
 fn following() -> Bench {
@@ -117,9 +117,9 @@ fn its_failsafe_gets_no_setpoints() {
 fn timesync_is_answered_and_its_answers_are_not() {
     let mut bench = Bench::ardupilot(config());
     bench.run(1.0);
-    bench.tell(&TIMESYNC_DATA { tc1: 0, ts1: 77 });
+    bench.send(&TIMESYNC_DATA { tc1: 0, ts1: 77 });
     assert_eq!(bench.timesyncs, [(bench.now.micros() as i64 * 1000, 77)]);
-    bench.tell(&TIMESYNC_DATA { tc1: 5, ts1: 78 });
+    bench.send(&TIMESYNC_DATA { tc1: 5, ts1: 78 });
     assert_eq!(bench.timesyncs.len(), 1);
 }
 

@@ -7,8 +7,8 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 
 use super::*;
+use crate::fake_autopilot::*;
 use crate::fake_flash::{Flash, obey, started};
-use crate::fake_px4::*;
 use crate::frame::{self, Header};
 use crate::store::{Erasing, READ};
 use crate::{Duration, Link, State};

@@ -3,7 +3,7 @@ use std::vec::Vec;
 
 use super::*;
 use crate::commands::EXCLUDE;
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 use crate::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
 use mavlink::dialects::ardupilotmega::MavCmd;
 use planner_core::schedule::Gate;

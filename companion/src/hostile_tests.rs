@@ -10,7 +10,7 @@ use planner_core::Point;
 use super::tests::assert_no_gap;
 use super::*;
 use crate::autopilot::Kind;
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 use crate::frame::Frame;
 use crate::intent::Intent;
 use crate::px4;

@@ -10,7 +10,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 use super::*;
 use crate::autopilot::Kind;
 use crate::commands::{ACCEPTED, TEMPORARILY_REJECTED};
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 use crate::intent::{GROUNDED, ON_PLAN, OUT};
 use crate::{ardupilot, px4};
 

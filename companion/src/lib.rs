@@ -24,9 +24,9 @@ mod detour;
 pub mod echo;
 mod events;
 #[cfg(test)]
-mod fake_flash;
+mod fake_autopilot;
 #[cfg(test)]
-mod fake_px4;
+mod fake_flash;
 pub mod frame;
 pub mod ftp;
 mod guidance;

@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 use planner_core::deconflict::Method;
 
 use super::*;
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 use crate::px4;
 
 /// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
@@ -211,12 +211,12 @@ fn the_heartbeat_is_believed_and_no_ack() {
     bench.until(State::Engaging, 6.0);
     // PX4's first ack of DO_SET_MODE says accepted, whatever comes of it.
     let ack = |result| COMMAND_ACK_DATA { command: MavCmd::MAV_CMD_DO_SET_MODE, result };
-    bench.tell(&ack(MavResult::MAV_RESULT_ACCEPTED));
+    bench.send(&ack(MavResult::MAV_RESULT_ACCEPTED));
     bench.run(2.0);
     assert_eq!(bench.state(), State::Engaging);
     assert!(bench.commands.iter().filter(|c| c.0 == 176).count() >= 2, "asked again");
     bench.refused.clear();
-    bench.tell(&ack(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
+    bench.send(&ack(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
     bench.until(State::Follow, 20.0);
 }
 

@@ -6,7 +6,7 @@ use std::vec::Vec;
 use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::*;
-use crate::fake_px4::*;
+use crate::fake_autopilot::*;
 use crate::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
 use crate::{RosterEntry, px4};
 

@@ -6,8 +6,8 @@ use std::vec::Vec;
 use mavlink::dialects::ardupilotmega::*;
 
 use super::*;
+use crate::fake_autopilot::*;
 use crate::fake_flash::{Flash, obey, started};
-use crate::fake_px4::*;
 use crate::frame::{self, Framer, Header};
 use crate::parameters::TABLE;
 use crate::store::READ;

@@ -22,7 +22,7 @@ const PRIVATE: [&str; 10] = [
     "packet",
     "memory",
     "stream",
-    "fake_px4",
+    "fake_autopilot",
     "fake_flash",
 ];
 

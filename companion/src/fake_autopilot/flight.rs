@@ -1,0 +1,54 @@
+//! How the vehicle flies: to where the setpoint says at a limited speed, and down in the mode that lands.
+
+use planner_core::Point;
+
+use super::Bench;
+use crate::Duration;
+use crate::autopilot::Kind;
+
+impl Bench {
+    pub(crate) fn on_ground(&self) -> bool {
+        self.enu.z < 0.05
+    }
+
+    /// Whether it lifts off, or has.
+    fn lifts(&self) -> bool {
+        self.kind == Kind::Px4 || self.took_off && self.now >= self.lifts_at
+    }
+
+    /// 50 ms of flight: where the mode leads, at a limited speed; on the ground the motors stop by themselves.
+    pub(super) fn fly(&mut self) {
+        let step = 0.1;
+        let target = match self.mode {
+            mode if mode == self.kind.setpoint_mode() && self.lifts() => self.target,
+            mode if mode == self.kind.land_mode() && !self.never_lands => {
+                Some(Point::new(self.enu.x, self.enu.y, 0.0))
+            }
+            _ => None,
+        };
+        if let Some(target) = target.filter(|_| self.armed && !self.stuck) {
+            let way = target - self.enu;
+            self.enu += way * (step / way.norm().max(step));
+        }
+        let landing = self.mode == self.kind.land_mode() && self.on_ground() && self.armed;
+        self.landed_at = if landing { self.landed_at.or(Some(self.now)) } else { None };
+        if self.landed_at.is_some_and(|at| self.now - at > Duration::from_millis(2200)) && !self.stays_armed {
+            self.armed = false;
+        }
+        self.disarm_by_itself();
+    }
+
+    /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`, `DISARM_DELAY`).
+    fn disarm_by_itself(&mut self) {
+        let streamed = self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
+        let takes_off = match self.kind {
+            Kind::Px4 => streamed && self.mode == self.kind.setpoint_mode(),
+            Kind::ArduPilot => self.took_off,
+        };
+        let idle = self.armed && self.on_ground() && !takes_off && !self.stays_armed;
+        self.idle_since = if idle { self.idle_since.or(Some(self.now)) } else { None };
+        if self.idle_since.is_some_and(|at| self.now - at > Duration::from_secs(10)) {
+            self.armed = false;
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! The mission that the tests fly: one vehicle, or two, from a pad past a corner to a goal above.
+
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::frames::Geodetic;
+use planner_core::path::Path;
+use planner_core::schedule::VehiclePlan;
+
+use crate::{Config, RosterEntry};
+
+pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+/// 300 m away and 20 m up: frames that are mixed up fly into the ground.
+pub(crate) const EKF_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3350, lon_deg: -3.7640, alt_m: 720.0 };
+pub(crate) const SYSTEM: u8 = 42;
+pub(crate) const START: Point = Point::new(8.0, 12.0, 1.5);
+pub(crate) const GOAL: Point = Point::new(16.0, 12.0, 3.5);
+
+pub(crate) fn config() -> Config<4> {
+    let mut config = Config::new(SYSTEM, START, ORIGIN);
+    config.method = Method::Priority;
+    config.mission_crc = 0xC0FFEE;
+    config
+}
+
+pub(crate) fn two_vehicles() -> Config<4> {
+    let mut config = config();
+    config.roster.push(RosterEntry { system_id: 77, start: Point::new(8.0, 20.0, 1.5) }).unwrap();
+    config
+}
+
+pub(crate) fn plan() -> VehiclePlan<16, 8> {
+    let mut path = Path::new();
+    for point in [START, Point::new(16.0, 12.0, 1.5), GOAL] {
+        path.push(point, 1.2).unwrap();
+    }
+    let gates = heapless::Vec::new();
+    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
+}
