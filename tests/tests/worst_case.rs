@@ -13,8 +13,12 @@ const SLACK: f64 = 1.25;
 /// says by what. It is to grow no further.
 const STEP: u64 = 88_000;
 /// Modules of companion that are its own, where no call is public, and doubles of its tests.
-const PRIVATE: [&str; 10] = [
+const PRIVATE: [&str; 14] = [
     "guidance",
+    "phase",
+    "progress",
+    "raw",
+    "setpoint",
     "brakes",
     "retreat",
     "sweep",
