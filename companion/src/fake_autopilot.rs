@@ -250,6 +250,7 @@ impl Bench {
     }
 
     /// Runs until a state is reached; panics with what happened if it is not within the time.
+    #[track_caller]
     pub fn until(&mut self, state: crate::State, seconds: f32) {
         for _ in 0..(seconds * 20.0) as u32 {
             if self.state() == state {

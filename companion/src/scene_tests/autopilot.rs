@@ -1,0 +1,110 @@
+//! The autopilot acts by itself, does not act, or is not heard.
+
+use super::State::*;
+use super::*;
+
+/// "On ground" in the air: disarming is refused, and the autopilot does not land.
+fn hovers() -> Bench {
+    let mut bench = flying();
+    bench.refused = std::vec![176, 400];
+    bench.false_ground = true;
+    land(&mut bench);
+    bench.until(Disarm, 6.0);
+    bench
+}
+
+/// In the air when the companion starts.
+fn found_in_the_air() -> Bench {
+    let mut bench = Bench::new(config());
+    (bench.armed, bench.mode, bench.enu.z) = (true, px4::OFFBOARD, 1.5);
+    bench.until(Failsafe, 3.0);
+    bench
+}
+
+/// Its failsafe, and the end of one.
+pub(super) fn takes_over(scenes: &mut Scenes) {
+    scenes.play(flying(), |b| b.armed = false, Aborted, 3.0);
+    scenes.play(flying(), fails_safe, Failsafe, 3.0);
+    scenes.play(landing(), fails_safe, Failsafe, 3.0);
+    let lands_in_the_end = |b: &mut Bench| {
+        fails_safe(b);
+        b.run(302.0);
+        b.armed = false;
+    };
+    scenes.play(flying(), lands_in_the_end, Aborted, 3.0);
+    let while_engaging = |b: &mut Bench| {
+        fails_safe(b);
+        b.refused.push(176);
+    };
+    scenes.play(to(Engaging), while_engaging, Aborted, 5.0);
+    let another_mode = |b: &mut Bench| {
+        b.mode = px4::RTL;
+        b.refused.push(176);
+    };
+    scenes.play(to(Streaming), another_mode, Aborted, 5.0);
+    // Given up in the air: somebody has to land it.
+    let given_up = |b: &mut Bench| {
+        b.armed = false;
+        b.until(Aborted, 2.0);
+        b.armed = true;
+    };
+    scenes.play(flying(), given_up, Land, 2.0);
+}
+
+pub(super) fn does_not_do_as_asked(scenes: &mut Scenes) {
+    scenes.play(landing(), |b| b.run(125.0), Land, 1.0);
+    scenes.play(to(Climb), |b| stuck(b, 61.0), Aborted, 30.0);
+    scenes.play(flying(), |b| stuck(b, 610.0), Aborted, 30.0);
+    let stays_armed = |b: &mut Bench| {
+        b.stays_armed = true;
+        b.refused.push(400);
+        land(b);
+    };
+    scenes.play(flying(), stays_armed, Aborted, 60.0);
+    scenes.play(hovers(), |b| b.run(6.0), Disarm, 6.0);
+    scenes.play(hovers(), |b| b.false_ground = false, Land, 1.0);
+    // One that takes off by command, and does not.
+    let mut grounded = Bench::ardupilot(config());
+    grounded.refused = std::vec![22];
+    grounded.until(Ready, 6.0);
+    grounded.start();
+    grounded.stays_armed = true;
+    let disarms_at_last = |b: &mut Bench| {
+        b.run(14.0);
+        b.stays_armed = false;
+    };
+    scenes.play(grounded, disarms_at_last, Aborted, 30.0);
+}
+
+pub(super) fn is_not_heard(scenes: &mut Scenes) {
+    let silent = |b: &mut Bench| b.silent = true;
+    scenes.play(ready(), silent, WaitAutopilot, 5.0);
+    scenes.play(to(Streaming), silent, Aborted, 5.0);
+    scenes.play(flying(), silent, AutopilotSilent, 5.0);
+    scenes.play(flying(), silent, Aborted, 125.0);
+    scenes.play(landing(), silent, Aborted, 125.0);
+    let for_a_while = |b: &mut Bench| {
+        b.silent = true;
+        b.run(6.0);
+        b.silent = false;
+    };
+    scenes.play(flying(), for_a_while, Done, 60.0);
+    let is_to_be_landed = |b: &mut Bench| {
+        b.silent = true;
+        b.until(AutopilotSilent, 5.0);
+        b.until(Land, 65.0);
+    };
+    scenes.play(flying(), is_to_be_landed, Aborted, 130.0);
+}
+
+/// Nothing is sent until it is commanded to land; the autopilot's failsafe lands.
+pub(super) fn flies_when_the_companion_starts(scenes: &mut Scenes) {
+    let lands_by_itself = |b: &mut Bench| {
+        b.start();
+        b.run(3.0);
+        assert!(b.setpoints.is_empty() && b.commands.iter().all(|c| c.0 != 400 && c.0 != 176));
+        (b.armed, b.enu.z) = (false, 0.0);
+    };
+    scenes.play(found_in_the_air(), lands_by_itself, Aborted, 3.0);
+    scenes.play(found_in_the_air(), land, Land, 1.0);
+}

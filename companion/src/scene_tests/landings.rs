@@ -1,0 +1,87 @@
+//! Why the vehicle lands, and where there is room for it.
+
+use super::State::*;
+use super::*;
+
+/// Commanded to land while the other is where there is then no room: it waits above.
+fn held_by(b: &mut Bench, neighbour: Neighbour) {
+    b.neighbour = neighbour;
+    b.run(0.3);
+    land(b);
+    b.until(LandingHeld, 8.0);
+}
+
+/// In the middle of its path, to land while another is below.
+fn held() -> Bench {
+    let mut bench = accompanied(Follow, 2.0);
+    let below = bench.enu + Point::new(1.0, 0.0, -2.5);
+    held_by(&mut bench, flies(below, ON_PLAN));
+    bench
+}
+
+/// So near the pad that there is no room over it.
+fn at_the_pad() -> Neighbour {
+    flies(START - Point::new(1.35, 0.0, 1.35), ON_PLAN)
+}
+
+/// Where the way aside ends it lands.
+fn lands_aside(b: &mut Bench, seconds: f32) {
+    b.until(Land, seconds);
+    assert!((b.enu - GOAL).xy().norm() < 0.5, "where the way aside ends: {:?}", b.enu);
+}
+
+pub(super) fn are_commanded(scenes: &mut Scenes) {
+    scenes.play(flying(), back, Aborted, 60.0);
+    scenes.play(to(Climb), back, Aborted, 60.0);
+}
+
+/// Of the battery, and of the geofence.
+pub(super) fn at_a_limit(scenes: &mut Scenes) {
+    scenes.play(flying(), |b| b.battery = 10, Aborted, 30.0);
+    scenes.play(flying(), |b| b.battery = 5, Aborted, 30.0);
+    let low = Point::new(0.0, 0.0, -1.0);
+    let narrow = fenced(config(), low, Point::new(12.0, 30.0, 10.0));
+    scenes.play(Bench::following(narrow), nothing, Aborted, 60.0);
+    // The same while another vehicle lies below: it waits inside until there is room.
+    let narrow = fenced(two_vehicles(), low, Point::new(10.0, 30.0, 10.0));
+    let waits_inside = |b: &mut Bench| {
+        b.neighbour = landed(Point::new(11.0, 12.0, 0.0));
+        b.run(20.0);
+        assert!(b.state() == Follow && (9.8..10.05).contains(&b.enu.x), "{:?}", b.enu);
+        b.neighbour = landed(Point::new(8.0, 20.0, 0.0));
+        b.until(Land, 5.0);
+    };
+    scenes.play(Bench::accompanied(narrow), waits_inside, Aborted, 60.0);
+}
+
+/// Another is below where it lands.
+pub(super) fn wait_for_room(scenes: &mut Scenes) {
+    let nowhere_for_long = |b: &mut Bench| {
+        b.until(Follow, 25.0);
+        // Back over its pad there is no room either, nor aside.
+        b.neighbour = at_the_pad();
+        b.answer_detour = Some(Err(PlanFailure::Unreachable));
+        b.until(LandingHeld, 120.0);
+        b.run(85.0);
+        assert!(b.state() == LandingHeld && b.enu.z > 0.8, "{:?} {:?}", b.texts, b.enu);
+        b.neighbour = flies(Point::new(8.0, 30.0, 1.5), ON_PLAN);
+    };
+    scenes.play(held(), nowhere_for_long, Aborted, 30.0);
+    scenes.play(held(), |b| b.battery = 5, Aborted, 30.0);
+}
+
+/// Over its pad is no room, but aside there is.
+pub(super) fn end_aside(scenes: &mut Scenes) {
+    let on_its_way_up = |b: &mut Bench| {
+        held_by(b, stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT));
+        b.until(Follow, 25.0);
+        lands_aside(b, 60.0);
+    };
+    scenes.play(accompanied(Climb, 2.0), on_its_way_up, Aborted, 30.0);
+    let on_its_way_back = |b: &mut Bench| {
+        back(b);
+        b.neighbour = at_the_pad();
+        lands_aside(b, 120.0);
+    };
+    scenes.play(accompanied(Follow, 2.0), on_its_way_back, Aborted, 30.0);
+}

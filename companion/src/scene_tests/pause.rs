@@ -1,0 +1,34 @@
+//! The ground station pauses the mission.
+
+use super::State::*;
+use super::*;
+
+pub(super) fn in_flight(scenes: &mut Scenes) {
+    scenes.play(flying(), pause, Paused, 1.0);
+    let resumed = |b: &mut Bench| {
+        pause(b);
+        b.run(3.0);
+        resume(b);
+    };
+    scenes.play(flying(), resumed, Done, 60.0);
+    let for_too_long = |b: &mut Bench| {
+        pause(b);
+        b.run(601.0);
+    };
+    scenes.play(flying(), for_too_long, Aborted, 30.0);
+    // In the climb, and called back.
+    let called_back = |b: &mut Bench| {
+        pause(b);
+        back(b);
+    };
+    scenes.play(to(Climb), called_back, Land, 1.0);
+}
+
+pub(super) fn on_the_ground(scenes: &mut Scenes) {
+    let started_all_the_same = |b: &mut Bench| {
+        pause(b);
+        b.start();
+        b.run(31.0);
+    };
+    scenes.play(ready(), started_all_the_same, Scheduled, 1.0);
+}

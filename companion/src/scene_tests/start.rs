@@ -1,0 +1,145 @@
+//! From the plan to the lift-off.
+
+use planner_core::schedule::Gate;
+
+use super::State::*;
+use super::*;
+
+fn answered(answer: Option<Result<VehiclePlan<16, 8>, PlanFailure>>) -> Bench {
+    let mut bench = Bench::new(config());
+    bench.answer_plan = answer;
+    bench
+}
+
+/// Started, and waiting for vehicle 77 to pass.
+fn gated() -> Bench {
+    let mut gated = plan();
+    gated.gates.push(Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+    let mut bench = Bench::new(two_vehicles());
+    bench.answer_plan = Some(Ok(gated));
+    bench.until(Ready, 6.0);
+    bench.start();
+    bench.run(1.0);
+    assert_eq!(bench.state(), Scheduled);
+    bench
+}
+
+/// To be armed by an autopilot that `script` made odd.
+fn arming_after(script: impl FnOnce(&mut Bench)) -> Bench {
+    let mut bench = to(Streaming);
+    script(&mut bench);
+    bench.until(Arming, 6.0);
+    bench
+}
+
+/// The autopilot denies arming.
+fn denied() -> Bench {
+    arming_after(|b| b.refused.push(400))
+}
+
+/// Armed all the same, once it is not to start any more.
+fn armed_late(b: &mut Bench) {
+    pause(b);
+    b.armed = true;
+    b.run(1.0);
+    assert_eq!(b.state(), CancelStart);
+}
+
+/// The planner's answers.
+pub(super) fn planned(scenes: &mut Scenes) {
+    let late = |b: &mut Bench| {
+        b.run(35.0);
+        b.answer_plan = Some(Ok(plan()));
+    };
+    scenes.play(answered(None), late, Ready, 40.0);
+    let start = |b: &mut Bench| {
+        b.until(Ready, 6.0);
+        b.start();
+    };
+    let idle = VehiclePlan { goal: None, path: Default::default(), ..plan() };
+    scenes.play(answered(Some(Ok(idle))), start, Done, 1.0);
+    for failure in [PlanFailure::NoRoadmap, PlanFailure::Unreachable] {
+        scenes.play(answered(Some(Err(failure))), |b| b.run(6.0), Aborted, 1.0);
+    }
+}
+
+/// What the start meets on the pad.
+pub(super) fn started(scenes: &mut Scenes) {
+    let dragged = |b: &mut Bench| {
+        drag(b, Point::x());
+        b.start();
+    };
+    scenes.play(ready(), dragged, Aborted, 1.0);
+    let armed = |b: &mut Bench| {
+        b.armed = true;
+        b.run(1.5);
+        b.start();
+    };
+    scenes.play(ready(), armed, Aborted, 1.0);
+    let low = |b: &mut Bench| {
+        b.battery = 9;
+        b.run(1.5);
+        b.start();
+    };
+    scenes.play(ready(), low, Aborted, 1.0);
+    let high = fenced(config(), Point::new(0.0, 0.0, 1.0), Point::new(20.0, 30.0, 10.0));
+    scenes.play(ready_with(high), Bench::start, Aborted, 1.0);
+    let again = |b: &mut Bench| {
+        b.start();
+        b.until(Streaming, 3.0);
+        land(b);
+        b.start();
+    };
+    scenes.play(ready(), again, Ready, 6.0);
+}
+
+/// While others go first.
+pub(super) fn scheduled(scenes: &mut Scenes) {
+    scenes.play(gated(), |b| b.armed = true, Aborted, 2.0);
+    scenes.play(gated(), |b| b.battery = 9, Aborted, 2.0);
+    scenes.play(gated(), |b| drag(b, Point::x()), Aborted, 2.0);
+    let narrow = fenced(two_vehicles(), Point::new(7.0, 0.0, -1.0), Point::new(20.0, 30.0, 10.0));
+    let mut outside = ready_with(narrow);
+    outside.start();
+    scenes.play(outside, |b| drag(b, Point::x() * -0.4), Aborted, 2.0);
+    let hovers_over_the_pad = |b: &mut Bench| {
+        b.neighbour = flies(Point::new(8.0, 12.0, 3.0), ON_PLAN);
+        b.until(Ready, 6.0);
+        b.start();
+        b.run(25.0);
+    };
+    scenes.play(Bench::new(two_vehicles()), hovers_over_the_pad, Scheduled, 1.0);
+    // Nobody hears it on the ground.
+    let unheard = |b: &mut Bench| {
+        b.start();
+        b.run(12.0);
+    };
+    scenes.play(ready_with(two_vehicles()), unheard, Scheduled, 1.0);
+}
+
+/// From the first setpoint until arming.
+pub(super) fn streaming(scenes: &mut Scenes) {
+    scenes.play(to(Streaming), land, Aborted, 1.0);
+    scenes.play(to(Streaming), back, Aborted, 1.0);
+    scenes.play(to(Streaming), |b| b.refused.push(176), Aborted, 8.0);
+    scenes.play(to(Streaming), |b| b.refused.push(400), Aborted, 30.0);
+}
+
+/// Paused, cancelled, never answered, disarmed at once, or armed and lifted off all the same.
+pub(super) fn arming(scenes: &mut Scenes) {
+    scenes.play(denied(), pause, Scheduled, 4.0);
+    scenes.play(denied(), land, Aborted, 4.0);
+    scenes.play(denied(), back, Aborted, 4.0);
+    scenes.play(denied(), |b| b.battery = 9, Aborted, 5.0);
+    scenes.play(denied(), |b| b.no_position = true, Aborted, 5.0);
+    scenes.play(denied(), |b| drag(b, Point::x()), Aborted, 5.0);
+    let unanswered = arming_after(|b| (b.mute, b.refused) = (true, std::vec![400]));
+    scenes.play(unanswered, nothing, Aborted, 9.0);
+    scenes.play(arming_after(|b| b.never_arms = true), nothing, Aborted, 9.0);
+    scenes.play(denied(), armed_late, Disarm, 6.0);
+    let lifted_off = |b: &mut Bench| {
+        armed_late(b);
+        b.enu.z = 1.0;
+    };
+    scenes.play(denied(), lifted_off, Land, 2.0);
+}
