@@ -1,8 +1,7 @@
-//! Every state against every interruption, and random sequences of them, on the scripted autopilots.
+//! Every state against every interruption, on the scripted autopilots; random sequences of them are in `random`.
 
 extern crate std;
 use std::format;
-use std::string::String;
 use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::MavCmd;
@@ -13,6 +12,9 @@ use crate::commands::{ACCEPTED, TEMPORARILY_REJECTED};
 use crate::fake_autopilot::*;
 use crate::intent::{GROUNDED, ON_PLAN, OUT};
 use crate::{ardupilot, px4};
+
+#[path = "interruption_tests/random.rs"]
+mod random;
 
 const ARM: u16 = 400;
 const SET_MODE: u16 = 176;
@@ -405,186 +407,6 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
         (State::Follow, std::vec![(193, ACCEPTED, 255, 190)]),
         "repeated: done already"
     );
-}
-
-/// One thing that happens.
-#[derive(Clone, Copy, Debug)]
-enum Happens {
-    Pause,
-    Resume,
-    Land,
-    Return,
-    Start,
-    Pilot,
-    Back,
-    Failsafe,
-    NoPosition,
-    Position,
-    Jump,
-    Silent,
-    Heard,
-    Disarm,
-    Battery,
-    FalseGround,
-    TrueGround,
-    Refuses,
-    Obeys,
-    Mute,
-    Wait,
-}
-
-const ALL: [Happens; 21] = {
-    use Happens::*;
-    [
-        Pause,
-        Resume,
-        Land,
-        Return,
-        Start,
-        Pilot,
-        Back,
-        Failsafe,
-        NoPosition,
-        Position,
-        Jump,
-        Silent,
-        Heard,
-        Disarm,
-        Battery,
-        FalseGround,
-        TrueGround,
-        Refuses,
-        Obeys,
-        Mute,
-        Wait,
-    ]
-};
-
-/// What must hold at every tick, whatever happens.
-struct Watch {
-    /// The setpoint mode, in the air, heard, and no setpoints, for so many ticks.
-    unattended: u32,
-    /// Commands seen so far.
-    commands: usize,
-    /// NAV_LAND was accepted in the air.
-    landing: bool,
-    /// Ticks in a mode of the pilot's, heard.
-    piloted: u32,
-    /// Arming requests since the last start or resume, and whether one took effect.
-    armed_once: bool,
-    log: Vec<String>,
-}
-
-impl Watch {
-    fn tick(&mut self, b: &mut Bench) {
-        let before = b.setpoints.len();
-        b.tick();
-        let sent = b.setpoints.len() > before;
-        let state = b.state();
-        let ours = b.mode == b.kind.setpoint_mode();
-        let lifts = b.kind == Kind::ArduPilot && state == State::TakeOff;
-        let nobody =
-            b.armed && !b.on_ground() && ours && !b.silent && !sent && !lifts && state != State::Failsafe;
-        self.unattended = if nobody { self.unattended + 1 } else { 0 };
-        assert!(self.unattended < 30, "nobody flies it in {state:?}: {:#?} {:?}", self.log, b.texts);
-        let foreign = !ours && b.mode != b.kind.land_mode() && b.armed && !b.silent;
-        self.piloted = if foreign { self.piloted + 1 } else { 0 };
-        for &(command, param1, ..) in &b.commands[self.commands..] {
-            let acts = matches!(command, SET_MODE | TAKE_OFF) || (command, param1) == (ARM, 1.0);
-            assert!(self.piloted < 30 || !acts, "{command} under the pilot in {state:?}: {:#?}", self.log);
-            assert!(
-                (command, param1) != (ARM, 1.0) || !self.armed_once,
-                "armed again in {state:?}: {:#?} {:?}",
-                self.log,
-                b.texts
-            );
-        }
-        self.commands = b.commands.len();
-        // What the companion can know: the armed bit, or the ack.
-        let acked = b.companion.handshake.is_armed_unseen(b.now + Duration::from_secs(9));
-        self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
-        let flies_on = matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
-        assert!(!self.landing || !flies_on, "an accepted landing is forgotten in {state:?}: {:#?}", self.log);
-        assert!(
-            !b.companion.pending.pause || !matches!(state, State::Climb | State::Follow),
-            "a pause is forgotten in {state:?}: {:#?}",
-            self.log
-        );
-        self.landing &= state != State::Aborted && state != State::Failsafe && state != State::Done;
-    }
-
-    fn happen(&mut self, b: &mut Bench, what: Happens) {
-        use Happens::*;
-        let state = b.state();
-        self.log.push(format!("{:.2} s {state:?} {:?}: {what:?}", b.now.micros() as f64 * 1e-6, b.enu));
-        match what {
-            Pause => _ = pause(b),
-            Resume => {
-                let resumed = resume(b) == Some(ACCEPTED);
-                self.armed_once &= b.armed || !resumed;
-            }
-            Land => self.landing |= land(b) == Some(ACCEPTED) && b.armed && b.state() != State::Aborted,
-            Return => _ = order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
-            Start => {
-                let started = order(b, MavCmd::MAV_CMD_MISSION_START, 0.0) == Some(ACCEPTED);
-                self.armed_once &= b.armed || !(started && state == State::Ready);
-            }
-            Pilot => (b.mode, b.status) = (pilot_mode(b.kind), 3),
-            Back if b.status < 5 => b.mode = b.kind.setpoint_mode(),
-            Failsafe => (b.mode, b.status) = (if b.kind == Kind::Px4 { px4::RTL } else { ardupilot::RTL }, 5),
-            NoPosition => b.no_position = true,
-            Position => b.no_position = false,
-            Jump => b.enu.y += 3.0,
-            Silent => b.silent = true,
-            Heard => b.silent = false,
-            Disarm if b.on_ground() => b.armed = false,
-            Battery => b.battery = 2,
-            FalseGround => b.false_ground = true,
-            TrueGround => b.false_ground = false,
-            Refuses => b.refused = std::vec![SET_MODE, ARM],
-            Obeys => b.refused.clear(),
-            Mute => b.mute = !b.mute,
-            Back | Disarm | Wait => {}
-        }
-    }
-}
-
-proptest::proptest! {
-    #![proptest_config(proptest::prelude::ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 3000 }))]
-    #[test]
-    fn whatever_happens_somebody_flies_and_nothing_accepted_is_forgotten(
-        px4 in proptest::prelude::any::<bool>(),
-        begin in 0u32..400,
-        script in proptest::collection::vec((0usize..ALL.len(), 1u32..80), 1..16),
-    ) {
-        let mut b = bench(if px4 { Kind::Px4 } else { Kind::ArduPilot });
-        b.start();
-        let mut watch =
-            Watch { unattended: 0, commands: 0, landing: false, piloted: 0, armed_once: false, log: Vec::new() };
-        (0..begin).for_each(|_| watch.tick(&mut b));
-        for (what, ticks) in script {
-            watch.happen(&mut b, ALL[what]);
-            (0..ticks).for_each(|_| watch.tick(&mut b));
-        }
-        // All is well again, and whoever took the vehicle gives it back or lands it.
-        (b.silent, b.no_position, b.false_ground, b.status) = (false, false, false, 3);
-        b.refused.clear();
-        if b.armed && b.mode != b.kind.setpoint_mode() {
-            b.mode = b.kind.land_mode();
-        }
-        for second in 0..100 {
-            if matches!(b.state(), State::PilotReturned | State::Paused) {
-                watch.happen(&mut b, Happens::Resume);
-            }
-            // What the companion of an earlier flight would be: nobody's, until it is landed.
-            if b.state() == State::Failsafe && second == 40 {
-                watch.happen(&mut b, Happens::Land);
-            }
-            (0..20).for_each(|_| watch.tick(&mut b));
-        }
-        let down = b.on_ground() && !b.armed;
-        proptest::prop_assert!(down, "{:?} {} {:?} {:#?} {:?}", b.state(), b.mode, b.enu, watch.log, b.texts);
-    }
 }
 
 #[test]
