@@ -1,0 +1,134 @@
+//! One vehicle of a meeting: its companion, its autopilot, and what it has heard.
+
+use companion::frame::Framer;
+use companion::{Companion, Config, Instant, RosterEntry, State};
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic};
+
+use super::autopilot::{Autopilot, Flown};
+use super::oracle::{Heard, Seen};
+use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES, WAYPOINTS};
+use super::{ORIGIN, Packet};
+use crate::setpoints::{Limits, SetpointCheck};
+
+/// Nobody leaves this box, metres: minimum and maximum corner.
+const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
+/// A vehicle that has heard nobody for so long is deaf, seconds: it has stopped, and lands after 20 s.
+const DEAF_S: f32 = 20.0;
+/// A vehicle that is faster is not stopped, m/s.
+const MOVES_MPS: f32 = 0.7;
+/// Speed of a setpoint, m/s: nominal, and what it may run over where it catches up.
+const SPEED_MPS: f32 = 2.2;
+
+type Mate = Companion<VEHICLES, WAYPOINTS, GATES>;
+
+/// A vehicle with its companion.
+pub(super) struct Member {
+    pub(super) companion: Mate,
+    pub(super) autopilot: Autopilot,
+    pub(super) inbox: Vec<Packet>,
+    pub(super) heard: Vec<Heard>,
+    pub(super) framer: Framer,
+    pub(super) dead: bool,
+    pub(super) sends: bool,
+    pub(super) hears: bool,
+    pub(super) bytes: Vec<u8>,
+    pub(super) commands: u8,
+    /// Stops by the safety filter so far, and since when the last one lasts.
+    pub(super) stops: u32,
+    pub(super) stopped_since: Option<Instant>,
+    pub(super) longest_stop_s: f32,
+}
+
+fn config(scene: &Scene, i: usize) -> Config<VEHICLES> {
+    let own = &scene.vehicles[i];
+    let start = |vehicle: &scene::Vehicle| vehicle.plan.path.waypoints()[0].position;
+    let mut config = Config::new(own.id, start(own), ORIGIN);
+    config.roster.clear();
+    for vehicle in &scene.vehicles {
+        let entry = RosterEntry { system_id: vehicle.id, start: start(vehicle) };
+        config.roster.push(entry).expect("a meeting fits");
+    }
+    config.mission_crc = 0xC0FFEE;
+    config.cruise_mps = CRUISE_MPS;
+    config.climb_mps = CLIMB_MPS;
+    config.safety_distance_m = SAFETY_M;
+    config.geofence = Some(FENCE);
+    config
+}
+
+impl Member {
+    pub(super) fn new(scene: &Scene, i: usize) -> Self {
+        let vehicle = &scene.vehicles[i];
+        let ekf_origin = Geodetic {
+            lat_deg: ORIGIN.lat_deg + 0.00002 * i as f64,
+            lon_deg: ORIGIN.lon_deg - 0.00003 * i as f64,
+            alt_m: ORIGIN.alt_m + i as f64,
+        };
+        let ned = |point: &Point| {
+            let place = frames::enu_to_geodetic(&ORIGIN, point);
+            frames::geodetic_to_ned(vehicle.kind.projection(), &ekf_origin, &place).cast::<f32>()
+        };
+        let (low, high) = (ned(&FENCE.0), ned(&FENCE.1));
+        let (low, high) = (low.inf(&high), low.sup(&high));
+        let slack = Vector3::repeat(0.05);
+        let limits = Limits { speed_mps: SPEED_MPS, fence: Some((low - slack, high + slack)) };
+        let mut autopilot = Autopilot::new(
+            vehicle.kind,
+            vehicle.id,
+            (ORIGIN, ekf_origin),
+            vehicle.pad,
+            vehicle.phase,
+            SetpointCheck::new(limits),
+        );
+        autopilot.on_loss = vehicle.on_loss;
+        Self {
+            companion: Mate::new(config(scene, i)).expect("a sound configuration"),
+            autopilot,
+            inbox: Vec::new(),
+            heard: vec![Heard::default(); scene.vehicles.len()],
+            framer: Framer::new(),
+            dead: false,
+            sends: true,
+            hears: true,
+            bytes: Vec::new(),
+            commands: 0,
+            stops: 0,
+            stopped_since: None,
+            longest_stop_s: 0.0,
+        }
+    }
+
+    /// A stop by the filter lasts until nobody is waited for, or the vehicle flies.
+    pub(super) fn note_stops(&mut self, now: Instant) {
+        let stops = self.companion.filter_stops();
+        if core::mem::replace(&mut self.stops, stops) != stops {
+            self.stopped_since.get_or_insert(now);
+        } else if self.companion.waiting_for() == 0 || self.autopilot.velocity.norm() > MOVES_MPS {
+            self.stopped_since = None;
+        }
+        if let Some(since) = self.stopped_since {
+            self.longest_stop_s = self.longest_stop_s.max((now - since).secs_f32());
+        }
+    }
+
+    pub(super) fn seen(&self, now_s: f32) -> Seen {
+        let lately = |heard: &Heard| heard.position.is_some_and(|(.., at_s)| now_s - at_s < DEAF_S);
+        let lands = self.autopilot.flown() == Flown::Commanded
+            && self.autopilot.mode == self.autopilot.kind.land_mode();
+        Seen {
+            position: self.autopilot.position,
+            velocity: self.autopilot.velocity,
+            airborne: self.autopilot.is_airborne(),
+            own: !self.dead && self.autopilot.armed && self.autopilot.flown() != Flown::Other,
+            lands,
+            deaf: !self.heard.iter().any(lately),
+        }
+    }
+
+    pub(super) fn rests(&self) -> bool {
+        let over = matches!(self.companion.state(), State::Done | State::Aborted);
+        !self.autopilot.armed && !self.autopilot.is_airborne() && (over || self.dead)
+    }
+}

@@ -1,0 +1,67 @@
+//! The planner of detours: in the open, with nothing around but vehicles.
+
+use planner_core::Point;
+use planner_core::detour::{DetourRequest, KeepOff, Nature};
+use planner_core::path::Path;
+
+use super::oracle;
+use super::scene::Plan;
+
+/// A way around in the open: straight, or past one or two points beside and above.
+pub(super) fn around(request: &DetourRequest, keep: &[KeepOff], own: &Plan) -> Option<Plan> {
+    let last = own.path.waypoints().last()?.position;
+    let ground = last - Point::new(0.0, 0.0, request.descent_m);
+    let here = request.here;
+    let clear = |from: Point, to: Point| {
+        keep.iter().all(|k| {
+            let now_m = oracle::distance((here, here), (k.from, k.to));
+            let apart_m = k.radius_m.min((now_m - 0.002).max(0.0));
+            let solid = if k.nature == Nature::Landing { (k.from, k.from) } else { (k.from, k.to) };
+            oracle::distance((from, to), solid) >= apart_m
+        })
+    };
+    let mut ways: Vec<Vec<Point>> = Vec::new();
+    let offs = (0..8).map(|i| {
+        let angle = i as f32 * core::f32::consts::FRAC_PI_4;
+        Point::new(angle.cos(), angle.sin(), 0.0)
+    });
+    let offs: Vec<Point> = offs.collect();
+    if request.aside {
+        for length in [3.0, 5.0, 8.0] {
+            for off in &offs {
+                ways.push(vec![here, here + off * length]);
+            }
+        }
+        let rests =
+            |at: &Point| keep.iter().all(|k| oracle::distance((*at, *at), (k.from, k.to)) >= k.radius_m);
+        let way = ways.into_iter().find(|way| clear(way[0], way[1]) && rests(&way[1]))?;
+        return along(&way, own, request.descent_m);
+    }
+    ways.push(vec![here, last]);
+    for length in [2.5, 4.0, 6.0] {
+        for off in &offs {
+            for rise in [0.0, 2.5] {
+                let beside = off * length + Point::new(0.0, 0.0, rise);
+                ways.push(vec![here, here + beside, last]);
+                ways.push(vec![here, last + beside, last]);
+                ways.push(vec![here, here + beside, last + beside, last]);
+            }
+        }
+    }
+    let length = |way: &Vec<Point>| way.windows(2).map(|leg| (leg[1] - leg[0]).norm()).sum::<f32>();
+    ways.sort_by(|a, b| length(a).total_cmp(&length(b)));
+    let way = ways.into_iter().find(|way| {
+        way.iter().all(|p| p.z > 0.5)
+            && way.windows(2).all(|leg| clear(leg[0], leg[1]))
+            && keep.iter().all(|k| oracle::distance((last, ground), (k.from, k.to)) >= k.radius_m)
+    })?;
+    along(&way, own, request.descent_m)
+}
+
+fn along(way: &[Point], own: &Plan, descent_m: f32) -> Option<Plan> {
+    let mut path = Path::new();
+    for point in way {
+        path.push(*point, 2.0).ok()?;
+    }
+    Some(Plan { path, descent_m, gates: heapless::Vec::new(), ..own.clone() })
+}
