@@ -1,0 +1,127 @@
+//! How the vehicle flies: what the controllers ask for, and what comes of it.
+
+use companion::autopilot::Kind;
+use companion::{Instant, ardupilot, px4};
+use nalgebra::Vector3;
+use planner_core::Point;
+
+use super::{ARDUPILOT_LOITER, Autopilot, PX4_POSITION, STEP_S};
+
+/// Height over home that a return climbs to, metres.
+const RETURN_M: f32 = 6.0;
+
+impl Autopilot {
+    /// The acceleration that its controllers ask for.
+    fn wanted(&self, now: Instant, floor_z: f32) -> Vector3<f32> {
+        let kind = self.kind;
+        let (position_gain, velocity_gain) = match kind {
+            Kind::Px4 => (Point::new(0.95, 0.95, 1.0), Point::new(1.8, 1.8, 4.0)),
+            Kind::ArduPilot => (Point::new(1.0, 1.0, 1.0), Point::new(2.5, 2.5, 4.0)),
+        };
+        let mut feed_forward = Point::zeros();
+        let mut velocity = Point::zeros();
+        let stale_s = if kind == Kind::Px4 { f32::INFINITY } else { self.guid_timeout_s };
+        if self.mode == kind.setpoint_mode() {
+            if let Some(z) = self.takeoff_z {
+                velocity.z = (z - self.position.z).clamp(-0.5, 1.2);
+            } else if let Some(target) = self.target.filter(|_| self.age_s(now) < stale_s) {
+                velocity = target.velocity;
+                if let Some(place) = target.position {
+                    velocity += (place - self.position).component_mul(&position_gain);
+                    feed_forward = target.acceleration;
+                }
+            }
+            if kind == Kind::Px4 {
+                // The ramp of a take-off.
+                let lifted_s = self.lifted_at.map_or(0.0, |at| (now - at).secs_f32());
+                velocity.z = velocity.z.min(0.4 + 0.4 * lifted_s);
+            }
+        } else if self.mode == kind.land_mode() {
+            velocity.z = -self.landing_mps(floor_z);
+        } else if self.mode == px4::RTL && kind == Kind::Px4
+            || self.mode == ardupilot::RTL && kind == Kind::ArduPilot
+        {
+            let away = self.home - self.position;
+            let across = away.xy();
+            if across.norm() < 0.3 {
+                velocity.z = -self.landing_mps(floor_z);
+            } else if self.position.z < self.home.z + RETURN_M - 0.3 && across.norm() > 1.0 {
+                velocity.z = 1.0;
+            } else {
+                let speed = across.norm().min(3.0) / across.norm();
+                velocity = Point::new(across.x * speed, across.y * speed, 0.0);
+            }
+        } else if self.mode == PX4_POSITION && kind == Kind::Px4
+            || self.mode == ARDUPILOT_LOITER && kind == Kind::ArduPilot
+        {
+            velocity = self.pilot;
+            if self.position.z < floor_z + 0.6 {
+                velocity.z = velocity.z.max(0.3);
+            }
+        }
+        let across = velocity.xy().norm();
+        if across > 5.0 {
+            (velocity.x, velocity.y) = (velocity.x * 5.0 / across, velocity.y * 5.0 / across);
+        }
+        velocity.z = velocity.z.clamp(-1.5, 2.5);
+        let mut wanted = (velocity - self.velocity).component_mul(&velocity_gain) + feed_forward;
+        let (across_most, up_most, down_most) = match kind {
+            Kind::Px4 => (5.0, 4.0, 3.0),
+            Kind::ArduPilot => (2.5, 1.1, 1.1),
+        };
+        let across = wanted.xy().norm();
+        if across > across_most {
+            (wanted.x, wanted.y) = (wanted.x * across_most / across, wanted.y * across_most / across);
+        }
+        wanted.z = wanted.z.clamp(-down_most, up_most);
+        wanted
+    }
+
+    fn landing_mps(&self, floor_z: f32) -> f32 {
+        let height = self.position.z - floor_z;
+        match self.kind {
+            Kind::Px4 if height > 7.0 => 1.5,
+            Kind::Px4 if height > 3.0 => 1.05,
+            Kind::Px4 => 0.8,
+            Kind::ArduPilot if height > 10.0 => 0.9,
+            Kind::ArduPilot => 0.5,
+        }
+    }
+
+    pub(super) fn fly(&mut self, now: Instant, floor_z: f32) {
+        if !self.armed {
+            (self.velocity, self.acceleration) = (Point::zeros(), Point::zeros());
+            return;
+        }
+        let wanted = self.wanted(now, floor_z);
+        self.acceleration += (wanted - self.acceleration) * (STEP_S / 0.12);
+        self.velocity += self.acceleration * STEP_S;
+        self.position += self.velocity * STEP_S;
+        // A floor is met from above only.
+        if self.position.z <= floor_z && self.position.z > floor_z - 0.3 {
+            self.position.z = floor_z;
+            self.velocity = Point::new(0.0, 0.0, self.velocity.z.max(0.0));
+            self.acceleration = Point::new(0.0, 0.0, self.acceleration.z.max(0.0));
+        }
+        let height = self.position.z - floor_z;
+        if height > 0.12 && !self.airborne {
+            self.airborne = true;
+            self.lifted_at = Some(now);
+        }
+        let rests = (-0.3..0.03).contains(&height) && self.velocity.z < 0.05;
+        self.grounded_since = if rests { self.grounded_since.or(Some(now)) } else { None };
+        let rested_s = self.grounded_since.map_or(0.0, |at| (now - at).secs_f32());
+        if rested_s > 0.6 {
+            self.airborne = false;
+        }
+        let flew = self.lifted_at.is_some();
+        let after_s = match self.kind {
+            Kind::Px4 if flew => 2.8,
+            Kind::ArduPilot if flew && self.mode != ardupilot::GUIDED => 1.4,
+            _ => 10.0,
+        };
+        if rested_s > after_s && (now - self.armed_at).secs_f32() > after_s {
+            self.armed = false;
+        }
+    }
+}
