@@ -12,7 +12,7 @@ use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES
 use super::{ORIGIN, Packet};
 use crate::setpoints::{Limits, SetpointCheck};
 
-/// Nobody leaves this box, metres: minimum and maximum corner.
+/// No vehicle leaves this box, metres: minimum and maximum corner.
 const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 70.0, 60.0));
 /// A vehicle that has heard nobody for so long is deaf, seconds: it has stopped, and lands after 20 s.
 const DEAF_S: f32 = 20.0;

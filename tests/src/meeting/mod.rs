@@ -34,7 +34,7 @@ use crate::setpoints::SetpointStats;
 
 /// A meeting is over by then, seconds after its start.
 pub const LIMIT_S: f32 = 180.0;
-/// After everything has happened and everybody stands, this much is still flown, seconds.
+/// After everything has happened and all stand, this much is still flown, seconds.
 const AFTERMATH_S: f32 = 3.0;
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 const STEP_MS: u64 = 25;

@@ -1,0 +1,82 @@
+//! What happens in a meeting beside the flights.
+
+use planner_core::Point;
+
+use super::{Happening, START_S, Vehicle, What};
+use crate::meeting::autopilot::Failsafe;
+use crate::meeting::dice::Dice;
+
+/// Starts, and what else happens.
+pub(super) fn happenings(vehicles: &[Vehicle], dice: &mut Dice) -> Vec<Happening> {
+    let mut out = Vec::new();
+    let mut ended = vec![false; vehicles.len()];
+    for vehicle in 0..vehicles.len() {
+        out.push(Happening { at_s: START_S, vehicle, what: What::Start });
+        out.push(Happening { at_s: START_S + 1.5, vehicle, what: What::Start });
+    }
+    let events = [0, 1, 1, 1, 2, 2, 3][dice.below(7)];
+    let mut busy_until = vec![START_S + 2.0; vehicles.len()];
+    for _ in 0..events {
+        let vehicle = dice.below(vehicles.len());
+        if ended[vehicle] {
+            continue;
+        }
+        let at_s = busy_until[vehicle].max(START_S + dice.real(2.0, 40.0));
+        let lasts_s = dice.real(1.0, 20.0);
+        let until = at_s + lasts_s;
+        let mut push = |at_s, what| out.push(Happening { at_s, vehicle, what });
+        let how = if dice.chance(0.5) { Failsafe::Land } else { Failsafe::Return };
+        match dice.below(10) {
+            0 | 1 => {
+                push(at_s, What::Pause);
+                match dice.below(4) {
+                    0 => push(until, What::Return),
+                    1 => push(until, What::Land),
+                    _ => {
+                        push(until, What::Resume);
+                        push(until + 3.0, What::Resume);
+                    }
+                }
+                // A command that is refused then comes again.
+                push(at_s + 40.0, What::Resume);
+            }
+            2 => push(at_s, What::Return),
+            3 => push(at_s, What::Land),
+            4 | 5 => {
+                let mut velocity = dice.direction() * dice.real(0.0, 1.5);
+                velocity.z *= 0.5;
+                push(at_s, What::PilotTakes(velocity));
+                if dice.chance(0.5) {
+                    push(at_s + 0.5 * lasts_s, What::PilotTakes(Point::zeros()));
+                    push(until, What::PilotReturns);
+                    (1..5).for_each(|i| push(until + 1.5 * i as f32, What::Resume));
+                    // A vehicle that cannot go on is landed.
+                    push(until + 40.0, What::Land);
+                } else {
+                    push(until, What::PilotLands);
+                    ended[vehicle] = true;
+                }
+            }
+            6 => {
+                push(at_s, What::Fails(how));
+                ended[vehicle] = true;
+            }
+            7 => {
+                push(at_s, What::Dies);
+                // An ArduCopter hovers for ever: its pilot lands it.
+                push(at_s + 20.0, What::PilotLands);
+                ended[vehicle] = true;
+            }
+            _ => {
+                let (sends, hears) = [(true, false), (false, true), (true, true)][dice.below(3)];
+                push(at_s, What::Cut { sends, hears });
+                if dice.chance(0.7) {
+                    push(at_s + dice.real(1.0, 25.0), What::Healed);
+                }
+            }
+        }
+        busy_until[vehicle] = until + 8.0;
+    }
+    out.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
+    out
+}

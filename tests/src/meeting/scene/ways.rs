@@ -1,0 +1,181 @@
+//! Ways of a meeting's vehicles: the geometries in which they come close.
+
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::schedule::{self, Flight};
+
+use super::{SAFETY_M, SCHEDULE, WAYPOINTS};
+use crate::meeting::dice::Dice;
+
+/// No flight is longer, seconds.
+const LONGEST_S: f32 = 60.0;
+/// The geometries.
+pub(super) const KINDS: [&str; 6] = ["crossing", "shared", "vertical", "beside", "corridor", "random"];
+
+/// A way: ground of the pad, points of the path, ground of the goal.
+pub(super) struct Way {
+    pub(super) pad: Point,
+    pub(super) points: Vec<Point>,
+    pub(super) ground_z: f32,
+}
+
+pub(super) fn at_height(place: Point, z: f32) -> Point {
+    Point::new(place.x, place.y, z)
+}
+
+/// A way of vehicle `i` of `n` in a geometry whose numbers are in `shape`.
+pub(super) fn way(kind: &str, i: usize, shape: &Shape, dice: &mut Dice) -> Way {
+    let up = |dice: &mut Dice| if dice.chance(0.2) { dice.real(1.0, 29.0) } else { dice.real(1.0, 5.0) };
+    let (middle, z) = (shape.middle, shape.z);
+    match kind {
+        "crossing" => {
+            let angle = shape.angle + dice.real(0.2, 2.9) * i as f32;
+            let (reach, beyond) = (dice.real(4.0, 9.0), dice.real(4.0, 9.0));
+            let direction = Point::new(angle.cos(), angle.sin(), 0.0);
+            let level = z + dice.real(-0.4, 0.4);
+            let from = at_height(middle - direction * reach, level);
+            let to = at_height(middle + direction * beyond, level + dice.real(-0.5, 0.5));
+            grounded(vec![from, at_height(middle, level), to], dice)
+        }
+        "shared" => {
+            let mut points = vec![middle + Point::new(dice.real(-7.0, -3.0), dice.real(-5.0, 5.0), 0.0)];
+            points.extend([middle, middle + shape.along * 7.0]);
+            points.push(
+                points[2] + Point::new(dice.real(2.0, 6.0), dice.real(-6.0, 6.0), dice.real(-0.5, 2.0)),
+            );
+            if dice.chance(0.25) {
+                points.reverse();
+            }
+            points.iter_mut().for_each(|p| p.z = p.z.max(1.0) + 0.0);
+            grounded(points, dice)
+        }
+        "vertical" => {
+            // Above one another's pads and goals.
+            let here = middle + Point::new(dice.real(-0.8, 0.8), dice.real(-0.8, 0.8), 0.0);
+            let away = middle + Point::new(dice.real(-9.0, 9.0), dice.real(-9.0, 9.0), 0.0);
+            let (low, high) = (up(dice), up(dice));
+            let beside =
+                |p: Point, dice: &mut Dice| p + Point::new(dice.real(2.0, 4.0), dice.real(2.0, 4.0), 0.0);
+            match i % 3 {
+                0 => grounded(vec![at_height(here, low), at_height(away, low + dice.real(-0.5, 2.0))], dice),
+                1 => grounded(vec![at_height(away, high), at_height(here, high)], dice),
+                _ => grounded(
+                    vec![at_height(away, high), at_height(here, high), at_height(beside(here, dice), high)],
+                    dice,
+                ),
+            }
+        }
+        "beside" => {
+            // A path, and pads close to it.
+            let across = Point::new(-shape.along.y, shape.along.x, 0.0);
+            let line =
+                |along: f32, off: f32, z: f32| at_height(middle + shape.along * along + across * off, z);
+            if i == 0 {
+                grounded(vec![line(-8.0, 0.0, z), line(8.0, 0.0, z)], dice)
+            } else {
+                let off = dice.real(1.6, 3.0) * if dice.chance(0.5) { 1.0 } else { -1.0 };
+                let (along, top) = (dice.real(-5.0, 5.0), z + dice.real(-1.0, 3.0));
+                let to = line(along + dice.real(-4.0, 4.0), off + off.signum() * dice.real(3.0, 8.0), top);
+                let mut points = vec![line(along, off, top.max(1.0)), to];
+                if dice.chance(0.5) {
+                    points.reverse();
+                }
+                grounded(points, dice)
+            }
+        }
+        "corridor" => {
+            let along = shape.along;
+            let end = dice.real(5.0, 9.0);
+            let mut points = vec![
+                at_height(
+                    middle - along * end + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
+                    z,
+                ),
+                at_height(middle - along * 4.0, z),
+                at_height(middle + along * 4.0, z),
+                at_height(
+                    middle + along * end + Point::new(dice.real(-4.0, 4.0), dice.real(-4.0, 4.0), 0.0),
+                    z,
+                ),
+            ];
+            if i % 2 == 1 {
+                points.reverse();
+            }
+            grounded(points, dice)
+        }
+        _ => {
+            let count = 2 + dice.below(3);
+            let low = Point::new(middle.x - 8.0, middle.y - 8.0, 1.0);
+            let high = Point::new(middle.x + 8.0, middle.y + 8.0, 6.0);
+            grounded((0..count).map(|_| dice.point(low, high)).collect(), dice)
+        }
+    }
+}
+
+/// Puts pads under a path: mostly on the floor, some on a platform.
+fn grounded(mut points: Vec<Point>, dice: &mut Dice) -> Way {
+    points.iter_mut().for_each(|p| p.z = p.z.max(0.8));
+    let mut ground = |top: f32| {
+        let most = (top - 0.8).max(0.0);
+        if dice.chance(0.2) { dice.real(0.0, most) } else { 0.0 }
+    };
+    let (first, last) = (points[0], points[points.len() - 1]);
+    Way { pad: at_height(first, ground(first.z)), ground_z: ground(last.z), points }
+}
+
+/// The numbers of a geometry: metres, radians.
+pub(super) struct Shape {
+    pub(super) middle: Point,
+    pub(super) along: Point,
+    pub(super) angle: f32,
+    pub(super) z: f32,
+}
+
+/// The flight along a way; none where it is too short or too long.
+pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
+    let mut path = Path::new();
+    for point in &way.points {
+        path.push(*point, 2.0).ok()?;
+    }
+    let first = way.points.first()?;
+    let climb_m = first.z - way.pad.z;
+    path.label(climb_m / SCHEDULE.vertical_mps, SCHEDULE.cruise_mps);
+    let descent_m = way.points.last()?.z - way.ground_z;
+    let length_s = path.length_m() / SCHEDULE.cruise_mps + climb_m + descent_m;
+    (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(Flight {
+        id,
+        goal: Some(u16::from(id)),
+        path,
+        climb_m,
+        descent_m,
+        depart_s: 0.0,
+        piece_m: schedule::PIECE_M,
+    })
+}
+
+/// Where a flight begins and ends, on the ground.
+pub(super) fn pads(flight: &Flight<WAYPOINTS>) -> [Point; 2] {
+    let down = |length| Point::new(0.0, 0.0, length);
+    let points = flight.path.waypoints();
+    [points[0].position - down(flight.climb_m), points[points.len() - 1].position - down(flight.descent_m)]
+}
+
+/// Whether the flights leave one another's platforms room, and their pads lie apart.
+pub(super) fn fits(flights: &[Flight<WAYPOINTS>], next: &Flight<WAYPOINTS>) -> bool {
+    let own = pads(next);
+    let over = |pads: &[Point; 2], path: &Path<WAYPOINTS>| {
+        let steps = (path.length_m() / 0.3) as usize;
+        path.points_from(0.0, 0.3)
+            .take(steps + 1)
+            .any(|p| pads.iter().any(|pad| (pad - p).xy().norm() < 1.2 && p.z < pad.z + 0.7))
+    };
+    !over(&own, &next.path)
+        && flights.iter().all(|other| {
+            let theirs = pads(other);
+            let apart = own.iter().zip(&theirs).all(|(a, b)| {
+                (a - b).norm() > SAFETY_M + 0.5 && ((a - b).xy().norm() > 1.6 || (a.z - b.z).abs() < 0.1)
+            });
+            let crossed = (own[0] - theirs[1]).norm().min((own[1] - theirs[0]).norm()) > SAFETY_M + 0.3;
+            apart && crossed && !over(&theirs, &next.path) && !over(&own, &other.path)
+        })
+}
