@@ -1,5 +1,6 @@
-//! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams the companion relies on, and a
-//! vehicle that goes where the setpoint says at a limited speed. The real closed loop is host-sim's.
+//! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams that the
+//! companion relies on, and a vehicle that goes where the setpoint says at a limited speed. The real
+//! closed loop is host-sim's.
 
 extern crate std;
 use std::vec::Vec;
@@ -87,8 +88,8 @@ pub struct Bench {
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
     /// Whether there is a way around: by y = 16.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
-    /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place, flags of
-    /// its intent, progress, CRC of its plan.
+    /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
+    /// flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
     /// When it last knew where it is; none: always.
     pub neighbour_clock: Option<Instant>,
@@ -261,7 +262,7 @@ impl Bench {
         assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
     }
 
-    /// The same with vehicle 77 standing on its pad, from where it follows the plan.
+    /// Started, while vehicle 77 stands on its pad, from where it follows the plan.
     pub fn accompanied(config: Config<4>) -> Self {
         let mut bench = Self::new(config);
         bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));

@@ -1,4 +1,5 @@
-//! A scene for every row of the mission table: something happens to a vehicle in some state, and another state follows.
+//! A scene for every row of the mission table: something happens to a vehicle in some state, and
+//! another state follows.
 
 extern crate std;
 use std::string::String;

@@ -1,4 +1,4 @@
-//! What the companion sends: setpoints and commands, with their answers, and what goes to the radio.
+//! What the companion sends: setpoints and commands with their answers, and frames to the radio.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;

@@ -1,4 +1,4 @@
-//! How the vehicle flies: to where the setpoint says at a limited speed, and down in the mode that lands.
+//! How the vehicle flies: to the setpoint at a limited speed, and down in the mode that lands.
 
 use planner_core::Point;
 
@@ -16,7 +16,7 @@ impl Bench {
         self.kind == Kind::Px4 || self.took_off && self.now >= self.lifts_at
     }
 
-    /// 50 ms of flight: where the mode leads, at a limited speed; on the ground the motors stop by themselves.
+    /// 50 ms of flight; on the ground the motors stop by themselves.
     pub(super) fn fly(&mut self) {
         let step = 0.1;
         let target = match self.mode {
@@ -38,7 +38,8 @@ impl Bench {
         self.disarm_by_itself();
     }
 
-    /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`, `DISARM_DELAY`).
+    /// Both autopilots disarm after 10 s on the ground with nothing to fly to (`COM_DISARM_PRFLT`,
+    /// `DISARM_DELAY`).
     fn disarm_by_itself(&mut self) {
         let streamed = self.setpoints.last().is_some_and(|s| self.now - s.0 < Duration::from_secs(1));
         let takes_off = match self.kind {

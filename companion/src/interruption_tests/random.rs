@@ -1,4 +1,5 @@
-//! Random sequences of commands, faults and the pilot's doings: what must hold at every tick, and that all end on the ground.
+//! Random sequences of commands, faults and the pilot's acts: what must hold at every tick, and that
+//! all end on the ground.
 
 use std::string::String;
 

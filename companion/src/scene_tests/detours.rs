@@ -76,7 +76,8 @@ pub(super) fn before_take_off(scenes: &mut Scenes) {
 }
 
 pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
-    // Down on the first stretch of the path: there is no place before it, so it goes aside, as often as need be.
+    // Down on the first stretch of the path: there is no place before it, so this one goes aside,
+    // as often as need be.
     let comes_down = |b: &mut Bench| {
         b.answer_detour = None;
         b.neighbour = flies(Point::new(9.5, 12.0, 2.8), 0);
