@@ -322,7 +322,7 @@ impl Mission {
     fn encode(&self) -> anyhow::Result<Vec<u8>> {
         let scenario = &self.scenario;
         let header = MissionHeader {
-            roadmap_crc: self.view().crc(),
+            roadmap_crc: crc(&self.roadmap_file),
             mode: planner_mode(&scenario.mission),
             method: scenario.deconfliction.method,
             origin: scenario.map.origin,
@@ -354,6 +354,11 @@ impl Mission {
             .map_err(|e| anyhow!("no mission file: {}: {e}", scenario.path))?;
         Ok(bytes)
     }
+}
+
+/// What the file ends with.
+fn crc(roadmap_file: &[u8]) -> u32 {
+    u32::from_le_bytes(*roadmap_file.last_chunk().expect("we wrote it ourselves"))
 }
 
 fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {

@@ -41,12 +41,12 @@ pub struct Roadmap {
     pub heights_m: Vec<f32>,
 }
 
-/// How long each part took, seconds.
+/// How long each part took, seconds. Boxes and nodes are made at the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Parts {
     /// The tree of boxes over the map, from which distances are told.
     pub boxes_s: f64,
-    /// Random free nodes.
+    /// Random free nodes, and their heights over the ground.
     pub nodes_s: f64,
     /// Which pairs of them are joined, and the clearance of each.
     pub edges_s: f64,
@@ -59,24 +59,28 @@ pub struct Parts {
 /// Samples and joins: Algorithm 1 of P3D, with the clearance of every edge. The result does not depend on the number of
 /// threads.
 pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, Parts)> {
-    let begun = Instant::now();
     let grid = map.grid();
-    let tree = BoxTree::new(&grid);
-    let with_boxes = Instant::now();
-    let nodes = sample(map, terminals, config)?;
-    let with_nodes = Instant::now();
+    let height_m = |node: &Point| map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m);
+    let sampled = || {
+        let nodes = sample(map, terminals, config)?;
+        let heights_m: Vec<f32> = nodes.iter().map(height_m).collect();
+        anyhow::Ok((nodes, heights_m))
+    };
+    let ((tree, boxes_s), (sampled, nodes_s)) =
+        rayon::join(|| timed(|| BoxTree::new(&grid)), || timed(sampled));
+    let (nodes, heights_m) = sampled?;
+    let joining = Instant::now();
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
-    let parts = Parts {
-        boxes_s: (with_boxes - begun).as_secs_f64(),
-        nodes_s: (with_nodes - with_boxes).as_secs_f64(),
-        edges_s: with_nodes.elapsed().as_secs_f64(),
-        cap_s: 0.0,
-        file_s: 0.0,
-    };
-    let height_m = |node: &Point| map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m);
-    let heights_m = nodes.iter().map(height_m).collect();
+    let parts = Parts { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), cap_s: 0.0, file_s: 0.0 };
     Ok((Roadmap { nodes, edges, heights_m }, parts))
+}
+
+/// What some work gives, and how long it took, seconds.
+fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let begun = Instant::now();
+    let done = work();
+    (done, begun.elapsed().as_secs_f64())
 }
 
 /// Terminals and free nodes.

@@ -12,10 +12,15 @@ use rayon::prelude::*;
 
 /// Children of a node.
 const FAN: usize = 8;
-/// Nodes waiting to be opened: 7 a level, and the last one's 8. Halving a box list thrice a level, 2³² boxes make 11 levels.
-const WAITING: usize = 96;
+/// Nodes waiting to be opened: 7 a level, and the last one's 8. Seven partings, always of the largest part and into two of
+/// which neither has less than a third, leave none with more than a quarter: 2³² boxes make 16 levels.
+const WAITING: usize = 120;
 /// Child of a node that is a box of obstacles.
 const LEAF: u32 = u32::MAX;
+/// Places along an axis at which boxes may be parted.
+const BINS: usize = 16;
+/// A node is opened by segments that pass it this near, metres: the clearance of most edges is less.
+const NEAR_M: f32 = 0.6;
 
 /// Cells `low..high`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -37,10 +42,18 @@ impl CellBox {
         }
     }
 
-    /// The sides across an axis, then where it begins: boxes that may be joined along it follow one another in this order.
-    fn along(&self, axis: usize) -> [u16; 5] {
+    /// The sides across an axis, one number.
+    fn across(&self, axis: usize) -> u64 {
         let (v, w) = ((axis + 1) % 3, (axis + 2) % 3);
-        [self.low[v], self.high[v], self.low[w], self.high[w], self.low[axis]]
+        let sides = [self.low[v], self.high[v], self.low[w], self.high[w]];
+        sides.into_iter().fold(0, |all, side| all << 16 | u64::from(side))
+    }
+
+    /// A measure of how many segments pass it within a distance, in cells: half the surface of all places that near, but
+    /// for a constant.
+    fn passed_by(&self, near: f32) -> f32 {
+        let [x, y, z] = [0, 1, 2].map(|a| f32::from(self.high[a] - self.low[a]));
+        x * y + y * z + z * x + core::f32::consts::PI * near * (x + y + z)
     }
 }
 
@@ -69,9 +82,9 @@ fn take_apart(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
 
 /// Joins boxes that touch along an axis and have equal sides across it.
 fn join_along(axis: usize, boxes: &mut Vec<CellBox>) {
-    boxes.sort_unstable_by_key(|b| b.along(axis));
+    boxes.sort_unstable_by_key(|b| (b.across(axis), b.low[axis]));
     boxes.dedup_by(|next, last| {
-        let joins = last.along(axis)[..4] == next.along(axis)[..4] && last.high[axis] == next.low[axis];
+        let joins = last.across(axis) == next.across(axis) && last.high[axis] == next.low[axis];
         if joins {
             last.high[axis] = next.high[axis];
         }
@@ -143,18 +156,15 @@ impl BoxTree {
     fn add(&mut self, boxes: &mut [CellBox]) -> u32 {
         let index = self.nodes.len();
         self.nodes.push(Node::EMPTY);
-        let mut parts = vec![boxes];
+        // Few enough are children one by one.
+        let mut parts: Vec<_> = if boxes.len() <= FAN { boxes.chunks_mut(1).collect() } else { vec![boxes] };
         while parts.len() < FAN {
             let Some(largest) =
                 (0..parts.len()).filter(|&i| parts[i].len() > 1).max_by_key(|&i| parts[i].len())
             else {
                 break;
             };
-            let part = parts.swap_remove(largest);
-            let axis = longest_axis(part);
-            let middle = part.len() / 2;
-            part.select_nth_unstable_by_key(middle, |b| b.center(axis));
-            let (left, right) = part.split_at_mut(middle);
+            let (left, right) = in_two(parts.swap_remove(largest), NEAR_M / self.shape.resolution_m);
             parts.extend([left, right]);
         }
         for (lane, part) in parts.into_iter().enumerate().filter(|(_, part)| !part.is_empty()) {
@@ -211,16 +221,13 @@ impl BoxTree {
                 if least[lane] >= bound {
                     continue;
                 }
-                let corner = |sides: &[[f32; FAN]; 3]| [sides[0][lane], sides[1][lane], sides[2][lane]];
-                let square = segment.square_to_box(corner(&node.low), corner(&node.high));
-                if square >= bound {
-                    continue;
-                }
                 if node.child[lane] == LEAF {
-                    bound = square;
+                    let corner = |sides: &[[f32; FAN]; 3]| [sides[0][lane], sides[1][lane], sides[2][lane]];
+                    bound = smaller(segment.square_to_box(corner(&node.low), corner(&node.high)), bound);
                     continue;
                 }
                 // The nearest is opened first.
+                let square = least[lane];
                 let mut place = count;
                 while place > first && waiting[place - 1].square < square {
                     waiting[place] = waiting[place - 1];
@@ -234,13 +241,68 @@ impl BoxTree {
     }
 }
 
-/// The axis along which centres lie farthest apart.
-fn longest_axis(boxes: &[CellBox]) -> usize {
-    let spread = |axis: usize| {
-        let centers = boxes.iter().map(|b| b.center(axis));
-        centers.clone().max().unwrap_or(0) - centers.min().unwrap_or(0)
-    };
-    (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0)
+/// Parts two boxes or more so that few segments have to open both halves, of which neither has less than a third: the surface
+/// area heuristic (MacDonald and Booth 1990) in bins (Wald 2007), for segments that pass within `near` cells. O(boxes).
+fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) {
+    let mut best = (f32::INFINITY, 0, 0);
+    for axis in 0..3 {
+        let Some(bin) = bins(boxes, axis) else { continue };
+        let mut all: [Option<(CellBox, usize)>; BINS] = [None; BINS];
+        for b in boxes.iter() {
+            let one = &mut all[bin(b)];
+            *one = one.map_or(Some((*b, 1)), |(whole, count)| Some((whole.join(b), count + 1)));
+        }
+        let add = |sum: &mut Option<(CellBox, usize)>, next: Option<(CellBox, usize)>| {
+            *sum = match (*sum, next) {
+                (Some((a, n)), Some((b, m))) => Some((a.join(&b), n + m)),
+                (sum, next) => sum.or(next),
+            };
+            sum.map_or(0.0, |(whole, count)| whole.passed_by(near) * count as f32)
+        };
+        let (mut above, mut below) = (None, None);
+        let mut costs = [0.0; BINS];
+        for i in (1..BINS).rev() {
+            costs[i] = add(&mut above, all[i]);
+        }
+        for i in 1..BINS {
+            let cost = add(&mut below, all[i - 1]) + costs[i];
+            let count = below.map_or(0, |(_, count)| count);
+            let least = boxes.len().div_ceil(3);
+            if cost < best.0 && count >= least && boxes.len() - count >= least {
+                best = (cost, axis, i);
+            }
+        }
+    }
+    let (cost, axis, first_above) = best;
+    let mut middle = 0;
+    if let Some(bin) = bins(boxes, axis).filter(|_| cost.is_finite()) {
+        for i in 0..boxes.len() {
+            if bin(&boxes[i]) < first_above {
+                boxes.swap(i, middle);
+                middle += 1;
+            }
+        }
+    } else {
+        // Most are in one bin of each axis.
+        let spread = |axis: usize| extent(boxes, axis).map_or(0, |(low, high)| high - low);
+        let axis = (0..3).max_by_key(|&axis| spread(axis)).unwrap_or(0);
+        middle = boxes.len() / 2;
+        boxes.select_nth_unstable_by_key(middle, |b| b.center(axis));
+    }
+    boxes.split_at_mut(middle)
+}
+
+/// Least and greatest of the boxes' centres along an axis, twice.
+fn extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
+    let centers = || boxes.iter().map(|b| b.center(axis));
+    Some((centers().min()?, centers().max()?))
+}
+
+/// Which of [`BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
+fn bins(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
+    let (low, high) = extent(boxes, axis)?;
+    (low < high)
+        .then_some(move |b: &CellBox| (b.center(axis) - low) as usize * (BINS - 1) / (high - low) as usize)
 }
 
 /// A segment in cells.
