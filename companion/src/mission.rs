@@ -68,6 +68,8 @@ pub enum Action {
 pub struct Row {
     /// States it applies to.
     pub from: &'static [State],
+    /// The same, a bit for each.
+    pub(crate) states: u32,
     /// What must hold.
     pub guard: Guard,
     /// How long it must have held; zero: at once.
@@ -86,12 +88,23 @@ pub(crate) const NOW: Duration = Duration::from_millis(0);
 
 /// Whether some row of `state` waits for `guard`: a command that none waits for is refused.
 pub fn awaits(state: State, guard: Guard) -> bool {
-    TABLE.iter().any(|row| row.guard == guard && row.from.contains(&state))
+    TABLE.iter().any(|row| row.guard == guard && row.states & bits(&[state]) != 0)
 }
 
 /// The first row that applies.
 pub fn update(state: State, inputs: &Inputs) -> Option<&'static Row> {
-    TABLE.iter().find(|row| row.from.contains(&state) && row.guard.holds(inputs, row.limit))
+    let here = bits(&[state]);
+    TABLE.iter().find(|row| row.states & here != 0 && row.guard.holds(inputs, row.limit))
+}
+
+/// States, a bit for each.
+pub(crate) const fn bits(states: &[State]) -> u32 {
+    let (mut bits, mut i) = (0, 0);
+    while i < states.len() {
+        bits |= 1 << states[i] as u32;
+        i += 1;
+    }
+    bits
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@
 //! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
 mod contact;
+mod met;
 mod places;
 pub(crate) mod relay;
 
@@ -14,9 +15,9 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::frames::{self, Geodetic};
-use planner_core::safety::Heard;
 
 use self::contact::Contact;
+pub(crate) use self::met::{Met, Reach};
 use crate::config::RosterEntry;
 use crate::echo::{Echo, Lateness};
 use crate::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
@@ -34,7 +35,7 @@ const DEAD: Duration = Duration::from_secs(45);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 const DOWN: Duration = Duration::from_secs(75);
 /// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
-const STRETCH_M: f32 = 6.0;
+pub(crate) const STRETCH_M: f32 = 6.0;
 /// Spacing of the places on that stretch below which it may lie, metres.
 const STRETCH_STEP_M: f32 = 1.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
@@ -48,6 +49,8 @@ const BELOW_M: f32 = 15.0;
 const LANDS_MPS: f32 = 2.0;
 /// A place older than this tells little of how low a vehicle is that lands, seconds.
 const OLD_S: f32 = 1.0;
+/// The same: what was heard within this time is no older.
+const FRESHLY: Duration = Duration::from_secs(1);
 /// A vehicle this little below may yet be above in a moment, metres.
 const LEVEL_M: f32 = 1.0;
 /// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
@@ -79,30 +82,6 @@ const TOP_M: f32 = 0.3;
 const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
 /// Nobody flies higher over another than this, metres.
 const SKY_M: f32 = 1000.0;
-
-/// A neighbour as the safety filter sees it.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Met<'a> {
-    pub(crate) id: u8,
-    /// Whether the roster does not name it.
-    pub(crate) stranger: bool,
-    /// Whether it follows the shared plan.
-    pub(crate) on_plan: bool,
-    /// Whether it does so out of range, as others report.
-    pub(crate) far: bool,
-    /// Whether it knows that plan.
-    pub(crate) shares_plan: bool,
-    /// Whether it has stood for a while.
-    pub(crate) stands: bool,
-    /// Whether it stands until another vehicle moves.
-    pub(crate) waits: bool,
-    /// Whether it has been silent for so long that it counts as lost.
-    pub(crate) lost: bool,
-    /// What its set follows from.
-    pub(crate) heard: Heard<'a>,
-    /// Where it was last heard, if its set is that of a climb since: it may not have begun that.
-    pub(crate) low: Option<Point>,
-}
 
 /// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
 /// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
@@ -323,14 +302,15 @@ impl<const V: usize> Neighbours<V> {
             if placed_at.is_none() && progress_m.is_none() {
                 continue;
             }
+            let dead = contact.is_dead(self.clear_at);
             let state = Neighbour {
                 // Of one that was never heard itself only the progress is known.
                 position: placed_at.map_or(NOWHERE, |_| contact.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
                 rank: contact.rank,
                 progress_m,
-                grounded: contact.state.grounded || contact.is_dead(self.clear_at),
-                out: contact.is_out_since(self.clear_at),
+                grounded: contact.state.grounded || dead,
+                out: contact.out_at.is_some_and(|since| since <= self.clear_at) || dead,
                 detours: contact.tells(DETOURS),
                 ..contact.state
             };
@@ -338,59 +318,6 @@ impl<const V: usize> Neighbours<V> {
             let _ = self.heard.push(state);
         }
         &self.heard
-    }
-
-    /// Contact `i` as the safety filter sees it; none if its place was never heard.
-    pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
-        let contact = self.contacts.get(i)?;
-        let placed_s = (now - contact.position_at?).secs_f32();
-        // Where positions are lost, an intent says as well where it is: at its setpoint.
-        let told_at = contact.belongs_at.filter(|_| placed_s > OLD_S && !contact.points.is_empty());
-        let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < OLD_S);
-        let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
-        // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
-        let unplaced_for = now - contact.position_at?;
-        let unplaced = unplaced_for >= DEAD && !contact.is_far(now);
-        let dead = (contact.is_dead(now) || unplaced) && !contact.points.is_empty();
-        let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
-        let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
-        let at = contact.points.first().filter(|_| by_intent);
-        let mut here = at.copied().unwrap_or(contact.state.position);
-        // Unheard in its climb it may have come to the top of it, and a little further.
-        let top = contact.climbs_to().filter(|_| age_s > OLD_S && !lies);
-        here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { top.unwrap_or(here.z) };
-        let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
-        let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
-        let rests = dead || top.is_some();
-        let heard = Heard {
-            position: here,
-            velocity: contact.state.velocity,
-            speed_mps: if rests { 0.0 } else { contact.speed_mps },
-            // Whoever flew along its points stopped on them, and rests where a reroute keeps off.
-            age_s: if rests { 0.0 } else { age_s },
-            delay_s: match (dead, top) {
-                (false, Some(_)) => BEYOND_TOP_S,
-                (true, _) => 0.0,
-                _ => contact.late.delay_s,
-            },
-            points: if rests { &[] } else { &contact.points },
-            extent_m: contact.extent_m,
-            grounded,
-            column_to_m: (down && !grounded).then_some(floor_m),
-        };
-        Some(Met {
-            id: contact.id,
-            stranger: contact.rank == STRANGER,
-            on_plan: contact.state.progress_m.is_some() && !contact.tells(DETOURS | OUT),
-            far: contact.is_far(now),
-            shares_plan: contact.shares_plan,
-            lost: dead,
-            waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
-            stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
-            heard,
-            low: top.map(|_| contact.state.position),
-        })
     }
 
     /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.

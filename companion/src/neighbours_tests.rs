@@ -1,3 +1,9 @@
+extern crate std;
+
+use planner_core::safety::{Bounds, Braking};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
 use super::*;
 
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 600.0 };
@@ -260,4 +266,82 @@ fn deaf_is_who_hears_none_of_those_there_are() {
     table.handle_intent(at(10), 0, &intent(0, 1, 2), 1, None);
     assert!(!table.is_deaf(at(12)), "one is heard");
     assert!(table.is_deaf(at(14)));
+}
+
+/// A number from low to high.
+fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
+    low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0
+}
+
+#[test]
+fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
+    let braking = Braking { accel_mps2: 1.5, jerk_mps3: 8.0 };
+    let bounds = Bounds { braking, speed_max_mps: 2.0, silent_s: 3.0 };
+    let (mut beyond, mut reached, mut missed) = (0, 0, 0);
+    for seed in 0..20_000 {
+        let rng = &mut Pcg32::seed_from_u64(seed);
+        let near = |rng: &mut Pcg32, m: f32| {
+            Point::new(uniform(rng, -m, m), uniform(rng, -m, m), uniform(rng, -m, m))
+        };
+        let mut table = joined(0);
+        let contact = &mut table.contacts[1];
+        contact.state.position = near(rng, 10.0);
+        contact.state.velocity = near(rng, 2.0);
+        contact.speed_mps = contact.state.velocity.norm();
+        contact.flags = rng.next_u32() as u8;
+        contact.column = rng.next_u32().is_multiple_of(2);
+        contact.floor_m = [f32::NAN, -3.0][rng.next_u32() as usize % 2];
+        contact.state.progress_m = [None, Some(1.0)][rng.next_u32() as usize % 2];
+        contact.late.delay_s = uniform(rng, 0.0, 1.0);
+        let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
+        let from = contact.state.position + near(rng, beside_m);
+        contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
+        let first = contact.points.first().copied().unwrap_or_default();
+        let extent_m = |p: &Point| (p - first).norm();
+        contact.extent_m = contact.points.iter().map(extent_m).fold(0.0, f32::max);
+        let now = Instant::from_millis(200_000);
+        let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
+        let age = |rng: &mut Pcg32| {
+            let ms = ages_ms[rng.next_u32() as usize % 6] + u64::from(rng.next_u32() % 200);
+            Instant::from_millis(200_000 - ms)
+        };
+        let placed_at = age(rng);
+        contact.position_at = Some(placed_at);
+        contact.belongs_at = Some(age(rng));
+        contact.heard_at = contact.position_at.max(contact.belongs_at);
+        contact.relayed_at = Some(age(rng)).filter(|_| seed % 3 == 0);
+        contact.moved_at = age(rng);
+        let lands = seed % 2 == 0;
+        let stopped = rng.next_u32().is_multiple_of(3);
+        let reach = Reach {
+            place: near(rng, 10.0),
+            within_m: 2.0 + uniform(rng, 0.0, 4.0),
+            bounds: &bounds,
+            ahead_s: if stopped { 3.0 } else { 0.0 },
+            stretch_m: if lands { STRETCH_M } else { 0.0 },
+            on_plan: rng.next_u32().is_multiple_of(2),
+        };
+        let mut met = table.met(1, now).expect("it was placed");
+        if met.on_plan && reach.on_plan {
+            met.heard.delay_s = 0.0;
+        }
+        let silent = met.lost || met.heard.age_s > OLD_S;
+        if lands && silent {
+            (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
+        }
+        let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
+        let reach_m = reach.within_m + met.heard.reach_m(&bounds, ahead_s);
+        let away = met.heard.position - reach.place;
+        let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
+        let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
+        let below = lands && silent && table.may_lie_below(1, &reach.place, reach.within_m);
+        if table.is_beyond(1, now, &reach) {
+            assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
+            beyond += 1;
+        } else {
+            reached += usize::from(!out_of_reach || below);
+            missed += usize::from(out_of_reach && !below);
+        }
+    }
+    assert!(beyond > 2000 && reached > 2000 && missed < beyond, "{beyond} {reached} {missed}");
 }

@@ -1,6 +1,6 @@
 //! The rows of the mission's transition table; [`crate::mission`] says what states, guards and actions are.
 
-use crate::mission::{Action, Guard, NOW, Row, State, To};
+use crate::mission::{Action, Guard, NOW, Row, State, To, bits};
 use crate::time::Duration;
 
 pub(crate) const fn s(secs: u64) -> Duration {
@@ -15,7 +15,7 @@ pub(crate) const fn info(
     action: Action,
     text: &'static str,
 ) -> Row {
-    Row { from, guard, limit, to: To::State(to), action, text, warning: false }
+    Row { from, states: bits(from), guard, limit, to: To::State(to), action, text, warning: false }
 }
 
 pub(crate) const fn warn(
@@ -26,7 +26,7 @@ pub(crate) const fn warn(
     action: Action,
     text: &'static str,
 ) -> Row {
-    Row { from, guard, limit, to: To::State(to), action, text, warning: true }
+    Row { from, states: bits(from), guard, limit, to: To::State(to), action, text, warning: true }
 }
 
 /// Back to the interrupted state.
@@ -37,7 +37,7 @@ pub(crate) const fn back(
     action: Action,
     text: &'static str,
 ) -> Row {
-    Row { from, guard, limit, to: To::Interrupted, action, text, warning: false }
+    Row { from, states: bits(from), guard, limit, to: To::Interrupted, action, text, warning: false }
 }
 
 /// Longer than the armed bit lags behind the ack of arming, twice over.

@@ -106,6 +106,8 @@ const LOOKS: usize = 16;
 /// Time of flight from one look to the next, seconds.
 const LOOK_EVERY_S: f32 = 0.25;
 
+/// Distances so much less are the same, metres.
+const ROUNDING_M: f32 = 0.05;
 /// A reference this little beyond a gate still stands at it: what overruns a stop is not to carry it through, metres.
 const AT_GATE_M: f32 = 0.1;
 
@@ -196,7 +198,7 @@ impl Ahead {
 
     /// Distance along the own path to where it first comes within the safety distance of a neighbour that flies on as last
     /// heard; `None` if not within the look-ahead, or if flying on only takes us further apart. Squares are compared: a board
-    /// takes its square roots by software.
+    /// takes its square roots by software. From far apart the next looks are left out that are too early for both to meet.
     fn first_contact<const W: usize>(
         &self,
         cfg: &DeconflictConfig,
@@ -205,11 +207,22 @@ impl Ahead {
     ) -> Option<f32> {
         let now = (n.position + n.velocity * n.age_s - own.position).norm_squared();
         let near = fminf(cfg.safety_distance_m * cfg.safety_distance_m, now);
-        self.points.iter().zip(1u8..).find_map(|(there, look)| {
-            let after_s = f32::from(look) * LOOK_EVERY_S;
-            let apart = (n.position + n.velocity * (n.age_s + after_s) - there).norm_squared();
-            (apart < near).then_some(f32::from(look - 1) * self.step_m)
-        })
+        // No more than this do both fly from one look to the next.
+        let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
+        let looks_a_metre = 1.0 / (self.step_m + LOOK_EVERY_S * fastest_mps);
+        let mut i = 0;
+        while let Some(there) = self.points.get(i) {
+            let after_s = (i + 1) as f32 * LOOK_EVERY_S;
+            let away = n.position + n.velocity * (n.age_s + after_s) - there;
+            if away.norm_squared() < near {
+                return Some(i as f32 * self.step_m);
+            }
+            let least_m = away.x.abs().max(away.y.abs()).max(away.z.abs());
+            let room_m = least_m - cfg.safety_distance_m - ROUNDING_M;
+            // Not below zero, and 0 where it is no number.
+            i += 1 + (room_m * looks_a_metre) as usize;
+        }
+        None
     }
 }
 

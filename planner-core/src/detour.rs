@@ -56,7 +56,12 @@ impl KeepOff {
 
     /// The same, with no more distance than `here` has: who is too near already may fly off.
     fn seen_from(&self, here: &Point, nearer_m: f32) -> Self {
-        let now_m = sqrtf(segments_distance_sq((here, here), (&self.from, &self.to)));
+        let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
+        let far_m = self.radius_m + nearer_m;
+        if now_sq >= far_m * far_m {
+            return *self;
+        }
+        let now_m = sqrtf(now_sq);
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
@@ -93,15 +98,37 @@ impl KeepOff {
     }
 
     fn touches(&self, a: &Point, b: &Point) -> bool {
-        // Most are apart along one axis alone, which is cheaper to see than a distance.
-        let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
-        let beside = |axis: usize| {
-            let (low, high) = sorted(a[axis], b[axis]);
-            let (least, most) = sorted(self.from[axis], self.to[axis]);
-            high + self.radius_m < least || low - self.radius_m > most
-        };
-        !(0..3).any(beside)
-            && segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
+        let room = Box::around(self);
+        room.sides(a) & room.sides(b) == 0 && self.comes_near(a, b)
+    }
+
+    fn comes_near(&self, a: &Point, b: &Point) -> bool {
+        segments_distance_sq((a, b), (&self.from, &self.to)) < self.radius_m * self.radius_m
+    }
+}
+
+/// The box around what is too near: most is beside it, which is cheaper to see than a distance.
+struct Box {
+    low: Point,
+    high: Point,
+}
+
+impl Box {
+    fn around(of: &KeepOff) -> Self {
+        let (from, to) = (&of.from, &of.to);
+        let radius = Point::repeat(of.radius_m);
+        Self { low: from.inf(to) - radius, high: from.sup(to) + radius }
+    }
+
+    /// Beyond which of its six sides a place is, a bit for each: what is between two places beyond the same side is too.
+    fn sides(&self, p: &Point) -> u8 {
+        let (low, high) = (&self.low, &self.high);
+        u8::from(p.x < low.x)
+            | u8::from(p.x > high.x) << 1
+            | u8::from(p.y < low.y) << 2
+            | u8::from(p.y > high.y) << 3
+            | u8::from(p.z < low.z) << 4
+            | u8::from(p.z > high.z) << 5
     }
 }
 
@@ -121,12 +148,20 @@ pub fn is_blocked<const W: usize>(
     let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
     let next = legs_begun(path, along_m);
-    climbs
-        || obstacle.touches(&last.position, &ground)
-        || path.waypoints()[next.saturating_sub(1)..].windows(2).any(|leg| {
-            let begun = if along_m > leg[0].along_m { path.point_at(along_m) } else { None };
-            obstacle.touches(&begun.unwrap_or(leg[0].position), &leg[1].position)
-        })
+    if climbs || obstacle.touches(&last.position, &ground) {
+        return true;
+    }
+    let ahead = &path.waypoints()[next.saturating_sub(1)..];
+    let Some((begun, ahead)) = ahead.split_first() else { return false };
+    let begun = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
+    let mut from = begun.unwrap_or(first.position);
+    let room = Box::around(&obstacle);
+    let mut beside = room.sides(&from);
+    ahead.iter().any(|w| {
+        let was_beside = core::mem::replace(&mut beside, room.sides(&w.position));
+        let leg = (core::mem::replace(&mut from, w.position), w.position);
+        was_beside & beside == 0 && obstacle.comes_near(&leg.0, &leg.1)
+    })
 }
 
 /// How many stretches [`is_blocked`] looks at: the legs ahead, the climb, the descent.

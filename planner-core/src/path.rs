@@ -140,9 +140,10 @@ impl<const W: usize> Path<W> {
     pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
         let (low, high) = (near_m - window_m, near_m + window_m);
         let mut best = (f32::INFINITY, near_m);
-        for leg in self.waypoints.windows(2) {
-            if leg[1].along_m < low || leg[0].along_m > high {
-                continue;
+        let first = self.leg_at(low).max(1);
+        for leg in self.waypoints.get(first - 1..).unwrap_or_default().windows(2) {
+            if leg[0].along_m > high {
+                break;
             }
             let direction = leg[1].position - leg[0].position;
             let share = (position - leg[0].position).dot(&direction) / direction.norm_squared();

@@ -12,7 +12,7 @@
 //! the segments of one set times those of the other; [`Heard::reach_m`] is a cheap bound for the many that are far.
 
 use heapless::Vec;
-use libm::{fmaxf, fminf, sqrtf};
+use libm::sqrtf;
 
 use crate::schedule::segments_distance_sq;
 use crate::{ConfigError, Point, all_positive};
@@ -42,6 +42,7 @@ pub struct Braking {
 
 impl Braking {
     /// How far a vehicle flies on that begins to brake at this speed, metres.
+    #[inline]
     pub fn stop_m(&self, speed_mps: f32) -> f32 {
         let ramp_s = self.accel_mps2 / self.jerk_mps3;
         0.5 * speed_mps * (speed_mps / self.accel_mps2 + ramp_s)
@@ -53,7 +54,10 @@ impl Braking {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Set {
     points: Vec<Point, POINTS>,
-    column_to_m: Option<f32>,
+    /// Lower end of the column.
+    foot: Option<Point>,
+    /// Around points and column.
+    span: Span,
     /// How far beside the line it can be, metres.
     pub grow_m: f32,
 }
@@ -64,71 +68,132 @@ impl Set {
         let mut points = Vec::new();
         // The first of nine.
         let _ = points.push(place);
-        Self { points, column_to_m: None, grow_m: 0.0 }
+        Self { points, foot: None, span: Span { low: place, high: place }, grow_m: 0.0 }
+    }
+
+    /// Goes on straight to a point; whether there is room for it.
+    fn push(&mut self, to: Point) -> bool {
+        self.span.take(&to);
+        self.points.push(to).is_ok()
     }
 
     /// From `place` along the points `ahead`, for `length_m` from the first of them. Where they end the set ends.
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
+        set.follow(ahead, length_m);
+        set
+    }
+
+    fn follow(&mut self, ahead: impl Iterator<Item = Point>, length_m: f32) {
         let (mut left_m, mut last) = (length_m, None);
         for point in ahead {
             let Some(from) = last.replace(point) else {
-                let _ = set.points.push(point);
+                self.push(point);
                 continue;
             };
             let leg: Point = point - from;
             let leg_m = sqrtf(leg.norm_squared());
             let end = if leg_m > left_m { from + leg * (left_m / leg_m) } else { point };
-            if set.points.push(end).is_err() {
+            if !self.push(end) {
                 // More corners than there is room for: anywhere within what is left.
-                set.grow_m = fmaxf(left_m, 0.0);
-                return set;
+                self.grow_m = left_m.max(0.0);
+                return;
             }
             left_m -= leg_m;
             if left_m <= 0.0 {
-                break;
+                return;
             }
         }
-        set
     }
 
     /// From `place` straight up or down to the height `to_m`.
     pub fn vertical(place: Point, to_m: f32) -> Self {
         let mut set = Self::at(place);
-        let _ = set.points.push(Point::new(place.x, place.y, to_m));
+        set.push(Point::new(place.x, place.y, to_m));
         set
     }
 
     /// How far from its first point it reaches at most, metres.
     pub fn reach_m(&self) -> f32 {
         let here = self.points[0];
-        let most_sq = self.points.iter().fold(0.0, |most, p| fmaxf(most, (p - here).norm_squared()));
+        let most_sq = self.points.iter().fold(0.0_f32, |most, p| most.max((p - here).norm_squared()));
         sqrtf(most_sq) + self.grow_m
     }
 
-    fn segments(&self) -> impl Iterator<Item = (Point, Point)> + '_ {
+    /// Adds the column below the first point, down to a height.
+    fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
-        let alone = (self.points.len() == 1).then_some((first, first));
-        let legs = self.points.windows(2).map(|leg| (leg[0], leg[1]));
-        let column = self.column_to_m.filter(|z| *z < first.z);
-        legs.chain(alone).chain(column.map(|z| (first, Point::new(first.x, first.y, z))))
+        self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
+        if let Some(foot) = &self.foot {
+            self.span.take(foot);
+        }
+    }
+
+    /// Its legs, at least one, and the column.
+    fn segments(&self) -> impl Iterator<Item = (&Point, &Point)> {
+        let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
+        self.points.iter().zip(next).chain(self.foot.as_ref().map(|foot| (&self.points[0], foot)))
     }
 
     /// Square of the least distance to a segment, or `within_sq` if it is not less.
     fn distance_sq(&self, from: &Point, to: &Point, within_sq: f32) -> f32 {
-        let within_m = sqrtf(within_sq);
-        self.segments().fold(within_sq, |least, (a, b)| {
-            let beside = |axis: usize| {
-                let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
-                let (low, high) = sorted(a[axis], b[axis]);
-                let (least, most) = sorted(from[axis], to[axis]);
-                low - most > within_m || least - high > within_m
-            };
-            if (0..3).any(beside) {
-                return least;
+        let span = Span::of(from, to);
+        if span.is_apart(&self.span.low, &self.span.high, within_sq) {
+            return within_sq;
+        }
+        let mut least = within_sq;
+        self.segments().for_each(|(a, b)| {
+            if !span.is_apart(a, b, least) {
+                least = least.min(segments_distance_sq((a, b), (from, to)));
             }
-            fminf(least, segments_distance_sq((&a, &b), (from, to)))
-        })
+        });
+        least
+    }
+
+    /// Square of the least distance to another set's line, or `within_sq` if it is not less.
+    fn least_sq(&self, other: &Self, within_sq: f32) -> f32 {
+        if self.span.is_apart(&other.span.low, &other.span.high, within_sq) {
+            return within_sq;
+        }
+        // Where the second leg begins a first one without length is.
+        let double = self.points.len() > 2 && self.points[0] == self.points[1];
+        let segments = self.segments().skip(usize::from(double));
+        segments.fold(within_sq, |least, (a, b)| other.distance_sq(a, b, least))
+    }
+}
+
+/// Lowest and highest coordinates: most is apart by those, which is cheaper to see than a distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    low: Point,
+    high: Point,
+}
+
+impl Span {
+    fn of(a: &Point, b: &Point) -> Self {
+        let mut span = Self { low: *a, high: *a };
+        span.take(b);
+        span
+    }
+
+    fn take(&mut self, p: &Point) {
+        // Not `min`: what that does about numbers that are none takes a board three times as long.
+        let less = |a: f32, b: f32| if a < b { a } else { b };
+        let more = |a: f32, b: f32| if a > b { a } else { b };
+        let (low, high) = (&mut self.low, &mut self.high);
+        (low.x, low.y, low.z) = (less(p.x, low.x), less(p.y, low.y), less(p.z, low.z));
+        (high.x, high.y, high.z) = (more(p.x, high.x), more(p.y, high.y), more(p.z, high.z));
+    }
+
+    /// Whether the box around `a` and `b` is no nearer than the root of `within_sq`.
+    fn is_apart(&self, a: &Point, b: &Point, within_sq: f32) -> bool {
+        let gap = |low: f32, high: f32, a: f32, b: f32| {
+            (a - high).min(b - high).max((low - a).min(low - b)).max(0.0)
+        };
+        let x = gap(self.low.x, self.high.x, a.x, b.x);
+        let y = gap(self.low.y, self.high.y, a.y, b.y);
+        let z = gap(self.low.z, self.high.z, a.z, b.z);
+        x * x + y * y + z * z >= within_sq
     }
 }
 
@@ -180,6 +245,7 @@ impl Bounds {
 
 impl Heard<'_> {
     /// How far from its place it can be in any direction, `ahead_s` of flight included, metres.
+    #[inline]
     pub fn reach_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
         if self.grounded {
             return 0.0;
@@ -194,51 +260,55 @@ impl Heard<'_> {
         let first_m = away.x + away.y + away.z;
         if first_m < OFF_M {
             // On its points, and no further than those lead.
-            return fminf(along_m + OFF_M, first_m + self.extent_m);
+            return (along_m + OFF_M).min(first_m + self.extent_m);
         }
         along_m + self.wider_m(bounds) + OFF_M
     }
 
     /// How old what it says is, seconds.
+    #[inline]
     fn old_s(&self) -> f32 {
         self.age_s + self.delay_s
     }
 
+    #[inline]
     fn ball_m(&self, bounds: &Bounds) -> f32 {
-        bounds.speed_max_mps * fminf(self.old_s(), bounds.silent_s)
+        bounds.speed_max_mps * self.old_s().min(bounds.silent_s)
     }
 
     /// How far it flies until it has stopped.
+    #[inline]
     fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
         // It may have begun to speed up since it was heard.
         let gained_mps = bounds.braking.accel_mps2 * (self.old_s() + REACTION_S);
-        let most_mps = fmaxf(self.speed_mps, bounds.speed_max_mps);
-        let speed_mps = fminf(fminf(self.speed_mps + gained_mps, most_mps), 2.0 * bounds.speed_max_mps);
+        let most_mps = self.speed_mps.max(bounds.speed_max_mps);
+        let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
         speed_mps * (self.old_s() + REACTION_S + LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
     }
 
+    #[inline]
     fn wider_m(&self, bounds: &Bounds) -> f32 {
         0.5 * bounds.braking.accel_mps2 * self.old_s() * self.old_s()
     }
 
     /// Where it can be; with `ahead_s` also where its points lead it in so much time.
     pub fn set(&self, bounds: &Bounds, ahead_s: f32) -> Set {
-        let mut set = if self.grounded {
-            return Set::at(self.position);
-        } else if self.age_s > FRESH_S {
-            Set { grow_m: self.ball_m(bounds), ..Set::at(self.position) }
+        let mut set = Set::at(self.position);
+        if self.grounded {
+            return set;
+        }
+        if self.age_s > FRESH_S {
+            set.grow_m = self.ball_m(bounds);
         } else if let Some((leg, nearest)) = self.nearest() {
             let ahead = core::iter::once(nearest).chain(self.points[leg..].iter().copied());
-            Set::along(self.position, ahead, self.along_m(bounds, ahead_s))
+            set.follow(ahead, self.along_m(bounds, ahead_s));
         } else {
             let share = if self.speed_mps > 0.0 { self.along_m(bounds, 0.0) / self.speed_mps } else { 0.0 };
-            let mut set = Set::at(self.position);
-            // The second of nine.
-            let _ = set.points.push(self.position + self.velocity * share);
-            Set { grow_m: self.wider_m(bounds), ..set }
-        };
-        set.column_to_m = self.column_to_m;
+            set.push(self.position + self.velocity * share);
+            set.grow_m = self.wider_m(bounds);
+        }
+        set.add_column(self.column_to_m);
         set
     }
 
@@ -266,11 +336,8 @@ impl Heard<'_> {
 pub fn conflicts(own: &Set, other: &Set, place: &Point, apart_m: f32) -> bool {
     let here = own.points[0];
     let most_m = apart_m + other.grow_m + own.grow_m;
-    let least_sq = |within_sq: f32| {
-        own.segments().fold(within_sq, |least, (a, b)| fminf(least, other.distance_sq(&a, &b, least)))
-    };
     let most_sq = most_m * most_m;
-    let motion_sq = least_sq(most_sq);
+    let motion_sq = own.least_sq(other, most_sq);
     if motion_sq >= most_sq {
         return false;
     }
@@ -279,9 +346,8 @@ pub fn conflicts(own: &Set, other: &Set, place: &Point, apart_m: f32) -> bool {
         return true;
     }
     // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
-    let nearer = |from: &Point, to: &Point| segments_distance_sq((from, to), (place, place));
-    let least_sq = own.segments().fold(f32::INFINITY, |least, (a, b)| fminf(least, nearer(&a, &b)));
-    let limit_m = fminf(sqrtf((here - place).norm_squared()), 2.0 * most_m);
+    let least_sq = own.distance_sq(place, place, f32::INFINITY);
+    let limit_m = sqrtf((here - place).norm_squared()).min(2.0 * most_m);
     sqrtf(least_sq) < limit_m - NEARER_M
 }
 

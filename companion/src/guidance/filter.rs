@@ -16,7 +16,7 @@ use planner_core::schedule::VehiclePlan;
 
 use super::{Guidance, Phase, Scene};
 use crate::mission::State;
-use crate::neighbours::{Met, Neighbours};
+use crate::neighbours::{Met, Neighbours, Reach, STRETCH_M};
 use crate::telemetry::Telemetry;
 use crate::time::{Duration, Instant};
 
@@ -399,9 +399,23 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let deaf = lands && neighbours.is_deaf(now);
         let mut near = 0;
+        let on_plan = self.on_plan(state, scene);
+        let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
+        let reach = Reach {
+            place,
+            within_m: own_reach_m + most_apart_m,
+            bounds,
+            ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
+            // It may lie below anywhere on the stretch that it flew unheard.
+            stretch_m: if lands { STRETCH_M } else { 0.0 },
+            on_plan,
+        };
         for i in 0..neighbours.len() {
+            if neighbours.is_beyond(i, now, &reach) {
+                continue;
+            }
             let Some(mut met) = neighbours.met(i, now) else { continue };
-            let by_gates = met.on_plan && self.on_plan(state, scene);
+            let by_gates = met.on_plan && on_plan;
             if met.far && (by_gates || lands) {
                 // Not within radio range, and where the plan has it.
                 continue;
@@ -426,10 +440,9 @@ impl Guidance {
             let last_place = self.returning || !self.on_path || deaf;
             let rests = (met.heard.grounded || met.lost) && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
-            let by_plan = met.on_plan && self.on_plan(state, scene);
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
-            } else if (met.heard.grounded || met.stands) && by_plan {
+            } else if (met.heard.grounded || met.stands) && by_gates {
                 // Past a vehicle that waits the schedule leads as near as that and what both stray.
                 safety_m
             } else if met.heard.grounded {
@@ -448,17 +461,16 @@ impl Guidance {
                 continue;
             }
             near += 1;
-            let yields = self.yields_to(state, scene, &met);
-            // Between two on the plan the gates keep the order.
-            let ahead_s = if yields && !by_gates { ahead_s } else { 0.0 };
-            let found = Found { id: met.id, yields, stranger: met.stranger };
-            if near > NEAR_MOST {
-                return Some(found);
-            }
-            let other = met.heard.set(bounds, ahead_s);
-            let low = |low: Point| safety::conflicts(own, &Set::at(low), &low, apart_m);
-            if safety::conflicts(own, &other, &met.heard.position, apart_m) || met.low.is_some_and(low) {
-                return Some(found);
+            let meets = || {
+                // Between two on the plan the gates keep the order.
+                let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
+                let other = met.heard.set(bounds, if ahead { ahead_s } else { 0.0 });
+                let low = |low: Point| safety::conflicts(own, &Set::at(low), &low, apart_m);
+                safety::conflicts(own, &other, &met.heard.position, apart_m) || met.low.is_some_and(low)
+            };
+            if near > NEAR_MOST || meets() {
+                let yields = self.yields_to(state, scene, &met);
+                return Some(Found { id: met.id, yields, stranger: met.stranger });
             }
         }
         None

@@ -65,17 +65,17 @@ impl Contact {
         self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= SILENT)
     }
 
+    /// Whether it follows the shared plan, as last heard.
+    pub(super) fn on_plan(&self) -> bool {
+        self.state.progress_m.is_some() && !self.tells(DETOURS | OUT)
+    }
+
     pub(super) fn tells(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
 
     pub(super) fn is_out(&self, now: Instant) -> bool {
         self.tells(OUT) || self.is_dead(now)
-    }
-
-    /// Whether it is out, and was when it was last looked at what is in the way.
-    pub(super) fn is_out_since(&self, at: Instant) -> bool {
-        self.out_at.is_some_and(|since| since <= at) || self.is_dead(at)
     }
 
     /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at

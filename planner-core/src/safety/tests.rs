@@ -41,7 +41,7 @@ proptest! {
     ) {
         let own = Set::along(own[0], own[1..].iter().copied(), length_m);
         let mut other = Set { grow_m, ..Set::along(other[0], other[1..].iter().copied(), length_m) };
-        other.column_to_m = (floor > 0.0).then_some(floor);
+        other.add_column((floor > 0.0).then_some(floor));
         let (here, there) = (places(&own), places(&other));
         let motion_m = least(&here, &there) - grow_m;
         let now_m = least(&here[..1], &there) - grow_m;
