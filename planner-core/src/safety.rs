@@ -64,6 +64,7 @@ pub struct Set {
 
 impl Set {
     /// One place.
+    #[inline]
     pub fn at(place: Point) -> Self {
         let mut points = Vec::new();
         // The first of nine.

@@ -95,6 +95,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Contact `i` as the safety filter sees it; none if its place was never heard.
+    #[inline(always)]
     pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
         let contact = self.contacts.get(i)?;
         let placed_s = (now - contact.position_at?).secs_f32();
