@@ -98,8 +98,14 @@ impl KeepOff {
     }
 
     fn touches(&self, a: &Point, b: &Point) -> bool {
-        let room = Box::around(self);
-        room.sides(a) & room.sides(b) == 0 && self.comes_near(a, b)
+        // Most are apart along one axis alone, which is cheaper to see than a distance.
+        let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
+        let beside = |axis: usize| {
+            let (low, high) = sorted(a[axis], b[axis]);
+            let (least, most) = sorted(self.from[axis], self.to[axis]);
+            high + self.radius_m < least || low - self.radius_m > most
+        };
+        !(0..3).any(beside) && self.comes_near(a, b)
     }
 
     fn comes_near(&self, a: &Point, b: &Point) -> bool {
@@ -107,7 +113,7 @@ impl KeepOff {
     }
 }
 
-/// The box around what is too near: most is beside it, which is cheaper to see than a distance.
+/// The box around what is too near, for many legs in a row: most are beside it.
 struct Box {
     low: Point,
     high: Point,
