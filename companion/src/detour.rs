@@ -48,9 +48,11 @@ const RETRY_S: u64 = 10;
 const DEAD_END: Duration = Duration::from_secs(30);
 /// After no place to land was found aside, the next is sought so much later.
 const ASIDE_AGAIN_S: u64 = 70;
+/// A vehicle that hears nobody seeks it once its landing has waited for so long.
+const DEAF_ASIDE: Duration = Duration::from_secs(60);
 /// So many ways around that are not found are enough, or one less in this time, seconds.
 const DETOURS_TRIED: u8 = 4;
-const GIVES_UP_S: u64 = 150;
+const GIVES_UP_S: u64 = 100;
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
@@ -129,6 +131,8 @@ pub(crate) struct Around {
     pub(crate) ready: bool,
     /// Ways around not found since somebody moved.
     pub(crate) failed: u8,
+    /// The last one was not found although all others lie or rest for good, or for a while from here, whoever moved.
+    pub(crate) hopeless: bool,
     /// Ways around not found from here, whoever moved between; how far along the path that is, and since when.
     pub(crate) failed_here: u8,
     pub(crate) failed_at_m: f32,
@@ -180,10 +184,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
         match self.state {
-            State::Scheduled => {
+            State::Scheduled | State::PadReplanning => {
                 self.around.blocked
                     || !self.guidance.filter.column_clear()
-                    || self.neighbours.silence(now, self.entered_at) >= UNHEARD
+                    || self.neighbours.silence(now, self.started_at()) >= UNHEARD
                     || (held && self.guidance.advice.stop_within_m <= 0.05)
             }
             State::Follow => held && stands,
@@ -265,7 +269,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             !self.guidance.returning && (stuck || astray || dead_end || stopped || self.around.in_the_way);
         if !self.neighbours.all_stand(now) {
             // Somebody moved: what stood in the way may have gone.
-            (self.around.quiet_since, self.around.failed) = (None, 0);
+            (self.around.quiet_since, self.around.failed, self.around.hopeless) = (None, 0, false);
         } else if self.around.quiet_since.is_none() {
             self.around.quiet_since = Some(now);
         }
@@ -428,6 +432,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             self.around.failed = self.around.failed.saturating_add(1);
             self.around.failed_here = self.around.failed_here.saturating_add(1);
+            let long = self.now - self.around.failed_since >= Duration::from_secs(GIVES_UP_S);
+            let often = long && self.around.failed_here >= DETOURS_TRIED - 1;
+            let for_good = failure != PlanFailure::Late && self.neighbours.all_down(self.now);
+            self.around.hopeless = often || for_good;
         }
     }
 
@@ -435,15 +443,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn can_land_aside(&self) -> bool {
         let retries = |at: Instant| self.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
         self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
-            && (!self.neighbours.is_deaf(self.now) || self.neighbours.all_rest())
+            && (!self.neighbours.is_deaf(self.now)
+                || self.neighbours.all_rest()
+                || self.guidance.filter.column_blocked_for(self.now) >= DEAF_ASIDE)
             && self.around.no_way_aside_at.is_none_or(retries)
     }
 
-    /// Whether enough ways around were not found: while nobody moved, or for a while from here whoever moved.
+    /// Whether enough ways around were not found, or led nowhere.
     pub(crate) fn gives_up(&self) -> bool {
-        let Around { failed, fruitless, failed_here, failed_since, .. } = self.around;
-        let long = self.now - failed_since >= Duration::from_secs(GIVES_UP_S);
-        failed.saturating_add(fruitless) >= DETOURS_TRIED || (failed_here >= DETOURS_TRIED - 1 && long)
+        self.around.hopeless || self.around.failed.saturating_add(self.around.fruitless) >= DETOURS_TRIED
     }
 
     /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.

@@ -54,8 +54,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             } else {
                 Duration::default()
             },
-            // On its way back it is already on its way to the ground: it does not stop for want of being heard.
-            neighbour_age: match self.guidance.returning {
+            // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
+            // being heard.
+            neighbour_age: match self.guidance.returning || self.around.lands {
                 true => Duration::default(),
                 false => self.neighbours.silence(now, self.entered_at),
             },
@@ -111,11 +112,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column_blocked: self.guidance.filter.column_blocked_for(now),
             column_clear: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
-            can_turn_back: self.guidance.along_m() > 0.0
+            can_turn_back: self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
                 && !self.neighbours.is_deaf(now),
-            pad_taken: match follow && self.guidance.returning && self.guidance.descends() {
-                true => self.guidance.filter.hindered_for(now),
+            pad_taken: match follow && self.guidance.returning {
+                true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
+                true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),
             },
             can_land_aside: self.can_land_aside(),

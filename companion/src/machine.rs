@@ -327,6 +327,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// When the mission was started.
+    pub(crate) fn started_at(&self) -> Instant {
+        self.started_at
+    }
+
     /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
     pub(crate) fn departure_due(&self) -> bool {
         let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);

@@ -35,7 +35,9 @@ const DEAD: Duration = Duration::from_secs(45);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 const DOWN: Duration = Duration::from_secs(75);
 /// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
-pub(crate) const STRETCH_M: f32 = 6.0;
+const STRETCH_M: f32 = 6.0;
+/// And by so much for each second that messages are late, m/s.
+const STRETCH_MPS: f32 = 2.0;
 /// Spacing of the places on that stretch below which it may lie, metres.
 const STRETCH_STEP_M: f32 = 1.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
@@ -318,6 +320,16 @@ impl<const V: usize> Neighbours<V> {
             let _ = self.heard.push(state);
         }
         &self.heard
+    }
+
+    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
+    pub(crate) fn all_down(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, DOWN))
+    }
+
+    /// Whether a vehicle of the roster has landed, or is out of the plan.
+    pub(crate) fn rests(&self, id: u8, now: Instant) -> bool {
+        self.in_roster(id).is_some_and(|at| self.contacts[at].tells(LANDED) || self.contacts[at].is_out(now))
     }
 
     /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.

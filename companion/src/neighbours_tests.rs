@@ -314,20 +314,24 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let lands = seed % 2 == 0;
         let stopped = rng.next_u32().is_multiple_of(3);
         let reach = Reach {
-            place: near(rng, 10.0),
+            place: near(rng, 14.0),
             within_m: 2.0 + uniform(rng, 0.0, 4.0),
             bounds: &bounds,
             ahead_s: if stopped { 3.0 } else { 0.0 },
-            stretch_m: if lands { STRETCH_M } else { 0.0 },
             on_plan: rng.next_u32().is_multiple_of(2),
         };
         let mut met = table.met(1, now).expect("it was placed");
         if met.on_plan && reach.on_plan {
             met.heard.delay_s = 0.0;
         }
+        if met.lost && !lands && rng.next_u32().is_multiple_of(2) {
+            // As a vehicle that hears nobody sees it.
+            (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
+        }
         let silent = met.lost || met.heard.age_s > OLD_S;
         if lands && silent {
             (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
+            met.heard.rests_within_m = 0.0;
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.heard.reach_m(&bounds, ahead_s);
@@ -343,5 +347,5 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             missed += usize::from(out_of_reach && !below);
         }
     }
-    assert!(beyond > 2000 && reached > 2000 && missed < beyond, "{beyond} {reached} {missed}");
+    assert!(beyond > 2000 && reached > 1000 && missed < beyond, "{beyond} {reached} {missed}");
 }

@@ -215,6 +215,9 @@ pub struct Heard<'a> {
     pub points: &'a [Point],
     /// How far from the first of them they lead at most, metres.
     pub extent_m: f32,
+    /// How far along its points it may have stopped since, unheard for long, metres; 0 for one that is
+    /// heard.
+    pub rests_within_m: f32,
     /// Whether it stands on the ground.
     pub grounded: bool,
     /// Height down to which its column counts, metres; none while it stays on its points.
@@ -274,12 +277,16 @@ impl Heard<'_> {
 
     #[inline]
     fn ball_m(&self, bounds: &Bounds) -> f32 {
-        bounds.speed_max_mps * self.old_s().min(bounds.silent_s)
+        // It hears that nobody hears it by messages that are as late as its own.
+        bounds.speed_max_mps * self.old_s().min(bounds.silent_s + 2.0 * self.delay_s)
     }
 
     /// How far it flies until it has stopped.
     #[inline]
     fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
+        if self.rests_within_m > 0.0 {
+            return self.rests_within_m;
+        }
         // It may have begun to speed up since it was heard.
         let gained_mps = bounds.braking.accel_mps2 * (self.old_s() + REACTION_S);
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);

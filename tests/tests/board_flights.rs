@@ -11,10 +11,8 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, scope};
 use std::time::{Duration, Instant as Clock};
 
-use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle};
 use companion::store::File;
 use companion::{Link as Port, State};
-use firmware::capacity::VEHICLES;
 use flockmate_tests::board::{self, Downfall, Emulated};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
 use host_sim::autopilot::ardupilot;
@@ -23,10 +21,7 @@ use host_sim::mission::Mission;
 use host_sim::upload::Client;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
-use planner_core::frames::{Geodetic, enu_to_geodetic};
-use planner_core::plan::VehicleTask;
-use planner_core::prm::{Config, Sampling};
-use planner_core::roadmap::{self, Edge, RoadmapView};
+use planner_core::frames::enu_to_geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -239,50 +234,6 @@ fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
     let bank = board::bank(&others.roadmap_file, &others.mission_file);
     let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &ours, 1);
     vehicle.until_said("This system id is not in the mission: no plan");
-}
-
-/// A roadmap and a mission that are sound, of one vehicle more than a board holds.
-fn crowd() -> (Vec<u8>, Vec<u8>) {
-    let count = VEHICLES + 1;
-    let places: Vec<Point> = (0..=count).map(|i| Point::new(3.0 * i as f32, 0.0, 1.5)).collect();
-    let edge = |i: usize| Edge { a: i as u16 - 1, b: i as u16, clearance_m: 1.0 };
-    let edges: Vec<Edge> = (1..=count).map(edge).collect();
-    let origin = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
-    let config = Config {
-        nodes: 0,
-        edge_min_m: 0.5,
-        edge_max_m: 8.0,
-        clearance_m: 0.8,
-        seed: 1,
-        sampling: Sampling::Uniform,
-    };
-    let mut file = vec![0; roadmap::encoded_len(places.len(), edges.len(), 0).expect("it is small")];
-    let header = host_sim::roadmap::header(&config, origin, count as u16, 1);
-    roadmap::write(&header, &places, &edges, &mut file).expect("it is a roadmap");
-    let header = MissionHeader {
-        roadmap_crc: RoadmapView::parse(&file).expect("just written").crc(),
-        ..*mission(LOBBY).mission_view().header()
-    };
-    let vehicle = |i: usize| MissionVehicle {
-        task: VehicleTask { id: i as u8 + 1, required_clearance_m: 0.8, climb_m: 1.0, goal: None },
-        start: places[i],
-        radius_m: 0.3,
-        speed_max_mps: 3.0,
-    };
-    let vehicles: Vec<_> = (0..count).map(vehicle).collect();
-    let goal = MissionGoal { position: places[count], descent_m: 1.0 };
-    let mut text = vec![0; mission_file::encoded_len(count, 1)];
-    mission_file::write(&header, &vehicles, &[goal], &mut text).expect("it is a mission");
-    (file, text)
-}
-
-#[test]
-fn a_board_that_has_no_room_for_its_mission_says_so() {
-    let Some(program) = board::program("flockmate") else { return };
-    let (roadmap, crowd) = crowd();
-    let bank = board::bank(&roadmap, &crowd);
-    let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &mission(LOBBY), 1);
-    vehicle.until_said("Mission: it has too many vehicles or goals");
 }
 
 /// What a board says of a mission that it does not plan any more.

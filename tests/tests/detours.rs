@@ -23,15 +23,8 @@ const CASES: usize = 400;
 const PLACES: usize = 20_000;
 /// What a companion keeps from where a vehicle lies that it does not see, metres.
 const KEPT_M: f32 = 2.5;
-/// Nobody comes nearer to it: the safety distance that a mission has by default.
-const SAFE_M: f32 = 1.5;
-/// Nor to one that lies on something whose top the roadmap does not know: two hulls, and twice as much again. No path comes
-/// nearer to what it lies on than its required clearance.
+/// Nobody comes nearer to it: two hulls, and twice as much again.
 const NEAREST_M: f32 = 1.2;
-/// The ground is as the roadmap has it, within this, metres.
-const AS_KNOWN_M: f32 = 0.5;
-/// Share of the cases in which somebody lies higher than that and is passed at less than the safety distance.
-const HIGHER_PERCENT: f64 = 1.0;
 /// Share of the ways around that the ground of the roadmap leaves as they are.
 const SAME_PERCENT: usize = 85;
 /// Where the ground is deeper than told, what lies there is not kept off: at most this share of the places.
@@ -127,9 +120,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
     let mut board = Box::new(SearchWorkspace::<BOARD>::new());
     let mut desk = Box::new(SearchWorkspace::<DESK>::new());
     let [mut cases, mut same, mut found, mut found_by_old] = [0; 4];
-    // Where the ground is as the roadmap has it, and where it is higher.
-    let mut nearest_m = [f32::INFINITY; 2];
-    let mut too_near = 0;
+    let mut nearest_m = f32::INFINITY;
     while cases < CASES {
         let start = dice.below(new.node_count()) as u16;
         let goal = dice.below(usize::from(GOALS)) as u16;
@@ -175,20 +166,16 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             let share = ((lies - leg[0]).dot(&along) / along.norm_squared()).clamp(0.0, 1.0);
             (leg[0] + along * share - lies).norm()
         };
-        let passed_m = by_board.iter().flat_map(|path| path.windows(2).map(passed_m));
-        let passed_m = passed_m.fold(f32::INFINITY, f32::min);
-        let higher = new.ground_around(&silent).is_some_and(|(_, high_m)| ground_m > high_m + AS_KNOWN_M);
-        nearest_m[usize::from(higher)] = nearest_m[usize::from(higher)].min(passed_m);
-        too_near += usize::from(passed_m < SAFE_M);
+        for passed_m in by_board.iter().flat_map(|path| path.windows(2).map(passed_m)) {
+            nearest_m = passed_m.min(nearest_m);
+        }
     }
     println!(
         "{name}: of {cases} vehicles {found} find a way with the map; the same way {same} with the ground of the \
-         roadmap, {found_by_old} without; the nearest passes what lies there at {:.2} m, {:.2} m where it lies \
-         higher than the roadmap knows; {too_near} nearer than {SAFE_M} m",
-        nearest_m[0], nearest_m[1]
+         roadmap, {found_by_old} without; the nearest passes what lies there at {nearest_m:.2} m"
     );
-    assert!(nearest_m[0] > SAFE_M && nearest_m[1] > NEAREST_M, "{name}: {nearest_m:?}");
-    assert!(too_near as f64 * 100.0 <= cases as f64 * HIGHER_PERCENT, "{name}: {too_near} of {cases}");
+    // Whoever is nearer to where something may lie than it should be has to come no nearer, so it may pass nearer than KEPT_M.
+    assert!(nearest_m > NEAREST_M, "{name}: {nearest_m}");
     assert!(same * 100 >= found * SAME_PERCENT, "{name}: {same} of {found}");
     assert!(found_by_old < same, "{name}: the ground makes no difference");
 }

@@ -16,7 +16,7 @@ use planner_core::schedule::VehiclePlan;
 
 use super::{Guidance, Phase, Scene};
 use crate::mission::State;
-use crate::neighbours::{Met, Neighbours, Reach, STRETCH_M};
+use crate::neighbours::{Met, Neighbours, Reach};
 use crate::telemetry::Telemetry;
 use crate::time::{Duration, Instant};
 
@@ -50,8 +50,8 @@ const SWAY_MPS: f32 = 0.3;
 const TURNS_MPS: f32 = 0.05;
 /// And where no more than this is left to the reference, metres.
 const TURNS_M: f32 = 0.03;
-/// A stop this near is a standstill, metres.
-const WAITS_M: f32 = 0.5;
+/// A stop this near is a standstill, metres: a little more than the way that advice looks ahead.
+const WAITS_M: f32 = 0.6;
 /// What kept the vehicle from going on within this time still does.
 const LATELY: Duration = Duration::from_millis(500);
 /// A landing that waited for so long needs no more room than the hulls.
@@ -72,6 +72,8 @@ pub(crate) struct Filter {
     blocker: u8,
     /// Whether this vehicle is the one that yields.
     yields: bool,
+    /// Whether the other one rests for good, or is lost.
+    rests: bool,
     stranger: bool,
     /// Whether the sets met in the last step.
     meets: bool,
@@ -116,6 +118,11 @@ impl Filter {
     /// For how long it has kept the vehicle stopped although it goes first.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
         if self.yields { Duration::default() } else { self.hindered_for(now) }
+    }
+
+    /// For how long it has kept the vehicle from going on for one that rests.
+    pub(crate) fn barred_for(&self, now: Instant) -> Duration {
+        if self.rests { self.hindered_for(now) } else { Duration::default() }
     }
 
     /// For how long it has made the vehicle yield.
@@ -295,7 +302,7 @@ impl Guidance {
                     self.filter.hinder(now);
                 }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
-                self.filter.stranger = found.stranger;
+                (self.filter.stranger, self.filter.rests) = (found.stranger, found.rests);
             }
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
@@ -305,7 +312,7 @@ impl Guidance {
                     self.filter.reset_stop();
                 }
             }
-            None => self.count_standstill(state, scene, now),
+            None => self.count_standstill(state, scene, neighbours, now),
         }
     }
 
@@ -327,10 +334,11 @@ impl Guidance {
     }
 
     /// A standstill before a vehicle that no gate waits for counts as one of the filter's.
-    fn count_standstill<const W: usize, const G: usize>(
+    fn count_standstill<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
         scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
         now: Instant,
     ) {
         let id = self.advice.waiting_for;
@@ -345,7 +353,7 @@ impl Guidance {
             && !scene.plan.is_some_and(gate)
         {
             self.filter.hinder(now);
-            self.filter.yields = id < scene.id;
+            (self.filter.yields, self.filter.rests) = (id < scene.id, neighbours.rests(id, now));
         }
     }
 
@@ -397,7 +405,7 @@ impl Guidance {
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
-        let deaf = lands && neighbours.is_deaf(now);
+        let deaf = neighbours.is_deaf(now);
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
@@ -406,8 +414,6 @@ impl Guidance {
             within_m: own_reach_m + most_apart_m,
             bounds,
             ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
-            // It may lie below anywhere on the stretch that it flew unheard.
-            stretch_m: if lands { STRETCH_M } else { 0.0 },
             on_plan,
         };
         for i in 0..neighbours.len() {
@@ -424,10 +430,15 @@ impl Guidance {
                 // The gates keep two on the plan apart, however late their messages are.
                 met.heard.delay_s = 0.0;
             }
+            if met.lost && deaf && !lands {
+                // Where nobody is heard it may be this vehicle's receiver that fails: the others fly on.
+                (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
+            }
             let silent = met.lost || met.heard.age_s > safety::FRESH_S;
             if lands && silent {
                 // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
                 (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
+                met.heard.rests_within_m = 0.0;
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
             let held = self.filter.held_for(now);
@@ -437,8 +448,9 @@ impl Guidance {
             }
             // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
             // there is another place.
-            let last_place = self.returning || !self.on_path || deaf;
-            let rests = (met.heard.grounded || met.lost) && last_place && held >= LANDS_LATE;
+            let last_place = self.returning || !self.on_path || (lands && deaf);
+            let lies = met.heard.grounded || met.lost || (deaf && silent);
+            let rests = lies && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
@@ -452,7 +464,7 @@ impl Guidance {
                 safety_m + STRAY_M
             };
             if lands && silent && !deaf && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
-                return Some(Found { id: met.id, yields: true, stranger: false });
+                return Some(Found { id: met.id, yields: true, stranger: false, rests: true });
             }
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
             let away = met.heard.position - place;
@@ -470,7 +482,8 @@ impl Guidance {
             };
             if near > NEAR_MOST || meets() {
                 let yields = self.yields_to(state, scene, &met);
-                return Some(Found { id: met.id, yields, stranger: met.stranger });
+                let rests = met.heard.grounded || met.lost;
+                return Some(Found { id: met.id, yields, stranger: met.stranger, rests });
             }
         }
         None
@@ -513,6 +526,7 @@ struct Found {
     id: u8,
     yields: bool,
     stranger: bool,
+    rests: bool,
 }
 
 impl Filter {
@@ -535,6 +549,6 @@ impl Filter {
 
     fn reset_stop(&mut self) {
         (self.stopped_since, self.clear_since) = (None, None);
-        (self.yields, self.stranger) = (false, false);
+        (self.yields, self.stranger, self.rests) = (false, false, false);
     }
 }

@@ -125,7 +125,8 @@ pub enum Guard {
     Hindered,
     /// The same, and it does not: a place aside may yet be sought.
     NoRoomHere,
-    /// Back over its pad the descent has been stopped for the limit: a place aside may be sought.
+    /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent
+    /// there by any: a place aside may be sought.
     PadTaken,
     /// There is no place aside to land at.
     NoPlaceAside,
@@ -252,7 +253,8 @@ pub struct Inputs {
     pub column_clear: Duration,
     /// On its path, and not on the way back yet.
     pub can_turn_back: bool,
-    /// Time for which something has stopped the descent to its pad.
+    /// Time for which something has stopped the descent to its pad, or a vehicle that rests the way
+    /// there.
     pub pad_taken: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,

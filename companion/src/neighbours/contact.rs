@@ -152,9 +152,15 @@ impl Contact {
         (climbs && top.z > here.z + TOP_M).then_some(top.z)
     }
 
+    /// How far along its path it may come unheard, metres: further where messages are late, its own and
+    /// those by which it learns that nobody hears it.
+    pub(super) fn stretch_m(&self) -> f32 {
+        STRETCH_M + STRETCH_MPS * 2.0 * self.late.delay_s
+    }
+
     /// Places along its path as far as it may come unheard.
     pub(super) fn stretch(&self, mut tell: impl FnMut(Point)) {
-        let (mut at, mut left_m) = (self.state.position, STRETCH_M);
+        let (mut at, mut left_m) = (self.state.position, self.stretch_m());
         tell(at);
         for next in &self.points {
             let leg_m = (next - at).norm();

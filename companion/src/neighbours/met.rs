@@ -1,7 +1,7 @@
 //! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{Bounds, Heard};
+use planner_core::safety::{Bounds, Heard, OFF_M};
 
 use super::*;
 
@@ -40,8 +40,6 @@ pub(crate) struct Reach<'a> {
     pub(crate) bounds: &'a Bounds,
     /// So many seconds of their flight count as well.
     pub(crate) ahead_s: f32,
-    /// So far at least silent ones are looked at, metres.
-    pub(crate) stretch_m: f32,
     /// Whether it follows the shared plan: gates keep it apart from those that do.
     pub(crate) on_plan: bool,
 }
@@ -64,6 +62,7 @@ impl<const V: usize> Neighbours<V> {
             delay_s: if reach.on_plan && contact.on_plan() { 0.0 } else { contact.late.delay_s },
             points: &contact.points,
             extent_m: contact.extent_m,
+            rests_within_m: 0.0,
             grounded,
             column_to_m: None,
         };
@@ -75,23 +74,16 @@ impl<const V: usize> Neighbours<V> {
             let above_m = if column { 0.0 } else { away.z };
             return across_sq + above_m * above_m >= most_m * most_m;
         }
-        // Silent, or told by its intents alone. Seen from above it is where it was, at the first of its points, or as far from
+        // Silent, or known by its intents alone. Seen from above it is where it was, at the first of its points, or as far from
         // either as it can have flown.
         let told_sq = contact.points.first().map_or(f32::INFINITY, |p| (p - reach.place).xy().norm_squared());
-        let beside = |most_m: f32| {
-            let most_m = reach.within_m + most_m.max(reach.stretch_m);
-            across_sq.min(told_sq) >= most_m * most_m
-        };
         (heard.speed_mps, heard.points, heard.grounded) = (0.0, &[], false);
-        if age >= DEAD && contact.relayed_at.is_none() && !contact.points.is_empty() {
-            // Dead: it rests, and later lies.
-            heard.delay_s = 0.0;
-            let lies = age >= DOWN && !contact.floor_m.is_nan();
-            return beside(if lies { 0.0 } else { heard.reach_m(reach.bounds, reach.ahead_s) });
-        }
+        let ball_m = reach.bounds.speed_max_mps * (reach.bounds.silent_s + 2.0 * contact.late.delay_s);
         heard.delay_s = contact.late.delay_s.max(BEYOND_TOP_S);
         let rests_m = heard.reach_m(reach.bounds, reach.ahead_s);
-        beside(rests_m.max(reach.bounds.speed_max_mps * reach.bounds.silent_s).max(contact.extent_m))
+        let most_m =
+            reach.within_m + ball_m.max(rests_m).max(contact.stretch_m() + OFF_M).max(contact.extent_m);
+        across_sq.min(told_sq) >= most_m * most_m
     }
 
     /// Contact `i` as the safety filter sees it; none if its place was never heard.
@@ -122,15 +114,16 @@ impl<const V: usize> Neighbours<V> {
             position: here,
             velocity: contact.state.velocity,
             speed_mps: if rests { 0.0 } else { contact.speed_mps },
-            // Whoever flew along its points stopped on them, and rests where a reroute keeps off.
+            // A vehicle that flew along its points stopped on them, and rests where a reroute keeps off.
             age_s: if rests { 0.0 } else { age_s },
             delay_s: match (dead, top) {
                 (false, Some(_)) => BEYOND_TOP_S,
                 (true, _) => 0.0,
                 _ => contact.late.delay_s,
             },
-            points: if rests { &[] } else { &contact.points },
+            points: if top.is_some() || lies { &[] } else { &contact.points },
             extent_m: contact.extent_m,
+            rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
             column_to_m: (down && !grounded).then_some(floor_m),
         };

@@ -402,6 +402,7 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
                 delay_s: 0.3,
                 points: &ahead[..i % 3],
                 extent_m: hard,
+                rests_within_m: 0.0,
                 grounded: i % 5 == 0,
                 column_to_m: (i % 2 == 0).then_some(hard),
             };

@@ -72,6 +72,7 @@ proptest! {
             delay_s: 0.0,
             points: &path,
             extent_m: extent_m(&path),
+            rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
         };
@@ -101,6 +102,7 @@ proptest! {
             delay_s: 0.2,
             points: &path,
             extent_m: extent_m(&path),
+            rests_within_m: 0.0,
             grounded: false,
             column_to_m: None,
         };
@@ -202,6 +204,7 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     delay_s: 0.0,
                     points: &other.path[next..],
                     extent_m: extent_m(&other.path[next..]),
+                    rests_within_m: 0.0,
                     grounded: false,
                     column_to_m: None,
                 };

@@ -352,6 +352,7 @@ impl<'a> World<'a> {
             vehicles: scene.vehicles.len(),
             violations: oracle.violations,
             touches: oracle.touches,
+            unforeseen: oracle.unforeseen,
             stuck,
             least_m: oracle.least_m,
             ended_s,

@@ -193,6 +193,8 @@ pub struct Oracle {
     touching: Vec<bool>,
     /// Touches: seconds, the vehicle that moved, the other, metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
+    /// Touches of a vehicle that was carried off unheard: no message puts it there.
+    pub unforeseen: usize,
     /// The smallest distance of two vehicles, one of them off the ground.
     pub least_m: f32,
 }
@@ -222,6 +224,7 @@ impl Oracle {
             violations: Vec::new(),
             touching: vec![false; count * count],
             touches: Vec::new(),
+            unforeseen: 0,
             least_m: f32::INFINITY,
         }
     }
@@ -246,7 +249,14 @@ impl Oracle {
                     self.judge_sets(step, now_s, (a, b), &seen[a], &heard(a, b), &floor_z);
                 }
                 if a < b {
-                    self.judge_distance(step, (a, b), seen);
+                    // Carried off unheard, by its pilot or its autopilot, it is nowhere that its companion's silence allows.
+                    let carried = |from: usize, to: usize| {
+                        heard(from, to).position.is_some_and(|(place, _, _, at_s)| {
+                            now_s - at_s > GROWS_S
+                                && (place - seen[to].position).norm() > CRUISE_MPS * GROWS_S
+                        })
+                    };
+                    self.judge_distance(step, (a, b), seen, carried);
                 }
             }
         }
@@ -277,7 +287,13 @@ impl Oracle {
         }
     }
 
-    fn judge_distance(&mut self, step: usize, (a, b): (usize, usize), seen: &[Seen]) {
+    fn judge_distance(
+        &mut self,
+        step: usize,
+        (a, b): (usize, usize),
+        seen: &[Seen],
+        carried: impl Fn(usize, usize) -> bool,
+    ) {
         let at = a * self.count + b;
         if !seen[a].airborne && !seen[b].airborne {
             self.end_near(a, b);
@@ -309,7 +325,10 @@ impl Oracle {
             let now_s = step as f32 * STEP_S;
             for (from, to, apart) in [(a, b, apart), (b, a, -apart)] {
                 if toward(&seen[from], apart) && !self.touching[at] {
-                    self.touches.push((now_s, from, to, apart_m));
+                    match carried(from, to) {
+                        true => self.unforeseen += 1,
+                        false => self.touches.push((now_s, from, to, apart_m)),
+                    }
                     self.touching[at] = true;
                 }
             }

@@ -22,6 +22,8 @@ pub struct Outcome {
     pub violations: Vec<Violation>,
     /// Touches by own motion: seconds, the vehicle that moved, the other, metres.
     pub touches: Vec<(f32, usize, usize, f32)>,
+    /// Touches of a vehicle that was carried off unheard.
+    pub unforeseen: usize,
     /// Indices of vehicles that were not on the ground at the end, and their states.
     pub stuck: Vec<(usize, State)>,
     /// Smallest distance, metres.
@@ -92,6 +94,8 @@ pub struct Summary {
     pub unavoidable: [usize; 2],
     /// Touches by own motion.
     pub touches: [usize; 2],
+    /// With a touch of a vehicle that was carried off unheard.
+    pub unforeseen: usize,
     /// Somebody had not landed in the end.
     pub stuck: [usize; 2],
     /// Vehicles, and those that landed at their goals.
@@ -108,6 +112,7 @@ pub fn summary(outcomes: &[Outcome]) -> Summary {
         sum.too_near[at] += usize::from(failed);
         sum.unavoidable[at] += usize::from(!failed && !outcome.violations.is_empty());
         sum.touches[at] += usize::from(!outcome.touches.is_empty());
+        sum.unforeseen += usize::from(outcome.unforeseen > 0);
         sum.stuck[at] += usize::from(!outcome.stuck.is_empty());
         sum.arrived.0 += outcome.vehicles;
         sum.arrived.1 += outcome.arrived;
@@ -135,6 +140,7 @@ impl std::fmt::Display for Summary {
                 self.meetings[at], self.too_near[at], self.unavoidable[at], self.touches[at], self.stuck[at]
             )?;
         }
+        writeln!(f, "{} with a touch of a vehicle that was carried off unheard", self.unforeseen)?;
         write!(f, "{} of {} vehicles landed at their goals", self.arrived.1, self.arrived.0)
     }
 }
