@@ -405,7 +405,7 @@ impl Guidance {
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
-        let deaf = neighbours.is_deaf(now);
+        let deaf = lands && neighbours.is_deaf(now);
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
@@ -430,7 +430,7 @@ impl Guidance {
                 // The gates keep two on the plan apart, however late their messages are.
                 met.heard.delay_s = 0.0;
             }
-            if met.lost && deaf && !lands {
+            if met.lost && !lands && neighbours.is_deaf(now) {
                 // Where nobody is heard it may be this vehicle's receiver that fails: the others fly on.
                 (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
             }
@@ -448,7 +448,7 @@ impl Guidance {
             }
             // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
             // there is another place.
-            let last_place = self.returning || !self.on_path || (lands && deaf);
+            let last_place = self.returning || !self.on_path || deaf;
             let lies = met.heard.grounded || met.lost || (deaf && silent);
             let rests = lies && last_place && held >= LANDS_LATE;
             let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
