@@ -220,7 +220,7 @@ impl Ahead {
             let least_m = away.x.abs().max(away.y.abs()).max(away.z.abs());
             let room_m = least_m - cfg.safety_distance_m - ROUNDING_M;
             // Not below zero, and 0 where it is no number.
-            i += 1 + (room_m * looks_a_metre) as usize;
+            i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
         }
         None
     }
