@@ -175,6 +175,19 @@ pub struct Scene<'a, const W: usize, const G: usize> {
     pub detours: bool,
 }
 
+impl<'a, const W: usize, const G: usize> Scene<'a, W, G> {
+    /// What is known of a vehicle of this rank and id; a plan without a path is none.
+    pub fn new(
+        plan: Option<&'a VehiclePlan<W, G>>,
+        telemetry: &'a Telemetry,
+        (rank, id): (u16, u8),
+        detours: bool,
+    ) -> Self {
+        let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
+        Self { plan, telemetry, rank, id, detours }
+    }
+}
+
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let door = Door::new(Limits::new(config, autopilot), config.geofence);

@@ -218,13 +218,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// What the safety filter finds at this moment, as each step asks it: the vehicle that it stops for, 0 for none. Nothing
     /// changes by it; its cost is counted so.
     pub fn ask_filter(&mut self, now: Instant) -> u8 {
-        let scene = Scene {
-            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
-            telemetry: &self.telemetry,
-            rank: self.rank,
-            id: self.config.system_id,
-            detours: self.around.flying,
-        };
+        let scene = Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        );
         self.guidance.ask_filter(self.state, &scene, &self.neighbours, now)
     }
 
@@ -318,13 +317,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     pub(crate) fn scene(&self) -> Scene<'_, W, G> {
-        Scene {
-            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
-            telemetry: &self.telemetry,
-            rank: self.rank,
-            id: self.config.system_id,
-            detours: self.around.flying,
-        }
+        Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        )
     }
 
     /// When the mission was started.

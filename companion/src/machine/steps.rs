@@ -20,13 +20,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.watch_estimate();
         let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
         self.stepped_at = now;
-        let scene = Scene {
-            plan: self.plan.as_ref().filter(|plan| !plan.path.waypoints().is_empty()),
-            telemetry: &self.telemetry,
-            rank: self.rank,
-            id: self.config.system_id,
-            detours: self.around.flying,
-        };
+        let scene = Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        );
         if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s) && now >= self.held_at {
             self.held_at = now + HELD_EVERY;
             self.say(true, "Setpoint out of limits: holding");

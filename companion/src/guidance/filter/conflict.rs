@@ -1,0 +1,205 @@
+//! Which neighbour's set meets that of the vehicle, and which of the two goes first.
+
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::safety::{self, Bounds, REACTION_S, Set};
+use planner_core::schedule::VehiclePlan;
+
+use super::super::{Guidance, Phase, Scene};
+use super::STRANGER;
+use crate::mission::State;
+use crate::neighbours::{Met, Neighbours, Reach};
+use crate::telemetry::Telemetry;
+use crate::time::{Duration, Instant};
+
+/// The vehicle that yields waits until so many seconds of the other one's way are free.
+const AHEAD_S: f32 = 3.0;
+/// More neighbours than this are not compared in one step: with more nearby the vehicle stops.
+const NEAR_MOST: usize = 6;
+/// What two vehicles in the air overshoot their stops together, metres; the schedule leaves 0.5 m for it and for the rest.
+const STRAY_M: f32 = 0.25;
+/// What this vehicle alone strays from its path, metres.
+const STRAYS_M: f32 = 0.1;
+/// Distance between two hulls that is kept from a stranger then, metres.
+const HULLS_M: f32 = 0.3;
+/// What a vehicle may fly faster than its reference and yet stop with it, m/s.
+const SWAY_MPS: f32 = 0.3;
+/// A landing that waited for so long needs no more room than the hulls.
+const LANDS_LATE: Duration = Duration::from_secs(40);
+
+/// A neighbour whose set meets that of the vehicle.
+pub(super) struct Found {
+    pub(super) id: u8,
+    pub(super) yields: bool,
+    pub(super) stranger: bool,
+    pub(super) rests: bool,
+}
+
+impl Guidance {
+    /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the setpoint, which is all that a
+    /// stop can hold back: the vehicle flies on to it in any case.
+    pub(super) fn own_set<const W: usize>(
+        &self,
+        path: &Path<W>,
+        telemetry: &Telemetry,
+        bounds: &Bounds,
+        extra_m: f32,
+        back: bool,
+    ) -> Set {
+        let velocity_mps = telemetry.velocity.norm();
+        // Beside the path it flies straight to where it goes on.
+        let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.settled);
+        let join = path.point_at(self.tracker.along_m).filter(|_| joins);
+        let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
+        let reference_mps = self.door.velocity().norm();
+        let speed_mps = reference_mps.max(velocity_mps - SWAY_MPS);
+        let braking_m = bounds.braking.stop_m(speed_mps).max(self.door.braking_m(true));
+        let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
+        let here = self.door.position();
+        let points = path.waypoints();
+        if back {
+            let next = points.partition_point(|w| w.along_m < along_m);
+            let behind = points[..next].iter().rev().map(|w| w.position);
+            return Set::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
+        }
+        // It stops for its gates in any case.
+        let join_m = join.map_or(0.0, |join| (join - here).norm());
+        let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
+        let next = points.partition_point(|w| w.along_m <= along_m);
+        let ahead = points[next..].iter().map(|w| w.position);
+        Set::along(here, core::iter::once(here).chain(join).chain(ahead), fly_m)
+    }
+
+    /// The first neighbour whose set meets `own`.
+    pub(super) fn first_conflict<const V: usize, const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        own: &Set,
+        bounds: &Bounds,
+        now: Instant,
+    ) -> Option<Found> {
+        let safety_m = self.deconflict.safety_distance_m;
+        let place = scene.telemetry.position;
+        let own_reach_m = own.reach_m();
+        let lands = matches!(state, State::Land | State::LandingHeld);
+        let deaf = lands && neighbours.is_deaf(now);
+        let mut near = 0;
+        let on_plan = self.on_plan(state, scene);
+        let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
+        let reach = Reach {
+            place,
+            within_m: own_reach_m + most_apart_m,
+            bounds,
+            ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
+            on_plan,
+        };
+        for i in 0..neighbours.len() {
+            if neighbours.is_beyond(i, now, &reach) {
+                continue;
+            }
+            let Some(mut met) = neighbours.met(i, now) else { continue };
+            let by_gates = met.on_plan && on_plan;
+            if met.far && (by_gates || lands) {
+                // Not within radio range, and where the plan has it.
+                continue;
+            }
+            if by_gates {
+                // The gates keep two on the plan apart, however late their messages are.
+                met.heard.delay_s = 0.0;
+            }
+            if met.lost && !lands && neighbours.is_deaf(now) {
+                // Where nobody is heard it may be this vehicle's receiver that fails: the others fly on.
+                (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
+            }
+            let silent = met.lost || met.heard.age_s > safety::FRESH_S;
+            if lands && silent {
+                // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
+                (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
+                met.heard.rests_within_m = 0.0;
+            }
+            let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
+            let held = self.filter.held_for(now);
+            if lands && met.stranger && held >= LANDS_LATE {
+                // A place that anybody may claim keeps no vehicle in the air.
+                continue;
+            }
+            // Only beside its own pad, where no path leads back to it, or where nobody is heard on the way: everywhere else
+            // there is another place.
+            let last_place = self.returning || !self.on_path || deaf;
+            let lies = met.heard.grounded || met.lost || (deaf && silent);
+            let rests = lies && last_place && held >= LANDS_LATE;
+            let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
+            let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
+                2.0 * self.track.radius_m + HULLS_M
+            } else if (met.heard.grounded || met.stands) && by_gates {
+                // Past a vehicle that waits the schedule leads as near as that and what both stray.
+                safety_m
+            } else if met.heard.grounded {
+                let vertical = lands || state == State::Climb || self.descends();
+                safety_m + if vertical { 0.0 } else { STRAYS_M }
+            } else {
+                safety_m + STRAY_M
+            };
+            if lands && silent && !deaf && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
+                return Some(Found { id: met.id, yields: true, stranger: false, rests: true });
+            }
+            let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
+            let away = met.heard.position - place;
+            let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
+            if away.x * away.x + away.y * away.y + above_m * above_m >= reach_m * reach_m {
+                continue;
+            }
+            near += 1;
+            let meets = || {
+                // Between two on the plan the gates keep the order.
+                let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
+                let other = met.heard.set(bounds, if ahead { ahead_s } else { 0.0 });
+                let low = |low: Point| safety::conflicts(own, &Set::at(low), &low, apart_m);
+                safety::conflicts(own, &other, &met.heard.position, apart_m) || met.low.is_some_and(low)
+            };
+            if near > NEAR_MOST || meets() {
+                let yields = self.yields_to(state, scene, &met);
+                let rests = met.heard.grounded || met.lost;
+                return Some(Found { id: met.id, yields, stranger: met.stranger, rests });
+            }
+        }
+        None
+    }
+
+    pub(super) fn on_plan<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+    ) -> bool {
+        !self.returning && !scene.detours && !matches!(state, State::Land | State::LandingHeld)
+    }
+
+    /// Whether this vehicle lets `met` go first: a vehicle on the plan goes before one off it, then the gates' order decides,
+    /// then the lower id goes.
+    pub(super) fn yields_to<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        met: &Met<'_>,
+    ) -> bool {
+        // Of two with different plans neither follows the other one's.
+        let on_plan = self.on_plan(state, scene) && met.shares_plan;
+        if met.stranger || met.on_plan != on_plan {
+            return met.stranger || met.on_plan;
+        }
+        let along_m = if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY };
+        let waits = |plan: &VehiclePlan<W, G>| {
+            plan.gates.iter().any(|gate| gate.id == met.id && gate.at_m >= along_m)
+        };
+        if on_plan && scene.plan.is_some_and(waits) && self.advice.waiting_for == met.id {
+            return true;
+        }
+        // A vehicle on the plan that waits does so for one that goes first.
+        if on_plan && met.waits {
+            return false;
+        }
+        met.id < scene.id
+    }
+}
