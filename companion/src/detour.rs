@@ -1,4 +1,4 @@
-//! Living with vehicles that left the plan: who counts as out, what is in the way, and flying around it.
+//! Living with vehicles that left the plan: which count as out, what blocks the path, and flying around it.
 //!
 //! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it counts as dead) opens every
 //! gate that waits for it, and is an obstacle where it rests. A vehicle whose path that blocks, or which was out itself and
@@ -154,7 +154,7 @@ pub(crate) struct Around {
     pub(crate) in_the_way: bool,
 }
 
-/// What the others are told of where it is.
+/// What it reports to the others of where it is.
 pub(crate) struct Told {
     pub(crate) position: Point,
     pub(crate) velocity: Point,
@@ -221,7 +221,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Looks for what is in the way, and whether the others stand.
+    /// Looks for what blocks the path, and whether the others stand.
     pub(crate) fn look_around(&mut self) {
         let now = self.now;
         self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.plan.is_some();
@@ -268,7 +268,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.around.blocked =
             !self.guidance.returning && (stuck || astray || dead_end || stopped || self.around.in_the_way);
         if !self.neighbours.all_stand(now) {
-            // Somebody moved: what stood in the way may have gone.
+            // Somebody moved: what blocked the path may have gone.
             (self.around.quiet_since, self.around.failed, self.around.hopeless) = (None, 0, false);
         } else if self.around.quiet_since.is_none() {
             self.around.quiet_since = Some(now);

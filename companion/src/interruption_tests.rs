@@ -13,7 +13,7 @@ use crate::fake_autopilot::*;
 use crate::intent::{GROUNDED, ON_PLAN, OUT};
 use crate::{ardupilot, px4};
 
-#[path = "interruption_tests/random.rs"]
+#[path = "interruption_tests/random_tests.rs"]
 mod random;
 
 const ARM: u16 = 400;

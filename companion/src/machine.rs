@@ -364,5 +364,9 @@ mod scene_tests;
 mod hostile_tests;
 
 #[cfg(test)]
+#[path = "estimate_tests.rs"]
+mod estimate_tests;
+
+#[cfg(test)]
 #[path = "interruption_tests.rs"]
 mod interruption_tests;

@@ -94,7 +94,7 @@ pub struct Neighbours<const V: usize> {
     /// The first contacts are the roster, sorted by id; the rest are strangers.
     roster: usize,
     dropped: u32,
-    /// When it was last found that nobody who was out is in the way.
+    /// When it was last found that no vehicle that is out blocks the path.
     clear_at: Instant,
     /// No vehicle's progress grows faster, m/s.
     fastest_mps: f32,
@@ -278,7 +278,7 @@ impl<const V: usize> Neighbours<V> {
         contact.flags = intent.flags;
         let out = contact.tells(OUT) && contact.position_at.is_some();
         contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
-        // Ranks beyond the bitmap are not told.
+        // Ranks beyond the bitmap are not reported.
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
             contact.hears_us_at = Some(now);
         }
@@ -294,7 +294,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// Every neighbour whose position or progress was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
-    /// whether it is in the way ([`Self::found_clear`]).
+    /// whether it blocks the path ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
         self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
@@ -412,19 +412,19 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether a neighbour of the roster was heard within `span`, and one told that it hears us.
+    /// Whether a neighbour of the roster was heard within `span`, and one reported that it hears us.
     pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
         let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
         let roster = &self.contacts[..self.roster];
         roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
     }
 
-    /// Whether every other vehicle of the roster told that it has landed or is out; true where there is none.
+    /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
     pub fn all_rest(&self) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT))
     }
 
-    /// Time since any neighbour of the roster was heard, or since one told that it hears us, whichever is longer; zero when
+    /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when
     /// all of them have landed or are out, or there are none. Where neither ever was, the time since `since`.
     pub fn silence(&self, now: Instant, since: Instant) -> Duration {
         if self.all_rest() {

@@ -12,19 +12,19 @@ use crate::fake_autopilot::*;
 use crate::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
 use crate::{Config, RosterEntry, px4};
 
-#[path = "scene_tests/autopilot.rs"]
+#[path = "scene_tests/autopilot_tests.rs"]
 mod autopilot;
-#[path = "scene_tests/detours.rs"]
+#[path = "scene_tests/detours_tests.rs"]
 mod detours;
-#[path = "scene_tests/landings.rs"]
+#[path = "scene_tests/landings_tests.rs"]
 mod landings;
-#[path = "scene_tests/pause.rs"]
+#[path = "scene_tests/pause_tests.rs"]
 mod pause;
-#[path = "scene_tests/pilot.rs"]
+#[path = "scene_tests/pilot_tests.rs"]
 mod pilot;
-#[path = "scene_tests/position.rs"]
+#[path = "scene_tests/position_tests.rs"]
 mod position;
-#[path = "scene_tests/start.rs"]
+#[path = "scene_tests/start_tests.rs"]
 mod start;
 
 /// The other vehicle: place, flags of its intent, progress, CRC of its plan.

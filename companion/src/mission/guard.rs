@@ -144,9 +144,9 @@ pub enum Guard {
     NeighbourHeard,
     /// On the ground after a flight or in the mode that lands, and at rest.
     OnGround,
-    /// Something that left the plan is in the way, or we left it ourselves.
+    /// A vehicle that left the plan, or an obstacle, blocks the path, or this vehicle left the plan itself.
     PathBlocked,
-    /// Nothing is in the way any more.
+    /// Nothing blocks the path any more.
     PathClear,
     /// The path is blocked, all others stand, and it is this vehicle's turn.
     OurTurn,

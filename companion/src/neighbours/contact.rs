@@ -16,7 +16,7 @@ pub(super) struct Contact {
     pub(super) position_at: Option<Instant>,
     pub(super) boot_ms: u32,
     pub(super) flags: u8,
-    /// Since when it tells that it is out, and it is known where.
+    /// Since when it has reported that it is out, with its place known.
     pub(super) out_at: Option<Instant>,
     pub(super) hears_us_at: Option<Instant>,
     /// Whom it hears, a bit for each rank.

@@ -19,7 +19,7 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Everybody who was out at `at` was looked at, and nobody is in the way.
+    /// Every vehicle that was out at `at` was looked at, and none blocks the path.
     pub fn found_clear(&mut self, at: Instant) {
         self.clear_at = at;
     }

@@ -5,58 +5,23 @@ use std::string::String;
 
 use super::*;
 
-/// One thing that happens.
-#[derive(Clone, Copy, Debug)]
-enum Happens {
-    Pause,
-    Resume,
-    Land,
-    Return,
-    Start,
-    Pilot,
-    Back,
-    Failsafe,
-    NoPosition,
-    Position,
-    Jump,
-    Silent,
-    Heard,
-    Disarm,
-    Battery,
-    FalseGround,
-    TrueGround,
-    Refuses,
-    Obeys,
-    Mute,
-    Wait,
+/// Declares what can happen, and the list of all of it.
+macro_rules! happens {
+    ($($name:ident),*) => {
+        /// One thing that happens.
+        #[derive(Clone, Copy, Debug)]
+        enum Happens {
+            $($name),*
+        }
+
+        const ALL: &[Happens] = &[$(Happens::$name),*];
+    };
 }
 
-const ALL: [Happens; 21] = {
-    use Happens::*;
-    [
-        Pause,
-        Resume,
-        Land,
-        Return,
-        Start,
-        Pilot,
-        Back,
-        Failsafe,
-        NoPosition,
-        Position,
-        Jump,
-        Silent,
-        Heard,
-        Disarm,
-        Battery,
-        FalseGround,
-        TrueGround,
-        Refuses,
-        Obeys,
-        Mute,
-        Wait,
-    ]
-};
+happens! {
+    Pause, Resume, Land, Return, Start, Pilot, Back, Failsafe, NoPosition, Position, Jump,
+    Silent, Heard, Disarm, Battery, FalseGround, TrueGround, Refuses, Obeys, Mute, Wait
+}
 
 /// What must hold at every tick, whatever happens.
 struct Watch {
