@@ -73,8 +73,6 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// A setpoint that stands this near the end of the path has flown it, metres.
 const AT_END_M: f32 = 0.02;
-/// While another flies the vehicle, the setpoint follows its estimate no faster than any vehicle flown so flies, m/s.
-const FOLLOWS_MPS: f32 = 15.0;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Shorter than this a leg need not be flown, metres.
@@ -260,7 +258,7 @@ impl Guidance {
         // Where places are sent again it brakes from the last one.
         let lost = core::mem::take(&mut self.lost) && self.unsent_s > 0.0;
         if lost || !self.door.is_live() {
-            self.door.begin_at(point, FOLLOWS_MPS * self.unsent_s);
+            self.door.resume_at(point, self.unsent_s);
             self.settle();
         }
     }
@@ -276,7 +274,7 @@ impl Guidance {
         self.reset();
         self.phase = Phase::Climb;
         if !self.door.is_live() {
-            self.door.begin_at(*position, FOLLOWS_MPS * self.unsent_s);
+            self.door.begin_at(*position, self.unsent_s);
         }
     }
 
@@ -343,20 +341,20 @@ impl Guidance {
         let taken_before = core::mem::replace(&mut self.taken, taken);
         if known && (taken || taken_before || !self.door.is_live()) {
             // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
-            if taken || !self.door.is_live() {
-                self.door.go_with(position, FOLLOWS_MPS * self.unsent_s, self.unsent_s);
-            }
-            if flies && !taken {
+            if taken {
+                self.door.go_with(position, self.unsent_s);
+            } else if !self.door.is_live() {
+                self.door.resume_at(position, self.unsent_s);
+            } else if flies {
                 self.door.move_on(&scene.telemetry.velocity);
             }
             self.settle();
             self.lost = false;
         }
-        if self.door.is_live() && known && state != State::PositionLost {
-            self.unsent_s = 0.0;
-        }
+        let sends = known && state != State::PositionLost;
         if !self.door.is_live() || taken {
             self.sent_acceleration = Point::zeros();
+            self.count_unsent(sends);
             return true;
         }
         let up = state == State::Follow && self.phase == Phase::Descent && self.filter.backs_up(now);
@@ -400,6 +398,7 @@ impl Guidance {
             false => 0.0,
         };
         let mut blocked = false;
+        let dt_s = if self.door.resumes() { self.unsent_s } else { dt_s };
         // Where it stops stays where it is, however many raw points this step takes.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.fenced &= !moves;
@@ -438,7 +437,16 @@ impl Guidance {
         if scene.plan.is_some() && (self.on_path || self.phase == Phase::Climb) && known {
             self.reported_m = self.progress_m(state, scene);
         }
+        self.count_unsent(sends);
         sound
+    }
+
+    /// Ends a step: `sends` says whether its setpoint has a place.
+    fn count_unsent(&mut self, sends: bool) {
+        if sends && self.door.is_live() {
+            self.door.mark_sent();
+            self.unsent_s = 0.0;
+        }
     }
 
     /// What the safety filter finds at this moment: the vehicle that it stops for, 0 for none. Nothing changes by it.

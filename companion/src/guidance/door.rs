@@ -53,6 +53,10 @@ const SLOW_MPS: f32 = 0.2;
 const STANDS_MPS: f32 = 0.01;
 /// The end of a stop: speed falls by this share of itself each second.
 const TAIL_PER_S: f32 = 4.0;
+/// A vehicle that another flies is followed no faster, m/s: a place that moves faster is an estimate that jumps.
+const FOLLOWS_MPS: f32 = 15.0;
+/// After so short a time without setpoints the vehicle still does what the last one said, seconds.
+const GAP_S: f32 = 0.3;
 /// Share of the newest step in the velocity at which a vehicle was followed: it is reported in steps of its own.
 const FOLLOWED_SHARE: f32 = 0.25;
 /// A vehicle goes on at most so many times faster than it was followed.
@@ -107,9 +111,12 @@ pub struct Door {
     /// Speed of the clock, and its change each second.
     clock: f32,
     clock_rate: f32,
-    /// Whether there is a setpoint to go on from, and whether there ever was.
+    /// Whether there is a setpoint to go on from.
     live: bool,
-    used: bool,
+    /// The place sent last.
+    sent: Option<Point>,
+    /// Whether it goes on after a gap, which the next step makes up for.
+    resumes: bool,
     /// Velocity at which setpoints followed a vehicle that another flies.
     followed: Point,
     /// Of the step that is being made: its length, whether the safety filter stops, whether its raw points are sound.
@@ -139,7 +146,8 @@ impl Door {
             clock: 1.0,
             clock_rate: 0.0,
             live: false,
-            used: false,
+            sent: None,
+            resumes: false,
             followed: Point::zeros(),
             dt_s: 0.0,
             stopping: false,
@@ -221,23 +229,43 @@ impl Door {
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
-    /// Begins at a place, at rest, no further than `most_m` from what was sent last: an estimate that jumps is no motion.
-    pub(crate) fn begin_at(&mut self, place: Point, most_m: f32) {
-        let here = self.position();
-        let place = if place.iter().all(|c| c.is_finite()) { self.inside(place) } else { here };
-        let place = if self.used { here + shortened(place - here, most_m) } else { place };
+    /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it goes on as it was: the autopilot has
+    /// done so too.
+    pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
+        if !self.live && self.sent == Some(self.position()) && unsent_s < GAP_S {
+            (self.live, self.resumes) = (true, true);
+            self.rest();
+        } else {
+            self.begin_at(place, unsent_s);
+        }
+    }
+
+    /// At rest at a place, no further from what was sent last than a vehicle is followed: an estimate that jumps is no motion.
+    pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
+        let place = if place.iter().all(|c| c.is_finite()) { self.inside(place) } else { self.position() };
+        let place = self.sent.map_or(place, |sent| sent + shortened(place - sent, FOLLOWS_MPS * unsent_s));
         self.motion = Motion::at(place);
-        (self.live, self.used, self.followed) = (true, true, Point::zeros());
+        (self.live, self.resumes, self.followed) = (true, false, Point::zeros());
         self.rest();
     }
 
-    /// Goes with a vehicle that another flies, for `dt_s`, no further than `most_m`.
-    pub(crate) fn go_with(&mut self, place: Point, most_m: f32, dt_s: f32) {
+    /// Goes with a vehicle that another flies, `unsent_s` after a place was sent last.
+    pub(crate) fn go_with(&mut self, place: Point, unsent_s: f32) {
         let (here, was_live, followed) = (self.position(), self.live, self.followed);
-        self.begin_at(place, most_m);
-        if was_live && dt_s > 0.0 {
-            self.followed = followed + ((self.position() - here) / dt_s - followed) * FOLLOWED_SHARE;
+        self.begin_at(place, unsent_s);
+        if was_live && unsent_s > 0.0 {
+            self.followed = followed + ((self.position() - here) / unsent_s - followed) * FOLLOWED_SHARE;
         }
+    }
+
+    /// Whether the next step goes on from the last setpoint sent: its time is that since then.
+    pub(crate) fn resumes(&self) -> bool {
+        self.resumes
+    }
+
+    /// The setpoint is sent.
+    pub(crate) fn mark_sent(&mut self) {
+        self.sent = Some(self.position());
     }
 
     /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back. A velocity that is not
@@ -279,7 +307,8 @@ impl Door {
             self.dt_s = 0.0;
             return 0;
         }
-        self.dt_s = fminf(dt_s, f32::from(TICKS) * TICK_S);
+        let resumes = core::mem::take(&mut self.resumes);
+        self.dt_s = fminf(dt_s, if resumes { GAP_S } else { f32::from(TICKS) * TICK_S });
         // A hard stop that has begun ends as one.
         let brakes = self.clock_rate < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
         self.stopping = pace.urgent || (self.stopping && brakes);
@@ -288,7 +317,8 @@ impl Door {
         self.run_clock(pace, self.dt_s);
         self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
         let due = (self.share as u8).min(TICKS);
-        self.share = fmaxf(self.share - f32::from(due), 0.0);
+        // After a gap the curve is one point.
+        self.share = if resumes { 0.0 } else { fmaxf(self.share - f32::from(due), 0.0) };
         due
     }
 

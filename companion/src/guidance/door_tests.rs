@@ -113,7 +113,8 @@ proptest! {
         let came_at = Point::new(came_at.0, came_at.1, came_at.2);
         let place = low + size.component_mul(&Point::new(share.0, share.1, share.2));
         for step in 0..8 {
-            door.go_with(place + came_at * (TICK_S * step as f32), 1.0, TICK_S);
+            door.go_with(place + came_at * (TICK_S * step as f32), TICK_S);
+            door.mark_sent();
         }
         door.move_on(&came_at);
         let mut step = 0;
