@@ -9,6 +9,7 @@ mod flash;
 mod install;
 mod shell;
 mod size;
+mod structure;
 mod test;
 
 use std::process::ExitCode;
@@ -28,6 +29,8 @@ enum Command {
     Emulate(emulate::Args),
     /// What the firmware takes of a board's memory.
     Size(size::Args),
+    /// Import cycles, large structs and long functions.
+    Structure,
     /// The firmware onto a board behind a debug probe.
     Flash(flash::Args),
 }
@@ -39,6 +42,7 @@ fn main() -> ExitCode {
         Command::Build(args) => build::run(&args),
         Command::Emulate(args) => emulate::run_emulate(&args).map(drop),
         Command::Size(args) => size::run(&args),
+        Command::Structure => structure::run(),
         Command::Flash(args) => flash::run_flash(&args),
     };
     match done {

@@ -1,0 +1,36 @@
+//! `cargo xtask structure`: which file imports which, and the shape of structs and functions.
+//!
+//! Read from the sources with `syn`. An import is any path that leaves its file: a `use`, a type, a call. What a `pub use` passes on counts
+//! as an import of the file that defines it. Test modules may import what they like; a `mod` line is no import.
+
+mod imports;
+mod shape;
+mod sources;
+
+use std::path::Path;
+
+use anyhow::{Result, ensure};
+
+use self::sources::Tree;
+
+/// The crates that are looked at, by folder.
+const CRATES: [&str; 6] = ["planner-core", "companion", "host-sim", "firmware", "tests", "xtask"];
+
+/// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason.
+pub fn run() -> Result<()> {
+    let mut wrong = 0;
+    for name in CRATES {
+        for tree in Tree::of_crate(Path::new(name))? {
+            for cycle in imports::cycles(&tree) {
+                println!("{name}: import cycle: {}", cycle.join(" → "));
+                wrong += 1;
+            }
+            for (what, reason) in shape::beyond(&tree) {
+                println!("{name}: {what}: {}", reason.unwrap_or("no reason given"));
+                wrong += usize::from(reason.is_none());
+            }
+        }
+    }
+    ensure!(wrong == 0, "{wrong} places break the rules of the structure");
+    Ok(())
+}

@@ -1,0 +1,148 @@
+//! Which file imports which.
+
+use std::collections::BTreeSet;
+
+use syn::visit::{self, Visit};
+use syn::{Item, ItemMod, ItemUse, UseTree, Visibility};
+
+use super::sources::{Source, Tree};
+
+/// `pub use` of a `pub use` at most so many times.
+const PASSED_ON: usize = 6;
+
+/// Every set of files that import each other, by path.
+pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
+    let imports: Vec<BTreeSet<usize>> = (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
+    let reach: Vec<BTreeSet<usize>> = (0..imports.len()).map(|at| reached(&imports, at)).collect();
+    let mut seen: BTreeSet<usize> = BTreeSet::new();
+    let mut found = Vec::new();
+    for (at, from_here) in reach.iter().enumerate() {
+        if !from_here.contains(&at) || seen.contains(&at) {
+            continue;
+        }
+        let cycle: Vec<usize> = from_here.iter().copied().filter(|other| reach[*other].contains(&at)).collect();
+        seen.extend(&cycle);
+        found.push(cycle.iter().map(|file| tree.sources[*file].path.display().to_string()).collect());
+    }
+    found
+}
+
+fn reached(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {
+    let mut reached = BTreeSet::new();
+    let mut open: Vec<usize> = imports[from].iter().copied().collect();
+    while let Some(file) = open.pop() {
+        if reached.insert(file) {
+            open.extend(&imports[file]);
+        }
+    }
+    reached
+}
+
+fn of_file(tree: &Tree, at: usize) -> BTreeSet<usize> {
+    let source = &tree.sources[at];
+    let mut paths = Paths { module: source.module.clone(), found: Vec::new() };
+    source.items.iter().for_each(|item| paths.visit_item(item));
+    let files = paths.found.iter().filter_map(|(module, path)| resolve(tree, module, path, PASSED_ON));
+    files.filter(|file| *file != at).collect()
+}
+
+/// Paths of a file, each with the module it stands in.
+struct Paths {
+    module: Vec<String>,
+    found: Vec<(Vec<String>, Vec<String>)>,
+}
+
+impl Visit<'_> for Paths {
+    fn visit_item_mod(&mut self, item: &ItemMod) {
+        let name = item.ident.to_string();
+        if item.content.is_some() && name != "tests" {
+            self.module.push(name);
+            visit::visit_item_mod(self, item);
+            self.module.pop();
+        }
+    }
+
+    fn visit_item_use(&mut self, item: &ItemUse) {
+        let passes_on = !matches!(item.vis, Visibility::Inherited);
+        if !passes_on {
+            flatten(&item.tree, &mut Vec::new(), &mut |path, _| self.found.push((self.module.clone(), path)));
+        }
+    }
+
+    fn visit_path(&mut self, path: &syn::Path) {
+        let path_names: Vec<String> = path.segments.iter().map(|part| part.ident.to_string()).collect();
+        if path_names.len() > 1 {
+            self.found.push((self.module.clone(), path_names));
+        }
+        visit::visit_path(self, path);
+    }
+}
+
+/// Every path of a `use`, with the name it gets.
+fn flatten(tree: &UseTree, before: &mut Vec<String>, give: &mut impl FnMut(Vec<String>, String)) {
+    match tree {
+        UseTree::Path(part) => {
+            before.push(part.ident.to_string());
+            flatten(&part.tree, before, give);
+            before.pop();
+        }
+        UseTree::Name(name) => {
+            let name = name.ident.to_string();
+            let mut path = before.clone();
+            if name != "self" {
+                path.push(name);
+            }
+            let last = path.last().cloned().unwrap_or_default();
+            give(path, last);
+        }
+        UseTree::Rename(pair) => {
+            let mut path = before.clone();
+            path.push(pair.ident.to_string());
+            give(path, pair.rename.to_string());
+        }
+        UseTree::Glob(_) => give([before.clone(), vec!["*".to_owned()]].concat(), "*".to_owned()),
+        UseTree::Group(group) => group.items.iter().for_each(|tree| flatten(tree, before, give)),
+    }
+}
+
+/// The file that defines what a path names, if it is one of this crate.
+fn resolve(tree: &Tree, module: &[String], path: &[String], passed_on: usize) -> Option<usize> {
+    let (first, rest) = path.split_first()?;
+    let whole = match first.as_str() {
+        "crate" => rest.to_vec(),
+        "self" => [module, rest].concat(),
+        "super" => {
+            let up = path.iter().take_while(|part| *part == "super").count();
+            [&module[..module.len().checked_sub(up)?], &path[up..]].concat()
+        }
+        _ => {
+            let whole = [module, path].concat();
+            tree.modules.contains_key(&whole[..=module.len()]).then_some(whole)?
+        }
+    };
+    let length = (0..=whole.len()).rev().find(|length| tree.modules.contains_key(&whole[..*length]))?;
+    let file = tree.modules[&whole[..length]];
+    match whole.get(length) {
+        Some(name) if passed_on > 0 => {
+            Some(passed(tree, &tree.sources[file], &whole[..length], name, passed_on).unwrap_or(file))
+        }
+        _ => Some(file),
+    }
+}
+
+/// The file behind a `pub use` of this name.
+fn passed(tree: &Tree, source: &Source, module: &[String], name: &str, left: usize) -> Option<usize> {
+    let mut behind = None;
+    for item in &source.items {
+        let Item::Use(item) = item else { continue };
+        if matches!(item.vis, Visibility::Inherited) {
+            continue;
+        }
+        flatten(&item.tree, &mut Vec::new(), &mut |path, given| {
+            if given == name {
+                behind = behind.or_else(|| resolve(tree, module, &path, left - 1));
+            }
+        });
+    }
+    behind
+}

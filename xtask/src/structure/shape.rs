@@ -1,0 +1,79 @@
+//! Structs and functions beyond the limits.
+
+use syn::visit::{self, Visit};
+use syn::{FnArg, ImplItemFn, ItemFn, ItemStruct, Signature};
+
+use super::sources::Tree;
+
+/// Fields of a struct, but for settings and telemetry records.
+const FIELDS: usize = 20;
+/// Fields of `Companion`.
+const COMPANION_FIELDS: usize = 12;
+/// Lines of a function.
+const LINES: usize = 60;
+/// Arguments of a function, `self` not counted.
+const ARGUMENTS: usize = 6;
+
+/// Exceptions, each with its reason.
+const EXCEPTIONS: &[(&str, &str)] = &[];
+
+/// What is beyond the limits, and why it may be.
+pub fn beyond(tree: &Tree) -> Vec<(String, Option<&'static str>)> {
+    let mut shape = Shape { file: String::new(), found: Vec::new() };
+    for source in &tree.sources {
+        shape.file = source.path.display().to_string();
+        source.items.iter().for_each(|item| shape.visit_item(item));
+    }
+    shape.found
+}
+
+struct Shape {
+    file: String,
+    found: Vec<(String, Option<&'static str>)>,
+}
+
+impl Shape {
+    fn judge(&mut self, name: &str, count: usize, most: usize, of: &str) {
+        if count > most {
+            let reason = EXCEPTIONS.iter().find(|(exception, _)| *exception == name).map(|(_, reason)| *reason);
+            self.found.push((format!("{}: {name} has {count} {of}, more than {most}", self.file), reason));
+        }
+    }
+
+    fn function(&mut self, signature: &Signature, lines: usize) {
+        let name = signature.ident.to_string();
+        let arguments = signature.inputs.iter().filter(|input| matches!(input, FnArg::Typed(_))).count();
+        self.judge(&name, lines, LINES, "lines");
+        self.judge(&name, arguments, ARGUMENTS, "arguments");
+    }
+}
+
+impl Visit<'_> for Shape {
+    fn visit_item_mod(&mut self, item: &syn::ItemMod) {
+        if item.ident != "tests" {
+            visit::visit_item_mod(self, item);
+        }
+    }
+
+    fn visit_item_struct(&mut self, item: &ItemStruct) {
+        let name = item.ident.to_string();
+        let most = if name == "Companion" { COMPANION_FIELDS } else { FIELDS };
+        self.judge(&name, item.fields.len(), most, "fields");
+    }
+
+    fn visit_item_fn(&mut self, item: &ItemFn) {
+        self.function(&item.sig, lines(&item.block));
+        visit::visit_item_fn(self, item);
+    }
+
+    fn visit_impl_item_fn(&mut self, item: &ImplItemFn) {
+        self.function(&item.sig, lines(&item.block));
+        visit::visit_impl_item_fn(self, item);
+    }
+}
+
+/// Lines between the braces.
+fn lines(block: &syn::Block) -> usize {
+    let braces = block.brace_token.span;
+    (braces.close().start().line - braces.open().start().line).saturating_sub(1)
+}

@@ -1,0 +1,113 @@
+//! The module tree of a crate: every file with the modules it defines.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result};
+use syn::{Attribute, Item};
+
+/// One file of a crate, parsed, without its tests.
+pub struct Source {
+    /// Path from the top of the repository.
+    pub path: PathBuf,
+    /// Its module, from the crate's root.
+    pub module: Vec<String>,
+    /// Its items.
+    pub items: Vec<Item>,
+}
+
+/// The files of one crate root.
+pub struct Tree {
+    /// Every file.
+    pub sources: Vec<Source>,
+    /// File of each module, inline modules included.
+    pub modules: BTreeMap<Vec<String>, usize>,
+}
+
+impl Tree {
+    /// Library, program and further programs of the crate in a folder.
+    pub fn of_crate(folder: &Path) -> Result<Vec<Self>> {
+        let source = folder.join("src");
+        let mut roots = vec![source.join("lib.rs"), source.join("main.rs")];
+        if let Ok(programs) = fs::read_dir(source.join("bin")) {
+            for program in programs {
+                let path = program?.path();
+                roots.push(if path.is_dir() { path.join("main.rs") } else { path });
+            }
+        }
+        roots.sort();
+        roots.iter().filter(|root| root.exists()).map(|root| Self::of_root(root)).collect()
+    }
+
+    fn of_root(root: &Path) -> Result<Self> {
+        let mut tree = Self { sources: Vec::new(), modules: BTreeMap::new() };
+        let folder = root.parent().context("a root lies in a folder")?;
+        tree.read(root, folder, Vec::new())?;
+        Ok(tree)
+    }
+
+    /// Reads a file and those of its modules; `folder` is where they lie.
+    fn read(&mut self, path: &Path, folder: &Path, module: Vec<String>) -> Result<()> {
+        let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
+        let items: Vec<Item> = file.items.into_iter().filter(|item| !is_test(attributes(item))).collect();
+        let at = self.sources.len();
+        self.modules.insert(module.clone(), at);
+        self.sources.push(Source { path: path.to_owned(), module: module.clone(), items: items.clone() });
+        self.read_modules(&items, path, folder, &module, at)
+    }
+
+    fn read_modules(
+        &mut self,
+        items: &[Item],
+        path: &Path,
+        folder: &Path,
+        module: &[String],
+        at: usize,
+    ) -> Result<()> {
+        for item in items {
+            let Item::Mod(child) = item else { continue };
+            let name = child.ident.to_string();
+            let mut inner = module.to_vec();
+            inner.push(name.clone());
+            if let Some((_, items)) = &child.content {
+                self.modules.insert(inner.clone(), at);
+                self.read_modules(items, path, &folder.join(&name), &inner, at)?;
+                continue;
+            }
+            let named = path_attribute(&child.attrs).map(|named| path.with_file_name(named));
+            let places = [folder.join(format!("{name}.rs")), folder.join(&name).join("mod.rs")];
+            let found = named.or_else(|| places.into_iter().find(|place| place.exists()));
+            let found = found.with_context(|| format!("{}: no file of mod {name}", path.display()))?;
+            self.read(&found, &folder.join(&name), inner)?;
+        }
+        Ok(())
+    }
+}
+
+fn attributes(item: &Item) -> &[Attribute] {
+    match item {
+        Item::Mod(item) => &item.attrs,
+        Item::Fn(item) => &item.attrs,
+        Item::Use(item) => &item.attrs,
+        Item::Impl(item) => &item.attrs,
+        _ => &[],
+    }
+}
+
+/// Whether it is compiled for tests only.
+fn is_test(attributes: &[Attribute]) -> bool {
+    attributes.iter().any(|attribute| {
+        attribute.path().is_ident("cfg")
+            && attribute.parse_args::<syn::Meta>().is_ok_and(|meta| meta.path().is_ident("test"))
+    })
+}
+
+fn path_attribute(attributes: &[Attribute]) -> Option<String> {
+    attributes.iter().find_map(|attribute| {
+        let syn::Meta::NameValue(pair) = &attribute.meta else { return None };
+        let syn::Expr::Lit(syn::ExprLit { lit: syn::Lit::Str(text), .. }) = &pair.value else { return None };
+        pair.path.is_ident("path").then(|| text.value())
+    })
+}
