@@ -1,9 +1,14 @@
 //! Which autopilot flies the vehicle, by HEARTBEAT's `autopilot` field, and where its numbers are.
 
+pub mod ardupilot;
+pub(crate) mod handshake;
+pub(crate) mod limits;
+pub mod px4;
+pub mod telemetry;
+
 use planner_core::frames::Projection;
 
-use crate::limits::LimitParameter;
-use crate::{ardupilot, px4};
+use crate::autopilot::limits::LimitParameter;
 
 /// An autopilot the companion can fly.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -6,7 +6,7 @@ use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 
 use crate::autopilot::Kind;
-use crate::limits::{AutopilotLimits, Settings};
+use crate::autopilot::limits::{AutopilotLimits, Settings};
 use crate::margins;
 
 /// Most ground stations a mission names.

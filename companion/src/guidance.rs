@@ -15,6 +15,7 @@ mod hold;
 mod phase;
 mod progress;
 mod raw;
+pub(crate) mod retreat;
 mod setpoint;
 mod waypoints;
 
@@ -30,12 +31,12 @@ use self::phase::Phase;
 use self::progress::nearest_m;
 use self::setpoint::correction;
 use self::waypoints::Waypoints;
+use crate::autopilot::limits::{AutopilotLimits, Limits, Settings};
+use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
-use crate::limits::{AutopilotLimits, Limits, Settings};
+use crate::guidance::retreat::Search;
 use crate::mission::State;
-use crate::neighbours::Neighbours;
-use crate::retreat::Search;
-use crate::telemetry::Telemetry;
+use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 pub use self::door::{SMOOTH_MOST_S, Stats};

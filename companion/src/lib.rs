@@ -7,55 +7,32 @@
 //! [`Companion::handle_flash`] how each went, whenever that is. Times never go back. Every call does bounded work.
 //!
 //! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
-//! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`outbox::DEPTH`]; when it is full
+//! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`link::outbox::DEPTH`]; when it is full
 //! the newest is dropped and counted ([`Companion::dropped`]).
 //!
-//! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`px4`] and
-//! [`ardupilot`]; [`autopilot::Kind`] chooses between them by HEARTBEAT.
+//! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`autopilot::px4`] and
+//! [`autopilot::ardupilot`]; [`autopilot::Kind`] chooses between them by HEARTBEAT.
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod ardupilot;
 pub mod autopilot;
-pub mod budget;
-pub mod commands;
+mod companion;
 pub mod config;
-mod detour;
-pub mod echo;
 mod events;
-#[cfg(test)]
-mod fake_autopilot;
-#[cfg(test)]
-mod fake_flash;
-pub mod frame;
-pub mod ftp;
 mod guidance;
-mod inputs;
-pub mod intent;
-mod limits;
-mod machine;
+pub mod link;
 pub mod margins;
 pub mod mission;
-pub mod mission_file;
-pub mod neighbours;
-pub mod outbox;
-pub mod parameters;
-pub mod px4;
-mod requests;
-mod retreat;
-mod senders;
-mod services;
-pub mod store;
-mod sweep;
-pub mod table;
-pub mod telemetry;
+pub mod services;
+pub mod storage;
+pub mod swarm;
+#[cfg(test)]
+mod testing;
 pub mod time;
-mod transmit;
-mod waits;
 
+pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link};
-pub use machine::Companion;
 pub use mission::State;
 pub use time::{Duration, Instant};
 

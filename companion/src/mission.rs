@@ -5,9 +5,12 @@
 //! a test compares the two.
 
 mod guard;
+mod inputs;
 mod state;
+pub mod table;
+pub(crate) mod waits;
 
-use crate::table::TABLE;
+use crate::mission::table::TABLE;
 use crate::time::Duration;
 
 pub(crate) use self::guard::FRESH;
@@ -108,5 +111,4 @@ pub(crate) const fn bits(states: &[State]) -> u32 {
 }
 
 #[cfg(test)]
-#[path = "mission_tests.rs"]
 mod tests;

@@ -2,22 +2,24 @@
 //! addressed to our own system and component, so a ground station may come by the radio or through the autopilot's routing.
 //! Only a ground station of the mission sets parameters and uses files; what others may request is in `senders`.
 
+pub mod ftp;
+pub mod parameters;
+
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     AUTOPILOT_VERSION_DATA, MavParamError, MavProtocolCapability, PARAM_REQUEST_LIST_DATA,
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, TIMESYNC_DATA,
 };
 
-use crate::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use self::parameters::{Parameters, Refused};
+use crate::companion::Companion;
 use crate::events::{Event, Link};
-use crate::frame::Frame;
-use crate::ftp;
-use crate::machine::Companion;
+use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use crate::link::frame::Frame;
+use crate::link::outbox::Outgoing;
+use crate::link::senders::{Kind, Sender};
 use crate::mission::State;
-use crate::outbox::Outgoing;
-use crate::parameters::{self, Parameters, Refused};
-use crate::senders::{Kind, Sender};
-use crate::store::{Erasing, Fault, FlashRequest, Store};
+use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
 /// `MAV_PARAM_TYPE_REAL32`.
@@ -243,5 +245,4 @@ pub(crate) fn version(system_id: u8) -> AUTOPILOT_VERSION_DATA {
 }
 
 #[cfg(test)]
-#[path = "services_tests.rs"]
 mod tests;

@@ -8,8 +8,8 @@
 
 use core::fmt::Write as _;
 
-use companion::mission_file::{self, MissionError, MissionView};
-use companion::store::{ReadFlash, Store};
+use companion::storage::mission_file::{self, MissionError, MissionView};
+use companion::storage::store::{ReadFlash, Store};
 use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};

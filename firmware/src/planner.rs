@@ -2,7 +2,7 @@
 //! way around what is in its way.
 
 use companion::PlanFailure;
-use companion::mission_file::MissionView;
+use companion::storage::mission_file::MissionView;
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
 use planner_core::plan::{self, PlanError, SwarmPlan};

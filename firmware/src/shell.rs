@@ -7,8 +7,8 @@
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use companion::frame::{Framer, MAX_SENT};
-use companion::store::{Fault, FlashRequest, READ, ReadFlash};
+use companion::link::frame::{Framer, MAX_SENT};
+use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash};
 use companion::{Companion, Event, Link, PlanFailure, State};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;

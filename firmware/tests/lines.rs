@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::task::{Context, Waker};
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Config, Link};
 use embassy_time_driver::Driver;
 use embedded_io_async::{ErrorKind, ErrorType, Read, Write};

@@ -1,8 +1,8 @@
 //! Capacities of the desk's swarm, and what each costs; what each board can hold.
 
-use companion::mission_file::MissionView;
-use companion::store::Layout;
-use companion::store::area::DATA_AT;
+use companion::storage::mission_file::MissionView;
+use companion::storage::store::Layout;
+use companion::storage::store::area::DATA_AT;
 use planner_core::roadmap::RoadmapView;
 
 /// Nodes of a roadmap, terminals among them: 30 bytes each in scratch.

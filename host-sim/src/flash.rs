@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use companion::store::{Fault, FlashRequest, Layout, READ, ReadFlash};
+use companion::storage::store::{Fault, FlashRequest, Layout, READ, ReadFlash};
 
 use crate::files;
 use crate::quote::quoted_path;

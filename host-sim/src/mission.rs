@@ -7,7 +7,7 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use companion::PlanFailure;
-use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::frames::{Geodetic, enu_to_geodetic};

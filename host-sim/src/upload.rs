@@ -10,9 +10,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::{Context, bail};
-use companion::frame::{self, Frame, Framer, Header};
-use companion::ftp::{DATA, MESSAGE, PAYLOAD_LEN};
-use companion::store::File;
+use companion::link::frame::{self, Frame, Framer, Header};
+use companion::services::ftp::{DATA, MESSAGE, PAYLOAD_LEN};
+use companion::storage::store::File;
 use companion::{COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 

@@ -1,6 +1,6 @@
 //! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it.
 //!
-//! It is flown alone, while all others stand (`companion/src/detour.rs` waits for that), so there is no time in it: the
+//! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so there is no time in it: the
 //! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOff`]. It begins with
 //! the rest of the leg at hand, forward or back, which is known to be clear of walls. Where the vehicle is nearer to
 //! something already than it should be, it only comes no nearer. A column ends at the ground, as far as the roadmap says where

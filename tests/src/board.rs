@@ -8,9 +8,9 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::Link as Port;
-use companion::ftp::DATA;
-use companion::store::window::Taken;
-use companion::store::{Erasing, File, READ, Store, UploadState, WORD};
+use companion::services::ftp::DATA;
+use companion::storage::store::window::Taken;
+use companion::storage::store::{Erasing, File, READ, Store, UploadState, WORD};
 use host_sim::flash::{DeskFlash, LAYOUT};
 use host_sim::link::{Link, LinkUrl};
 use object::{Object, ObjectSymbol, Symbol};

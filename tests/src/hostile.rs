@@ -5,8 +5,8 @@
 //! pilot's mode left alone; answers bounded. One target ([`attack`]) serves the fuzzer and the bench.
 
 use companion::autopilot::Kind;
-use companion::frame::{self, Framer, Header, MAX_SENT};
-use companion::intent::Intent;
+use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::intent::Intent;
 use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
@@ -208,7 +208,7 @@ impl Flight {
         }
         let place = Point::new(8.0, 30.0, 0.0);
         let intent = Intent {
-            flags: companion::intent::GROUNDED | companion::intent::ON_PLAN,
+            flags: companion::link::intent::GROUNDED | companion::link::intent::ON_PLAN,
             progress_m: -3.0,
             ..intent()
         };

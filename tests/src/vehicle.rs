@@ -4,7 +4,7 @@ use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use companion::Link as Port;
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{COMPONENT, Instant, State};
 use host_sim::autopilot::{Autopilot, Config};
 use host_sim::link::Link;

@@ -16,8 +16,8 @@ use std::thread::{scope, sleep};
 use std::time::{Duration, Instant as Clock};
 
 use companion::Link as Port;
-use companion::frame::{self, Header};
-use companion::store::File;
+use companion::link::frame::{self, Header};
+use companion::storage::store::File;
 use flockmate_tests::board::{self, Emulated};
 use host_sim::link::Link;
 use host_sim::upload::{Client, crc32};

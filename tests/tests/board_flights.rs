@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, scope};
 use std::time::{Duration, Instant as Clock};
 
-use companion::store::File;
+use companion::storage::store::File;
 use companion::{Link as Port, State};
 use flockmate_tests::board::{self, Downfall, Emulated};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};

@@ -1,7 +1,7 @@
 //! A companion lives with what real autopilots were seen to do, here done by the simulated ones: docs/autopilots.md has the
 //! list. In memory, byte by byte, on flat ground.
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
 use host_sim::autopilot::{self, Autopilot, Mode, Personality, ardupilot};
 use planner_core::Point;

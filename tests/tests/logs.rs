@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Duration, Event, Instant, Link};
 use flockmate_tests::{logs, python, workspace};
 use host_sim::autopilot::{self, Autopilot, Personality};

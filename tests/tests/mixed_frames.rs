@@ -4,7 +4,7 @@
 //! Seeds are the numbers of the missions; a failing one is named.
 
 use companion::Instant;
-use companion::frame::Framer;
+use companion::link::frame::Framer;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;

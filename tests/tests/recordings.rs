@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config as CompanionConfig, Instant, Link};
 use flockmate_tests::{logs, shared_data};
 use host_sim::autopilot::{Autopilot, Config, Personality};

@@ -8,7 +8,7 @@ use std::thread::{self, sleep};
 use std::time::{Duration, Instant as Clock};
 
 use companion::Instant;
-use companion::frame::{self, Framer, Header};
+use companion::link::frame::{self, Framer, Header};
 use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, listening, workspace};
 use host_sim::link::{Link, LinkUrl};
 use serialport::TTYPort;

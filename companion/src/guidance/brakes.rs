@@ -4,9 +4,9 @@ use planner_core::deconflict::Advice;
 use planner_core::path::Path;
 
 use super::{Guidance, Phase};
+use crate::guidance::retreat::{self, Shelter};
 use crate::mission::State;
-use crate::neighbours::Neighbours;
-use crate::retreat::{self, Shelter};
+use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
 /// A stop further ahead is no place to wait at yet, metres.

@@ -23,7 +23,7 @@ use planner_core::Point;
 
 use super::fence::Fence;
 use super::follower::{Motion, shortened};
-use crate::limits::Limits;
+use crate::autopilot::limits::Limits;
 
 /// Time between two raw points, seconds: the rate of the setpoints.
 pub const TICK_S: f32 = 0.05;
@@ -458,5 +458,4 @@ fn average(limits: &Limits) -> usize {
 }
 
 #[cfg(test)]
-#[path = "door_tests.rs"]
 mod tests;

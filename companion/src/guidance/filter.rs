@@ -18,7 +18,7 @@ use planner_core::schedule::VehiclePlan;
 
 use super::{Guidance, Scene};
 use crate::mission::State;
-use crate::neighbours::Neighbours;
+use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
 /// Change of acceleration in a stop by the filter, m/s³.

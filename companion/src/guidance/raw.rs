@@ -7,9 +7,9 @@ use planner_core::schedule::VehiclePlan;
 
 use super::door::TICK_S;
 use super::{FENCE_MARGIN_M, Guidance, JOIN_MPS, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
+use crate::guidance::retreat;
 use crate::mission::State;
-use crate::neighbours::Neighbours;
-use crate::retreat;
+use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
 impl Guidance {

@@ -4,8 +4,8 @@ use planner_core::Point;
 
 use super::{DAMP_PER_S, Guidance, HOLD_MOST_MPS2, HOLD_PER_S2, Scene};
 use crate::autopilot::Kind;
+use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
-use crate::telemetry::Telemetry;
 
 /// What the autopilot is sent.
 #[derive(Clone, Copy, Debug, PartialEq)]

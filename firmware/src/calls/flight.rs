@@ -3,8 +3,8 @@
 //! The script is a PX4 that goes where its setpoint says, and neighbours that tell random places, intents and flags, or nothing.
 //! Half of the flights are hard: everybody is near, and off the plan, out of it, or silent for up to 90 s.
 
-use companion::frame::{self, Header, MAX_SENT};
-use companion::intent::{self, Intent};
+use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::intent::{self, Intent};
 use companion::{Config, Duration, Event, Instant, Link, PlanFailure, RosterEntry};
 use heapless::Vec;
 use planner_core::frames::{self, Geodetic};

@@ -16,7 +16,7 @@ fn regions_are_as_the_manual_has_them() {
 
 #[test]
 fn only_the_sectors_of_the_roadmap_are_cached_and_read_only() {
-    let slot = companion::store::Layout::H743.slot_len;
+    let slot = companion::storage::store::Layout::H743.slot_len;
     for (at, without) in [(0, 0b1111_1000), (slot, 0b1100_0111)] {
         let region = h743::roadmap(at, slot);
         // XN, AP 110, C.

@@ -3,7 +3,7 @@
 //! Read by field ([`Fields`]): offsets are those of the wire order. What is for another system or component, or of an id
 //! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
 
-use companion::frame::Frame;
+use companion::link::frame::Frame;
 use mavlink::dialects::ardupilotmega as dialect;
 
 use super::command::Command;

@@ -118,7 +118,7 @@ impl Autopilot {
     }
 
     /// Framing counters of a port.
-    pub fn counters(&self, port: usize) -> companion::frame::Counters {
+    pub fn counters(&self, port: usize) -> companion::link::frame::Counters {
         self.body.ports.get(port).map(Port::counters).unwrap_or_default()
     }
 

@@ -1,6 +1,6 @@
 //! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings and send queue.
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::time::Instant;
 use mavlink::MessageData;
 

@@ -4,7 +4,7 @@
 mod ardupilot;
 mod protocol;
 
-use companion::frame::{self, Frame, Framer, Header};
+use companion::link::frame::{self, Frame, Framer, Header};
 use companion::time::Instant;
 
 use super::*;

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
-use companion::frame::MAX_SENT;
-use companion::store::{READ, Store};
+use companion::link::frame::MAX_SENT;
+use companion::storage::store::{READ, Store};
 use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 

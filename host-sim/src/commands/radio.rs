@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
 use companion::Instant;
-use companion::frame::{Framer, MAX_SENT};
+use companion::link::frame::{Framer, MAX_SENT};
 use planner_core::Point;
 
 use crate::link::{Link, LinkUrl};

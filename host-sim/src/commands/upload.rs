@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::{Context, anyhow, bail, ensure};
-use companion::mission_file::{self, MissionView};
-use companion::store::File;
+use companion::storage::mission_file::{self, MissionView};
+use companion::storage::store::File;
 use planner_core::roadmap;
 
 use crate::capacity::{BOARDS, Board};

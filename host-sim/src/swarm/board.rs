@@ -3,8 +3,8 @@
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
 //! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
 
-use companion::frame::{Frame, Framer, MAX_SENT};
-use companion::intent::Intent;
+use companion::link::frame::{Frame, Framer, MAX_SENT};
+use companion::link::intent::Intent;
 use companion::{COMPONENT, Instant, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, STATUSTEXT_DATA, TUNNEL_DATA};

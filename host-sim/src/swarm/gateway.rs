@@ -6,7 +6,7 @@
 
 use std::io;
 
-use companion::frame::Framer;
+use companion::link::frame::Framer;
 use companion::time::Instant;
 use planner_core::Point;
 

@@ -2,7 +2,7 @@
 //! tells a vehicle to go on that its pilot gave back, and all of an obstacle it sees. Who cannot fly is not waited for, and who is late not for ever.
 
 use companion::State;
-use companion::frame::{self, Header};
+use companion::link::frame::{self, Header};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, COMMAND_LONG_DATA, MavCmd, MavFrame};
 use planner_core::Point;

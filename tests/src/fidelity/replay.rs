@@ -1,6 +1,6 @@
 //! Flies a recording's setpoints and commands again.
 
-use companion::frame::{self, Header};
+use companion::link::frame::{self, Header};
 use host_sim::autopilot::{Autopilot, Config, Personality};
 use mavlink::dialects::ardupilotmega::{
     MavFrame, MavParamType, PARAM_SET_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,

@@ -1,8 +1,8 @@
 //! Frames forged from random numbers: fields random and at their bounds, some of a message that would be believed.
 
 use companion::autopilot::Kind;
-use companion::frame::{self, Header, MAX_SENT};
-use companion::intent::POINTS;
+use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::intent::POINTS;
 use companion::{AUTOPILOT, COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;

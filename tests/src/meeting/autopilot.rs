@@ -8,9 +8,10 @@ mod reports;
 
 use std::collections::BTreeSet;
 
+use companion::Instant;
 use companion::autopilot::Kind;
-use companion::frame::Framer;
-use companion::{Instant, ardupilot, px4};
+use companion::autopilot::{ardupilot, px4};
+use companion::link::frame::Framer;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 

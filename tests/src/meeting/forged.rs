@@ -1,7 +1,7 @@
 //! Messages of a vehicle whose reports are wrong.
 
-use companion::frame::{self, Header, MAX_SENT};
-use companion::intent::Intent;
+use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::intent::Intent;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! One vehicle of a meeting: its companion, its autopilot, and what it has heard.
 
-use companion::frame::Framer;
+use companion::link::frame::Framer;
 use companion::{Companion, Config, Instant, RosterEntry, State};
 use nalgebra::Vector3;
 use planner_core::Point;

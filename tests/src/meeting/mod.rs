@@ -12,8 +12,8 @@ mod outcome;
 mod planner;
 pub mod scene;
 
-use companion::frame::{self, Framer, Header, MAX_SENT};
-use companion::intent::Intent;
+use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::intent::Intent;
 use companion::{COMPONENT, Event, Instant, Link, PlanFailure};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{

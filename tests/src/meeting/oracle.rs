@@ -10,7 +10,7 @@
 //! A violation of the safety distance is a failure if a stop of each vehicle, begun at the first step at which its sets
 //! came too near, would have kept the distance.
 
-use companion::intent::{GROUNDED, Intent, LANDED};
+use companion::link::intent::{GROUNDED, Intent, LANDED};
 use planner_core::Point;
 
 use super::autopilot::STEP_S;

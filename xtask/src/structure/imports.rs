@@ -20,7 +20,8 @@ pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
         if !from_here.contains(&at) || seen.contains(&at) {
             continue;
         }
-        let cycle: Vec<usize> = from_here.iter().copied().filter(|other| reach[*other].contains(&at)).collect();
+        let cycle: Vec<usize> =
+            from_here.iter().copied().filter(|other| reach[*other].contains(&at)).collect();
         seen.extend(&cycle);
         found.push(cycle.iter().map(|file| tree.sources[*file].path.display().to_string()).collect());
     }

@@ -35,7 +35,8 @@ struct Shape {
 impl Shape {
     fn judge(&mut self, name: &str, count: usize, most: usize, of: &str) {
         if count > most {
-            let reason = EXCEPTIONS.iter().find(|(exception, _)| *exception == name).map(|(_, reason)| *reason);
+            let reason =
+                EXCEPTIONS.iter().find(|(exception, _)| *exception == name).map(|(_, reason)| *reason);
             self.found.push((format!("{}: {name} has {count} {of}, more than {most}", self.file), reason));
         }
     }

@@ -7,9 +7,9 @@ use planner_core::schedule::VehiclePlan;
 
 use super::super::{Guidance, Phase, Scene};
 use super::STRANGER;
+use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
-use crate::neighbours::{Met, Neighbours, Reach};
-use crate::telemetry::Telemetry;
+use crate::swarm::neighbours::{Met, Neighbours, Reach};
 use crate::time::{Duration, Instant};
 
 /// The vehicle that yields waits until so many seconds of the other one's way are free.

@@ -1,12 +1,12 @@
 //! The calls of companion on the ground: files, parameters, commands, hostile bytes.
 
-use companion::commands;
 use companion::config::USUAL_GROUND_STATIONS;
-use companion::frame::{self, Framer, Header, MAX_SENT};
-use companion::intent::{self, Intent};
-use companion::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
-use companion::parameters::{self, Parameters};
-use companion::store::{Fault, FlashRequest, READ, ReadFlash, Store};
+use companion::link::commands;
+use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::intent::{self, Intent};
+use companion::services::parameters::{self, Parameters};
+use companion::storage::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash, Store};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::calls::{Meter, flight};

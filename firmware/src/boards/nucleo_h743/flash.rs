@@ -19,7 +19,7 @@
 
 use core::arch::asm;
 
-use companion::store::{Fault, Layout, ReadFlash, WORD};
+use companion::storage::store::{Fault, Layout, ReadFlash, WORD};
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::SCB;
 use embassy_stm32::flash::{Async, Flash as Device};

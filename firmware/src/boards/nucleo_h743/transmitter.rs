@@ -1,7 +1,7 @@
 //! Transmits by DMA from memory that is not cached: what a task has to send lies where the DMA may
 //! see an older state.
 
-use companion::frame::MAX_SENT;
+use companion::link::frame::MAX_SENT;
 use embassy_stm32::mode::Async as ByDma;
 use embassy_stm32::usart::{self, UartTx};
 use embedded_io_async::{ErrorType, Write};

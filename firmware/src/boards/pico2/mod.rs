@@ -14,7 +14,7 @@
 //! board restarts by its watchdog, which resets all of it but the oscillators.
 #![expect(unsafe_code, reason = "executors in interrupts, roadmaps as they lie in flash")]
 
-use companion::store::{Fault, Layout, ReadFlash};
+use companion::storage::store::{Fault, Layout, ReadFlash};
 use defmt_rtt as _;
 use embassy_rp::flash::{Blocking, Flash as Device};
 use embassy_rp::gpio::{Level, Output};

@@ -2,7 +2,7 @@
 //! that are programmed once between two erasures, and torn ones that cannot be read.
 #![expect(unsafe_code, reason = "the emulated flash is memory that the linker knows nothing of")]
 
-use companion::store::{Fault, Layout, ReadFlash, WORD};
+use companion::storage::store::{Fault, Layout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
 use crate::lent::{Lender, Lent};

@@ -1,7 +1,8 @@
 //! How the vehicle flies: what the controllers ask for, and what comes of it.
 
+use companion::Instant;
 use companion::autopilot::Kind;
-use companion::{Instant, ardupilot, px4};
+use companion::autopilot::{ardupilot, px4};
 use nalgebra::Vector3;
 use planner_core::Point;
 

@@ -1,7 +1,8 @@
 //! What the companion sends: setpoints, commands and parameters.
 
+use companion::Instant;
 use companion::autopilot::Kind;
-use companion::{Instant, px4};
+use companion::autopilot::px4;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;

@@ -1,7 +1,7 @@
 //! What the companion hears: answers, and streams as PX4 and ArduCopter send them.
 
 use companion::autopilot::Kind;
-use companion::frame::{self, Header, MAX_SENT};
+use companion::link::frame::{self, Header, MAX_SENT};
 use companion::{AUTOPILOT, Instant};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;

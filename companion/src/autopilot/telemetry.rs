@@ -1,0 +1,433 @@
+//! What the autopilot says of itself, turned into the mission frame.
+//!
+//! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
+//! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
+//! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
+//! anew and [`SETTLE`] has passed without another jump.
+//!
+//! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
+//! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
+//! named no other for [`DOUBT`]; then it has moved, and the mission lands. An origin further than [`ORIGIN_MOST_M`] from the mission's
+//! counts as none.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_ACK_DATA, EKF_STATUS_REPORT_DATA, ESTIMATOR_STATUS_DATA, GLOBAL_POSITION_INT_DATA,
+    GPS_GLOBAL_ORIGIN_DATA, LOCAL_POSITION_NED_DATA, SYS_STATUS_DATA,
+};
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic};
+
+use crate::autopilot::Kind;
+use crate::autopilot::ardupilot;
+use crate::link::frame::Frame;
+use crate::margins;
+use crate::time::{Duration, Instant};
+
+const HEARTBEAT: u32 = 0;
+const EXTENDED_SYS_STATE: u32 = 245;
+const ARMED: u8 = 0x80;
+const CRITICAL: u8 = 5;
+const ON_GROUND: u8 = 1;
+/// Further than this plus [`JUMP_MPS`] × time from where the last position and velocity lead is a jump, metres.
+const JUMP_M: f32 = 1.0;
+/// More than any vehicle flown so changes its velocity between two positions, m/s.
+const JUMP_MPS: f32 = 5.0;
+/// An EKF origin further from the mission's is not used, metres: the autopilot's frame is f32, and rounds a setpoint by up to
+/// 1.4 mm at this distance, by metres on the other side of the earth.
+const ORIGIN_MOST_M: f32 = 30_000.0;
+/// No gap is longer than the mission waits for its autopilot, seconds.
+const GAP_MOST_S: f32 = 60.0;
+/// After a jump, or so long without one, the position is not used for this long; another one starts it anew. What comes first
+/// after a silence may have waited on the way.
+pub const SETTLE: Duration = Duration::from_millis(1000);
+/// Another EKF origin is believed after this long without the known one: the autopilot is asked several times meanwhile.
+const DOUBT: Duration = Duration::from_millis(800);
+/// After this long without a frame the sequence starts afresh.
+const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
+
+/// Streams whose age is kept: more than any autopilot is asked for.
+const STREAMS: usize = 8;
+
+/// Drops frames that repeat or come late: up to 64 behind the newest of the last second.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SequenceFilter {
+    last: Option<(u8, Instant)>,
+}
+
+impl SequenceFilter {
+    /// Whether the frame is new.
+    pub fn accept(&mut self, sequence: u8, now: Instant) -> bool {
+        if let Some((last, at)) = self.last {
+            let behind = last.wrapping_sub(sequence);
+            if behind < 64 && now - at < SEQUENCE_LIFETIME {
+                return false;
+            }
+        }
+        self.last = Some((sequence, now));
+        true
+    }
+}
+
+/// COMMAND_ACK.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Ack {
+    /// `MAV_CMD`.
+    pub(crate) command: u16,
+    /// `MAV_RESULT`.
+    pub(crate) result: u8,
+    /// Addressee: system and component, 0 where the autopilot names none.
+    pub(crate) to: (u8, u8),
+}
+
+/// What changed by a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Change {
+    /// Nothing, or not for us.
+    None,
+    /// Something is newer.
+    Updated,
+    /// The EKF origin is no longer known: ask for it.
+    OriginLost,
+    /// Another EKF origin was heard while armed: ask for it.
+    OriginDoubted,
+    /// An EKF origin so many kilometres from the mission's is not used.
+    OriginFar(u32),
+}
+
+/// The autopilot as last heard.
+#[derive(Clone, Debug, Default)]
+pub struct Telemetry {
+    sequence: SequenceFilter,
+    /// Which autopilot it is, from its first HEARTBEAT on; others are then ignored.
+    pub kind: Option<Kind>,
+    /// When HEARTBEAT was last heard.
+    pub heartbeat_at: Option<Instant>,
+    /// Flight mode, the autopilot's own number.
+    pub custom_mode: u32,
+    /// Whether the motors are armed.
+    pub armed: bool,
+    /// `MAV_STATE`.
+    pub system_status: u8,
+    /// Whether the landing detector says ground; `None` before the first report.
+    pub on_ground: Option<bool>,
+    /// Battery charge in percent, −1 unknown.
+    pub battery_percent: i8,
+    /// Height above home in metres, as ArduCopter's NAV_TAKEOFF counts it.
+    pub above_home_m: f32,
+    /// Whether there is no mission whose origin the EKF's is compared with.
+    anywhere: bool,
+    /// EKF origin, once heard.
+    pub ekf_origin: Option<Geodetic>,
+    /// The origin that was last used while armed.
+    flown_origin: Option<Geodetic>,
+    /// Since when only other origins are heard.
+    doubted_at: Option<Instant>,
+    /// The EKF origin moved while armed.
+    pub(crate) origin_moved: bool,
+    /// What the estimator last reported of its error, metres, and when; infinite for one that is not sound.
+    accuracy: Option<(f32, Instant)>,
+    /// When the position below was heard; `None` while it is unknown.
+    pub position_at: Option<Instant>,
+    /// Place, ENU metres.
+    pub position: Point,
+    /// Velocity, ENU m/s.
+    pub velocity: Point,
+    /// The last answer to a command, until it is taken.
+    pub(crate) ack: Option<Ack>,
+    /// When each stream of [`Kind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
+    streams: [Instant; STREAMS],
+    boot_ms: u32,
+    /// By the autopilot's clock, of the last position used, milliseconds.
+    read_boot_ms: u32,
+    /// When a position was last read, used or not.
+    read_at: Option<Instant>,
+    settled_at: Instant,
+    /// After a silence positions count from then on.
+    counts_from: Instant,
+    estimator_ready: bool,
+}
+
+impl Telemetry {
+    /// Nothing heard.
+    /// A board without a mission takes an EKF origin anywhere.
+    pub fn new(anywhere: bool) -> Self {
+        Self { battery_percent: -1, anywhere, ..Self::default() }
+    }
+
+    /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
+    pub fn is_critical(&self) -> bool {
+        self.system_status >= CRITICAL
+    }
+
+    /// Whether the battery is known to hold less than so many percent.
+    pub(crate) fn charge_below(&self, percent: i8) -> bool {
+        (0..percent).contains(&self.battery_percent)
+    }
+
+    /// Time since the last HEARTBEAT; the greatest value if none came.
+    pub fn heartbeat_age(&self, now: Instant) -> Duration {
+        age(self.heartbeat_at, now)
+    }
+
+    /// Time since the last usable position; the greatest value if none is known.
+    pub fn position_age(&self, now: Instant) -> Duration {
+        age(self.position_at, now)
+    }
+
+    /// How far the estimate may be off, metres, by what the autopilot reports and by what the operator vouches for
+    /// (`FLK_EST_M`); infinite while that is not known.
+    pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
+        match self.accuracy {
+            Some((accuracy_m, at)) if now - at <= margins::ACCURACY_AGE => {
+                libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)
+            }
+            _ => f32::INFINITY,
+        }
+    }
+
+    /// Whether another EKF origin is in doubt, so that the autopilot is to be asked.
+    pub(crate) fn doubts_origin(&self) -> bool {
+        self.doubted_at.is_some()
+    }
+
+    /// Whether the position jumped lately.
+    pub fn is_settling(&self, now: Instant) -> bool {
+        now < self.settled_at
+    }
+
+    /// Takes a frame of the autopilot link in.
+    pub fn handle(&mut self, now: Instant, mission_origin: &Geodetic, frame: &Frame) -> Change {
+        // An origin is confirmed while armed, so a forwarded one needs no place in the sequence, and takes none from the true ones.
+        let confirmed = self.armed && frame.message_id == GPS_GLOBAL_ORIGIN_DATA::ID;
+        if !confirmed && !self.sequence.accept(frame.sequence, now) {
+            return Change::None;
+        }
+        self.note_stream(frame.message_id, now);
+        match frame.message_id {
+            // By field: a command newer than the crate's may be answered.
+            COMMAND_ACK_DATA::ID => {
+                let p = frame.padded();
+                let command = u16::from_le_bytes([p[0], p[1]]);
+                self.ack = Some(Ack { command, result: p[2], to: (p[8], p[9]) });
+                Change::Updated
+            }
+            // By field: a vehicle type newer than the crate must not make the autopilot silent.
+            HEARTBEAT => {
+                let p = frame.padded();
+                let Some(kind) = Kind::from_heartbeat(p[5]) else { return Change::None };
+                if *self.kind.get_or_insert(kind) != kind {
+                    return Change::None;
+                }
+                self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+                self.armed = p[6] & ARMED != 0;
+                self.watch_origin();
+                self.system_status = p[7];
+                self.heartbeat_at = Some(now);
+                Change::Updated
+            }
+            EXTENDED_SYS_STATE => {
+                let landed = frame.padded()[1];
+                if landed != 0 {
+                    self.on_ground = Some(landed == ON_GROUND);
+                }
+                Change::Updated
+            }
+            SYS_STATUS_DATA::ID => match frame.decode::<SYS_STATUS_DATA>() {
+                Some(status) => {
+                    // Unknown (−1) does not hide what was known.
+                    if status.battery_remaining >= 0 {
+                        self.battery_percent = status.battery_remaining;
+                    }
+                    Change::Updated
+                }
+                None => Change::None,
+            },
+            GPS_GLOBAL_ORIGIN_DATA::ID => match frame.decode::<GPS_GLOBAL_ORIGIN_DATA>() {
+                Some(origin) => self.handle_origin(now, mission_origin, &origin),
+                None => Change::None,
+            },
+            EKF_STATUS_REPORT_DATA::ID => {
+                // By field: flags newer than the crate's must not hide the others.
+                let p = frame.padded();
+                self.estimator_ready = ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
+                let ratio = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                // Velocity, horizontal and vertical position, compass. It reports no metres: 0 leaves what is vouched for.
+                let sound = self.estimator_ready
+                    && [0, 4, 8, 12].into_iter().all(|at| ardupilot::ratio_is_sound(ratio(at)));
+                self.accuracy = Some((if sound { 0.0 } else { f32::INFINITY }, now));
+                if !self.estimator_ready && self.kind == Some(Kind::ArduPilot) {
+                    self.position_at = None;
+                }
+                Change::Updated
+            }
+            ESTIMATOR_STATUS_DATA::ID if self.kind == Some(Kind::Px4) => {
+                // By field: flags newer than the crate's must not hide the accuracy.
+                let p = frame.padded();
+                let metres = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
+                let (across_m, height_m) = (metres(32), metres(36));
+                // NaN, and what is less than nothing, is not known.
+                let known = across_m >= 0.0 && height_m >= 0.0;
+                let worst_m = if known { libm::fmaxf(across_m, height_m) } else { f32::INFINITY };
+                self.accuracy = Some((worst_m, now));
+                Change::Updated
+            }
+            GLOBAL_POSITION_INT_DATA::ID => match frame.decode::<GLOBAL_POSITION_INT_DATA>() {
+                Some(global) => {
+                    self.above_home_m = global.relative_alt as f32 * 1e-3;
+                    Change::None
+                }
+                None => Change::None,
+            },
+            LOCAL_POSITION_NED_DATA::ID => match frame.decode::<LOCAL_POSITION_NED_DATA>() {
+                Some(local) => self.handle_position(now, mission_origin, &local),
+                None => Change::None,
+            },
+            _ => Change::None,
+        }
+    }
+
+    /// Time since a stream was last heard; the greatest value if it never was.
+    pub(crate) fn stream_age(&self, message_id: u32, now: Instant) -> Duration {
+        let heard = self.stream(message_id).and_then(|at| self.streams.get(at)).copied();
+        age(heard.filter(|at| *at > Instant::ZERO), now)
+    }
+
+    /// Its index among the streams that are on.
+    fn stream(&self, message_id: u32) -> Option<usize> {
+        let kept = self.kind.unwrap_or_default().streams();
+        let mut on = kept.iter().filter(|(_, interval_us)| *interval_us > 0.0);
+        on.position(|(id, _)| u32::from(*id) == message_id)
+    }
+
+    fn note_stream(&mut self, message_id: u32, now: Instant) {
+        let slot = self.stream(message_id).and_then(|at| self.streams.get_mut(at));
+        if let Some(slot) = slot {
+            *slot = now;
+        }
+    }
+
+    fn handle_origin(
+        &mut self,
+        now: Instant,
+        mission_origin: &Geodetic,
+        data: &GPS_GLOBAL_ORIGIN_DATA,
+    ) -> Change {
+        let origin = Geodetic {
+            lat_deg: f64::from(data.latitude) * 1e-7,
+            lon_deg: f64::from(data.longitude) * 1e-7,
+            alt_m: f64::from(data.altitude) * 1e-3,
+        };
+        if !origin.is_valid() {
+            return Change::None;
+        }
+        if self.armed
+            && let Some(flown) = self.flown_origin
+        {
+            if flown != origin {
+                let since = *self.doubted_at.get_or_insert(now);
+                self.origin_moved |= now - since >= DOUBT;
+                return Change::OriginDoubted;
+            }
+            self.doubted_at = None;
+        }
+        let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
+        if away_m > ORIGIN_MOST_M && !self.anywhere {
+            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+            self.settled_at = now + SETTLE;
+            return Change::OriginFar((away_m * 1e-3) as u32);
+        }
+        if self.ekf_origin.is_some_and(|known| known != origin) {
+            // A position on its way may still be about the old one.
+            self.settled_at = now + SETTLE;
+        }
+        if self.ekf_origin != Some(origin) {
+            self.ekf_origin = Some(origin);
+            // The next position is about the new origin and no jump.
+            self.position_at = None;
+            self.read_at = None;
+        }
+        self.watch_origin();
+        Change::Updated
+    }
+
+    /// Armed, the origin stays; disarmed, one in doubt is asked for.
+    fn watch_origin(&mut self) {
+        if self.armed {
+            self.flown_origin = self.flown_origin.or(self.ekf_origin);
+            return;
+        }
+        if self.origin_moved {
+            (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
+        }
+        (self.flown_origin, self.doubted_at, self.origin_moved) = (None, None, false);
+    }
+
+    fn handle_position(
+        &mut self,
+        now: Instant,
+        mission_origin: &Geodetic,
+        d: &LOCAL_POSITION_NED_DATA,
+    ) -> Change {
+        let fields = [d.x, d.y, d.z, d.vx, d.vy, d.vz];
+        let older = self.boot_ms.wrapping_sub(d.time_boot_ms);
+        let rebooted = older > 10_000 && older < u32::MAX / 2;
+        let stale = older < u32::MAX / 2 && !rebooted && self.read_at.is_some();
+        if fields.iter().any(|f| !f.is_finite()) || stale {
+            return Change::None;
+        }
+        self.boot_ms = d.time_boot_ms;
+        let Some(kind) = self.kind.filter(|kind| *kind == Kind::Px4 || self.estimator_ready) else {
+            return Change::None;
+        };
+        let Some(ekf_origin) = self.ekf_origin.filter(|_| !rebooted) else {
+            return if rebooted { self.lose_position(now) } else { Change::None };
+        };
+        let ned = Vector3::new(f64::from(d.x), f64::from(d.y), f64::from(d.z));
+        let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
+        let position = frames::geodetic_to_enu(mission_origin, &geodetic);
+        if let Some(at) = self.read_at {
+            // By the autopilot's clock, since the last one that was used: what waited on the way comes all at once.
+            let passed_s = d.time_boot_ms.wrapping_sub(self.read_boot_ms) as f32 * 1e-3;
+            let dt_s = passed_s.min(GAP_MOST_S);
+            if now - at > SETTLE {
+                self.counts_from = now + SETTLE;
+            }
+            let led_to = self.position + self.velocity * dt_s;
+            if (position - led_to).norm() > JUMP_M + JUMP_MPS * dt_s {
+                return self.lose_position(now);
+            }
+        }
+        (self.read_at, self.read_boot_ms) = (Some(now), d.time_boot_ms);
+        self.position = position;
+        // The two frames' norths differ by the convergence of meridians, 1e-4 rad a kilometre: left out for velocity.
+        self.velocity = frames::swap_enu_ned(&Vector3::new(d.vx, d.vy, d.vz));
+        if !self.is_settling(now) && now >= self.counts_from {
+            self.position_at = Some(now);
+        }
+        Change::Updated
+    }
+
+    fn lose_position(&mut self, now: Instant) -> Change {
+        self.ekf_origin = None;
+        self.position_at = None;
+        self.read_at = None;
+        self.settled_at = now + SETTLE;
+        Change::OriginLost
+    }
+
+    /// NED metres about this autopilot's EKF origin of a point of the mission frame; `None` while the origin is unknown.
+    pub fn to_ned(&self, mission_origin: &Geodetic, point: &Point) -> Option<Vector3<f32>> {
+        let geodetic = frames::enu_to_geodetic(mission_origin, point);
+        let ned = frames::geodetic_to_ned(self.kind?.projection(), &self.ekf_origin?, &geodetic);
+        Some(Vector3::new(ned.x as f32, ned.y as f32, ned.z as f32))
+    }
+}
+
+fn age(at: Option<Instant>, now: Instant) -> Duration {
+    at.map_or(Duration::from_micros(u64::MAX), |at| now - at)
+}
+
+#[cfg(test)]
+mod tests;

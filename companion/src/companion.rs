@@ -1,0 +1,351 @@
+//! The companion itself: routes frames in, runs the mission table, makes frames out.
+
+mod frames;
+mod steps;
+
+use heapless::Deque;
+use planner_core::Point;
+use planner_core::schedule::VehiclePlan;
+
+use crate::autopilot::Kind;
+use crate::autopilot::handshake::Handshake;
+use crate::autopilot::limits::AutopilotLimits;
+use crate::autopilot::telemetry::Telemetry;
+use crate::config::{Config, ConfigError, PlanFailure};
+use crate::events::{Event, Link};
+use crate::guidance::{Guidance, Scene, Stats};
+use crate::link::budget::Budget;
+use crate::link::commands::{Pending, Repeats};
+use crate::link::echo::Sent;
+use crate::link::frame::{Counters, Framer};
+use crate::link::outbox::Outbox;
+use crate::link::senders::Rates;
+use crate::mission::waits::Waits;
+use crate::mission::{Interrupted, State};
+use crate::services::ftp::Ftp;
+use crate::services::parameters::Parameters;
+use crate::storage::store::Store;
+use crate::swarm::detour::{Around, Obstacles};
+use crate::swarm::neighbours::Neighbours;
+use crate::time::{Duration, Instant};
+
+/// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
+const SETPOINT_EVERY: Duration = Duration::from_millis(50);
+/// A setpoint that is held, or an EKF origin that is not used, is reported no more often.
+const HELD_EVERY: Duration = Duration::from_secs(5);
+/// On the ground the table is looked at five times a second.
+const IDLE_EVERY: Duration = Duration::from_millis(200);
+/// A hovering vehicle sways more slowly, m/s.
+pub(crate) const STANDING_MPS: f32 = 0.3;
+pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
+pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
+/// While another EKF origin is in doubt the autopilot is asked this often.
+pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
+/// Rows taken at one instant; more would be a cycle in the table.
+const ROWS_AT_ONCE: usize = 4;
+const EVENTS: usize = 16;
+
+/// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
+#[derive(Clone, Debug)]
+pub struct Companion<const V: usize, const W: usize, const G: usize> {
+    pub(crate) config: Config<V>,
+    /// Cruise and climb of the mission, which parameters may limit.
+    pub(crate) nominal_mps: [f32; 2],
+    /// Since when the estimate is worse than the margin leaves at a crawl.
+    pub(crate) vague_since: Option<Instant>,
+    /// A parameter was set that is not in use yet.
+    pub(crate) untuned: bool,
+    pub(crate) rank: u16,
+    pub(crate) start: Point,
+    framers: [Framer; 2],
+    pub(crate) outboxes: [Outbox; 2],
+    pub(crate) telemetry: Telemetry,
+    pub(crate) neighbours: Neighbours<V>,
+    pub(crate) plan: Option<VehiclePlan<W, G>>,
+    pub(crate) plan_failure: Option<PlanFailure>,
+    pub(crate) around: Around,
+    pub(crate) obstacles: Obstacles,
+    pub(crate) state: State,
+    pub(crate) entered_at: Instant,
+    /// When MISSION_START was taken: the schedule counts from it.
+    started_at: Instant,
+    /// When the pilot took the vehicle.
+    pub(crate) pilot_since: Instant,
+    pub(crate) interrupted: Interrupted,
+    pub(crate) pending: Pending,
+    pub(crate) handshake: Handshake,
+    repeats: Repeats,
+    /// What the autopilot's parameters allow.
+    pub(crate) autopilot_limits: AutopilotLimits,
+    /// Which of them were read, by bits, and how often they may still be requested.
+    pub(crate) limits_read: u16,
+    pub(crate) limits_tries: u8,
+    pub(crate) limits_at: Instant,
+    pub(crate) waits: Waits,
+    pub(crate) guidance: Guidance,
+    pub(crate) mode_before: u32,
+    pub(crate) now: Instant,
+    /// When a setpoint that was held, and an EKF origin that is not used, may be reported again.
+    held_at: Instant,
+    far_at: Instant,
+    stepped_at: Instant,
+    next_step: Instant,
+    next_heartbeat: Instant,
+    next_swarm: Instant,
+    pub(crate) retry_at: Instant,
+    pub(crate) origin_at: Instant,
+    pub(crate) streams_at: Instant,
+    pub(crate) setup: usize,
+    pub(crate) setpoint_due: bool,
+    pub(crate) heartbeat_due: [bool; 2],
+    pub(crate) version_due: [bool; 2],
+    pub(crate) position_due: bool,
+    pub(crate) intent_due: bool,
+    /// What others do not hear may be passed on again, beginning with this rank.
+    pub(crate) relay_due: bool,
+    pub(crate) relay_next: u16,
+    pub(crate) radio: Budget,
+    pub(crate) sent: Sent,
+    pub(crate) rates: Rates,
+    pub(crate) store: Option<Store>,
+    pub(crate) parameters: Parameters,
+    pub(crate) ftp: Ftp,
+    pub(crate) events: Deque<Event, EVENTS>,
+}
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// A companion that has heard nothing yet.
+    pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
+        const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
+        config.check()?;
+        let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
+        let start = own.start;
+        Ok(Self {
+            nominal_mps: [config.cruise_mps, config.climb_mps],
+            vague_since: None,
+            untuned: false,
+            rank,
+            start,
+            framers: [Framer::new(), Framer::new()],
+            outboxes: [Outbox::default(), Outbox::default()],
+            telemetry: Telemetry::new(config.mission_crc == 0),
+            neighbours: Neighbours::new(
+                &config.roster,
+                config.system_id,
+                config.cruise_mps.max(config.climb_mps),
+            ),
+            plan: None,
+            plan_failure: None,
+            around: Around::default(),
+            obstacles: Obstacles::default(),
+            state: State::WaitAutopilot,
+            entered_at: Instant::ZERO,
+            started_at: Instant::ZERO,
+            pilot_since: Instant::ZERO,
+            interrupted: Interrupted::default(),
+            pending: Pending::default(),
+            handshake: Handshake::default(),
+            repeats: Repeats::default(),
+            autopilot_limits: AutopilotLimits::default_of(Kind::Px4),
+            limits_read: 0,
+            limits_tries: 0,
+            limits_at: Instant::ZERO,
+            waits: Waits::default(),
+            guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
+            mode_before: 0,
+            now: Instant::ZERO,
+            held_at: Instant::ZERO,
+            far_at: Instant::ZERO,
+            stepped_at: Instant::ZERO,
+            next_step: Instant::ZERO,
+            next_heartbeat: Instant::ZERO,
+            next_swarm: Instant::ZERO,
+            retry_at: Instant::ZERO,
+            origin_at: Instant::ZERO,
+            streams_at: Instant::ZERO,
+            setup: usize::MAX,
+            setpoint_due: false,
+            heartbeat_due: [false; 2],
+            version_due: [false; 2],
+            position_due: false,
+            intent_due: false,
+            relay_due: false,
+            relay_next: 0,
+            radio: Budget::default(),
+            sent: Sent::default(),
+            rates: Rates::default(),
+            store: None,
+            parameters: Parameters::default(),
+            ftp: Ftp::default(),
+            events: Deque::new(),
+            config,
+        })
+    }
+
+    /// Where the mission is.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// Whether setpoints are to go out, one each 50 ms.
+    pub fn streams(&self) -> bool {
+        self.state.streams_setpoints()
+    }
+
+    /// The autopilot as last heard.
+    pub fn telemetry(&self) -> &Telemetry {
+        &self.telemetry
+    }
+
+    /// Which autopilot flies the vehicle; PX4 while none was heard.
+    pub(crate) fn kind(&self) -> Kind {
+        self.telemetry.kind.unwrap_or_default()
+    }
+
+    /// System id of the vehicle waited for; 0 when free.
+    pub fn waiting_for(&self) -> u8 {
+        match self.guidance.filter.blocker() {
+            0 => self.guidance.advice.waiting_for,
+            id => id,
+        }
+    }
+
+    /// How often the safety filter stopped the vehicle.
+    pub fn filter_stops(&self) -> u32 {
+        self.guidance.filter.activations()
+    }
+
+    /// What the safety filter finds at this moment, as each step asks it: the vehicle that it stops for, 0 for none. Nothing
+    /// changes by it; its cost is counted so.
+    pub fn ask_filter(&mut self, now: Instant) -> u8 {
+        let scene = Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        );
+        self.guidance.ask_filter(self.state, &scene, &self.neighbours, now)
+    }
+
+    /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
+    pub fn stops_urgently(&self) -> bool {
+        self.guidance.door.stops_urgently()
+    }
+
+    /// Way made along the own path, metres.
+    pub fn progress_m(&self) -> f32 {
+        // What is flown around comes on top of where the plan was left.
+        let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
+        self.guidance.progress_m(self.state, &self.scene()) + left_at_m.max(0.0)
+    }
+
+    /// What the setpoints came to since the start.
+    pub fn setpoint_stats(&self) -> Stats {
+        self.guidance.door.stats
+    }
+
+    /// What a link's framer counted.
+    pub fn counters(&self, link: Link) -> Counters {
+        self.framers[link as usize].counters()
+    }
+
+    /// Messages dropped because a link's queue was full.
+    pub fn dropped(&self, link: Link) -> u32 {
+        self.outboxes[link as usize].dropped()
+    }
+
+    /// Takes bytes of a link in, all received by `now`.
+    pub fn handle_bytes(&mut self, link: Link, now: Instant, bytes: &[u8]) {
+        self.now = now;
+        let mut input = bytes;
+        let mut relevant = false;
+        while let Some(frame) = self.framers[link as usize].next(now, &mut input) {
+            relevant |= self.handle_frame(link, &frame);
+        }
+        if relevant {
+            self.run_table();
+        }
+    }
+
+    /// Lets time pass: to be called when [`Self::poll_timeout`] is due.
+    pub fn handle_timeout(&mut self, now: Instant) {
+        self.now = now;
+        for link in [Link::Autopilot, Link::Swarm] {
+            // Frees what a partial frame held back.
+            self.handle_bytes(link, now, &[]);
+        }
+        if now >= self.next_step {
+            self.step();
+        }
+        if now >= self.next_heartbeat {
+            self.next_heartbeat = now + HEARTBEAT_EVERY;
+            self.heartbeat_due = [true; 2];
+            self.relay_due = true;
+        }
+        if now >= self.next_swarm {
+            self.next_swarm = now + Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
+            self.position_due = self.telemetry.position_at.is_some();
+            self.intent_due = true;
+        }
+    }
+
+    /// Takes the planner's answer in: the mission's plan, or the way around asked for by [`Self::detour`]. Ignored unless one
+    /// was asked for.
+    pub fn handle_plan(&mut self, now: Instant, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
+        self.now = now;
+        match (self.state, outcome) {
+            (State::Planning, Ok(plan)) if self.begins_at(plan, &self.start) => {
+                self.plan = Some(plan.clone());
+            }
+            (State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
+            (State::Planning, Ok(_)) => self.plan_failure = Some(PlanFailure::Invalid),
+            (State::Planning, Err(failure)) => self.plan_failure = Some(failure),
+            (State::Replanning | State::PadReplanning, Err(failure)) => self.miss_detour(failure),
+            _ => return,
+        }
+        self.run_table();
+    }
+
+    /// The next event.
+    pub fn poll_event(&mut self) -> Option<Event> {
+        self.events.pop_front()
+    }
+
+    /// When [`Self::handle_timeout`] is due.
+    pub fn poll_timeout(&self) -> Option<Instant> {
+        Some(self.next_step.min(self.next_heartbeat).min(self.next_swarm))
+    }
+
+    pub(crate) fn scene(&self) -> Scene<'_, W, G> {
+        Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        )
+    }
+
+    /// When the mission was started.
+    pub(crate) fn started_at(&self) -> Instant {
+        self.started_at
+    }
+
+    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
+    pub(crate) fn departure_due(&self) -> bool {
+        let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
+        (self.now - self.started_at).secs_f32() >= depart_s
+    }
+
+    /// Finite, from `place`, and a path wherever there is a goal.
+    pub(crate) fn begins_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
+        let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
+        let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
+            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
+        let first = plan.path.waypoints().first();
+        let begins = first.is_some_and(|w| (w.position - place).norm() < 0.1);
+        finite && (begins || plan.goal.is_none())
+    }
+}
+
+#[cfg(test)]
+mod tests;

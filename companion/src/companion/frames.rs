@@ -1,0 +1,187 @@
+//! What becomes of a frame that came in.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    AUTOPILOT_VERSION_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, LOCAL_POSITION_NED_DATA,
+    PARAM_VALUE_DATA, TUNNEL_DATA,
+};
+
+use super::{Companion, HELD_EVERY, ORIGIN_AGAIN};
+use crate::autopilot::telemetry::Change;
+use crate::events::Link;
+use crate::link::budget;
+use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
+use crate::link::frame::Frame;
+use crate::link::intent::Intent;
+use crate::link::outbox::Outgoing;
+use crate::link::senders::{Kind as AnswerKind, Sender};
+use crate::swarm::neighbours::relay::Relay;
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Returns whether the mission table should be looked at.
+    pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
+        let sender = self.sender(link, frame);
+        if let Some(command) = commands::read(frame, self.config.system_id) {
+            if sender != Sender::GroundStation && command.acts() {
+                self.deny(link, sender, &command);
+                return false;
+            }
+            let now = self.now;
+            let (result, relevant) = match self.repeats.answered(frame, now) {
+                Some(result) => (result, false),
+                None => {
+                    let result = self.handle_command(link, sender, &command);
+                    self.repeats.remember(frame, result, now);
+                    (result, true)
+                }
+            };
+            if let Some(result) = result {
+                let ack = Outgoing::Ack { command: command.command, result, to: command.from };
+                self.answer_to(link, sender, AnswerKind::Ack, ack);
+            }
+            return relevant;
+        }
+        if self.serve(link, sender, frame) {
+            return false;
+        }
+        match link {
+            Link::Autopilot => {
+                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
+                    return false;
+                }
+                if frame.message_id == PARAM_VALUE_DATA::ID {
+                    self.handle_limit(frame);
+                    return false;
+                }
+                let change = self.telemetry.handle(self.now, &self.config.origin, frame);
+                if let Some(ack) = self.telemetry.ack.take() {
+                    self.handle_ack(&ack);
+                }
+                self.handshake.watch(self.state, &self.telemetry);
+                if change == Change::OriginDoubted {
+                    self.origin_at = self.origin_at.min(self.now + ORIGIN_AGAIN);
+                    return self.telemetry.origin_moved;
+                }
+                if let Change::OriginFar(km) = change {
+                    if self.now >= self.far_at {
+                        self.far_at = self.now + HELD_EVERY;
+                        self.say_count(true, "EKF origin # km away: not used", [km, 0]);
+                    }
+                    return true;
+                }
+                if change == Change::OriginLost {
+                    self.origin_at = self.now;
+                    // It may have been restarted and know nothing of the streams we asked for. Positions that jump
+                    // again and again are no reason to flood it.
+                    if self.now >= self.streams_at {
+                        self.ask_for_streams();
+                    }
+                }
+                change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID
+            }
+            Link::Swarm => {
+                self.handle_neighbour(frame);
+                false
+            }
+        }
+    }
+
+    pub(super) fn handle_neighbour(&mut self, frame: &Frame) {
+        let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
+        let id = frame.system;
+        if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
+            return;
+        }
+        // Its sequence number counts only if the frame decodes.
+        if frame.message_id == TUNNEL_DATA::ID {
+            if let Some(relay) = Relay::decode(frame.padded(), id) {
+                let ours = self.plan.as_ref().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
+                if ours && relay.mission_crc == self.config.mission_crc {
+                    self.neighbours.handle_relay(self.now, id, &relay);
+                }
+                return;
+            }
+            let Some(intent) = Intent::decode(frame.padded(), id) else { return };
+            if intent.mission_crc != self.config.mission_crc {
+                if self.config.roster.iter().any(|entry| entry.system_id == id) {
+                    let text = "Vehicle # has another mission file";
+                    self.say_of(Sender::Other, true, text, [u32::from(id), 0, 0]);
+                }
+                return;
+            }
+            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.rank);
+            let delay_s = echo.and_then(|echo| self.sent.delay_s(&echo, self.now));
+            if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
+                late.take(delay_s);
+            }
+            if self.neighbours.accept(id, frame.sequence, self.now) {
+                let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
+                self.neighbours.handle_intent(
+                    self.now,
+                    self.rank,
+                    &intent,
+                    self.config.mission_crc,
+                    plan_crc,
+                );
+            }
+        } else if let Some(data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
+            self.neighbours.handle_position(self.now, &self.config.origin, id, &data);
+        }
+    }
+
+    /// Answers a command of a sender whose commands do not count.
+    pub(super) fn deny(&mut self, link: Link, sender: Sender, command: &Command) {
+        if command.to_us {
+            let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
+            self.answer_to(link, sender, AnswerKind::Ack, ack);
+        }
+        let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
+        self.say_of(sender, true, "Command # denied, not a ground station: #/#", numbers);
+    }
+
+    /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
+    pub(super) fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
+        let (before, known) = (self.pending, self.obstacles.count());
+        let inputs = self.inputs();
+        let result = match commands::apply(&mut self.pending, self.state, &inputs, command) {
+            Some(result) => result,
+            None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
+            None if command.command == commands::EXCLUDE => self.exclude(command),
+            None if command.command == commands::RESTART
+                && (command.to_component || command.param2 == 1.0) =>
+            {
+                self.restart(command)
+            }
+            // To all components: another one's.
+            None if !command.to_component => return None,
+            None => UNSUPPORTED,
+        };
+        let restarts = command.command == commands::RESTART && result == ACCEPTED;
+        if restarts || self.pending != before || self.obstacles.count() != known {
+            self.log_command(sender, command);
+        }
+        command.to_us.then_some(result)
+    }
+
+    pub(super) fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
+        if !self.may_answer(link, sender, AnswerKind::Message) {
+            return TEMPORARILY_REJECTED;
+        }
+        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+            return TEMPORARILY_REJECTED;
+        }
+        if message == HEARTBEAT_DATA::ID as f32 {
+            self.heartbeat_due[link as usize] = true;
+        } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
+            self.version_due[link as usize] = true;
+        } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
+            self.position_due = self.telemetry.position_at.is_some();
+        } else {
+            return DENIED;
+        }
+        if link == Link::Swarm {
+            self.radio.spend(budget::POSITION);
+        }
+        ACCEPTED
+    }
+}

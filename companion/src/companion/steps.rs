@@ -1,0 +1,204 @@
+//! The step that is due, and what the rows of the table have done.
+
+use super::{Companion, DISARM_AFTER, HELD_EVERY, IDLE_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
+use crate::config::PlanFailure;
+use crate::events::Event;
+use crate::guidance::Scene;
+use crate::link::outbox::Outgoing;
+use crate::margins;
+use crate::mission::{self, Action, Guard, Row, State, To};
+use crate::storage::store::Erasing;
+use crate::swarm::detour::{Aim, Around};
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// One step of the control loop: reference, table, and what is asked for again.
+    pub(super) fn step(&mut self) {
+        let now = self.now;
+        if self.untuned && self.erasing() == Erasing::Allowed {
+            self.tune();
+        }
+        self.watch_estimate();
+        let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
+        self.stepped_at = now;
+        let scene = Scene::new(
+            self.plan.as_ref(),
+            &self.telemetry,
+            (self.rank, self.config.system_id),
+            self.around.flying,
+        );
+        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s) && now >= self.held_at {
+            self.held_at = now + HELD_EVERY;
+            self.say(true, "Setpoint out of limits: holding");
+        }
+        self.intent_due |= core::mem::take(&mut self.guidance.turned);
+        self.name_who_never_starts();
+        self.look_around();
+        self.run_table();
+        self.repeat_requests();
+        let flows = self.state.streams_setpoints();
+        self.setpoint_due = flows;
+        let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
+        // Steps keep their rhythm; after a long gap the rhythm restarts instead of catching up.
+        let due = self.next_step + every;
+        self.next_step = if due > now { due } else { now + every };
+    }
+
+    /// Compares the estimate's bound with what the margin leaves, and sets the pace.
+    pub(super) fn watch_estimate(&mut self) {
+        let (now, config) = (self.now, &self.config);
+        let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
+        // The best that a receiver can do was weighed when the margin was chosen.
+        let pace = match bound_m <= margins::ESTIMATE_M {
+            true => 1.0,
+            false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
+        };
+        let before = core::mem::replace(&mut self.guidance.pace, pace);
+        self.vague_since = if pace > 0.0 { None } else { self.vague_since.or(Some(now)) };
+        let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
+        if kind(before) == kind(pace) || !self.state.streams_setpoints() {
+            return;
+        }
+        // Whole centimetres, rounded up; more than a hundred metres is not known.
+        let cm = libm::ceilf(libm::fminf(bound_m, 100.0) * 100.0) as u32;
+        let room_m = margins::room_m(config.required_clearance_m, config.radius_m, margins::TRACKING_M);
+        let room_cm = libm::fmaxf(room_m * 100.0, 0.0) as u32;
+        let (warning, text) = match kind(pace) {
+            2 => (false, "Estimate within # cm again"),
+            1 => (true, "Estimate within # cm, margin # cm: slower"),
+            _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
+            _ => (true, "Estimate within # cm, margin # cm: stopping"),
+        };
+        self.say_count(warning, text, [cm, room_cm]);
+    }
+
+    pub(super) fn run_table(&mut self) {
+        for _ in 0..ROWS_AT_ONCE {
+            let inputs = self.inputs();
+            let Some(row) = mission::update(self.state, &inputs) else { return };
+            self.take(row);
+        }
+    }
+
+    pub(super) fn take(&mut self, row: &'static Row) {
+        let (from, now) = (self.state, self.now);
+        let to = match row.to {
+            To::State(to) => to,
+            To::Interrupted => self.interrupted.target(from),
+        };
+        self.interrupted.note(from, to);
+        self.state = to;
+        self.entered_at = now;
+        if row.guard == Guard::StartCommanded {
+            self.started_at = now;
+            self.mode_before = self.telemetry.custom_mode;
+        }
+        if to == State::PilotControl && from != State::PilotReturned {
+            self.pilot_since = now;
+        }
+        let ends = matches!(to, State::Aborted | State::Done)
+            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
+        self.pending.state_changed(row.guard, to, ends);
+        self.handshake.state_changed(from, to);
+        self.act(from, to, row);
+        if !row.text.is_empty() {
+            let text = Outgoing::Text { warning: row.warning, text: row.text };
+            self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
+        }
+        if let Some(text) = self.interrupted.text(from, to) {
+            self.say(false, text);
+        }
+        // Full only if the shell does not drain: then the newest is lost.
+        let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
+        let _ = self.events.push_back(changed);
+        // The step that the new state needs is due now.
+        if to.streams_setpoints() && !from.streams_setpoints() {
+            self.next_step = now;
+        }
+    }
+
+    pub(super) fn act(&mut self, from: State, to: State, row: &Row) {
+        let now = self.now;
+        self.mark_place(to);
+        let position = self.telemetry.position;
+        match row.action {
+            Action::None | Action::ForgetStart => {}
+            Action::Connect => self.ask_for_streams(),
+            Action::RequestPlan => {
+                self.plan = None;
+                self.plan_failure = None;
+                self.around = Around { left: self.around.left, ..Around::default() };
+                self.obstacles.avoided = 0;
+                self.neighbours.forget_plan();
+                self.guidance.reset();
+                let _ = self.events.push_back(Event::PlanRequested);
+            }
+            Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
+            Action::HoldHere => self.guidance.hold_at(position),
+            Action::HoldOver => self.retry_at = now,
+            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
+            Action::AskLand => self.ask_land(from),
+            Action::AskDisarm if to == State::Disarm => self.retry_at = now + DISARM_AFTER,
+            Action::AskDisarm | Action::CancelStart => self.retry_at = now,
+            Action::BeginClimb => self.guidance.begin_climb(&position),
+            Action::RunPath => self.guidance.run(now),
+            Action::RequestDetour => self.request_detour(Aim::Goal),
+            Action::RequestAside => {
+                self.guidance.brake();
+                // On its way back it was to land already.
+                let lands = self.guidance.returning;
+                self.request_detour(if lands { Aim::Landing } else { Aim::Aside });
+            }
+            Action::RequestLanding => self.request_detour(Aim::Landing),
+            Action::MissDetour => self.miss_detour(PlanFailure::Late),
+            Action::FlyDetour => {
+                self.guidance.begin_path(now);
+                self.guidance.aside = self.around.aside;
+            }
+            Action::BrakeOnPath => self.guidance.brake(),
+            Action::Rejoin => self.go_on(from, to),
+            Action::TurnBack => {
+                if let Some(plan) = &mut self.plan {
+                    self.guidance.turn_back(&mut plan.path, now);
+                    // Off the shared plan: neighbours keep clear of us as of a stranger.
+                    plan.gates.clear();
+                    core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
+                }
+            }
+        }
+    }
+
+    pub(super) fn ask_land(&mut self, from: State) {
+        use State::*;
+        self.retry_at = self.now;
+        let position = self.telemetry.position;
+        match from {
+            Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
+                self.guidance.brake();
+            }
+            // Off the path, or not known to be on it: the reference may be beyond a wall.
+            _ => self.guidance.hold_at(position),
+        }
+    }
+
+    /// Goes on in the state that was interrupted.
+    pub(super) fn go_on(&mut self, from: State, to: State) {
+        let (now, position) = (self.now, self.telemetry.position);
+        match to {
+            State::TakeOff => self.retry_at = now,
+            State::Land => self.ask_land(from),
+            _ => {
+                let climbs = matches!(self.interrupted.beneath(to), State::TakeOff | State::Climb);
+                if let Some(plan) = &self.plan {
+                    self.guidance.go_on(plan, climbs, &position, now);
+                }
+                if to == State::Blocked {
+                    // Until it was looked at again.
+                    (self.around.blocked, self.around.in_the_way) = (true, true);
+                }
+                if !matches!(to, State::Climb | State::Follow) {
+                    self.guidance.brake();
+                }
+            }
+        }
+    }
+}

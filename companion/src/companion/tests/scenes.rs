@@ -1,0 +1,202 @@
+//! A scene for every row of the mission table: something happens to a vehicle in some state, and
+//! another state follows.
+
+extern crate std;
+use std::string::String;
+use std::vec::Vec;
+
+use mavlink::dialects::ardupilotmega::MavCmd;
+
+use super::super::*;
+use crate::autopilot::px4;
+use crate::link::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
+use crate::testing::fake_autopilot::*;
+use crate::{Config, RosterEntry};
+
+mod autopilot;
+mod detours;
+mod landings;
+mod pause;
+mod pilot;
+mod position;
+mod start;
+
+/// The other vehicle: place, flags of its intent, progress, CRC of its plan.
+type Neighbour = Option<(Point, u8, f32, u32)>;
+
+/// Plays scenes, and collects the texts of the rows that they take.
+#[derive(Default)]
+struct Scenes {
+    texts: Vec<String>,
+}
+
+impl Scenes {
+    /// After `script` the state `end` is reached within so many seconds.
+    #[track_caller]
+    fn play(&mut self, mut bench: Bench, script: impl FnOnce(&mut Bench), end: State, seconds: f32) {
+        script(&mut bench);
+        bench.until(end, seconds);
+        self.texts.append(&mut bench.texts);
+    }
+}
+
+/// Every row of the table with a text is taken in some scene.
+#[test]
+fn every_row_has_its_scene() {
+    let mut scenes = Scenes::default();
+    let groups: &[fn(&mut Scenes)] = &[
+        start::planned,
+        start::started,
+        start::scheduled,
+        start::streaming,
+        start::arming,
+        autopilot::takes_over,
+        autopilot::does_not_do_as_asked,
+        autopilot::is_not_heard,
+        autopilot::flies_when_the_companion_starts,
+        pilot::takes_over,
+        pilot::returns,
+        position::is_lost,
+        position::is_not_to_be_trusted,
+        pause::in_flight,
+        pause::on_the_ground,
+        detours::others_are_not_heard,
+        detours::another_lies_below_the_path,
+        detours::before_take_off,
+        detours::another_flies_where_it_is_to_fly,
+        landings::are_commanded,
+        landings::at_a_limit,
+        landings::wait_for_room,
+        landings::end_aside,
+    ];
+    for group in groups {
+        group(&mut scenes);
+    }
+    for row in crate::mission::table::TABLE.iter().filter(|row| !row.text.is_empty()) {
+        assert!(scenes.texts.iter().any(|t| t == row.text), "no scene took: {}", row.text);
+    }
+}
+
+// Commands of the ground station.
+
+fn land(b: &mut Bench) {
+    b.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+}
+
+fn back(b: &mut Bench) {
+    b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+}
+
+fn pause(b: &mut Bench) {
+    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, crate::COMPONENT);
+}
+
+fn resume(b: &mut Bench) {
+    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+}
+
+// What happens in many scenes.
+
+fn nothing(_: &mut Bench) {}
+
+/// The autopilot's failsafe.
+fn fails_safe(b: &mut Bench) {
+    (b.mode, b.status) = (px4::RTL, 5);
+}
+
+/// The pilot's switch.
+fn pilot_takes(b: &mut Bench) {
+    b.mode = px4::HOLD;
+}
+
+/// Dragged on the ground by `by` three times, not so fast that it were a jump.
+fn drag(b: &mut Bench, by: Point) {
+    for _ in 0..3 {
+        b.enu += by;
+        b.run(0.3);
+    }
+}
+
+/// For so long nothing moves it.
+fn stuck(b: &mut Bench, seconds: f32) {
+    b.stuck = true;
+    b.run(seconds);
+    b.stuck = false;
+}
+
+// Where scenes begin.
+
+fn ready_with(config: Config<4>) -> Bench {
+    let mut bench = Bench::new(config);
+    bench.until(State::Ready, 6.0);
+    bench
+}
+
+/// On its pad, with nothing to wait for but the start.
+fn ready() -> Bench {
+    ready_with(config())
+}
+
+/// Started, and as far as this state.
+fn to(state: State) -> Bench {
+    let mut bench = ready();
+    bench.start();
+    bench.until(state, 30.0);
+    bench
+}
+
+/// In the middle of its path.
+fn flying() -> Bench {
+    Bench::following(config())
+}
+
+/// Commanded to land, which the autopilot does not get done.
+fn landing() -> Bench {
+    let mut bench = flying();
+    bench.never_lands = true;
+    land(&mut bench);
+    bench.run(2.0);
+    assert_eq!(bench.state(), State::Land);
+    bench
+}
+
+/// For so many seconds in this state, while vehicle 77 stands on its pad.
+fn accompanied(state: State, seconds: f32) -> Bench {
+    accompanied_with(two_vehicles(), state, seconds)
+}
+
+fn accompanied_with(config: Config<4>, state: State, seconds: f32) -> Bench {
+    let mut bench = Bench::accompanied(config);
+    bench.until(state, 20.0);
+    bench.run(seconds);
+    bench
+}
+
+/// Settings with a geofence.
+fn fenced(mut config: Config<4>, low: Point, high: Point) -> Config<4> {
+    config.geofence = Some((low, high));
+    config
+}
+
+// The other vehicle.
+
+fn stands(place: Point, flags: u8) -> Neighbour {
+    Some((place, GROUNDED | flags, 0.0, 5))
+}
+
+fn flies(place: Point, flags: u8) -> Neighbour {
+    Some((place, FLYING | flags, 0.0, 5))
+}
+
+/// It has followed its plan to the end.
+fn landed(place: Point) -> Neighbour {
+    Some((place, GROUNDED | LANDED | ON_PLAN, 99.0, 5))
+}
+
+fn on_pad(flags: u8) -> Neighbour {
+    stands(Point::new(8.0, 20.0, 0.0), flags)
+}
+
+fn below_the_path(flags: u8) -> Neighbour {
+    stands(Point::new(14.5, 12.5, 1.0), flags)
+}

@@ -1,0 +1,98 @@
+//! Another vehicle is not heard, lies below the path, or flies where this one is to fly.
+
+use super::State::*;
+use super::*;
+
+const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure::Unreachable));
+
+/// Another comes to lie below the path.
+fn blocked(b: &mut Bench) {
+    b.neighbour = below_the_path(OUT);
+    b.until(Blocked, 3.0);
+}
+
+pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
+    let unheard = |b: &mut Bench| b.neighbour = None;
+    scenes.play(accompanied(Follow, 1.0), unheard, Alone, 5.0);
+    scenes.play(accompanied(Follow, 1.0), unheard, Aborted, 60.0);
+    let for_a_while = |b: &mut Bench| {
+        b.neighbour = None;
+        b.until(Alone, 5.0);
+        b.neighbour = on_pad(ON_PLAN);
+    };
+    scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
+    // A third vehicle is never heard: nobody knows that it stands.
+    let mut three = two_vehicles();
+    three.roster.push(RosterEntry { system_id: 78, ..three.roster[1] }).unwrap();
+    let third_unheard = |b: &mut Bench| {
+        blocked(b);
+        b.run(601.0);
+    };
+    scenes.play(accompanied_with(three, Follow, 1.0), third_unheard, Aborted, 60.0);
+}
+
+/// Once all stand it is flown around, or the vehicle lands.
+pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
+    scenes.play(accompanied(Follow, 1.0), blocked, Done, 60.0);
+    let for_a_while = |b: &mut Bench| {
+        blocked(b);
+        b.neighbour = on_pad(ON_PLAN);
+    };
+    scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
+    let unanswered = |b: &mut Bench| {
+        b.answer_detour = None;
+        blocked(b);
+        b.until(Replanning, 6.0);
+        b.until(Blocked, 6.0);
+    };
+    scenes.play(accompanied(Follow, 1.0), unanswered, Replanning, 20.0);
+    let no_way = |b: &mut Bench| {
+        b.answer_detour = NO_WAY;
+        blocked(b);
+    };
+    scenes.play(accompanied(Follow, 1.0), no_way, Aborted, 120.0);
+    // It lies so near that there is no room to land either: back along the path there is.
+    let so_near = |b: &mut Bench| {
+        no_way(b);
+        b.until(Blocked, 5.0);
+        b.run(1.0);
+        b.neighbour = stands(Point::new(b.enu.x + 1.2, b.enu.y, 0.1), OUT);
+        b.until(Follow, 120.0);
+    };
+    scenes.play(accompanied(Follow, 1.0), so_near, Aborted, 60.0);
+}
+
+pub(super) fn before_take_off(scenes: &mut Scenes) {
+    let grounded = |answer| {
+        let mut bench = Bench::accompanied(two_vehicles());
+        bench.neighbour = below_the_path(OUT);
+        bench.answer_detour = answer;
+        bench.run(4.5);
+        bench
+    };
+    scenes.play(grounded(Some(Ok(()))), nothing, Done, 60.0);
+    scenes.play(grounded(NO_WAY), nothing, Scheduled, 1.0);
+    scenes.play(grounded(None), nothing, Scheduled, 6.0);
+}
+
+pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
+    // Down on the first stretch of the path: there is no place before it, so this one goes aside,
+    // as often as need be.
+    let comes_down = |b: &mut Bench| {
+        b.answer_detour = None;
+        b.neighbour = flies(Point::new(9.5, 12.0, 2.8), 0);
+    };
+    scenes.play(accompanied(Follow, 0.0), comes_down, Replanning, 6.0);
+    // One that flies a way of its own stays in front of it.
+    let stays_in_front = |b: &mut Bench| {
+        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS)
+    };
+    scenes.play(accompanied(Follow, 0.0), stays_in_front, Aborted, 140.0);
+    // On its way back it yields to one that follows the plan, and lands in the end.
+    let yields = |b: &mut Bench| {
+        back(b);
+        b.run(0.2);
+        b.neighbour = flies(Point::new(7.0, 12.0, 1.5), ON_PLAN);
+    };
+    scenes.play(accompanied(Follow, 3.0), yields, Aborted, 100.0);
+}

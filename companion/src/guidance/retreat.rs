@@ -1,0 +1,226 @@
+//! Out from under a vehicle that comes down: who waits below it flies back along its path until it is beside the column.
+//!
+//! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
+//! [`BESIDE_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
+//! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
+//! who follows behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
+//!
+//! ENU metres. Cost: [`BUDGET`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
+//! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.
+
+use planner_core::Point;
+use planner_core::deconflict::Neighbour;
+use planner_core::detour::KeepOff;
+use planner_core::path::{Path, Tracker};
+
+use crate::swarm::sweep::Sweep;
+
+/// What the one that comes down may drift, and the one below sways, metres.
+pub const BESIDE_M: f32 = 0.6;
+/// What two may stray together, metres.
+const FOLLOWER_M: f32 = 0.6;
+/// Spacing and number of the places looked at.
+const STEP_M: f32 = 0.25;
+const STEPS: u16 = 48;
+/// What a search may cost in one step: neighbours, columns, and [`PLACE_COST`] for each place.
+const BUDGET: u16 = 96;
+const PLACE_COST: u16 = 4;
+/// Fastest on a straight leg, and through its ends, m/s: a right angle is strayed from by 0.47 m then.
+const FAST_MPS: f32 = 1.5;
+const CORNER_MPS: f32 = 0.6;
+/// Acceleration, m/s².
+const ACCEL_MPS2: f32 = 1.0;
+/// Braking of a vehicle that flies on, m/s².
+const BRAKES_MPS2: f32 = 1.5;
+
+/// Where to wait.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Shelter {
+    /// Where it would anyway.
+    #[default]
+    Here,
+    /// Metres along the path.
+    Back(f32),
+    /// No place within reach is better.
+    Nowhere,
+}
+
+/// Looks for the nearest place to wait that no column holds.
+#[derive(Clone, Debug, Default)]
+pub struct Search {
+    sweep: Sweep,
+    /// Where it began, metres along the path, and how many places from there back are held.
+    from_m: Option<f32>,
+    held: u16,
+    /// What the last search found.
+    pub found: Shelter,
+}
+
+impl Search {
+    /// Searches on, back from `wait_m` along the path; `tell` gives the columns of a neighbour, of so many.
+    pub fn go_on<const W: usize>(
+        &mut self,
+        path: &Path<W>,
+        wait_m: f32,
+        neighbours: usize,
+        tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
+    ) {
+        // Who steps back while it searches waits ever further back; who waits further ahead asks anew.
+        let from_m = self.from_m.filter(|from_m| wait_m <= from_m + STEP_M).unwrap_or_else(|| {
+            self.held = 0;
+            self.sweep.restart();
+            wait_m
+        });
+        self.from_m = Some(from_m);
+        let mut budget = BUDGET;
+        let found = loop {
+            let along_m = from_m - f32::from(self.held) * STEP_M;
+            let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
+            let Some(place) = place.filter(|_| self.held <= STEPS) else { break Shelter::Nowhere };
+            budget = budget.saturating_sub(PLACE_COST);
+            match self.sweep.go_on(neighbours, &mut budget, 1, &tell, |column| column.holds(&place)) {
+                None => return,
+                Some(true) => self.held += 1,
+                Some(false) if self.held == 0 => break Shelter::Here,
+                Some(false) => break Shelter::Back(along_m),
+            }
+        };
+        (self.found, self.from_m) = (found, None);
+    }
+
+    /// Forgets what was found.
+    pub fn reset(&mut self) {
+        (self.found, self.from_m) = (Shelter::Here, None);
+    }
+}
+
+/// One step of `dt_s` back towards `to_m`; `None` if somebody is behind.
+pub fn step<const W: usize>(
+    path: &Path<W>,
+    tracker: &mut Tracker,
+    to_m: f32,
+    neighbours: &[Neighbour],
+    safety_m: f32,
+    dt_s: f32,
+) -> Option<Point> {
+    let here = path.point_at(tracker.along_m)?;
+    let back = path.point_at(tracker.along_m - STEP_M)?;
+    if tracker.speed_mps > 0.0 {
+        // It flies on, and brakes first.
+        tracker.speed_mps = (tracker.speed_mps - BRAKES_MPS2 * dt_s).max(0.0);
+        tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
+        return at(path, tracker);
+    }
+    let follows = |n: &&Neighbour| {
+        let apart = |p: &Point| (n.position - p).norm();
+        !n.grounded && n.progress_m.is_some() && apart(&back) < (safety_m + FOLLOWER_M).min(apart(&here))
+    };
+    if neighbours.iter().find(follows).is_some() {
+        return None;
+    }
+    let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
+    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * ACCEL_MPS2 * left_m);
+    let ahead = allowed(CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
+    // The tracker's speed is that of flying on; back is below zero.
+    let speed = ahead.min(FAST_MPS).min(ACCEL_MPS2 * dt_s - tracker.speed_mps.min(0.0));
+    tracker.speed_mps = -speed;
+    tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
+    at(path, tracker)
+}
+
+fn at<const W: usize>(path: &Path<W>, tracker: &Tracker) -> Option<Point> {
+    path.point_at(tracker.along_m)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use planner_core::detour::Nature;
+
+    use super::*;
+
+    fn path() -> Path<4> {
+        let mut path = Path::new();
+        for (x, y) in [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)] {
+            path.push(Point::new(x, y, 1.0), 0.8).unwrap();
+        }
+        path
+    }
+
+    fn above(x: f32, y: f32, z: f32) -> Neighbour {
+        Neighbour {
+            id: 9,
+            rank: 1,
+            position: Point::new(x, y, z),
+            velocity: Point::zeros(),
+            age_s: 0.0,
+            progress_m: None,
+            grounded: false,
+            out: false,
+            detours: false,
+        }
+    }
+
+    /// The column of one that comes down from 8 m.
+    fn column(x: f32, y: f32, radius_m: f32) -> KeepOff {
+        let (from, to) = (Point::new(x, y, 8.0), Point::new(x, y, 0.0));
+        KeepOff { from, to, radius_m, nature: Nature::Landing }
+    }
+
+    /// What a search for a place to wait at 9 m finds, and the steps it takes.
+    fn search(columns: &[KeepOff]) -> (Shelter, usize) {
+        let path = path();
+        let mut search = Search { found: Shelter::Back(99.0), ..Search::default() };
+        for steps in 1.. {
+            // A neighbour tells up to 16.
+            let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
+            search.go_on(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
+            if search.found != Shelter::Back(99.0) {
+                return (search.found, steps);
+            }
+            assert!(steps < 100);
+        }
+        unreachable!();
+    }
+
+    #[test]
+    fn a_place_below_one_that_comes_down_is_exchanged_for_one_before_it() {
+        let (Shelter::Back(to_m), 1) = search(&[column(6.0, 3.0, 2.1)]) else {
+            panic!("one is looked at in a step")
+        };
+        assert!((5.0..7.0).contains(&to_m), "{to_m}");
+        assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (Shelter::Here, 1));
+        assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (Shelter::Nowhere, 2), "nowhere is better");
+    }
+
+    #[test]
+    fn a_search_among_all_columns_there_can_be_takes_a_dozen_steps() {
+        let mut columns = std::vec![column(60.0, 0.0, 2.1); 31 * 16];
+        let (found, steps) = search(&columns);
+        assert!(found == Shelter::Here && (5..8).contains(&steps), "{steps}");
+        let last = columns.len() - 1;
+        columns[last] = column(6.0, 3.0, 2.1);
+        let (found, steps) = search(&columns);
+        assert!(matches!(found, Shelter::Back(_)) && steps < 20, "{found:?} after {steps}");
+    }
+
+    #[test]
+    fn it_goes_back_slowly_round_the_corner_and_not_into_who_follows() {
+        let path = path();
+        let mut tracker = Tracker { along_m: 9.0, ..Tracker::default() };
+        let mut follower = above(0.0, 0.0, 1.0);
+        follower.progress_m = Some(0.0);
+        let mut steps = 0;
+        while tracker.along_m > 4.0 && steps < 400 {
+            step(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
+            let corner_m = (tracker.along_m - 6.0).abs();
+            assert!(corner_m > 0.05 || tracker.speed_mps.abs() < CORNER_MPS + 0.15, "{tracker:?}");
+            steps += 1;
+        }
+        assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");
+        let mut near = Tracker { along_m: 2.0, ..Tracker::default() };
+        while step(&path, &mut near, 0.0, &[follower], 1.5, 0.05).is_some() {}
+        assert!(near.along_m > 1.5, "{near:?}");
+    }
+}

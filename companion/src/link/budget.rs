@@ -1,0 +1,67 @@
+//! How many bytes go to the swarm's radio, which all vehicles share: the state that keeps them apart always goes out, what is asked
+//! for beside it only as far as [`AIR_BPS`] or [`GROUND_BPS`] let it.
+//!
+//! State is made at a fixed rate ([`state_bps`]). All else (acks, texts, parameters, files, and what a REQUEST_MESSAGE asks for)
+//! spends from an account that fills with time. So in any span of t seconds the radio gets at most t times both, and [`SAVED`]
+//! and a frame more, whatever is asked.
+
+use crate::link::frame::MAX_SENT;
+use crate::time::Instant;
+
+/// Bytes of a second beside the state while armed: 32 vehicles add a quarter to their state.
+pub const AIR_BPS: u32 = 250;
+/// The same disarmed, when a person reads and writes files: with one vehicle's state it is a radio of 57 600 baud.
+pub const GROUND_BPS: u32 = 4500;
+/// Most bytes that are saved up: a list of all parameters, or five texts.
+pub const SAVED: u32 = 1000;
+/// Bytes of a position with its frame; nothing else that is asked for and made fresh is longer.
+pub(crate) const POSITION: usize = 40;
+/// The same and the longest intent with its frame.
+const STATE: u32 = POSITION as u32 + 145;
+/// Bytes of a heartbeat with its frame.
+const HEARTBEAT: u32 = 21;
+
+/// Most bytes a second of one vehicle's state, told so many times a second.
+pub const fn state_bps(swarm_hz: u8) -> u32 {
+    STATE * swarm_hz as u32 + HEARTBEAT
+}
+
+/// The account. In millionths of a byte, so that no time is too short to count.
+#[derive(Clone, Debug)]
+pub(crate) struct Budget {
+    left: i64,
+    at: Instant,
+}
+
+const BYTE: i64 = 1_000_000;
+
+impl Default for Budget {
+    fn default() -> Self {
+        Self { left: i64::from(SAVED) * BYTE, at: Instant::ZERO }
+    }
+}
+
+impl Budget {
+    /// Whether another frame may go out by now. It may be longer than what is left; then it is owed.
+    pub fn allows(&mut self, now: Instant, armed: bool) -> bool {
+        let rate = i64::from(if armed { AIR_BPS } else { GROUND_BPS });
+        // An hour fills it in any case.
+        let passed_us = (now - self.at).micros().min(3_600_000_000) as i64;
+        self.at = now;
+        self.left = (self.left + passed_us * rate).min(i64::from(SAVED) * BYTE);
+        self.left > 0
+    }
+
+    /// Whether half of what may be saved up is left, as of the last question whether a frame may go out.
+    pub(crate) fn is_half_full(&self) -> bool {
+        self.left > i64::from(SAVED / 2) * BYTE
+    }
+
+    /// A frame went out.
+    pub fn spend(&mut self, bytes: usize) {
+        self.left -= bytes.min(MAX_SENT) as i64 * BYTE;
+    }
+}
+
+#[cfg(test)]
+mod tests;

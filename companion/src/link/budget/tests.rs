@@ -1,0 +1,162 @@
+//! The radio gets what the budget says, whatever is asked.
+
+extern crate std;
+use std::vec::Vec;
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::*;
+
+use super::*;
+use crate::link::frame::{self, Header};
+use crate::storage::store::{Erasing, READ};
+use crate::testing::fake_autopilot::*;
+use crate::testing::fake_flash::{Flash, obey, started};
+use crate::{Duration, Link, State};
+
+/// A ground station that asks for everything at once by the radio.
+struct Greedy {
+    bench: Bench,
+    flash: Flash,
+    sequence: u8,
+    packet: u16,
+    /// Bytes that went to the radio, and when.
+    sent: Vec<(Instant, usize)>,
+    /// Intents among them.
+    told: usize,
+}
+
+impl Greedy {
+    fn new(mut bench: Bench) -> Self {
+        let mut flash = Flash::new(3);
+        bench.companion.mount(started(&mut flash));
+        Self { bench, flash, sequence: 0, packet: 0, sent: Vec::new(), told: 0 }
+    }
+
+    fn ask<M: MessageData>(&mut self, message: &M) {
+        let header = Header { system: 255, component: 190, sequence: self.sequence };
+        self.sequence = self.sequence.wrapping_add(1);
+        let mut bytes = [0; frame::MAX_SENT];
+        let length = frame::encode(header, message, &mut bytes);
+        self.bench.companion.handle_bytes(Link::Swarm, self.bench.now, &bytes[..length]);
+        self.drain();
+    }
+
+    fn ask_all(&mut self) {
+        for id in [0.0, 33.0, 148.0] {
+            self.ask(&COMMAND_LONG_DATA {
+                command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
+                param1: id,
+                target_system: SYSTEM,
+                target_component: crate::COMPONENT,
+                ..Default::default()
+            });
+        }
+        self.ask(&PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT });
+        self.ask(&TIMESYNC_DATA { tc1: 0, ts1: 5 });
+        // A listing: any answer of the file server is as long as a frame can be.
+        self.packet = self.packet.wrapping_add(1);
+        let mut payload = [0; 251];
+        payload[..2].copy_from_slice(&self.packet.to_le_bytes());
+        (payload[3], payload[250]) = (3, 1);
+        self.ask(&FILE_TRANSFER_PROTOCOL_DATA {
+            target_network: 0,
+            target_system: SYSTEM,
+            target_component: crate::COMPONENT,
+            payload,
+        });
+    }
+
+    fn drain(&mut self) {
+        let now = self.bench.now;
+        let mut read = [0; READ];
+        while let Some(request) = self.bench.companion.poll_flash() {
+            let outcome = obey(&mut self.flash, request, Erasing::Allowed, &mut read).expect("no power cut");
+            self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
+        }
+        self.bench.drain();
+        for frame in self.bench.swarm.drain(..) {
+            self.told += usize::from(frame.message_id == TUNNEL_DATA::ID);
+            self.sent.push((now, frame.payload().len() + 12));
+        }
+    }
+
+    /// So many seconds in which all is asked for forty times each.
+    fn run(&mut self, seconds: u32) {
+        (self.told, self.bench.swarm) = (0, Vec::new());
+        self.sent.clear();
+        for _ in 0..seconds * 20 {
+            self.ask_all();
+            self.ask_all();
+            self.bench.tick();
+            self.drain();
+        }
+    }
+
+    /// Most bytes within any second.
+    fn most_in_a_second(&self) -> u32 {
+        let second = |from: Instant| {
+            let within =
+                self.sent.iter().filter(|(at, _)| *at >= from && *at - from < Duration::from_secs(1));
+            within.map(|(_, bytes)| *bytes as u32).sum()
+        };
+        self.sent.iter().map(|(at, _)| second(*at)).max().unwrap_or_default()
+    }
+
+    fn bytes(&self) -> u32 {
+        self.sent.iter().map(|(_, bytes)| *bytes as u32).sum()
+    }
+}
+
+const HZ: u8 = 5;
+
+#[test]
+fn the_radio_gets_no_more_whatever_is_asked() {
+    let saved = SAVED + MAX_SENT as u32;
+    let mut ground = Greedy::new(Bench::new(config()));
+    ground.bench.until(State::Ready, 6.0);
+    ground.run(20);
+    assert!(ground.most_in_a_second() <= state_bps(HZ) + GROUND_BPS + saved, "{}", ground.most_in_a_second());
+    assert!(ground.bytes() <= 20 * (state_bps(HZ) + GROUND_BPS) + saved);
+    assert!(ground.bytes() > 20 * GROUND_BPS / 2, "it was asked for more: {}", ground.bytes());
+
+    let mut air = Greedy::new(Bench::following(config()));
+    air.bench.stuck = true;
+    air.run(20);
+    assert_eq!(air.bench.state(), State::Follow);
+    assert!(air.most_in_a_second() <= state_bps(HZ) + AIR_BPS + saved, "{}", air.most_in_a_second());
+    assert!(air.bytes() <= 20 * (state_bps(HZ) + AIR_BPS) + saved, "{}", air.bytes());
+    assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
+}
+
+#[test]
+fn state_is_as_long_as_said() {
+    let mut bench = Greedy::new(Bench::following(config()));
+    bench.bench.stuck = true;
+    bench.bench.swarm.clear();
+    for _ in 0..200 {
+        bench.bench.tick();
+    }
+    bench.drain();
+    // Ten seconds; this plan has fewer points than an intent holds.
+    assert!(
+        bench.bytes() <= 10 * state_bps(HZ) && bench.bytes() > 10 * state_bps(HZ) / 3,
+        "{}",
+        bench.bytes()
+    );
+    assert_eq!(STATE as usize, (28 + 12) + (5 + 32 + 12 * crate::link::intent::POINTS + 12));
+}
+
+#[test]
+fn what_is_owed_is_paid_back_by_time() {
+    let mut budget = Budget::default();
+    let at = |ms| Instant::ZERO + Duration::from_millis(ms);
+    let mut sent = 0;
+    while budget.allows(at(0), true) {
+        budget.spend(MAX_SENT);
+        sent += MAX_SENT as u32;
+    }
+    assert!((SAVED..=SAVED + MAX_SENT as u32).contains(&sent));
+    assert!(!budget.allows(at(10), true));
+    assert!(budget.allows(at(1100), true));
+    assert!(budget.allows(at(u64::from(u32::MAX)), true), "and never overflows");
+}

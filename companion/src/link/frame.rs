@@ -1,0 +1,371 @@
+//! MAVLink framing: bytes in, checked frames out, and messages back into bytes.
+//!
+//! Source: MAVLink guide, "Packet Serialization" and "Message Signing". The `mavlink` crate gives the message types and
+//! their CRC seeds; framing is ours, because its reader drops unknown ids and then searches their payload for a start
+//! byte: one false 0xFD there holds back every frame behind it.
+//!
+//! One rule finds the frames of any stream. A candidate is a start byte whose header is plausible and whose id the
+//! dialect knows. Of candidates that overlap, the first whose checksum is right is the frame; a candidate with a wrong
+//! checksum costs its start byte only, and the search goes on behind that byte. So no garbage, whatever it is, hides a
+//! whole frame behind it. What no checksum covers is searched too: a frame of unknown id and a signature, which is not
+//! checked here. Their bytes are not counted as noise.
+//!
+//! A candidate that is not complete holds back what follows it, for [`PARTIAL_LIFETIME`] after its own first byte and
+//! an eighth of that at most. Each byte costs O(1), and O(267) where starts are false.
+
+use crc::{CRC_16_MCRF4XX, Crc, Table};
+use heapless::Vec;
+use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::{MavlinkVersion, Message, MessageData};
+
+use crate::time::{Duration, Instant};
+
+/// A frame not complete this long after its first byte is given up.
+pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
+/// The longest frame without its signature: 10 bytes of header, 255 of payload, 2 of CRC.
+pub const MAX_SENT: usize = 267;
+
+const V1_START: u8 = 0xFE;
+const V2_START: u8 = 0xFD;
+/// A deprecated message; the only one whose CRC seed is 0.
+const COMPONENT_INFORMATION: u32 = 395;
+const SIGNED: u8 = 0x01;
+const SIGNATURE_LEN: usize = 13;
+/// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
+/// with the last of them.
+const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
+/// Steps that a lifetime touches, and one.
+const ARRIVALS: usize = 10;
+
+/// A frame whose CRC is right.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Frame {
+    /// Wire version.
+    pub version: MavlinkVersion,
+    /// Sequence number of the sender's link.
+    pub sequence: u8,
+    /// System id of the sender.
+    pub system: u8,
+    /// Component id of the sender.
+    pub component: u8,
+    /// Message id.
+    pub message_id: u32,
+    /// Whether a signature followed; it is not checked.
+    pub signed: bool,
+    len: u8,
+    payload: [u8; 255],
+}
+
+impl Frame {
+    /// The payload as received: V2 senders cut trailing zeros.
+    pub fn payload(&self) -> &[u8] {
+        &self.payload[..usize::from(self.len)]
+    }
+
+    /// The payload with the zeros that were cut put back, at any length up to 255.
+    pub fn padded(&self) -> &[u8; 255] {
+        &self.payload
+    }
+
+    /// Writes it as a V2 frame with the sender and sequence number it came with, to pass it on; the bytes written, or 0 where
+    /// `out` is too small. A signature is left out.
+    pub fn encode(&self, out: &mut [u8]) -> usize {
+        let Some(extra) = extra_crc(self.message_id) else { return 0 };
+        let header = Header { system: self.system, component: self.component, sequence: self.sequence };
+        encode_raw(header, self.message_id, extra, self.payload(), out)
+    }
+
+    /// The message, if the frame is one of type `M` and its enum values are known to the crate.
+    pub fn decode<M: MessageData>(&self) -> Option<M> {
+        if self.message_id != M::ID {
+            return None;
+        }
+        M::deser(self.version, self.payload()).ok()
+    }
+}
+
+/// What passed through a [`Framer`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Frames given out.
+    pub frames: u32,
+    /// Candidates of a known id whose CRC was wrong; a false start byte in noise may count here too.
+    pub bad_crc: u32,
+    /// Candidates of unknown id; a false start byte in noise may count here too.
+    pub unknown: u32,
+    /// Partial frames given up after [`PARTIAL_LIFETIME`].
+    pub expired: u32,
+    /// Bytes that belonged to no frame.
+    pub noise_bytes: u32,
+}
+
+/// The bytes before `until` in the buffer were received at `at` or earlier.
+#[derive(Clone, Copy, Debug)]
+struct Arrival {
+    until: usize,
+    at: Instant,
+}
+
+/// The decoder of one link. At most 480 bytes; all zero when new, so it may live in .bss.
+#[derive(Clone, Debug)]
+pub struct Framer {
+    buf: [u8; MAX_SENT],
+    len: usize,
+    /// When the bytes of the buffer were received, oldest first; the last one covers the whole buffer.
+    arrivals: Vec<Arrival, ARRIVALS>,
+    /// How many of the next bytes belong to a frame of unknown id or to a signature.
+    uncounted: usize,
+    counters: Counters,
+}
+
+const _: () = assert!(size_of::<Framer>() <= 480);
+
+/// What the bytes at the front of the buffer are.
+enum Front {
+    /// Too few bytes to tell; this many are needed in all.
+    Needs(usize),
+    /// Not a frame.
+    False,
+    /// A checked frame of this many bytes, without its signature.
+    Good(usize),
+    /// Whole, of known id, wrong CRC.
+    BadCrc,
+    /// The header of an unknown id; this many bytes with the signature, if it is a frame.
+    Unknown(usize),
+}
+
+impl Default for Framer {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Framer {
+    /// An empty decoder.
+    pub const fn new() -> Self {
+        Self {
+            buf: [0; MAX_SENT],
+            len: 0,
+            arrivals: Vec::new(),
+            uncounted: 0,
+            counters: Counters { frames: 0, bad_crc: 0, unknown: 0, expired: 0, noise_bytes: 0 },
+        }
+    }
+
+    /// What passed so far.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// When the partial frame held now expires, if one is held.
+    pub fn expires_at(&self) -> Option<Instant> {
+        self.arrivals.first().map(|oldest| oldest.at + PARTIAL_LIFETIME)
+    }
+
+    /// The next frame. Takes bytes off the front of `input` (all received at `now`) until a frame is whole or `input`
+    /// is empty; call until `None`. With an empty `input` it lets a partial frame expire.
+    pub fn next(&mut self, now: Instant, input: &mut &[u8]) -> Option<Frame> {
+        loop {
+            let needed = match self.front() {
+                Front::Good(total) => return Some(self.take(total)),
+                Front::Needs(_) if self.expires_at().is_some_and(|due| now > due) => {
+                    let counted = u32::from(self.uncounted == 0);
+                    self.counters.expired = self.counters.expired.wrapping_add(counted);
+                    self.drop_start();
+                    continue;
+                }
+                Front::Needs(needed) => needed,
+                Front::Unknown(total) => {
+                    if self.uncounted == 0 {
+                        self.counters.unknown = self.counters.unknown.wrapping_add(1);
+                        self.uncounted = total;
+                    }
+                    self.drop_start();
+                    continue;
+                }
+                Front::BadCrc => {
+                    let counted = u32::from(self.uncounted == 0);
+                    self.counters.bad_crc = self.counters.bad_crc.wrapping_add(counted);
+                    self.drop_start();
+                    continue;
+                }
+                Front::False => {
+                    self.drop_start();
+                    continue;
+                }
+            };
+            if input.is_empty() {
+                return None;
+            }
+            if self.len == 0 {
+                let noise = input.iter().position(|&b| is_start(b)).unwrap_or(input.len());
+                self.count_noise(noise);
+                *input = &input[noise..];
+            }
+            let count = input.len().min(needed - self.len);
+            self.buf[self.len..self.len + count].copy_from_slice(&input[..count]);
+            self.len += count;
+            *input = &input[count..];
+            if count > 0 {
+                self.note_arrival(now);
+            }
+        }
+    }
+
+    fn front(&self) -> Front {
+        let b = &self.buf[..self.len];
+        let (header, crc_at, signature, id) = match b {
+            [] | [V1_START | V2_START] => return Front::Needs(self.len + 1),
+            [V1_START, len, ..] => {
+                let id = b.get(5).map(|&id| u32::from(id));
+                (6, 6 + usize::from(*len), 0, id)
+            }
+            [V2_START, _] => return Front::Needs(3),
+            [V2_START, _, incompat, ..] if incompat & !SIGNED != 0 => return Front::False,
+            [V2_START, len, incompat, ..] => {
+                let signature = if incompat & SIGNED != 0 { SIGNATURE_LEN } else { 0 };
+                let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
+                (10, 10 + usize::from(*len), signature, id)
+            }
+            _ => return Front::False,
+        };
+        let Some(id) = id else { return Front::Needs(header) };
+        let total = crc_at + 2;
+        let Some(extra) = extra_crc(id) else { return Front::Unknown(total + signature) };
+        if self.len < total {
+            return Front::Needs(total);
+        }
+        let crc = u16::from_le_bytes([b[crc_at], b[crc_at + 1]]);
+        if calculate_crc(&b[1..crc_at], extra) == crc { Front::Good(total) } else { Front::BadCrc }
+    }
+
+    /// Copies the good frame at the front out and removes it.
+    fn take(&mut self, total: usize) -> Frame {
+        let b = &self.buf;
+        let len = b[1];
+        let (version, at, sequence, system, component, message_id) = if b[0] == V1_START {
+            (MavlinkVersion::V1, 6, b[2], b[3], b[4], u32::from(b[5]))
+        } else {
+            (MavlinkVersion::V2, 10, b[4], b[5], b[6], u32::from_le_bytes([b[7], b[8], b[9], 0]))
+        };
+        let signed = version == MavlinkVersion::V2 && b[2] & SIGNED != 0;
+        let mut payload = [0; 255];
+        payload[..usize::from(len)].copy_from_slice(&b[at..at + usize::from(len)]);
+        self.counters.frames = self.counters.frames.wrapping_add(1);
+        self.remove(total);
+        self.uncounted = if signed { SIGNATURE_LEN } else { 0 };
+        self.drop_to_start(0);
+        Frame { version, sequence, system, component, message_id, signed, len, payload }
+    }
+
+    /// Drops a false start byte and everything up to the next start byte in the buffer.
+    fn drop_start(&mut self) {
+        self.drop_to_start(1);
+    }
+
+    /// Drops everything up to the next start byte at `from` or later.
+    fn drop_to_start(&mut self, from: usize) {
+        let rest = &self.buf[from..self.len];
+        let next = from + rest.iter().position(|&b| is_start(b)).unwrap_or(rest.len());
+        self.count_noise(next);
+        self.remove(next);
+    }
+
+    /// Counts bytes that belong to no frame.
+    fn count_noise(&mut self, count: usize) {
+        let noise = count.saturating_sub(self.uncounted);
+        self.uncounted = self.uncounted.saturating_sub(count);
+        self.counters.noise_bytes = self.counters.noise_bytes.wrapping_add(noise as u32);
+    }
+
+    fn remove(&mut self, count: usize) {
+        self.buf.copy_within(count..self.len, 0);
+        self.len -= count;
+        self.arrivals.retain_mut(|arrival| {
+            arrival.until = arrival.until.saturating_sub(count);
+            arrival.until > 0
+        });
+    }
+
+    /// Bytes up to the end of the buffer were received at `now`.
+    fn note_arrival(&mut self, now: Instant) {
+        let arrival = Arrival { until: self.len, at: now };
+        let step = |at: Instant| at.micros() / ARRIVAL_STEP_US;
+        if let Some(last) = self.arrivals.last_mut().filter(|last| step(last.at) == step(now)) {
+            *last = arrival;
+        } else if let Err(arrival) = self.arrivals.push(arrival)
+            && let Some(last) = self.arrivals.last_mut()
+        {
+            *last = arrival;
+        }
+    }
+}
+
+fn is_start(byte: u8) -> bool {
+    byte == V1_START || byte == V2_START
+}
+
+/// The X.25 checksum of MAVLink over a frame without its start byte, closed by the seed of its message. By table, 16 bytes at
+/// a time (8 kB): checking is most of what a crowded radio costs, and the `mavlink` crate goes byte by byte.
+fn calculate_crc(frame: &[u8], extra_crc: u8) -> u16 {
+    const CRC: Crc<u16, Table<16>> = Crc::<u16, Table<16>>::new(&CRC_16_MCRF4XX);
+    let mut digest = CRC.digest();
+    digest.update(frame);
+    digest.update(&[extra_crc]);
+    digest.finalize()
+}
+
+/// The CRC seed of a message id, or `None` where the dialect does not know the id. The crate answers 0 for those, which
+/// is also the true seed of COMPONENT_INFORMATION.
+pub fn extra_crc(message_id: u32) -> Option<u8> {
+    let extra = MavMessage::extra_crc(message_id);
+    (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
+}
+
+/// Who sends a frame.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Header {
+    /// System id of the sender.
+    pub system: u8,
+    /// Component id of the sender.
+    pub component: u8,
+    /// Sequence number of the link.
+    pub sequence: u8,
+}
+
+/// Writes one message as a V2 frame, trailing zeros cut; the bytes written, or 0 where `out` is too small
+/// ([`MAX_SENT`] is always enough).
+pub fn encode<M: MessageData>(header: Header, message: &M, out: &mut [u8]) -> usize {
+    let mut payload = [0; 255];
+    let len = message.ser(MavlinkVersion::V2, &mut payload);
+    encode_raw(header, M::ID, M::EXTRA_CRC, &payload[..len], out)
+}
+
+/// As [`encode`], for a message of the whole dialect. Pulls in every message's encoder: not for the board.
+pub fn encode_message(header: Header, message: &MavMessage, out: &mut [u8]) -> usize {
+    let mut payload = [0; 255];
+    let len = message.ser(MavlinkVersion::V2, &mut payload);
+    let id = message.message_id();
+    encode_raw(header, id, MavMessage::extra_crc(id), &payload[..len], out)
+}
+
+/// As [`encode`], for a payload laid out by the caller: what the crate's enums cannot hold (TUNNEL with a private
+/// payload type). `payload` is at most 255 bytes; its trailing zeros are cut.
+pub fn encode_raw(header: Header, message_id: u32, extra_crc: u8, payload: &[u8], out: &mut [u8]) -> usize {
+    let used = payload.iter().rposition(|&b| b != 0).map_or(1, |last| last + 1).min(payload.len());
+    let total = 12 + used;
+    if used > 255 || out.len() < total {
+        return 0;
+    }
+    let id = message_id.to_le_bytes();
+    let Header { system, component, sequence } = header;
+    out[..10]
+        .copy_from_slice(&[V2_START, used as u8, 0, 0, sequence, system, component, id[0], id[1], id[2]]);
+    out[10..10 + used].copy_from_slice(&payload[..used]);
+    let crc = calculate_crc(&out[1..10 + used], extra_crc);
+    out[10 + used..total].copy_from_slice(&crc.to_le_bytes());
+    total
+}
+
+#[cfg(test)]
+mod tests;

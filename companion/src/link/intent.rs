@@ -1,0 +1,197 @@
+//! What a companion tells the swarm of its intent: the payload of TUNNEL under a private payload type.
+//!
+//! Little-endian, at most 128 bytes (`README.md` prints the same layout):
+//!
+//! | byte | type | field |
+//! |---|---|---|
+//! | 0 | u8 | version, 3 |
+//! | 1 | u8 | system id |
+//! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
+//! | 3 | u8 | number of path points, 0…8 |
+//! | 4 | u32 | CRC-32 of the mission file |
+//! | 8 | u32 | CRC-32 of the swarm's plan |
+//! | 12 | f32 | progress along the own path, metres; negative while climbing |
+//! | 16 | f32 | speed, m/s |
+//! | 20 | u32 | whom it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
+//! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
+//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
+//! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
+//! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it; the setpoint alone while it holds its place |
+//!
+//! A receiver refuses another version, NaN, and a system id that is not the sender's.
+
+use heapless::Vec;
+use planner_core::Point;
+
+use crate::link::echo::Echo;
+
+/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+pub const PAYLOAD_TYPE: u16 = 0xF10C;
+/// Most path points reported.
+pub const POINTS: usize = 8;
+/// Version of the layout.
+pub const VERSION: u8 = 3;
+const HEAD: usize = 32;
+const TUNNEL_HEAD: usize = 5;
+
+/// Stands on the ground.
+pub const GROUNDED: u8 = 1;
+/// Flies under its companion's setpoints.
+pub const FLYING: u8 = 2;
+/// Landed after its mission.
+pub const LANDED: u8 = 4;
+/// Its progress counts on the shared plan.
+pub const ON_PLAN: u8 = 8;
+/// Has left the plan and rests where it is, or a pilot keeps it: it opens all gates and is an obstacle.
+pub const OUT: u8 = 16;
+/// Stands, and will until somebody else moves.
+pub const WAITING: u8 = 32;
+/// Its path is blocked; it waits for all to stand, and flies around.
+pub const BLOCKED: u8 = 64;
+/// Flies a path of its own, or will; its progress is where it left the plan.
+pub const DETOURS: u8 = 128;
+
+/// One vehicle's intent.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Intent {
+    /// MAVLink system id.
+    pub system_id: u8,
+    /// [`GROUNDED`] and its kin.
+    pub flags: u8,
+    /// CRC-32 of the mission file.
+    pub mission_crc: u32,
+    /// CRC-32 of the swarm's plan.
+    pub plan_crc: u32,
+    /// Progress along the own path, metres.
+    pub progress_m: f32,
+    /// Speed, m/s.
+    pub speed_mps: f32,
+    /// Whom it heard lately, a bit for each rank.
+    pub heard: u32,
+    /// Height of the ground below it, as far as it knows, metres.
+    pub floor_m: f32,
+    /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
+    pub column: bool,
+    /// Whose intent it heard, and when: for the sender's measure of the delay.
+    pub echo: Option<Echo>,
+    /// Points that it flies along next, as far as it will go for now; none while somebody else flies it.
+    pub points: Vec<Point, POINTS>,
+}
+
+impl Intent {
+    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    pub fn encode(&self, out: &mut [u8; 133]) -> usize {
+        let len = HEAD + 12 * self.points.len();
+        out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+        (out[2], out[3], out[4]) = (0, 0, len as u8);
+        let body = &mut out[TUNNEL_HEAD..];
+        body[..4].copy_from_slice(&[VERSION, self.system_id, self.flags, self.points.len() as u8]);
+        body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
+        body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
+        body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
+        body[16..20].copy_from_slice(&self.speed_mps.to_le_bytes());
+        body[20..24].copy_from_slice(&self.heard.to_le_bytes());
+        body[24..28].copy_from_slice(&self.floor_m.to_le_bytes());
+        let [rank, sequence, held] =
+            self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
+        body[28..32].copy_from_slice(&[u8::from(self.column), rank, sequence, held]);
+        for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
+            to.copy_from_slice(&value.to_le_bytes());
+        }
+        TUNNEL_HEAD + len
+    }
+
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not an intent, or not a sound one.
+    pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
+        let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
+        let len = usize::from(padded[4]);
+        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
+        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+            return None;
+        }
+        let count = usize::from(body[3]);
+        if count > POINTS || len < HEAD + 12 * count {
+            return None;
+        }
+        let word = |at: usize| [body[at], body[at + 1], body[at + 2], body[at + 3]];
+        let float = |at: usize| Some(f32::from_le_bytes(word(at))).filter(|v| v.is_finite());
+        let mut points = Vec::new();
+        for i in 0..count {
+            let at = HEAD + 12 * i;
+            points.push(Point::new(float(at)?, float(at + 4)?, float(at + 8)?)).ok()?;
+        }
+        Some(Self {
+            system_id: sender,
+            flags: body[2],
+            mission_crc: u32::from_le_bytes(word(4)),
+            plan_crc: u32::from_le_bytes(word(8)),
+            progress_m: float(12)?,
+            speed_mps: float(16)?,
+            heard: u32::from_le_bytes(word(20)),
+            floor_m: float(24)?,
+            column: body[28] & 1 != 0,
+            echo: body[29].checked_sub(1).map(|rank| Echo { rank, sequence: body[30], held: body[31] }),
+            points,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn sample(count: usize) -> Intent {
+        let points = (0..count).map(|i| Point::new(i as f32, -1.5, 3.25)).collect();
+        Intent {
+            system_id: 9,
+            flags: FLYING | ON_PLAN,
+            mission_crc: 0xDEAD_BEEF,
+            plan_crc: 7,
+            progress_m: -1.25,
+            speed_mps: 2.0,
+            heard: 0x8000_0005,
+            floor_m: -0.5,
+            column: count == 3,
+            echo: (count > 2).then_some(Echo { rank: 254, sequence: 9, held: count as u8 }),
+            points,
+        }
+    }
+
+    fn padded(intent: &Intent) -> [u8; 255] {
+        let (mut out, mut padded) = ([0; 133], [0; 255]);
+        let len = intent.encode(&mut out);
+        assert!(len <= 5 + 128);
+        padded[..len].copy_from_slice(&out[..len]);
+        padded
+    }
+
+    #[test]
+    fn comes_back_as_sent_and_refuses_the_unsound() {
+        for count in 0..=POINTS {
+            assert_eq!(Intent::decode(&padded(&sample(count)), 9), Some(sample(count)));
+        }
+        assert_eq!(Intent::decode(&padded(&sample(2)), 8), None, "another sender");
+        for (at, value) in [(0, 0), (4, 31), (5, 2), (8, 9)] {
+            let mut bad = padded(&sample(2));
+            bad[at] = value;
+            assert_eq!(Intent::decode(&bad, 9), None, "byte {at}");
+        }
+        let nan = Intent { progress_m: f32::NAN, ..sample(0) };
+        assert_eq!(Intent::decode(&padded(&nan), 9), None);
+    }
+
+    proptest! {
+        #[test]
+        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 255), kind in any::<bool>()) {
+            let mut padded: [u8; 255] = bytes.try_into().unwrap();
+            if kind {
+                padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+                padded[5] = VERSION;
+            }
+            if let Some(intent) = Intent::decode(&padded, padded[6]) {
+                prop_assert!(intent.progress_m.is_finite() && intent.points.iter().all(|p| p.norm().is_finite() || p.amax().is_finite()));
+            }
+        }
+    }
+}

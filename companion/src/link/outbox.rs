@@ -1,0 +1,263 @@
+//! What waits to be sent on one link. Setpoints, heartbeats, positions and intents never wait here: they are made
+//! fresh when the link is polled. A full queue refuses the newest and counts it.
+
+use core::fmt::Write as _;
+
+use heapless::{Deque, String};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    COMMAND_ACK_DATA, COMMAND_LONG_DATA, MavCmd, MavParamType, MavSeverity, PARAM_ERROR_DATA,
+    PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, PARAM_VALUE_DATA, STATUSTEXT_DATA, TIMESYNC_DATA,
+};
+
+use crate::link::frame::{self, Header};
+use crate::services::parameters;
+
+/// Entries a link holds.
+pub const DEPTH: usize = 32;
+
+/// A message that waits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Outgoing {
+    /// SET_MESSAGE_INTERVAL: message id, microseconds or −1.
+    Interval(u16, f32),
+    /// REQUEST_MESSAGE: message id.
+    Request(u16),
+    /// DO_SET_MODE: parameters 2 and 3.
+    Mode(f32, f32),
+    /// NAV_TAKEOFF to a height above home, metres.
+    TakeOff(f32),
+    /// PARAM_REQUEST_READ by name.
+    ReadParameter(&'static str),
+    /// PARAM_SET of a REAL32.
+    Parameter(&'static str, f32),
+    /// The answer to a TIMESYNC.
+    Timesync {
+        /// Our clock, nanoseconds.
+        tc1: i64,
+        /// The sender's, nanoseconds.
+        ts1: i64,
+        /// Whom: system and component. An autopilot does not forward what is addressed to itself.
+        to: (u8, u8),
+    },
+    /// PARAM_VALUE of one of ours.
+    ParameterValue {
+        /// Its index.
+        index: usize,
+        /// Its name.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+    },
+    /// PARAM_ERROR.
+    ParameterError {
+        /// Index asked for; −1 if it was the name.
+        index: i16,
+        /// Name asked for.
+        id: [u8; 16],
+        /// `MAV_PARAM_ERROR`.
+        why: u8,
+        /// Whom: system and component.
+        to: (u8, u8),
+    },
+    /// COMPONENT_ARM_DISARM.
+    Arm(bool),
+    /// COMMAND_ACK.
+    Ack {
+        /// The command answered.
+        command: u16,
+        /// `MAV_RESULT`.
+        result: u8,
+        /// Whom: system and component.
+        to: (u8, u8),
+    },
+    /// STATUSTEXT.
+    Text {
+        /// Warning, else information.
+        warning: bool,
+        /// At most 50 bytes.
+        text: &'static str,
+    },
+    /// STATUSTEXT with numbers: each `#` of the text stands for one.
+    Count {
+        /// Warning, else information.
+        warning: bool,
+        /// At most 50 bytes with the numbers in it.
+        text: &'static str,
+        /// What each `#` stands for, in order.
+        numbers: [u32; 3],
+    },
+}
+
+/// The queue of one link.
+#[derive(Clone, Debug, Default)]
+pub struct Outbox {
+    queue: Deque<Outgoing, DEPTH>,
+    sequence: u8,
+    dropped: u32,
+}
+
+impl Outbox {
+    /// Puts a message at the end; a full queue drops and counts it. What is asked for again by itself (streams, modes,
+    /// arming) is asked for again; a dropped text or ack is lost.
+    pub fn push(&mut self, message: Outgoing) {
+        if self.queue.push_back(message).is_err() {
+            self.dropped = self.dropped.wrapping_add(1);
+        }
+    }
+
+    /// Messages dropped since the start.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    /// Free entries.
+    pub fn room(&self) -> usize {
+        DEPTH - self.queue.len()
+    }
+
+    /// The header of the next frame of this link.
+    pub fn header(&mut self, system: u8) -> Header {
+        let sequence = self.sequence;
+        self.sequence = self.sequence.wrapping_add(1);
+        Header { system, component: crate::COMPONENT, sequence }
+    }
+
+    /// Writes the first that waits; 0 if none does.
+    pub fn transmit(&mut self, system: u8, out: &mut [u8]) -> usize {
+        let Some(message) = self.queue.pop_front() else { return 0 };
+        let header = self.header(system);
+        let command = |command, param1: f32, param2: f32, param3: f32| COMMAND_LONG_DATA {
+            command,
+            param1,
+            param2,
+            param3,
+            target_system: system,
+            target_component: crate::AUTOPILOT,
+            ..COMMAND_LONG_DATA::default()
+        };
+        let long = match message {
+            Outgoing::Interval(id, us) => {
+                command(MavCmd::MAV_CMD_SET_MESSAGE_INTERVAL, f32::from(id), us, 0.0)
+            }
+            Outgoing::Request(id) => command(MavCmd::MAV_CMD_REQUEST_MESSAGE, f32::from(id), 0.0, 0.0),
+            Outgoing::Mode(main, sub) => command(MavCmd::MAV_CMD_DO_SET_MODE, 1.0, main, sub),
+            Outgoing::TakeOff(height_m) => {
+                COMMAND_LONG_DATA { param7: height_m, ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0) }
+            }
+            Outgoing::ReadParameter(name) => {
+                let read = PARAM_REQUEST_READ_DATA {
+                    param_index: -1,
+                    target_system: system,
+                    target_component: crate::AUTOPILOT,
+                    param_id: name.into(),
+                };
+                return frame::encode(header, &read, out);
+            }
+            Outgoing::Parameter(name, param_value) => {
+                let set = PARAM_SET_DATA {
+                    param_value,
+                    target_system: system,
+                    target_component: crate::AUTOPILOT,
+                    param_id: name.into(),
+                    param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+                };
+                return frame::encode(header, &set, out);
+            }
+            Outgoing::ParameterValue { index, name, value } => {
+                let told = PARAM_VALUE_DATA {
+                    param_value: value,
+                    param_count: parameters::COUNT as u16,
+                    param_index: index as u16,
+                    param_id: name.into(),
+                    param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
+                };
+                return frame::encode(header, &told, out);
+            }
+            Outgoing::ParameterError { index, id, why, to } => {
+                // By field: the name may be anything.
+                let mut payload = [0; PARAM_ERROR_DATA::ENCODED_LEN];
+                payload[..2].copy_from_slice(&index.to_le_bytes());
+                (payload[2], payload[3]) = to;
+                payload[4..20].copy_from_slice(&id);
+                payload[20] = why;
+                return frame::encode_raw(
+                    header,
+                    PARAM_ERROR_DATA::ID,
+                    PARAM_ERROR_DATA::EXTRA_CRC,
+                    &payload,
+                    out,
+                );
+            }
+            Outgoing::Timesync { tc1, ts1, to } => {
+                // By field: the crate's type lacks the addressee.
+                let mut payload = [0; TIMESYNC_DATA::ENCODED_LEN + 2];
+                payload[..8].copy_from_slice(&tc1.to_le_bytes());
+                payload[8..16].copy_from_slice(&ts1.to_le_bytes());
+                (payload[16], payload[17]) = to;
+                return frame::encode_raw(header, TIMESYNC_DATA::ID, TIMESYNC_DATA::EXTRA_CRC, &payload, out);
+            }
+            Outgoing::Arm(arm) => {
+                command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
+            }
+            Outgoing::Ack { command, result, to } => {
+                // By field: the command may be unknown to the crate, and its type lacks the addressee.
+                let [low, high] = command.to_le_bytes();
+                let payload = [low, high, result, 0, 0, 0, 0, 0, to.0, to.1];
+                return frame::encode_raw(
+                    header,
+                    COMMAND_ACK_DATA::ID,
+                    COMMAND_ACK_DATA::EXTRA_CRC,
+                    &payload,
+                    out,
+                );
+            }
+            Outgoing::Text { warning, text } => {
+                let severity = severity(warning);
+                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.into() }, out);
+            }
+            Outgoing::Count { warning, text, numbers } => {
+                let (severity, text) = (severity(warning), filled(text, numbers));
+                return frame::encode(header, &STATUSTEXT_DATA { severity, text: text.as_str().into() }, out);
+            }
+        };
+        frame::encode(header, &long, out)
+    }
+}
+
+fn severity(warning: bool) -> MavSeverity {
+    if warning { MavSeverity::MAV_SEVERITY_WARNING } else { MavSeverity::MAV_SEVERITY_INFO }
+}
+
+/// A text with its numbers in it; what is beyond 50 bytes is left out.
+fn filled(text: &str, numbers: [u32; 3]) -> String<50> {
+    let mut out = String::new();
+    let mut numbers = numbers.iter();
+    for piece in text.split_inclusive('#') {
+        let (words, number) = match piece.strip_suffix('#') {
+            Some(words) => (words, numbers.next()),
+            None => (piece, None),
+        };
+        // Full: what is left out is the end.
+        let _ = match number {
+            Some(number) => write!(out, "{words}{number}"),
+            None => out.write_str(words),
+        };
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_stand_where_the_text_says() {
+        assert_eq!(
+            filled("Setpoints: #, at most # ms apart", [1234, 55, 0]),
+            "Setpoints: 1234, at most 55 ms apart"
+        );
+        assert_eq!(filled("Nothing", [1, 2, 3]), "Nothing");
+        assert_eq!(filled("# # # #", [u32::MAX, 0, 7]), "4294967295 0 7 ");
+    }
+}

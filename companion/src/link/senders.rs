@@ -1,0 +1,158 @@
+//! Whose words count, and how often each kind of answer goes out.
+//!
+//! Three kinds of senders: a ground station that the mission file names, the own vehicle's autopilot side, and everybody
+//! else. Only a ground station commands, sets parameters and moves files. Others are answered too, but each kind of sender
+//! has its own rate for each kind of answer on each link. So a flood of one request starves neither another kind of answer
+//! nor the answers to a ground station. What a rate holds back is not answered: clients ask again.
+//!
+//! A system id is not a proof. What a forged one can do is in `SECURITY.md`.
+
+use crate::companion::Companion;
+use crate::events::Link;
+use crate::link::commands::{self, Command};
+use crate::link::frame::Frame;
+use crate::link::outbox::Outgoing;
+use crate::time::{Duration, Instant};
+
+/// Whose frame it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Sender {
+    /// Named by the mission file.
+    GroundStation,
+    /// Of the own system, on the autopilot's link.
+    Autopilot,
+    /// Any other.
+    Other,
+}
+
+/// Kinds of answers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    /// COMMAND_ACK.
+    Ack,
+    /// TIMESYNC.
+    Time,
+    /// PARAM_VALUE and PARAM_ERROR.
+    Parameter,
+    /// What a REQUEST_MESSAGE requests.
+    Message,
+    /// STATUSTEXT that names a sender.
+    Text,
+}
+
+const SENDERS: usize = 3;
+const KINDS: usize = 5;
+const LINKS: usize = 2;
+
+/// A token bucket: `burst` answers at once, then one each `every_ms`.
+#[derive(Clone, Copy, Debug)]
+struct Rate {
+    every_ms: u64,
+    burst: u64,
+}
+
+const fn rate(every_ms: u64, burst: u64) -> Rate {
+    Rate { every_ms, burst }
+}
+
+/// For each sender, in the order of [`Sender`], each kind in the order of [`Kind`]. What others can request by radio is at most
+/// 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the radio budget leaves in the air. A list of all parameters is one burst.
+/// PX4 sends TIMESYNC at 10 Hz, and needs no answer to fly.
+const RATES: [[Rate; KINDS]; SENDERS] = [
+    [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
+    [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
+    [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
+];
+
+/// Entries of a link's queue that no answer takes: they are left for texts, acks of the own requests, and commands.
+const KEPT_FREE: usize = 8;
+
+/// For each link, sender and kind the time at which its bucket is full again.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Rates {
+    full_at: [[[Instant; KINDS]; SENDERS]; LINKS],
+}
+
+impl Rates {
+    /// Whether another answer may go out; if so, it is counted.
+    pub fn take(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind) -> bool {
+        let Rate { every_ms, burst } = RATES[sender as usize][kind as usize];
+        let full_at = &mut self.full_at[link as usize][sender as usize][kind as usize];
+        let next = (*full_at).max(now) + Duration::from_millis(every_ms);
+        let allowed = next - now <= Duration::from_millis(every_ms * burst);
+        if allowed {
+            *full_at = next;
+        }
+        allowed
+    }
+}
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    pub(crate) fn sender(&self, link: Link, frame: &Frame) -> Sender {
+        if frame.system != 0 && self.config.ground_stations.contains(&frame.system) {
+            Sender::GroundStation
+        } else if link == Link::Autopilot && frame.system == self.config.system_id {
+            Sender::Autopilot
+        } else {
+            Sender::Other
+        }
+    }
+
+    /// Whether an answer may be queued now; if so, it is counted.
+    pub(crate) fn may_answer(&mut self, link: Link, sender: Sender, kind: Kind) -> bool {
+        self.outboxes[link as usize].room() > KEPT_FREE && self.rates.take(self.now, link, sender, kind)
+    }
+
+    /// Queues an answer, unless its rate or the queue is used up.
+    pub(crate) fn answer_to(&mut self, link: Link, sender: Sender, kind: Kind, answer: Outgoing) {
+        if self.may_answer(link, sender, kind) {
+            self.outboxes[link as usize].push(answer);
+        }
+    }
+
+    /// Says on both links what a sender did: each `#` of the text stands for a number.
+    pub(crate) fn say_of(&mut self, sender: Sender, warning: bool, text: &'static str, numbers: [u32; 3]) {
+        for link in [Link::Autopilot, Link::Swarm] {
+            self.answer_to(link, sender, Kind::Text, Outgoing::Count { warning, text, numbers });
+        }
+    }
+
+    /// Says by whom a command was given that took effect.
+    pub(crate) fn log_command(&mut self, sender: Sender, command: &Command) {
+        let text = match command.command {
+            commands::START => "Start from #/#",
+            commands::PAUSE_CONTINUE if command.param1 == 0.0 => "Pause from #/#",
+            commands::PAUSE_CONTINUE => "Resume from #/#",
+            commands::LAND => "Landing from #/#",
+            commands::RETURN => "Return from #/#",
+            commands::EXCLUDE if command.param1 > 0.0 => "Obstacle from #/#",
+            commands::EXCLUDE => "Obstacle revoked from #/#",
+            commands::RESTART => "Restart from #/#",
+            _ => "Command from #/#",
+        };
+        self.log_sender(sender, text, command.from);
+    }
+
+    pub(crate) fn log_sender(&mut self, sender: Sender, text: &'static str, from: (u8, u8)) {
+        self.say_of(sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_bucket_gives_its_burst_and_then_its_rate() {
+        let at = |ms| Instant::ZERO + Duration::from_millis(ms);
+        let mut rates = Rates::default();
+        let count = |rates: &mut Rates, ms, sender| {
+            (0..100).filter(|_| rates.take(at(ms), Link::Swarm, sender, Kind::Ack)).count()
+        };
+        assert_eq!(count(&mut rates, 0, Sender::Other), 2);
+        assert_eq!(count(&mut rates, 999, Sender::Other), 0);
+        assert_eq!(count(&mut rates, 1000, Sender::Other), 1);
+        assert_eq!(count(&mut rates, 1000, Sender::GroundStation), 10, "its own bucket");
+        assert_eq!(count(&mut rates, 1 << 40, Sender::Other), 2, "no more is saved up");
+    }
+}

@@ -1,0 +1,274 @@
+//! Frames out: what is made fresh when a link is polled.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::{
+    FILE_TRANSFER_PROTOCOL_DATA, GLOBAL_POSITION_INT_DATA, HEARTBEAT_DATA, MavAutopilot, MavFrame,
+    MavModeFlag, MavState, MavType, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA, TUNNEL_DATA,
+};
+use planner_core::{Point, frames};
+
+use crate::companion::Companion;
+use crate::events::Link;
+use crate::guidance::Setpoint;
+use crate::link::frame;
+use crate::link::intent::{self, Intent};
+use crate::link::outbox::Outgoing;
+use crate::mission::State;
+use crate::services;
+use crate::swarm::neighbours::relay;
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
+    pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
+        if out.len() < frame::MAX_SENT {
+            return 0;
+        }
+        let at = link as usize;
+        let system = self.config.system_id;
+        if link == Link::Autopilot
+            && core::mem::take(&mut self.setpoint_due)
+            && let Some(data) = self.setpoint()
+        {
+            return frame::encode(self.outboxes[at].header(system), &data, out);
+        }
+        if core::mem::take(&mut self.heartbeat_due[at]) {
+            return frame::encode(self.outboxes[at].header(system), &self.heartbeat(), out);
+        }
+        if link == Link::Swarm && core::mem::take(&mut self.position_due) {
+            let data = self.global_position();
+            return frame::encode(self.outboxes[at].header(system), &data, out);
+        }
+        if link == Link::Swarm && core::mem::take(&mut self.intent_due) {
+            let mut payload = [0; 133];
+            let len = self.intent().encode(&mut payload);
+            let header = self.outboxes[at].header(system);
+            self.sent.note(header.sequence, self.now);
+            if self.guidance.hold.is_on() {
+                self.guidance.hold.note(self.now);
+            }
+            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+            return 0;
+        }
+        let relayed = if link == Link::Swarm { self.pass_on(out) } else { 0 };
+        let length = if relayed > 0 { relayed } else { self.answer(link, out) };
+        if link == Link::Swarm {
+            self.radio.spend(length);
+        }
+        length
+    }
+
+    /// What neighbours do not hear from others, while the account has enough for answers too.
+    fn pass_on(&mut self, out: &mut [u8]) -> usize {
+        if !self.radio.is_half_full() || !core::mem::take(&mut self.relay_due) {
+            return 0;
+        }
+        let plan_crc = self.plan.as_ref().map_or(0, |plan| plan.plan_crc);
+        let crc = self.config.mission_crc;
+        let relay = self.neighbours.relay(self.now, &mut self.relay_next, crc, plan_crc);
+        if relay.is_empty() {
+            return 0;
+        }
+        let mut payload = [0; relay::LENGTH];
+        let len = relay.encode(self.config.system_id, &mut payload);
+        let header = self.outboxes[Link::Swarm as usize].header(self.config.system_id);
+        frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
+    }
+
+    /// What was asked for, and what waits to be told.
+    fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
+        let (at, system) = (link as usize, self.config.system_id);
+        if core::mem::take(&mut self.version_due[at]) {
+            return frame::encode(self.outboxes[at].header(system), &services::version(system), out);
+        }
+        let length = self.outboxes[at].transmit(system, out);
+        if length > 0 {
+            return length;
+        }
+        let Some(payload) = self.ftp.poll(at) else { return 0 };
+        let header = self.outboxes[at].header(system);
+        let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
+        frame::encode_raw(header, id, extra, &payload, out)
+    }
+
+    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    pub fn say(&mut self, warning: bool, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+    }
+
+    /// The same with numbers: each `#` of the text stands for one.
+    pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+        let numbers = [numbers[0], numbers[1], 0];
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+    }
+
+    fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
+        let still = Point::zeros();
+        let kind = self.kind();
+        let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, kind.stop_mask());
+        let (position, velocity, acceleration, mask) = match self.guidance.setpoint(self.state, &self.scene())
+        {
+            Setpoint::None => return None,
+            Setpoint::Stop(velocity) => stop(&velocity),
+            Setpoint::Move(position, velocity, acceleration) => {
+                self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
+                    let velocity = frames::swap_enu_ned(&velocity);
+                    (ned, velocity, frames::swap_enu_ned(&acceleration), kind.move_mask())
+                })
+            }
+        };
+        Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
+            time_boot_ms: self.now.boot_ms(),
+            x: position.x,
+            y: position.y,
+            z: position.z,
+            vx: velocity.x,
+            vy: velocity.y,
+            vz: velocity.z,
+            afx: acceleration.x,
+            afy: acceleration.y,
+            afz: acceleration.z,
+            type_mask: PositionTargetTypemask::from_bits_truncate(mask),
+            target_system: self.config.system_id,
+            target_component: crate::AUTOPILOT,
+            coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
+            ..SET_POSITION_TARGET_LOCAL_NED_DATA::default()
+        })
+    }
+
+    fn heartbeat(&self) -> HEARTBEAT_DATA {
+        let system_status = match self.state {
+            State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
+            State::Planning | State::Ready | State::Done | State::Aborted => MavState::MAV_STATE_STANDBY,
+            State::AutopilotSilent | State::PositionLost | State::Failsafe => MavState::MAV_STATE_CRITICAL,
+            _ => MavState::MAV_STATE_ACTIVE,
+        };
+        HEARTBEAT_DATA {
+            custom_mode: self.state as u32,
+            mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
+            autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
+            base_mode: MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
+            system_status,
+            mavlink_version: 3,
+        }
+    }
+
+    fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
+        let told = self.told_place();
+        let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
+        let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
+        GLOBAL_POSITION_INT_DATA {
+            // When the position was known, so that a copy is known as one.
+            time_boot_ms: told.at.boot_ms(),
+            lat: libm::round(place.lat_deg * 1e7) as i32,
+            lon: libm::round(place.lon_deg * 1e7) as i32,
+            alt: libm::round(place.alt_m * 1e3) as i32,
+            relative_alt: libm::roundf(told.position.z * 1e3) as i32,
+            vx: cm.x as i16,
+            vy: cm.y as i16,
+            vz: cm.z as i16,
+            hdg: u16::MAX,
+        }
+    }
+
+    fn intent(&self) -> Intent {
+        use State::*;
+        let grounded = match self.state {
+            Done | Disarm => true,
+            _ => !self.telemetry.armed || self.telemetry.on_ground == Some(true),
+        };
+        let on_plan = !self.guidance.returning
+            && matches!(
+                self.state,
+                Ready
+                    | Scheduled
+                    | PadReplanning
+                    | Streaming
+                    | Engaging
+                    | Arming
+                    | TakeOff
+                    | Climb
+                    | Follow
+                    | Blocked
+                    | Replanning
+                    | Paused
+            )
+            || matches!(self.state, Land | LandingHeld | Disarm | Done)
+                && self.guidance.at_goal(&self.scene());
+        let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
+        let out = self.is_out();
+        let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
+            | flag(intent::LANDED, self.state == Done)
+            | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
+            | flag(intent::OUT, out)
+            | flag(intent::WAITING, self.waits())
+            | flag(intent::BLOCKED, self.around.blocked)
+            | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
+        let plan = self.plan.as_ref();
+        let along_m = self.guidance.progress_m(self.state, &self.scene());
+        let (points, column) = self.way_ahead();
+        Intent {
+            system_id: self.config.system_id,
+            flags,
+            mission_crc: self.config.mission_crc,
+            plan_crc: plan.map_or(0, |plan| plan.plan_crc),
+            progress_m: if self.around.flying { self.around.left_at_m } else { along_m },
+            heard: self.neighbours.heard_bits(self.now),
+            speed_mps: self.telemetry.velocity.norm(),
+            floor_m: plan.map_or(self.start.z, |plan| self.guidance.ground_m(plan)),
+            column,
+            echo: self.neighbours.echo(self.sent.count(), self.now),
+            points,
+        }
+    }
+
+    /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
+    fn way_ahead(&self) -> (heapless::Vec<Point, { intent::POINTS }>, bool) {
+        use State::*;
+        let mut points = heapless::Vec::new();
+        let here = self.telemetry.position;
+        let setpoint = match self.guidance.setpoint(self.state, &self.scene()) {
+            Setpoint::Move(place, ..) => place,
+            _ => here,
+        };
+        let mut add = |point: Point| {
+            // Full after eight: the rest is further than it can fly before it is heard again.
+            let _ = points.push(point);
+        };
+        let Some(plan) = &self.plan else { return (points, true) };
+        let path = &plan.path;
+        let (first, last) = (path.point_at(0.0), path.point_at(path.length_m()));
+        let mut column = true;
+        match self.state {
+            // On the pad too: it may lift off before it is heard again.
+            Scheduled | PadReplanning | Streaming | Engaging | Arming | TakeOff | Climb => {
+                add(setpoint);
+                first.into_iter().for_each(add);
+            }
+            Land | LandingHeld => {
+                add(here);
+                add(Point::new(here.x, here.y, self.guidance.ground_m(plan)));
+            }
+            _ if self.guidance.hold.is_on() => {
+                column = false;
+                add(setpoint);
+            }
+            Follow if self.guidance.descends() => {
+                add(setpoint);
+                last.into_iter()
+                    .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
+            }
+            Follow | Paused | Alone | Blocked | Replanning | Stopping => {
+                column = false;
+                add(setpoint);
+                let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);
+                let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
+                ahead.for_each(|w| add(w.position));
+                path.point_at(to_m).filter(|_| to_m > from_m).into_iter().for_each(add);
+            }
+            _ => {}
+        }
+        (points, column)
+    }
+}

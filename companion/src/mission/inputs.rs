@@ -1,0 +1,151 @@
+//! What the guards of the mission table look at, from the state of the companion.
+
+use planner_core::Point;
+
+use crate::companion::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
+use crate::config::PlanFailure;
+use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
+use crate::mission::{FRESH, Inputs, State};
+use crate::time::Duration;
+
+/// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
+const LANDING_DRIFT_M: f32 = 1.0;
+/// The same of a vehicle that stood still.
+const STANDING_DRIFT_M: f32 = 0.3;
+/// A vehicle whose estimate is higher or lower than its pad by more than this does not take off, metres: real estimates on
+/// the ground were seen up to 1.1 m off.
+const START_HEIGHT_M: f32 = 1.5;
+/// A vehicle on the ground moves up or down more slowly, m/s.
+const RESTING_MPS: f32 = 0.5;
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// A snapshot.
+    pub(crate) fn inputs(&self) -> Inputs {
+        let (t, now, scene) = (&self.telemetry, self.now, self.scene());
+        let kind = self.kind();
+        let offboard = t.custom_mode == kind.setpoint_mode();
+        let mode_foreign = match self.state {
+            State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
+                !offboard && t.custom_mode != self.mode_before
+            }
+            // Disarming after a landing the autopilot chooses a mode of its own.
+            State::Land | State::LandingHeld | State::Disarm => {
+                !offboard && t.custom_mode != kind.land_mode() && t.armed
+            }
+            _ => !offboard,
+        };
+        let climb_m = self.plan.as_ref().map_or(0.0, |plan| plan.climb_m);
+        let away = t.position - (self.start - Point::new(0.0, 0.0, climb_m));
+        let height_tolerance_m = self.config.start_tolerance_m.min(START_HEIGHT_M);
+        let beneath = self.interrupted.beneath(self.state);
+        let follow = self.state == State::Follow;
+        let fence = self.config.geofence;
+        let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
+        let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
+        let inside =
+            |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
+        Inputs {
+            in_state: now - self.entered_at,
+            heartbeat_age: t.heartbeat_age(now),
+            position_age: t.position_age(now),
+            jumped: t.is_settling(now),
+            stalled: if follow || self.state == State::Blocked {
+                now - self.guidance.progress_at()
+            } else {
+                Duration::default()
+            },
+            // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
+            // being heard.
+            neighbour_age: match self.guidance.returning || self.around.lands {
+                true => Duration::default(),
+                false => self.neighbours.silence(now, self.entered_at),
+            },
+            neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
+            plan_ready: self.plan.is_some(),
+            plan_failed: self.plan_failure.is_some(),
+            roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
+            has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
+            at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
+            imprecise: self.state == State::Ready && self.guidance.pace < 1.0,
+            vague: self.vague_since.map_or(Duration::default(), |since| now - since),
+            origin_moved: t.origin_moved,
+            start: self.pending.start,
+            pause: self.pending.pause,
+            resume: self.pending.resume,
+            land: self.pending.land,
+            turn_back: self.pending.turn_back && !self.guidance.returning,
+            in_climb: matches!(beneath, State::TakeOff | State::Climb),
+            armed: t.armed,
+            armed_unseen: self.handshake.is_armed_unseen(now),
+            arming_unanswered: self.handshake.is_unanswered(now),
+            disarm_refused: self.handshake.disarm_refused,
+            ours: self.handshake.ours,
+            landing: t.custom_mode == kind.land_mode(),
+            offboard,
+            mode_foreign,
+            critical: t.is_critical(),
+            on_ground: t.on_ground == Some(true),
+            flown: self.handshake.flown,
+            vertical: t.position_age(now) < FRESH && t.velocity.z.abs() > RESTING_MPS,
+            airborne: t.armed && t.on_ground == Some(false),
+            lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
+            gates_open: self.guidance.advice.stop_within_m > 0.05
+                && self.guidance.filter.column_clear()
+                && self.departure_due()
+                && !self.pending.pause
+                && self.battery_reported()
+                && !self.around.blocked
+                && self.neighbours.is_clear_since(self.entered_at)
+                && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
+            climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
+            path_done: follow && self.guidance.path_done(&scene),
+            at_goal: self.guidance.at_goal(&scene),
+            near_path: match (beneath, self.state) {
+                // Those refer to no place on the path.
+                (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
+                (_, State::PilotReturned) => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
+                (_, State::PositionLost) => self.guidance.near_path(&scene, LOST_WINDOW_M),
+                _ => false,
+            },
+            battery_low: t.charge_below(self.config.battery_low_percent),
+            battery_critical: t.charge_below(self.config.battery_low_percent / 2),
+            column_blocked: self.guidance.filter.column_blocked_for(now),
+            column_clear: self.guidance.filter.column_clear_for(now),
+            must_land: self.must_land(),
+            can_turn_back: self.guidance.along_m() >= 0.0
+                && !self.guidance.returning
+                && !self.neighbours.is_deaf(now),
+            pad_taken: match follow && self.guidance.returning {
+                true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
+                true => self.guidance.filter.barred_for(now),
+                false => Duration::default(),
+            },
+            can_land_aside: self.can_land_aside(),
+            lands_aside: self.around.lands,
+            aside_reached: follow
+                && self.around.flying
+                && self.around.lands
+                && self.guidance.is_at_end(&scene)
+                && standing,
+            yielded: self.guidance.filter.yielded_for(now),
+            hindered: self.guidance.filter.hindered_for(now),
+            room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
+            outside: self.guidance.stands_at_fence()
+                || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
+            blocked: self.around.blocked,
+            our_turn: self.is_our_turn(),
+            detour_ready: self.around.ready,
+            no_way_around: self.gives_up(),
+            underneath: self.underneath(),
+            standing,
+        }
+    }
+
+    /// Whether it comes down whatever is below: with a battery that is nearly empty, or no place known to hold.
+    pub(crate) fn must_land(&self) -> bool {
+        let t = &self.telemetry;
+        t.charge_below(self.config.battery_low_percent / 2)
+            || t.origin_moved
+            || t.position_age(self.now) >= FRESH
+    }
+}

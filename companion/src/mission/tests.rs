@@ -1,0 +1,309 @@
+//! The table against its copy in the README, and against itself: every state reachable, left again, and texts that fit.
+
+extern crate std;
+use std::fmt::Write;
+use std::string::String;
+use std::vec::Vec;
+
+use super::guard::HEARD;
+use super::*;
+use crate::mission::table::*;
+use Action as A;
+use Guard as G;
+use State::*;
+
+/// The table as Markdown.
+fn printed() -> String {
+    let mut out =
+        String::from("| from | guard | for | to | action | STATUSTEXT |\n|---|---|---|---|---|---|\n");
+    for row in TABLE {
+        let from: Vec<String> = row.from.iter().map(|s| std::format!("{s:?}")).collect();
+        let limit = match row.limit.micros() {
+            0 => String::new(),
+            us => std::format!("{} s", us as f64 * 1e-6),
+        };
+        let to = match row.to {
+            To::State(to) => std::format!("{to:?}"),
+            To::Interrupted => "the interrupted state".into(),
+        };
+        let action = if row.action == A::None { String::new() } else { std::format!("{:?}", row.action) };
+        writeln!(out, "| {} | {:?} | {limit} | {to} | {action} | {} |", from.join(", "), row.guard, row.text)
+            .unwrap();
+    }
+    out
+}
+
+/// How the inputs show an interruption.
+type Shows = fn(&mut Inputs);
+
+/// What may interrupt a state.
+const INTERRUPTIONS: &[(&str, Shows)] = &[
+    ("pause", |i| i.pause = true),
+    ("resume", |i| i.resume = true),
+    ("land", |i| (i.land, i.offboard) = (true, !i.mode_foreign)),
+    ("return", |i| i.turn_back = true),
+    ("start", |i| i.start = true),
+    ("pilot's mode", |i| (i.mode_foreign, i.offboard) = (true, false)),
+    ("failsafe", |i| (i.mode_foreign, i.offboard, i.critical) = (true, false, true)),
+    ("position lost", |i| i.position_age = Duration::from_secs(3)),
+    ("position jumps", |i| (i.position_age, i.jumped) = (FRESH, true)),
+    ("autopilot silent", |i| i.heartbeat_age = Duration::from_secs(4)),
+    ("disarmed", |i| (i.armed, i.airborne) = (false, false)),
+    ("battery low", |i| (i.battery_low, i.room_below) = (true, true)),
+    ("battery critical", |i| (i.battery_low, i.battery_critical) = (true, true)),
+    ("outside the fence", |i| (i.outside, i.room_below) = (true, true)),
+    ("neighbours silent", |i| i.neighbour_age = Duration::from_secs(11)),
+];
+
+/// Inputs of a state in which nothing happens.
+pub(crate) fn quiet(state: State) -> Inputs {
+    let on_ground = WAITING.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
+    let mut i = Inputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..Inputs::default() };
+    (i.has_goal, i.flown, i.ours) = (true, !on_ground, !on_ground);
+    match state {
+        WaitAutopilot => i.heartbeat_age = HEARD,
+        WaitPosition => i.position_age = FRESH,
+        Blocked => i.blocked = true,
+        AutopilotSilent => i.heartbeat_age = Duration::from_secs(5),
+        PositionLost => i.position_age = Duration::from_secs(2),
+        Disarm => i.airborne = false,
+        PilotControl | Failsafe => i.mode_foreign = true,
+        _ => {}
+    }
+    assert_eq!(update(state, &i).map(|row| row.guard), None, "{state:?}");
+    i
+}
+
+/// The page: the table, and where each interruption of each state leads.
+fn page() -> String {
+    let mut out = String::from(
+        "# The mission's table\n\nGenerated from `companion/src/mission/table.rs` by the test `the_page_prints_this_table`; \
+         `FLOCKMATE_WRITE=1 cargo test -p companion\nthe_page` writes it. The first row whose `from` holds the state and \
+         whose guard has held as long as `for` says is taken,\ntop to bottom. A text after an interruption (`Interrupted: \
+         Climb`) names the state that is kept; \"the interrupted state\" is the\nway back to it.\n\n## Rows\n\n",
+    );
+    out += &printed();
+    out += "\n## Interruptions\n\nWhere each state goes when one thing happens and all else is as it should be; an empty \
+            cell: it stays. A command\nthat leads nowhere is refused, or answered ACCEPTED where it is done already. \
+            (back): the way out leads to the interrupted state.\n\n| state |";
+    INTERRUPTIONS.iter().for_each(|(name, _)| write!(out, " {name} |").unwrap());
+    out += "\n|---|";
+    INTERRUPTIONS.iter().for_each(|_| out += "---|");
+    out += "\n";
+    for state in State::ALL {
+        write!(out, "| {state:?} |").unwrap();
+        for (_, interrupt) in INTERRUPTIONS {
+            let mut inputs = quiet(*state);
+            interrupt(&mut inputs);
+            let back = |to| TABLE.iter().any(|row| row.from.contains(&to) && row.to == To::Interrupted);
+            match update(*state, &inputs).map(|row| row.to) {
+                None => out += " |",
+                Some(To::Interrupted) => out += " the interrupted state |",
+                Some(To::State(to)) if back(to) || to == PilotControl || to == AutopilotSilent => {
+                    write!(out, " {to:?} (back) |").unwrap();
+                }
+                Some(To::State(to)) => write!(out, " {to:?} |").unwrap(),
+            }
+        }
+        out += "\n";
+    }
+    out
+}
+
+#[test]
+fn the_page_prints_this_table() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../docs/table.md");
+    if std::env::var_os("FLOCKMATE_WRITE").is_some() {
+        std::fs::write(path, page()).unwrap();
+    }
+    let written = std::fs::read_to_string(path).unwrap_or_default();
+    assert!(
+        written == page(),
+        "docs/table.md is older than the table: FLOCKMATE_WRITE=1 cargo test -p companion the_page"
+    );
+}
+
+#[test]
+fn every_state_is_reached_and_every_wait_ends() {
+    for state in State::ALL {
+        let reached = TABLE.iter().any(|row| row.to == To::State(*state) && !row.from.contains(state));
+        assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
+        let timed = |row: &&Row| row.from.contains(state) && row.limit > NOW;
+        // On the ground, disarmed, waiting for a person, an autopilot or a neighbour may last.
+        let patient = [WaitAutopilot, WaitPosition, Ready, Scheduled, Done, Aborted];
+        assert!(
+            TABLE.iter().any(|row| timed(&row)) || patient.contains(state),
+            "{state:?} has no time limit"
+        );
+    }
+    for row in TABLE {
+        assert!(row.text.len() <= 50 && row.text.is_ascii(), "{}", row.text);
+    }
+}
+
+/// Inputs under which a guard holds for ever, everything else quiet.
+fn inputs_for(guard: Guard) -> Inputs {
+    let long = Duration::from_secs(3600);
+    let mut i = Inputs { armed: true, ..Inputs::default() };
+    match guard {
+        G::AutopilotHeard | G::PositionKnown => {}
+        G::NoHeartbeat => i.heartbeat_age = long,
+        G::NoPosition => i.position_age = long,
+        G::PositionJumped => (i.position_age, i.jumped) = (long, true),
+        G::FoundFlying => i.airborne = true,
+        G::BackOnPath => i.near_path = true,
+        G::BackOffPath => {}
+        G::PlanReady => i.plan_ready = true,
+        G::PlanFailed => i.plan_failed = true,
+        G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
+        G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
+        G::StartWithoutGoal => (i.start, i.at_start, i.armed) = (true, true, false),
+        G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
+        G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
+        G::StartVague => {
+            (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false);
+            (i.imprecise, i.in_state) = (true, long);
+        }
+        G::EstimateVague => i.vague = long,
+        G::OriginMoved => i.origin_moved = true,
+        G::GatesOpen => i.gates_open = true,
+        G::StartBatteryLow => {
+            (i.start, i.has_goal, i.at_start, i.armed, i.battery_low) = (true, true, true, false, true);
+        }
+        G::StartOutside => {
+            (i.start, i.has_goal, i.at_start, i.armed, i.outside) = (true, true, true, false, true);
+        }
+        G::AwayFromStart => i.armed = false,
+        G::ChargeLow => (i.armed, i.battery_low) = (false, true),
+        G::Outside => (i.armed, i.outside) = (false, true),
+        G::DisarmedAtGoal => (i.armed, i.at_goal) = (false, true),
+        G::StaysArmed => i.in_state = long,
+        G::StaysDisarmed => (i.armed, i.in_state) = (false, long),
+        G::StaysDisarmedPaused => (i.armed, i.in_state, i.start, i.pause) = (false, long, true, true),
+        G::ArmedUnseen => i.armed_unseen = true,
+        G::ArmingUnanswered => i.arming_unanswered = true,
+        G::InAir => i.airborne = true,
+        G::Unattended => (i.airborne, i.offboard, i.ours) = (true, true, true),
+        G::DisarmRefused => i.disarm_refused = true,
+        G::PausedOnPad => (i.pause, i.in_state) = (true, long),
+        G::LandUnattended => (i.land, i.airborne, i.offboard) = (true, true, true),
+        G::ReturnInClimb => (i.turn_back, i.in_climb) = (true, true),
+        G::Elapsed => i.in_state = long,
+        G::Offboard => i.offboard = true,
+        G::ModeTaken => i.mode_foreign = true,
+        G::FailsafeActs => (i.mode_foreign, i.critical) = (true, true),
+        G::Armed => i.armed = true,
+        G::Disarmed => i.armed = false,
+        G::LiftedOff => i.lifted_off = true,
+        G::ClimbDone => i.climb_done = true,
+        G::PathDone => i.path_done = true,
+        G::Stalled => i.stalled = long,
+        G::PauseCommanded => i.pause = true,
+        G::ResumeCommanded => i.resume = true,
+        G::ResumedOnPath => (i.offboard, i.resume, i.near_path) = (true, true, true),
+        G::ResumedOffPath => (i.offboard, i.resume) = (true, true),
+        G::LandCommanded => i.land = true,
+        G::ReturnCommanded => i.turn_back = true,
+        G::LandingBlocked => i.column_blocked = long,
+        G::LandingClear => i.column_clear = long,
+        G::NoRoomToLand => (i.column_blocked, i.offboard, i.can_turn_back) = (long, true, true),
+        G::NoRoomHere => (i.column_blocked, i.offboard, i.can_land_aside) = (long, true, true),
+        G::PadTaken => (i.pad_taken, i.can_land_aside) = (long, true),
+        G::NoPlaceAside => (i.plan_failed, i.lands_aside) = (true, true),
+        G::AsideReached => i.aside_reached = true,
+        G::ColumnBlocked => (i.column_blocked, i.in_state) = (long, long),
+        G::Yielded => (i.yielded, i.hindered) = (long, long),
+        G::Hindered => i.hindered = long,
+        G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
+        G::BatteryLow => (i.battery_low, i.room_below) = (true, true),
+        G::OutsideGeofence => (i.outside, i.room_below) = (true, true),
+        G::NeighboursSilent => i.neighbour_age = long,
+        G::NeighbourHeard => i.neighbour_heard = true,
+        G::OnGround => (i.on_ground, i.flown) = (true, true),
+        G::PathBlocked => i.blocked = true,
+        G::PathClear => {}
+        G::OurTurn => i.our_turn = true,
+        G::DetourReady => i.detour_ready = true,
+        G::DetourFailed => i.plan_failed = true,
+        G::NoWayAround => (i.no_way_around, i.room_below) = (true, true),
+        G::NoWayOn => (i.no_way_around, i.can_turn_back) = (true, true),
+        G::Underneath => i.underneath = long,
+        G::Standing => i.standing = true,
+    }
+    i
+}
+
+#[test]
+fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
+    for row in TABLE {
+        for from in row.from {
+            let mut inputs = inputs_for(row.guard);
+            // Where a position or an autopilot heard already moves on, they are not known yet.
+            match (from, row.guard) {
+                (PositionLost, G::BackOnPath | G::BackOffPath) | (AutopilotSilent, G::AutopilotHeard) => {}
+                (WaitPosition, G::PositionKnown) | (WaitAutopilot, G::AutopilotHeard) => {}
+                (PositionLost | WaitPosition, _) => inputs.position_age = FRESH,
+                (AutopilotSilent, _) => inputs.heartbeat_age = HEARD,
+                (Arming, _) => inputs.armed = false,
+                (Scheduled | PadReplanning | Streaming | Engaging, guard) => inputs.armed = guard == G::Armed,
+                (Blocked, guard) => inputs.blocked = guard != G::PathClear,
+                _ => {}
+            }
+            if row.guard == G::Armed {
+                inputs.armed = true;
+            }
+            if row.guard == G::NoHeartbeat {
+                inputs.heartbeat_age = Duration::from_secs(3600);
+            }
+            // On the pad, where it should be.
+            inputs.at_start |= !matches!(row.guard, G::AwayFromStart | G::StartElsewhere);
+            let taken = update(*from, &inputs).expect("a row");
+            assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);
+            if row.limit > NOW {
+                let quiet = Inputs { armed: inputs.armed, ..Inputs::default() };
+                let before = update(*from, &quiet);
+                assert!(
+                    before.is_none_or(|r| !core::ptr::eq(r, row)),
+                    "{from:?} {:?} ignores its limit",
+                    row.guard
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn the_pilot_outranks_everything_in_the_air() {
+    let everything = Inputs {
+        in_state: s(9999),
+        stalled: s(9999),
+        mode_foreign: true,
+        armed: true,
+        pause: true,
+        resume: true,
+        land: true,
+        turn_back: true,
+        battery_low: true,
+        outside: true,
+        path_done: true,
+        climb_done: true,
+        position_age: s(9999),
+        ..Inputs::default()
+    };
+    for state in FLYING.iter().chain(&[Land]) {
+        let to = |inputs| update(*state, inputs).map(|row| row.to);
+        assert_eq!(to(&everything), Some(To::State(PilotControl)), "{state:?}");
+        let failsafe = Inputs { critical: true, ..everything };
+        assert_eq!(to(&failsafe), Some(To::State(Failsafe)), "{state:?}");
+    }
+}
+
+#[test]
+fn every_text_is_explained() {
+    let page = include_str!("../../../docs/companion.md");
+    let served = crate::services::ftp::TEXTS.iter().map(|(_, text)| *text);
+    for text in TABLE.iter().map(|row| row.text).filter(|text| !text.is_empty()).chain(served) {
+        assert!(text.len() <= 50, "{text}");
+        assert!(page.contains(&std::format!("\n| {text} | ")), "{text}");
+    }
+}

@@ -1,0 +1,482 @@
+//! MAVLink FTP server: `roadmap.bin` and `mission.bin` are listed, read, written, removed and summed.
+//!
+//! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what clients rely on: an answer has
+//! the request's sequence number plus one, its session and its offset; the client names the session (`mavftp` writes to it before
+//! it heard that it is open); CRC-32 begins at 0 and is not inverted; a burst ends
+//! with its last packet marked.
+//!
+//! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
+//! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for a while
+//! and only answered again ([`memory`]); a session that nothing was written to is not opened anew for its client. What cannot be
+//! taken now is not answered: clients ask again. One session at a time; one request at a time, the others wait in a short queue.
+//! An answer that needs the flash is given when the flash is done.
+
+mod memory;
+mod packet;
+mod stream;
+
+use heapless::Deque;
+
+use self::memory::Memory;
+#[cfg(test)]
+pub(crate) use self::packet::TEXTS;
+use self::packet::{
+    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, told,
+};
+use self::stream::{Stream, due};
+use crate::link::frame::Frame;
+use crate::storage::store::window::Taken;
+use crate::storage::store::{Answer, Erasing, File, Store, UploadError, UploadState};
+use crate::time::{Duration, Instant};
+
+/// FILE_TRANSFER_PROTOCOL.
+pub const MESSAGE: u32 = 110;
+/// Bytes of its payload: network, system, component, then the packet.
+pub const PAYLOAD_LEN: usize = 254;
+/// Most data of a packet.
+pub const DATA: usize = 239;
+
+/// Whether a FILE_TRANSFER_PROTOCOL begins an upload or removes a file.
+pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
+    matches!(padded[6], op::CREATE | op::OPEN_WRITE | op::REMOVE)
+}
+
+/// Requests that wait; `mavftp` has five under way.
+const QUEUE: usize = 6;
+/// A session whose client was silent this long may be taken by another.
+const IDLE: Duration = Duration::from_secs(10);
+
+#[derive(Clone, Copy, Debug)]
+struct Reply {
+    link: usize,
+    to: (u8, u8),
+    packet: [u8; HEAD + DATA],
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Session {
+    id: u8,
+    client: (u8, u8),
+    file: File,
+    writes: bool,
+    /// Nothing was written to it yet.
+    fresh: bool,
+    opened_by: Request,
+    used: Instant,
+}
+
+/// What the server is at.
+#[derive(Clone, Copy, Debug)]
+enum Doing {
+    Nothing,
+    Read(Request, bool),
+    Sum(Request, bool),
+    Open(Request),
+    Close(Request),
+}
+
+/// The server. 4 kB, most of it requests that wait.
+#[derive(Clone, Debug)]
+pub struct Ftp {
+    queue: Deque<Request, QUEUE>,
+    reply: Option<Reply>,
+    session: Option<Session>,
+    doing: Doing,
+    stream: Option<Stream>,
+    memory: Memory,
+    text: Option<Text>,
+    now: Instant,
+}
+
+impl Default for Ftp {
+    fn default() -> Self {
+        Self {
+            queue: Deque::new(),
+            reply: None,
+            session: None,
+            doing: Doing::Nothing,
+            stream: None,
+            memory: Memory::default(),
+            text: None,
+            now: Instant::ZERO,
+        }
+    }
+}
+
+impl Ftp {
+    /// Takes a request in; a full queue drops it, and so it drops one that waits already.
+    pub fn handle(&mut self, link: usize, now: Instant, frame: &Frame) {
+        self.now = now;
+        let request = Request::read(link, frame);
+        let same = |held: &Request| held.is(&request);
+        let at_work = match &self.doing {
+            Doing::Nothing => false,
+            Doing::Read(held, _) | Doing::Sum(held, _) | Doing::Open(held) | Doing::Close(held) => same(held),
+        };
+        if !at_work && !self.queue.iter().any(same) {
+            // Full: the client asks again.
+            let _ = self.queue.push_back(request);
+        }
+    }
+
+    /// The answer that waits for a link: the whole payload of a FILE_TRANSFER_PROTOCOL.
+    pub fn poll(&mut self, link: usize) -> Option<[u8; PAYLOAD_LEN]> {
+        let Reply { to, packet, .. } = self.reply.take_if(|reply| reply.link == link)?;
+        let mut payload = [0; PAYLOAD_LEN];
+        (payload[1], payload[2]) = to;
+        payload[3..].copy_from_slice(&packet);
+        Some(payload)
+    }
+
+    /// What a person should be told.
+    pub fn text(&mut self) -> Option<Text> {
+        self.text.take()
+    }
+
+    /// Goes on as far as the flash and the link let it.
+    pub fn advance(&mut self, store: &mut Store, now: Instant, erasing: Erasing) {
+        self.now = now;
+        while self.reply.is_none() {
+            if !matches!(self.doing, Doing::Nothing) {
+                self.go_on(store);
+                return;
+            }
+            if let Some(request) = self.queue.pop_front() {
+                self.begin(&request, store, erasing);
+            } else {
+                self.next_of_stream(store);
+                return;
+            }
+        }
+    }
+
+    /// Takes what the flash answered.
+    pub fn answer(&mut self, answer: Answer<'_>) {
+        match (core::mem::replace(&mut self.doing, Doing::Nothing), answer) {
+            (Doing::Read(request, true), Answer::Bytes(bytes)) => match self.stream {
+                Some(stream) if stream.request().is(&request) => {
+                    let due = due(&request, Some(&stream));
+                    self.stream = stream.after(bytes.len());
+                    self.put(&due, ACK, u8::from(self.stream.is_none()), bytes);
+                }
+                _ => self.ack(&request, bytes),
+            },
+            (Doing::Sum(request, true), Answer::Sum(sum)) => {
+                self.ack(&request, &sum.to_le_bytes());
+            }
+            (Doing::Read(request, true) | Doing::Sum(request, true), _) => {
+                let due = due(&request, self.stream.take().as_ref());
+                self.nak(&due, No::Errno(EIO));
+            }
+            (other, _) => self.doing = other,
+        }
+    }
+
+    /// Asks the flash again, or sees whether an upload has come further.
+    fn go_on(&mut self, store: &mut Store) {
+        match &mut self.doing {
+            Doing::Nothing | Doing::Read(_, true) | Doing::Sum(_, true) => {}
+            Doing::Read(request, asked) => {
+                let due = due(request, self.stream.as_ref());
+                let file = self.session.map(|session| session.file);
+                let within = |file: &File| store.size(*file).is_some_and(|size| due.offset < size);
+                if let Some(file) = file.filter(within) {
+                    *asked = store.read(file, due.offset, chunk(&due));
+                } else {
+                    (self.doing, self.stream) = (Doing::Nothing, None);
+                    self.nak(&due, No::EndOfFile);
+                }
+            }
+            Doing::Sum(request, asked) => match request.file().filter(|file| store.size(*file).is_some()) {
+                Some(file) => *asked = store.sum(file, 0),
+                None => {
+                    let request = *request;
+                    self.doing = Doing::Nothing;
+                    self.nak(&request, No::NotFound);
+                }
+            },
+            Doing::Open(request) => {
+                let request = *request;
+                match store.upload() {
+                    Some(UploadState::Opening) => {}
+                    Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
+                    _ => {
+                        self.doing = Doing::Nothing;
+                        // To erase for it may have taken longer than a client may be silent.
+                        self.session = self.session.map(|session| Session { used: self.now, ..session });
+                        self.finish(&request, Ok(()));
+                    }
+                }
+            }
+            Doing::Close(request) => {
+                let request = *request;
+                match store.upload() {
+                    Some(UploadState::Ended(result)) => self.end_upload(&request, result),
+                    Some(_) => {}
+                    None => self.end_upload(&request, Err(UploadError::Incomplete)),
+                }
+            }
+        }
+    }
+
+    fn end_upload(&mut self, request: &Request, result: Result<(), UploadError>) {
+        self.doing = Doing::Nothing;
+        if let Some(session) = self.session.take() {
+            self.text = Some(told(session.file, result));
+        }
+        self.finish(request, result.map_err(No::from));
+    }
+
+    fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
+        if let Some(done) = self.memory.recall(request, self.now) {
+            if !is_open(request) || done.is_err() {
+                self.respond(request, done);
+            } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
+                // Its answer was lost; what was opened since then stays open otherwise.
+                self.opened(request, &session, store);
+            }
+            return;
+        }
+        if is_open(request) {
+            self.memory.forget_closed(request.client);
+        }
+        if matches!(request.opcode, op::TERMINATE | op::RESET | op::BURST_READ | op::READ | op::OPEN_READ) {
+            self.stream = None;
+        }
+        match request.opcode {
+            op::NONE => self.ack(request, &[]),
+            op::TERMINATE => match self.session_of(request) {
+                Ok(Session { writes: true, .. }) => {
+                    store.close();
+                    self.doing = Doing::Close(*request);
+                }
+                Ok(_) => {
+                    self.session = None;
+                    self.finish(request, Ok(()));
+                }
+                Err(no) => {
+                    let closed = self.memory.recall_closed(request, self.now);
+                    self.respond(request, closed.unwrap_or(Err(no)));
+                }
+            },
+            op::RESET => {
+                if self
+                    .session
+                    .is_some_and(|session| session.client == request.client || self.is_idle(&session))
+                {
+                    self.drop_session(store);
+                }
+                self.finish(request, Ok(()));
+            }
+            op::LIST => self.list(request, store),
+            op::OPEN_READ => match request.file().and_then(|file| Some((file, store.size(file)?))) {
+                None => self.nak(request, No::NotFound),
+                Some((file, size)) => {
+                    if self.take_session(request, file, false, store) {
+                        self.memory.note(request, Ok(()), self.now);
+                        self.ack(request, &size.to_le_bytes());
+                    }
+                }
+            },
+            op::READ | op::BURST_READ => match self.session_of(request) {
+                Ok(Session { writes: true, .. }) => self.nak(request, No::InvalidSession),
+                Ok(_) => {
+                    self.stream = (request.opcode == op::BURST_READ).then(|| Stream::new(request));
+                    self.doing = Doing::Read(*request, false);
+                }
+                Err(no) => self.nak(request, no),
+            },
+            op::CREATE | op::OPEN_WRITE => self.open(request, store, erasing),
+            op::WRITE => self.write(request, store),
+            op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
+                Some(file) => {
+                    store.remove(file);
+                    self.text = Some(REMOVED);
+                    self.finish(request, Ok(()));
+                }
+                None => self.nak(request, No::NotFound),
+            },
+            op::CRC32 => self.doing = Doing::Sum(*request, false),
+            op::TRUNCATE | op::RENAME if request.file().is_none_or(|file| store.size(file).is_none()) => {
+                self.nak(request, No::NotFound);
+            }
+            op::MAKE_DIRECTORY | op::REMOVE_DIRECTORY | op::TRUNCATE | op::RENAME => {
+                self.nak(request, No::Protected);
+            }
+            _ => self.nak(request, No::Unknown),
+        }
+    }
+
+    fn list(&mut self, request: &Request, store: &Store) {
+        if !request.path().is_empty() {
+            return self.nak(request, No::NotFound);
+        }
+        let mut entries = heapless::Vec::<u8, DATA>::new();
+        let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.size(*file)?)));
+        for (name, size) in held.skip(request.offset as usize) {
+            let mut digits = [0; 10];
+            // Both names and sizes are short: there is room for all.
+            let _ = entries.push(b'F');
+            let _ = entries.extend_from_slice(name.as_bytes());
+            let _ = entries.push(b'\t');
+            let _ = entries.extend_from_slice(decimal(size, &mut digits));
+            let _ = entries.push(0);
+        }
+        if entries.is_empty() {
+            self.nak(request, No::EndOfFile);
+        } else {
+            self.ack(request, &entries);
+        }
+    }
+
+    fn open(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
+        let Some(file) = request.file() else { return self.nak(request, No::Protected) };
+        let same = |session: &&mut Session| {
+            (session.client, session.id, session.file) == (request.client, request.session, file)
+                && session.fresh
+        };
+        if let Some(session) = self.session.as_mut().filter(same) {
+            (session.opened_by, session.used) = (*request, self.now);
+            return self.ack(request, &[]);
+        }
+        if !self.take_session(request, file, true, store) {
+            return;
+        }
+        match store.open(file, erasing) {
+            Ok(()) => self.doing = Doing::Open(*request),
+            Err(why) => {
+                self.session = None;
+                self.text = Some(told(file, Err(why)));
+                self.nak(request, why.into());
+            }
+        }
+    }
+
+    fn write(&mut self, request: &Request, store: &mut Store) {
+        match self.session_of(request) {
+            Ok(Session { writes: true, .. }) => {}
+            Ok(_) => return self.nak(request, No::Protected),
+            Err(no) => return self.nak(request, no),
+        }
+        if usize::from(request.size) > DATA || request.size == 0 {
+            return self.nak(request, No::InvalidSize);
+        }
+        if let Some(UploadState::Ended(Err(why))) = store.upload() {
+            return self.nak(request, why.into());
+        }
+        match store.take(request.offset, request.bytes()) {
+            Taken::Yes => {
+                self.session = self.session.map(|session| Session { fresh: false, ..session });
+                self.ack(request, &[]);
+            }
+            Taken::TooLarge => self.nak(request, No::Errno(EFBIG)),
+            Taken::Later => {}
+        }
+    }
+
+    /// Says once more what a session was opened with.
+    fn opened(&mut self, request: &Request, session: &Session, store: &Store) {
+        match store.size(session.file) {
+            Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
+            _ => self.ack(request, &[]),
+        }
+    }
+
+    /// The session a request belongs to; a request from before it was opened belongs to none.
+    fn session_of(&mut self, request: &Request) -> Result<Session, No> {
+        let now = self.now;
+        match &mut self.session {
+            Some(session) if session.client == request.client && session.id == request.session => {
+                if (request.sequence.wrapping_sub(session.opened_by.sequence) as i16) < 0 {
+                    return Err(No::InvalidSession);
+                }
+                session.used = now;
+                Ok(*session)
+            }
+            _ => Err(No::InvalidSession),
+        }
+    }
+
+    fn is_idle(&self, session: &Session) -> bool {
+        self.now - session.used > IDLE
+    }
+
+    /// Opens a session; says so where there is none to be had.
+    fn take_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
+        let held = |session: &Session| session.client != request.client && !self.is_idle(session);
+        if self.session.as_ref().is_some_and(held) {
+            self.nak(request, No::Sessions);
+            return false;
+        }
+        self.drop_session(store);
+        let Request { client, session: id, .. } = *request;
+        let opened_by = *request;
+        self.session = Some(Session { id, client, file, writes, fresh: writes, opened_by, used: self.now });
+        true
+    }
+
+    fn drop_session(&mut self, store: &mut Store) {
+        if self.session.take().is_some_and(|session| session.writes) {
+            store.abandon();
+        }
+    }
+
+    /// The next packet of a burst.
+    fn next_of_stream(&mut self, store: &mut Store) {
+        if let Some(stream) = self.stream {
+            self.doing = Doing::Read(stream.request(), false);
+            self.go_on(store);
+        }
+    }
+
+    /// Answers, and remembers the answer.
+    fn finish(&mut self, request: &Request, result: Result<(), No>) {
+        self.memory.note(request, result, self.now);
+        self.respond(request, result);
+    }
+
+    fn respond(&mut self, request: &Request, result: Result<(), No>) {
+        match result {
+            Ok(()) => self.ack(request, &[]),
+            Err(no) => self.nak(request, no),
+        }
+    }
+
+    fn ack(&mut self, request: &Request, data: &[u8]) {
+        self.put(request, ACK, 0, data);
+    }
+
+    fn nak(&mut self, request: &Request, no: No) {
+        let code = match no {
+            No::Errno(errno) => return self.put(request, NAK, 0, &[2, errno]),
+            No::InvalidSize => 3,
+            No::InvalidSession => 4,
+            No::Sessions => 5,
+            No::EndOfFile => 6,
+            No::Unknown => 7,
+            No::Protected => 9,
+            No::NotFound => 10,
+        };
+        self.put(request, NAK, 0, &[code]);
+    }
+
+    fn put(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
+        let data = &data[..data.len().min(DATA)];
+        let mut packet = [0; HEAD + DATA];
+        packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());
+        packet[2..8].copy_from_slice(&[
+            request.session,
+            opcode,
+            data.len() as u8,
+            request.opcode,
+            burst_complete,
+            0,
+        ]);
+        packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
+        packet[HEAD..HEAD + data.len()].copy_from_slice(data);
+        self.reply = Some(Reply { link: request.link, to: request.client, packet });
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,176 @@
+//! The packet inside a FILE_TRANSFER_PROTOCOL: 12 bytes of header (sequence u16, session, opcode, size, opcode answered, burst
+//! complete, 0, offset u32), then at most 239 of data.
+
+use super::DATA;
+use crate::link::frame::Frame;
+use crate::storage::store::{File, UploadError, crc32};
+
+/// Bytes before the data.
+pub const HEAD: usize = 12;
+/// Opcode of an answer that says yes.
+pub const ACK: u8 = 128;
+/// Opcode of an answer that says no.
+pub const NAK: u8 = 129;
+
+/// Opcodes.
+pub mod op {
+    pub const NONE: u8 = 0;
+    pub const TERMINATE: u8 = 1;
+    pub const RESET: u8 = 2;
+    pub const LIST: u8 = 3;
+    pub const OPEN_READ: u8 = 4;
+    pub const READ: u8 = 5;
+    pub const CREATE: u8 = 6;
+    pub const WRITE: u8 = 7;
+    pub const REMOVE: u8 = 8;
+    pub const MAKE_DIRECTORY: u8 = 9;
+    pub const REMOVE_DIRECTORY: u8 = 10;
+    pub const OPEN_WRITE: u8 = 11;
+    pub const TRUNCATE: u8 = 12;
+    pub const RENAME: u8 = 13;
+    pub const CRC32: u8 = 14;
+    pub const BURST_READ: u8 = 15;
+}
+
+/// Why not, as NAK says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum No {
+    /// With an `errno`.
+    Errno(u8),
+    InvalidSize,
+    InvalidSession,
+    Sessions,
+    EndOfFile,
+    Unknown,
+    Protected,
+    NotFound,
+}
+
+pub const EIO: u8 = 5;
+pub const EFBIG: u8 = 27;
+
+impl From<UploadError> for No {
+    fn from(why: UploadError) -> Self {
+        match why {
+            UploadError::Armed | UploadError::Waiting => Self::Protected,
+            UploadError::Incomplete | UploadError::Damaged | UploadError::Flash => Self::Errno(EIO),
+        }
+    }
+}
+
+/// What a person is told: whether it is a warning, and the text.
+pub type Text = (bool, &'static str);
+
+/// All that is told.
+pub const TEXTS: [Text; 8] = [
+    (false, "Roadmap stored: used from the next start"),
+    (false, "Mission stored: used from the next start"),
+    (false, "File removed from the next start on"),
+    (true, "Upload refused: armed"),
+    (true, "Upload refused: restart to use the last one"),
+    (true, "Upload incomplete: old file kept"),
+    (true, "Upload is no such file or damaged: old file kept"),
+    (true, "Flash failed: old file kept"),
+];
+
+/// What is told when a file was removed.
+pub const REMOVED: Text = TEXTS[2];
+
+/// What is told when an upload has ended.
+pub fn told(file: File, result: Result<(), UploadError>) -> Text {
+    TEXTS[match (file, result) {
+        (File::Roadmap, Ok(())) => 0,
+        (File::Mission, Ok(())) => 1,
+        (_, Err(UploadError::Armed)) => 3,
+        (_, Err(UploadError::Waiting)) => 4,
+        (_, Err(UploadError::Incomplete)) => 5,
+        (_, Err(UploadError::Damaged)) => 6,
+        (_, Err(UploadError::Flash)) => 7,
+    }]
+}
+
+#[derive(Clone, Copy, Debug)]
+pub struct Request {
+    pub link: usize,
+    pub client: (u8, u8),
+    pub sequence: u16,
+    pub session: u8,
+    pub opcode: u8,
+    pub size: u8,
+    pub offset: u32,
+    pub data: [u8; DATA],
+}
+
+impl Request {
+    pub fn read(link: usize, frame: &Frame) -> Self {
+        let p = &frame.padded()[3..];
+        let mut data = [0; DATA];
+        data.copy_from_slice(&p[HEAD..HEAD + DATA]);
+        Self {
+            link,
+            client: (frame.system, frame.component),
+            sequence: u16::from_le_bytes([p[0], p[1]]),
+            session: p[2],
+            opcode: p[3],
+            size: p[4],
+            offset: u32::from_le_bytes([p[8], p[9], p[10], p[11]]),
+            data,
+        }
+    }
+
+    pub fn is(&self, other: &Self) -> bool {
+        print(self) == print(other)
+    }
+
+    /// The data that counts, or all of it where the size is too large.
+    pub fn bytes(&self) -> &[u8] {
+        &self.data[..usize::from(self.size).min(DATA)]
+    }
+
+    /// The path it names, without slashes around it; a zero ends it.
+    pub fn path(&self) -> &[u8] {
+        let path = self.bytes().split(|b| *b == 0).next().unwrap_or_default();
+        let path =
+            path.strip_prefix(b".").filter(|rest| rest.first().is_none_or(|b| *b == b'/')).unwrap_or(path);
+        let start = path.iter().position(|b| *b != b'/').unwrap_or(path.len());
+        &path[start..]
+    }
+
+    pub fn file(&self) -> Option<File> {
+        File::ALL.into_iter().find(|file| file.name().as_bytes() == self.path())
+    }
+}
+
+/// Whether it opens a session.
+pub fn is_open(request: &Request) -> bool {
+    matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
+}
+
+/// What a repeated request is known by. Two programs of one client's id may begin at the same sequence number: session and data
+/// may tell them apart.
+pub type Print = ((u8, u8), u16, (u8, u8), u32, u32);
+
+pub fn print(request: &Request) -> Print {
+    let Request { client, sequence, session, opcode, offset, .. } = *request;
+    (client, sequence, (session, opcode), offset, crc32(request.bytes()))
+}
+
+/// Bytes asked for with each packet of a read.
+pub fn chunk(request: &Request) -> usize {
+    match usize::from(request.size) {
+        0 => DATA,
+        size => size.min(DATA),
+    }
+}
+
+pub fn decimal(mut number: u32, digits: &mut [u8; 10]) -> &[u8] {
+    let mut at = digits.len();
+    loop {
+        at -= 1;
+        digits[at] = b'0' + (number % 10) as u8;
+        number /= 10;
+        if number == 0 {
+            return &digits[at..];
+        }
+    }
+}

@@ -1,0 +1,490 @@
+//! The FTP server against a client over a bad link: requests and answers lost, repeated, overtaken.
+
+extern crate std;
+use std::collections::BTreeMap;
+use std::vec;
+use std::vec::Vec;
+
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::packet::{ACK, EFBIG, EIO, NAK, op};
+use super::stream::BURST;
+use super::*;
+use crate::link::frame::{self, Framer, Header};
+use crate::storage::store::READ;
+use crate::testing::fake_flash::{Flash, LAYOUT, obey, roadmap, started};
+
+const US: (u8, u8) = (7, crate::COMPONENT);
+const LINK: usize = 1;
+
+/// Session, opcode, request's opcode, burst complete, offset, data.
+#[derive(Clone, Debug, PartialEq)]
+struct Packet {
+    sequence: u16,
+    session: u8,
+    opcode: u8,
+    answers: u8,
+    last: bool,
+    offset: u32,
+    data: Vec<u8>,
+}
+
+struct World {
+    flash: Flash,
+    store: Store,
+    ftp: Ftp,
+    erasing: Erasing,
+    now: Instant,
+    rng: Pcg32,
+    /// Share of frames lost, and share repeated, in 256ths.
+    loss: u32,
+    repeats: u32,
+    /// Requests under way, and answers that arrived.
+    under_way: Vec<Vec<u8>>,
+    heard: Vec<Packet>,
+    texts: Vec<&'static str>,
+    client: (u8, u8),
+    sequence: u16,
+}
+
+impl World {
+    fn new(seed: u64, loss: u32, repeats: u32) -> Self {
+        let mut flash = Flash::new(seed);
+        let store = started(&mut flash);
+        Self {
+            flash,
+            store,
+            ftp: Ftp::default(),
+            erasing: Erasing::Allowed,
+            now: Instant::from_millis(1),
+            rng: Pcg32::seed_from_u64(seed),
+            loss,
+            repeats,
+            under_way: Vec::new(),
+            heard: Vec::new(),
+            texts: Vec::new(),
+            client: (255, 190),
+            sequence: 0,
+        }
+    }
+
+    fn restart(&mut self) {
+        self.store = started(&mut self.flash);
+        self.ftp = Ftp::default();
+    }
+
+    fn chance(&mut self, share: u32) -> bool {
+        self.rng.next_u32() % 256 < share
+    }
+
+    /// A request as it goes onto the link.
+    fn packet(&mut self, session: u8, opcode: u8, size: u8, offset: u32, data: &[u8]) -> Vec<u8> {
+        let mut p = vec![0; PAYLOAD_LEN];
+        (p[1], p[2]) = US;
+        p[3..5].copy_from_slice(&self.sequence.to_le_bytes());
+        self.sequence = self.sequence.wrapping_add(1);
+        p[5..8].copy_from_slice(&[session, opcode, size]);
+        p[11..15].copy_from_slice(&offset.to_le_bytes());
+        p[15..15 + data.len()].copy_from_slice(data);
+        p
+    }
+
+    fn send(&mut self, packet: &[u8]) {
+        if !self.chance(self.loss) {
+            self.under_way.push(packet.to_vec());
+        }
+        if self.chance(self.repeats) {
+            self.under_way.push(packet.to_vec());
+        }
+    }
+
+    /// A few milliseconds: what is under way arrives in some order, the server works, its answers come back.
+    fn step(&mut self) {
+        self.now = self.now + Duration::from_millis(5);
+        while !self.under_way.is_empty() {
+            // What stays under way is overtaken.
+            if self.under_way.len() > 1 && self.chance(40) {
+                break;
+            }
+            let pick = self.rng.next_u32() as usize % self.under_way.len().min(2);
+            let payload = self.under_way.remove(pick);
+            let mut bytes = [0; frame::MAX_SENT];
+            let header = Header { system: self.client.0, component: self.client.1, sequence: 0 };
+            let length = frame::encode_raw(header, MESSAGE, 84, &payload, &mut bytes);
+            let frame = Framer::new().next(self.now, &mut &bytes[..length]).expect("it is whole");
+            self.ftp.handle(LINK, self.now, &frame);
+        }
+        let mut read = [0; READ];
+        for _ in 0..2000 {
+            self.ftp.advance(&mut self.store, self.now, self.erasing);
+            self.texts.extend(self.ftp.text().map(|(_, text)| text));
+            assert!(self.ftp.poll(0).is_none(), "answered where it was asked");
+            let answer = self.ftp.poll(LINK);
+            if let Some(p) = answer {
+                assert_eq!((p[1], p[2]), self.client);
+                if !self.chance(self.loss) {
+                    let size = usize::from(p[7]);
+                    self.heard.push(Packet {
+                        sequence: u16::from_le_bytes([p[3], p[4]]),
+                        session: p[5],
+                        opcode: p[6],
+                        answers: p[8],
+                        last: p[9] == 1,
+                        offset: u32::from_le_bytes([p[11], p[12], p[13], p[14]]),
+                        data: p[15..15 + size].to_vec(),
+                    });
+                }
+            }
+            let Some(request) = self.store.poll(self.erasing) else {
+                if answer.is_none() {
+                    return;
+                }
+                continue;
+            };
+            let outcome = obey(&mut self.flash, request, self.erasing, &mut read).expect("no power cut");
+            if let Some(answer) = self.store.handle(outcome.map(|len| &read[..len])) {
+                self.ftp.answer(answer);
+            }
+        }
+    }
+
+    /// Asks until answered, as clients do.
+    fn ask(&mut self, session: u8, opcode: u8, offset: u32, data: &[u8]) -> Packet {
+        let request = self.packet(session, opcode, data.len() as u8, offset, data);
+        self.ask_again(&request)
+    }
+
+    fn ask_again(&mut self, request: &[u8]) -> Packet {
+        let sequence = u16::from_le_bytes([request[3], request[4]]).wrapping_add(1);
+        for _ in 0..200 {
+            self.send(request);
+            self.step();
+            if let Some(at) =
+                self.heard.iter().position(|p| p.sequence == sequence && p.answers == request[6])
+            {
+                return self.heard.remove(at);
+            }
+        }
+        panic!("no answer to opcode {}", request[6]);
+    }
+
+    /// Uploads as pymavlink does, with five pieces under way.
+    fn upload(&mut self, name: &str, file: &[u8], piece: usize) -> Packet {
+        let opened = self.ask(0, op::CREATE, 0, name.as_bytes());
+        assert_eq!(opened.opcode, ACK, "{opened:?}");
+        let session = opened.session;
+        // By the sequence number of the answer: late answers of an upload before this one mean nothing.
+        let mut missing: BTreeMap<u16, Vec<u8>> = BTreeMap::new();
+        for (i, part) in file.chunks(piece).enumerate() {
+            let packet = self.packet(session, op::WRITE, part.len() as u8, (i * piece) as u32, part);
+            missing.insert(self.sequence, packet);
+        }
+        for _ in 0..20_000 {
+            if missing.is_empty() {
+                return self.ask(session, op::TERMINATE, 0, &[]);
+            }
+            let next: Vec<_> = missing.values().take(5).cloned().collect();
+            next.iter().for_each(|packet| self.send(packet));
+            self.step();
+            for answer in self.heard.drain(..).filter(|p| p.answers == op::WRITE) {
+                if let Some(packet) = missing.remove(&answer.sequence) {
+                    assert_eq!((answer.opcode, answer.session), (ACK, session), "{answer:?}");
+                    assert_eq!(answer.offset.to_le_bytes(), packet[11..15]);
+                }
+            }
+        }
+        panic!("it never ends");
+    }
+
+    /// Reads a whole file by single reads.
+    fn download(&mut self, name: &str, piece: u8) -> Vec<u8> {
+        let opened = self.ask(0, op::OPEN_READ, 0, name.as_bytes());
+        assert_eq!(opened.opcode, ACK, "{opened:?}");
+        let size = u32::from_le_bytes(opened.data[..4].try_into().unwrap());
+        let mut file = Vec::new();
+        loop {
+            let request = self.packet(opened.session, op::READ, piece, file.len() as u32, &[]);
+            let answer = self.ask_again(&request);
+            if answer.opcode == NAK {
+                assert_eq!(answer.data, [6]);
+                assert_eq!(file.len() as u32, size);
+                assert_eq!(self.ask(opened.session, op::TERMINATE, 0, &[]).opcode, ACK);
+                return file;
+            }
+            file.extend_from_slice(&answer.data);
+        }
+    }
+}
+
+/// CRC-32 as clients compute it: from 0, not inverted.
+fn client_crc(bytes: &[u8]) -> u32 {
+    bytes.iter().fold(0, |crc: u32, byte| {
+        (0..8).fold(crc ^ u32::from(*byte), |c, _| if c & 1 == 1 { c >> 1 ^ 0xEDB8_8320 } else { c >> 1 })
+    })
+}
+
+#[test]
+fn a_roadmap_goes_up_and_comes_back_over_any_link() {
+    for seed in 0..40 {
+        let (loss, repeats) = if seed == 0 { (0, 0) } else { (60, 60) };
+        let mut world = World::new(seed, loss, repeats);
+        let file = roadmap(100 + 10 * seed as usize);
+        assert_eq!(world.ask(0, op::RESET, 0, &[]).opcode, ACK);
+        let piece = [80, 239, 17, 200][seed as usize % 4];
+        assert_eq!(world.upload("/roadmap.bin\0", &file, piece).opcode, ACK, "seed {seed}");
+        assert_eq!(world.texts, ["Roadmap stored: used from the next start"]);
+        assert_eq!(world.download("roadmap.bin", 239), file, "seed {seed}");
+        let sum = world.ask(9, op::CRC32, 0, b"/roadmap.bin");
+        assert_eq!(sum.data, client_crc(&file).to_le_bytes());
+        assert_eq!(sum.session, 9, "of no session: echoed");
+        world.restart();
+        assert!(world.store.roadmap().is_some_and(|extent| extent.end - extent.start == file.len() as u32));
+    }
+}
+
+#[test]
+fn a_burst_comes_in_packets_that_count_on() {
+    let mut world = World::new(50, 0, 0);
+    let file = roadmap(300);
+    world.upload("roadmap.bin", &file, 239);
+    let opened = world.ask(0, op::OPEN_READ, 0, b"roadmap.bin");
+    let (mut back, mut rounds) = (Vec::new(), 0);
+    while back.len() < file.len() {
+        (0..20).for_each(|_| world.step());
+        world.heard.clear();
+        let request = world.packet(opened.session, op::BURST_READ, 80, back.len() as u32, &[]);
+        let first = world.sequence;
+        world.send(&request);
+        (0..20).for_each(|_| world.step());
+        let packets = core::mem::take(&mut world.heard);
+        assert!(packets.len() <= usize::from(BURST) && packets.last().unwrap().last);
+        for (i, packet) in packets.iter().enumerate() {
+            assert_eq!(packet.sequence, first + i as u16);
+            assert_eq!((packet.offset as usize, packet.opcode), (back.len(), ACK));
+            assert_eq!(packet.last, i + 1 == packets.len());
+            back.extend_from_slice(&packet.data);
+        }
+        world.sequence += packets.len() as u16;
+        rounds += 1;
+    }
+    assert_eq!(back, file);
+    assert_eq!(rounds, file.len().div_ceil(80 * usize::from(BURST)));
+    let end = world.packet(opened.session, op::BURST_READ, 80, file.len() as u32, &[]);
+    assert_eq!(world.ask_again(&end).data, [6], "the end");
+}
+
+#[test]
+fn a_burst_that_ends_with_a_whole_packet_says_where_the_end_is() {
+    let mut world = World::new(52, 0, 0);
+    let file = roadmap(300);
+    world.upload("roadmap.bin", &file, 239);
+    let opened = world.ask(0, op::OPEN_READ, 0, b"roadmap.bin");
+    let (size, packets) = (200, 3);
+    let from = file.len() - packets * size;
+    let request = world.packet(opened.session, op::BURST_READ, size as u8, from as u32, &[]);
+    let first = world.sequence;
+    world.heard.clear();
+    world.send(&request);
+    (0..20).for_each(|_| world.step());
+    let heard: Vec<_> = world.heard.iter().map(|p| (p.sequence, p.offset as usize, p.opcode)).collect();
+    let mut want: Vec<_> = (0..packets).map(|i| (first + i as u16, from + i * size, ACK)).collect();
+    want.push((first + packets as u16, file.len(), NAK));
+    assert_eq!(heard, want);
+}
+
+#[test]
+fn what_is_asked_wrongly_is_refused_as_the_protocol_says() {
+    let mut world = World::new(51, 0, 0);
+    let no = |answer: Packet, code: u8| assert_eq!((answer.opcode, answer.data), (NAK, vec![code]));
+    assert_eq!(world.ask(3, op::NONE, 0, &[]).opcode, ACK);
+    no(world.ask(0, op::LIST, 0, b"/"), 6);
+    no(world.ask(0, op::OPEN_READ, 0, b"roadmap.bin"), 10);
+    no(world.ask(0, op::CRC32, 0, b"roadmap.bin"), 10);
+    no(world.ask(0, op::REMOVE, 0, b"roadmap.bin"), 10);
+    no(world.ask(0, op::RENAME, 0, b"roadmap.bin\0mission.bin"), 10);
+    no(world.ask(0, op::CREATE, 0, b"firmware.bin"), 9);
+    no(world.ask(0, op::LIST, 0, b"/fs"), 10);
+    no(world.ask(0, op::MAKE_DIRECTORY, 0, b"/fs"), 9);
+    no(world.ask(0, op::REMOVE_DIRECTORY, 0, b"/"), 9);
+    no(world.ask(0, 77, 0, &[]), 7);
+    no(world.ask(1, op::READ, 0, &[]), 4);
+    no(world.ask(1, op::WRITE, 0, &[1]), 4);
+    no(world.ask(1, op::TERMINATE, 0, &[]), 4);
+    assert_eq!(world.upload("mission.bin", &crate::testing::fake_flash::mission(9), 100).opcode, ACK);
+    let listed = world.ask(0, op::LIST, 0, b"/").data;
+    assert_eq!(listed, b"Fmission.bin\t396\0");
+    no(world.ask(0, op::LIST, 1, b"/"), 6);
+    no(world.ask(0, op::TRUNCATE, 0, b"mission.bin"), 9);
+    // A session of another client is not taken from it while it is alive.
+    let opened = world.ask(0, op::CREATE, 0, b"roadmap.bin");
+    assert_eq!(world.ask(opened.session, op::WRITE, 1 << 20, &[1; 50]).data, [2, EFBIG]);
+    world.client = (254, 1);
+    no(world.ask(0, op::OPEN_READ, 0, b"mission.bin"), 5);
+    no(world.ask(opened.session, op::WRITE, 0, &[1]), 4);
+    assert_eq!(world.ask(0, op::RESET, 0, &[]).opcode, ACK, "resets its own only");
+    world.client = (255, 190);
+    assert_eq!(world.ask(opened.session, op::WRITE, 0, &[1]).opcode, ACK);
+    world.now = world.now + Duration::from_secs(11);
+    world.client = (254, 1);
+    assert_eq!(world.ask(0, op::OPEN_READ, 0, b"mission.bin").opcode, ACK);
+    assert_eq!(world.ask(0, op::REMOVE, 0, b"mission.bin").opcode, ACK);
+    world.restart();
+    no(world.ask(0, op::OPEN_READ, 0, b"mission.bin"), 10);
+}
+
+#[test]
+fn a_damaged_upload_keeps_the_old_file_and_says_so() {
+    let mut world = World::new(52, 30, 30);
+    let (old, mut new) = (roadmap(60), roadmap(90));
+    world.upload("roadmap.bin", &old, 200);
+    world.restart();
+    new[100] ^= 1;
+    let answer = world.upload("roadmap.bin", &new, 200);
+    assert_eq!((answer.opcode, answer.data), (NAK, vec![2, EIO]));
+    assert_eq!(world.texts.last(), Some(&"Upload is no such file or damaged: old file kept"));
+    assert_eq!(world.download("roadmap.bin", 239), old);
+}
+
+#[test]
+fn nothing_is_erased_while_armed() {
+    let mut world = World::new(53, 0, 0);
+    let file = roadmap(60);
+    world.erasing = Erasing::Forbidden;
+    // Two areas were erased ahead; a third roadmap would need one.
+    assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
+    let mut store = Store::mount(LAYOUT, &mut world.flash);
+    core::mem::swap(&mut world.store, &mut store);
+    world.ftp = Ftp::default();
+    assert_eq!(world.upload("roadmap.bin", &roadmap(50), 239).opcode, ACK);
+    world.store = Store::mount(LAYOUT, &mut world.flash);
+    world.ftp = Ftp::default();
+    let refused = world.ask(0, op::CREATE, 0, b"roadmap.bin");
+    assert_eq!((refused.opcode, refused.data), (NAK, vec![9]));
+    assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+    world.heard.clear();
+    // What was asked before that was known waits, and is refused once it is.
+    world.erasing = Erasing::NotYet;
+    let opens = world.packet(0, op::CREATE, 11, 0, b"roadmap.bin");
+    world.send(&opens);
+    (0..3).for_each(|_| world.step());
+    assert!(world.heard.is_empty());
+    world.erasing = Erasing::Forbidden;
+    for _ in 0..3 {
+        let refused = world.ask_again(&opens);
+        assert_eq!((refused.opcode, refused.data), (NAK, vec![9]), "each time that it is asked");
+        assert_eq!(world.texts.last(), Some(&"Upload refused: armed"));
+        world.now = world.now + Duration::from_secs(2);
+    }
+    world.erasing = Erasing::Allowed;
+    assert_eq!(world.upload("roadmap.bin", &file, 239).opcode, ACK);
+}
+
+/// Asks, and again after 4 s each, under the same sequence number or a new one; the answers' opcodes.
+fn ask_three_times(world: &mut World, renumbers: bool, opcode: u8, data: &[u8]) -> [u8; 3] {
+    let mut request = world.packet(0, opcode, data.len() as u8, 0, data);
+    [(); 3].map(|()| {
+        let answer = world.ask_again(&request).opcode;
+        world.now = world.now + Duration::from_secs(4);
+        if renumbers {
+            request = world.packet(0, opcode, data.len() as u8, 0, data);
+        }
+        answer
+    })
+}
+
+#[test]
+fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers() {
+    for (renumbers, damaged) in [(false, false), (false, true), (true, false), (true, true)] {
+        let mut world = World::new(70, 0, 0);
+        let mut file = roadmap(80);
+        file[100] ^= u8::from(damaged);
+        assert_eq!(ask_three_times(&mut world, renumbers, op::CREATE, b"roadmap.bin"), [ACK; 3]);
+        let erased = world.flash.programmed;
+        world.ask(0, op::CREATE, 0, b"roadmap.bin");
+        assert_eq!(world.flash.programmed, erased, "opened once");
+        for (i, piece) in file.chunks(DATA).enumerate() {
+            assert_eq!(world.ask(0, op::WRITE, (i * DATA) as u32, piece).opcode, ACK);
+        }
+        let told = if damaged { NAK } else { ACK };
+        assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [told; 3]);
+        assert_eq!(world.texts.len(), 1, "{:?}", world.texts);
+        world.now = world.now + Duration::from_secs(10);
+        assert_eq!(world.ask(0, op::TERMINATE, 0, &[]).opcode, NAK, "there is no session");
+    }
+}
+
+#[test]
+fn an_upload_after_a_download_of_the_same_numbers_is_stored() {
+    let mut world = World::new(73, 0, 0);
+    let (old, new) = (roadmap(40), roadmap(80));
+    assert_eq!(world.upload("roadmap.bin", &old, 239).opcode, ACK);
+    world.restart();
+    world.sequence = 100;
+    assert_eq!(world.download("roadmap.bin", 239), old);
+    // Its TerminateSession has the number of the download's.
+    world.sequence -= 2 + new.chunks(239).len() as u16;
+    world.heard.clear();
+    assert_eq!(world.upload("roadmap.bin", &new, 239).opcode, ACK);
+    assert!(world.download("roadmap.bin", 239) == new, "said to be stored, and is not");
+}
+
+#[test]
+fn what_came_of_an_earlier_request_of_the_same_number_is_not_told_of_a_later_one() {
+    for pause in [4, 60] {
+        let mut world = World::new(71, 0, 0);
+        let (good, mut damaged) = (roadmap(80), roadmap(80));
+        damaged[100] ^= 1;
+        assert_eq!(world.upload("roadmap.bin", &damaged, 239).opcode, NAK);
+        world.now = world.now + Duration::from_secs(pause);
+        // A client that was restarted counts from zero again, and hears no late answers.
+        world.sequence = 0;
+        world.heard.clear();
+        assert_eq!(world.upload("roadmap.bin", &good, 239).opcode, ACK, "{pause} s later");
+        world.sequence -= 1;
+        let close = world.packet(0, op::TERMINATE, 0, 0, &[]);
+        for _ in 0..3 {
+            assert_eq!(world.ask_again(&close).opcode, ACK, "{pause} s later");
+            world.now = world.now + Duration::from_secs(2);
+        }
+    }
+}
+
+#[test]
+fn any_packets_in_any_order_are_survived() {
+    for seed in 0..60 {
+        let mut world = World::new(100 + seed, 20, 80);
+        let file = roadmap(80);
+        if seed % 2 == 0 {
+            world.upload("roadmap.bin", &file, 239);
+            world.restart();
+        }
+        for _ in 0..400 {
+            let mut data = [0; 60];
+            data.iter_mut().for_each(|byte| *byte = world.rng.next_u32() as u8);
+            let name: &[u8] =
+                [&b"roadmap.bin"[..], b"/mission.bin", &data, b""][world.rng.next_u32() as usize % 4];
+            let session = (world.rng.next_u32() % 3) as u8;
+            let opcode = (world.rng.next_u32() % 18) as u8;
+            let offset = world.rng.next_u32() >> (world.rng.next_u32() % 32);
+            let size = if world.chance(200) { name.len() as u8 } else { world.rng.next_u32() as u8 };
+            // Removing is what it says it is; here everything else must leave the file alone.
+            if opcode != op::REMOVE {
+                let packet = world.packet(session, opcode, size, offset, name);
+                world.send(&packet);
+            }
+            if world.chance(100) {
+                world.step();
+            }
+        }
+        (0..50).for_each(|_| world.step());
+        world.restart();
+        world.now = world.now + Duration::from_secs(20);
+        (world.loss, world.repeats) = (0, 0);
+        world.heard.clear();
+        if seed % 2 == 0 {
+            assert_eq!(world.download("roadmap.bin", 100), file, "seed {seed}");
+        }
+        assert_eq!(world.upload("roadmap.bin", &roadmap(120), 239).opcode, ACK, "seed {seed}");
+    }
+}

@@ -1,0 +1,214 @@
+//! The tunables of one vehicle, as MAVLink parameters: names, ranges, defaults, and how they are kept in flash.
+//!
+//! All travel as REAL32, since ground tools decode parameters by the autopilot's firmware. What the whole swarm must agree on is
+//! in the mission file instead. A changed value counts as soon as the vehicle stands
+//! disarmed and idle, but for the system id: that counts from the next start.
+
+use crate::config::Config;
+
+/// Longest name, bytes.
+pub const NAME_LEN: usize = 16;
+/// Bytes of a kept parameter.
+const ENTRY_LEN: usize = NAME_LEN + 4;
+
+/// A parameter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameter {
+    /// At most 16 bytes of ASCII.
+    pub name: &'static str,
+    /// Smallest value.
+    pub least: f32,
+    /// Largest value.
+    pub most: f32,
+    /// Value of a new board.
+    pub default: f32,
+    /// Whether only whole numbers are allowed.
+    pub whole: bool,
+}
+
+const fn real(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
+    Parameter { name, least, most, default, whole: false }
+}
+
+const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Parameter {
+    Parameter { name, least, most, default, whole: true }
+}
+
+/// How many there are.
+pub const COUNT: usize = 8;
+/// Bytes they take in flash.
+pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
+
+/// All parameters, sorted by name; `companion/README.md` prints the same table.
+pub const TABLE: [Parameter; COUNT] = [
+    real("FLK_ACCEL", 0.2, 5.0, 1.5),
+    whole("FLK_BATT_LOW", 0.0, 100.0, 15.0),
+    real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
+    real("FLK_EST_M", 0.05, 10.0, 0.1),
+    real("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
+    real("FLK_START_TOL", 0.2, 20.0, 2.0),
+    whole("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
+    whole("FLK_SYS_ID", 0.0, 250.0, 0.0),
+];
+
+const ACCEL: usize = 0;
+const BATT_LOW: usize = 1;
+const CLIMB_MAX: usize = 2;
+const EST_M: usize = 3;
+const SPEED_MAX: usize = 4;
+const START_TOL: usize = 5;
+const SWARM_HZ: usize = 6;
+const SYS_ID: usize = 7;
+
+/// Why a value was not taken.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// No parameter has this name or index.
+    Unknown,
+    /// NaN, infinite, out of range, or a fraction where a whole number is due.
+    Range,
+}
+
+/// The values.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    values: [f32; COUNT],
+}
+
+impl Default for Parameters {
+    fn default() -> Self {
+        Self { values: TABLE.map(|parameter| parameter.default) }
+    }
+}
+
+impl Parameters {
+    /// Index of a name.
+    pub fn index_of(name: &[u8]) -> Option<usize> {
+        TABLE.iter().position(|parameter| parameter.name.as_bytes() == name)
+    }
+
+    /// Name and value at an index.
+    pub fn get(&self, index: usize) -> Option<(&'static str, f32)> {
+        Some((TABLE.get(index)?.name, *self.values.get(index)?))
+    }
+
+    /// Sets a value; whether it changed.
+    ///
+    /// # Errors
+    /// An index that is none, or a value out of range: nothing changes.
+    pub fn set(&mut self, index: usize, value: f32) -> Result<bool, Refused> {
+        let (Some(parameter), Some(held)) = (TABLE.get(index), self.values.get_mut(index)) else {
+            return Err(Refused::Unknown);
+        };
+        let fraction = parameter.whole && libm::truncf(value) != value;
+        if !(parameter.least..=parameter.most).contains(&value) || fraction {
+            return Err(Refused::Range);
+        }
+        Ok(core::mem::replace(held, value) != value)
+    }
+
+    /// The system id asked for; `None` for the autopilot's own.
+    pub fn system_id(&self) -> Option<u8> {
+        Some(self.values[SYS_ID] as u8).filter(|id| *id != 0)
+    }
+
+    /// Puts this vehicle's values into the mission's settings.
+    pub fn apply<const V: usize>(&self, config: &mut Config<V>) {
+        config.accel_mps2 = self.values[ACCEL];
+        config.battery_low_percent = self.values[BATT_LOW] as i8;
+        config.climb_mps = libm::fminf(config.climb_mps, self.values[CLIMB_MAX]);
+        config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
+        config.estimate_m = self.values[EST_M];
+        config.start_tolerance_m = self.values[START_TOL];
+        config.swarm_hz = self.values[SWARM_HZ] as u8;
+    }
+
+    /// As they are kept: for each the name, padded with zeros, and the value.
+    pub fn to_bytes(&self) -> [u8; STORED_LEN] {
+        let mut bytes = [0; STORED_LEN];
+        for (entry, (parameter, value)) in
+            bytes.chunks_exact_mut(ENTRY_LEN).zip(TABLE.iter().zip(self.values))
+        {
+            entry[..parameter.name.len()].copy_from_slice(parameter.name.as_bytes());
+            entry[NAME_LEN..].copy_from_slice(&value.to_le_bytes());
+        }
+        bytes
+    }
+
+    /// Takes one kept entry: an older or newer firmware's names and ranges may be others, so what does not fit is left at its
+    /// default.
+    pub fn restore(&mut self, entry: &[u8; ENTRY_LEN]) {
+        let name = entry[..NAME_LEN].split(|b| *b == 0).next().unwrap_or_default();
+        let value = f32::from_le_bytes([entry[16], entry[17], entry[18], entry[19]]);
+        if let Some(index) = Self::index_of(name) {
+            // Out of range it stays what it is.
+            let _ = self.set(index, value);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_fit_are_sorted_and_defaults_in_range() {
+        assert!(TABLE.windows(2).all(|pair| pair[0].name < pair[1].name));
+        let mut values = Parameters::default();
+        for (index, parameter) in TABLE.iter().enumerate() {
+            assert!(parameter.name.len() <= NAME_LEN && parameter.name.is_ascii());
+            assert_eq!(values.set(index, parameter.default), Ok(false));
+            assert_eq!(values.set(index, parameter.most), Ok(parameter.most != parameter.default));
+            for bad in [f32::NAN, f32::INFINITY, parameter.least - 0.1, parameter.most * 1.1 + 0.1] {
+                assert_eq!(values.set(index, bad), Err(Refused::Range));
+            }
+            assert_eq!(parameter.whole, values.set(index, parameter.least + 0.5) == Err(Refused::Range));
+        }
+        assert_eq!(values.set(COUNT, 1.0), Err(Refused::Unknown));
+    }
+
+    #[test]
+    fn the_readme_prints_the_table() {
+        extern crate std;
+        let readme = include_str!("../../README.md");
+        for p in TABLE {
+            let row = std::format!("| {} | {} | {} | {} |", p.name, p.least, p.most, p.default);
+            assert!(readme.contains(&row), "{row}");
+        }
+    }
+
+    #[test]
+    fn kept_values_come_back_and_foreign_ones_do_no_harm() {
+        let mut values = Parameters::default();
+        values.set(SPEED_MAX, 3.5).unwrap();
+        values.set(SYS_ID, 7.0).unwrap();
+        let bytes = values.to_bytes();
+        let (entries, _) = bytes.as_chunks::<ENTRY_LEN>();
+        let mut back = Parameters::default();
+        entries.iter().for_each(|entry| back.restore(entry));
+        assert_eq!((back, back.system_id()), (values, Some(7)));
+        for foreign in [
+            [0xFF; ENTRY_LEN],
+            *b"FLK_ACCEL\0\0\0\0\0\0\0\xFF\xFF\xFF\xFF",
+            *b"FLK_NEWER\0\0\0\0\0\0\0\0\0\0\0",
+        ] {
+            back.restore(&foreign);
+        }
+        assert_eq!(back, values);
+    }
+
+    #[test]
+    fn limits_only_slow_a_mission_down() {
+        use planner_core::{Point, frames::Geodetic};
+        let origin = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+        let mission = Config::<1>::new(1, Point::zeros(), origin);
+        let mut config = mission.clone();
+        Parameters::default().apply(&mut config);
+        assert_eq!(config, mission, "the defaults change nothing");
+        let mut values = Parameters::default();
+        values.set(SPEED_MAX, 0.5).unwrap();
+        values.set(BATT_LOW, 30.0).unwrap();
+        values.apply(&mut config);
+        assert_eq!((config.cruise_mps, config.battery_low_percent), (0.5, 30));
+    }
+}

@@ -1,0 +1,465 @@
+//! The mission file: who flies, from where to which goals, how fast and how far apart; uploaded beside the roadmap.
+//!
+//! Little-endian, versioned, closed by a CRC-32; byte by byte in `companion/README.md`. Lengths are metres, speeds m/s, points
+//! east, north, up in the mission frame. Its CRC is what companions compare on the radio: it covers the roadmap's, so who
+//! agrees on it plans the same. What one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
+//!
+//! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor can meet a number that is
+//! not sound, whatever the bytes were.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::file::FileError;
+use planner_core::frames::Geodetic;
+use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
+use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
+use planner_core::schedule::ScheduleConfig;
+
+use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, holds};
+
+mod error;
+pub use error::MissionError;
+
+/// First eight bytes of the file.
+pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
+/// Version this code writes; it also reads version 1, which names no ground station and means 255.
+pub const VERSION: u16 = 2;
+/// The version before.
+const WITHOUT_GROUND_STATIONS: u16 = 1;
+/// Bytes before the first vehicle.
+pub const HEADER_LEN: usize = 104;
+/// Bytes of a vehicle.
+pub const VEHICLE_LEN: usize = 32;
+/// Bytes of a goal.
+pub const GOAL_LEN: usize = 16;
+/// The vehicle's goal that means: none of its own.
+pub const NO_GOAL: u16 = u16::MAX;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+const CRC_LEN: usize = 4;
+/// Flag: the six numbers of the geofence count.
+const FENCED: u16 = 1;
+/// Fastest speed a mission may name, m/s.
+const MAX_SPEED_MPS: f32 = 1000.0;
+
+/// What all vehicles of a mission share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissionHeader {
+    /// CRC-32 of the roadmap file it belongs to.
+    pub roadmap_crc: u32,
+    /// How goals are given out.
+    pub mode: Mode,
+    /// How vehicles keep apart.
+    pub method: Method,
+    /// Origin of the mission frame.
+    pub origin: Geodetic,
+    /// Speed along paths, m/s.
+    pub cruise_mps: f32,
+    /// Separation and speeds that are planned with; the schedule reckons with less than the cruise speed.
+    pub schedule: ScheduleConfig,
+    /// Smallest distance between two vehicles' centres, metres.
+    pub safety_distance_m: f32,
+    /// Minimum and maximum corner of the volume the vehicles may be in.
+    pub geofence: Option<(Point, Point)>,
+    /// System ids whose commands count; 0 is no id.
+    pub ground_stations: [u8; GROUND_STATIONS],
+}
+
+/// One vehicle; vehicle `i` starts at node `i` of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissionVehicle {
+    /// System id, clearance needed, height of the start over its pad, own goal.
+    pub task: VehicleTask,
+    /// First point of its path.
+    pub start: Point,
+    /// Radius of its hull, metres.
+    pub radius_m: f32,
+    /// Fastest it can fly, m/s.
+    pub speed_max_mps: f32,
+}
+
+/// One goal; goal `i` is node `vehicles + i` of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissionGoal {
+    /// Where it is.
+    pub position: Point,
+    /// Its height over where a vehicle stands on the ground below it, metres.
+    pub descent_m: f32,
+}
+
+/// Whether it is more than zero and at most `most`; false for NaN.
+fn positive(value: f32, most: f32) -> bool {
+    value > 0.0 && value <= most
+}
+
+fn in_range(point: &Point) -> bool {
+    point.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
+}
+
+impl MissionHeader {
+    fn check(&self) -> Result<(), MissionError> {
+        let refuse = |name| Err(FileError::Header(name).into());
+        if !self.origin.is_valid() {
+            return refuse("origin");
+        }
+        let schedule = &self.schedule;
+        if !positive(self.cruise_mps, MAX_SPEED_MPS) {
+            return refuse("cruise_mps");
+        }
+        if !positive(schedule.cruise_mps, MAX_SPEED_MPS) {
+            return refuse("schedule_mps");
+        }
+        if !positive(schedule.vertical_mps, MAX_SPEED_MPS) {
+            return refuse("vertical_mps");
+        }
+        if !positive(self.safety_distance_m, MAX_COORDINATE_M) {
+            return refuse("safety_distance_m");
+        }
+        if !positive(schedule.separation_m, MAX_COORDINATE_M) {
+            return refuse("separation_m");
+        }
+        if !positive(schedule.parked_separation_m, MAX_COORDINATE_M) {
+            return refuse("parked_separation_m");
+        }
+        let sound = |(low, high): &(Point, Point)| {
+            in_range(low) && in_range(high) && (0..3).all(|axis| low[axis] <= high[axis])
+        };
+        if !self.geofence.as_ref().is_none_or(sound) {
+            return refuse("geofence");
+        }
+        if self.ground_stations == [0; GROUND_STATIONS] {
+            return refuse("ground_stations");
+        }
+        Ok(())
+    }
+}
+
+impl MissionVehicle {
+    fn is_sound(&self, goals: usize) -> bool {
+        let task = &self.task;
+        task.id != 0
+            && task.goal.is_none_or(|goal| usize::from(goal) < goals)
+            && in_range(&self.start)
+            && (0.0..=MAX_COORDINATE_M).contains(&task.climb_m)
+            && positive(task.required_clearance_m, MAX_COORDINATE_M)
+            && positive(self.radius_m, MAX_COORDINATE_M)
+            && positive(self.speed_max_mps, MAX_SPEED_MPS)
+    }
+
+    fn from_bytes(b: &[u8; VEHICLE_LEN]) -> Self {
+        let goal = u16::from_le_bytes([b[2], b[3]]);
+        Self {
+            task: VehicleTask {
+                id: b[0],
+                required_clearance_m: f32_at(b, 20),
+                climb_m: f32_at(b, 24),
+                goal: (goal != NO_GOAL).then_some(goal),
+            },
+            start: point_at(b, 4),
+            radius_m: f32_at(b, 16),
+            speed_max_mps: f32_at(b, 28),
+        }
+    }
+
+    fn to_bytes(self) -> [u8; VEHICLE_LEN] {
+        let mut b = [0; VEHICLE_LEN];
+        b[0] = self.task.id;
+        b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
+        let numbers = [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
+        put(&mut b, 4, self.start.iter().copied().chain(numbers));
+        b
+    }
+}
+
+impl MissionGoal {
+    fn is_sound(&self) -> bool {
+        in_range(&self.position) && (0.0..=MAX_COORDINATE_M).contains(&self.descent_m)
+    }
+
+    fn from_bytes(b: &[u8; GOAL_LEN]) -> Self {
+        Self { position: point_at(b, 0), descent_m: f32_at(b, 12) }
+    }
+}
+
+fn f32_at(b: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]])
+}
+
+fn point_at(b: &[u8], at: usize) -> Point {
+    Point::new(f32_at(b, at), f32_at(b, at + 4), f32_at(b, at + 8))
+}
+
+fn put(b: &mut [u8], at: usize, numbers: impl Iterator<Item = f32>) {
+    for (to, number) in b[at..].chunks_exact_mut(4).zip(numbers) {
+        to.copy_from_slice(&number.to_le_bytes());
+    }
+}
+
+/// Bytes the mission file takes, CRC included.
+pub const fn encoded_len(vehicles: usize, goals: usize) -> usize {
+    HEADER_LEN + vehicles * VEHICLE_LEN + goals * GOAL_LEN + CRC_LEN
+}
+
+/// Writes a mission file; the bytes written.
+///
+/// # Errors
+/// Whatever [`MissionView::parse`] would refuse, or `out` is too small.
+pub fn write(
+    header: &MissionHeader,
+    vehicles: &[MissionVehicle],
+    goals: &[MissionGoal],
+    out: &mut [u8],
+) -> Result<usize, MissionError> {
+    let (Ok(vehicle_count), Ok(goal_count)) = (u16::try_from(vehicles.len()), u16::try_from(goals.len()))
+    else {
+        return Err(FileError::Length.into());
+    };
+    let needed = encoded_len(vehicles.len(), goals.len());
+    let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
+    out[..8].copy_from_slice(&MAGIC);
+    out[8..10].copy_from_slice(&VERSION.to_le_bytes());
+    out[10..12].copy_from_slice(&(HEADER_LEN as u16).to_le_bytes());
+    out[12..16].copy_from_slice(&(needed as u32).to_le_bytes());
+    out[16..20].copy_from_slice(&header.roadmap_crc.to_le_bytes());
+    out[20] = match header.mode {
+        Mode::Labelled => 0,
+        Mode::Unlabelled(Objective::TotalDistance) => 1,
+        Mode::Unlabelled(Objective::Makespan) => 2,
+    };
+    out[21] = match header.method {
+        Method::Off => 0,
+        Method::Algorithm2 => 1,
+        Method::Priority => 2,
+    };
+    let flags = if header.geofence.is_some() { FENCED } else { 0 };
+    out[22..24].copy_from_slice(&flags.to_le_bytes());
+    out[24..26].copy_from_slice(&vehicle_count.to_le_bytes());
+    out[26..28].copy_from_slice(&goal_count.to_le_bytes());
+    out[28..32].copy_from_slice(&header.ground_stations);
+    let origin = [header.origin.lat_deg, header.origin.lon_deg, header.origin.alt_m];
+    for (to, number) in out[32..56].chunks_exact_mut(8).zip(origin) {
+        to.copy_from_slice(&number.to_le_bytes());
+    }
+    let s = &header.schedule;
+    let numbers =
+        [header.cruise_mps, s.vertical_mps, header.safety_distance_m, s.separation_m, s.parked_separation_m];
+    let (low, high) = header.geofence.unwrap_or_default();
+    put(
+        &mut out[..HEADER_LEN],
+        56,
+        numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()).chain([s.cruise_mps]),
+    );
+    let (to_vehicles, to_goals) = out[HEADER_LEN..].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
+        to.copy_from_slice(&vehicle.to_bytes());
+    }
+    for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
+        put(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
+    }
+    let crc = CRC.checksum(&out[..needed - CRC_LEN]);
+    out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
+    MissionView::parse(out)?;
+    Ok(needed)
+}
+
+/// A checked mission over borrowed bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct MissionView<'a> {
+    header: MissionHeader,
+    crc: u32,
+    vehicles: &'a [[u8; VEHICLE_LEN]],
+    goals: &'a [[u8; GOAL_LEN]],
+}
+
+impl<'a> MissionView<'a> {
+    /// Checks a mission file at the start of `bytes`; what follows its length is ignored.
+    ///
+    /// # Errors
+    /// Names the first thing that is not sound.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, MissionError> {
+        let head: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or(FileError::Truncated)?;
+        if head[..8] != MAGIC {
+            return Err(FileError::Magic.into());
+        }
+        let u16_at = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
+        let u32_at = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let ground_stations = match u16_at(8) {
+            WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
+            VERSION => [head[28], head[29], head[30], head[31]],
+            other => return Err(FileError::Version(other).into()),
+        };
+        let total = u32_at(12) as usize;
+        let (vehicle_count, goal_count) = (usize::from(u16_at(24)), usize::from(u16_at(26)));
+        if usize::from(u16_at(10)) != HEADER_LEN || encoded_len(vehicle_count, goal_count) != total {
+            return Err(FileError::Length.into());
+        }
+        let body = bytes.get(..total).ok_or(FileError::Truncated)?;
+        let (covered, stored) = body.split_last_chunk::<CRC_LEN>().ok_or(FileError::Truncated)?;
+        let crc = u32::from_le_bytes(*stored);
+        if CRC.checksum(covered) != crc {
+            return Err(FileError::Crc.into());
+        }
+        let f64_at = |at: usize| f64::from_bits(u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32);
+        let header = MissionHeader {
+            roadmap_crc: u32_at(16),
+            mode: match head[20] {
+                0 => Mode::Labelled,
+                1 => Mode::Unlabelled(Objective::TotalDistance),
+                2 => Mode::Unlabelled(Objective::Makespan),
+                _ => return Err(FileError::Header("mode").into()),
+            },
+            method: match head[21] {
+                0 => Method::Off,
+                1 => Method::Algorithm2,
+                2 => Method::Priority,
+                _ => return Err(FileError::Header("method").into()),
+            },
+            origin: Geodetic { lat_deg: f64_at(32), lon_deg: f64_at(40), alt_m: f64_at(48) },
+            cruise_mps: f32_at(head, 56),
+            schedule: ScheduleConfig {
+                cruise_mps: f32_at(head, 100),
+                vertical_mps: f32_at(head, 60),
+                separation_m: f32_at(head, 68),
+                parked_separation_m: f32_at(head, 72),
+            },
+            safety_distance_m: f32_at(head, 64),
+            geofence: match u16_at(22) {
+                0 => None,
+                FENCED => Some((point_at(head, 76), point_at(head, 88))),
+                _ => return Err(FileError::Header("flags").into()),
+            },
+            ground_stations,
+        };
+        header.check()?;
+        let (vehicles, goals) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
+        let view = Self { header, crc, vehicles: vehicles.as_chunks().0, goals: goals.as_chunks().0 };
+        view.check_lists()?;
+        if u16_at(8) == VERSION && view.vehicles().any(|v| ground_stations.contains(&v.task.id)) {
+            return Err(FileError::Header("ground_stations").into());
+        }
+        Ok(view)
+    }
+
+    fn check_lists(&self) -> Result<(), MissionError> {
+        let labelled = self.header.mode == Mode::Labelled;
+        let inside = |place: &Point| self.header.geofence.as_ref().is_none_or(|fence| holds(fence, place));
+        let mut seen = [false; 256];
+        for (i, vehicle) in self.vehicles().enumerate() {
+            let id = vehicle.task.id;
+            let known = core::mem::replace(&mut seen[usize::from(id)], true);
+            if known || !vehicle.is_sound(self.goals.len()) {
+                return Err(MissionError::Vehicle(i as u16));
+            }
+            let same = |other: &[u8; VEHICLE_LEN]| other[2..4] == self.vehicles[i][2..4];
+            if labelled && vehicle.task.goal.is_some() && self.vehicles[..i].iter().any(same) {
+                return Err(MissionError::SameGoal(id));
+            }
+            if !inside(&vehicle.start) {
+                return Err(MissionError::StartOutside(id));
+            }
+        }
+        for (goal, i) in self.goals().zip(0..) {
+            if !goal.is_sound() {
+                return Err(MissionError::Goal(i));
+            }
+            if !inside(&goal.position) {
+                return Err(MissionError::GoalOutside(i));
+            }
+        }
+        Ok(())
+    }
+
+    /// What all vehicles share.
+    pub fn header(&self) -> &MissionHeader {
+        &self.header
+    }
+
+    /// The CRC-32 at the end of the file: the mission's identity on the radio.
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// Bytes the file takes.
+    pub fn byte_len(&self) -> usize {
+        encoded_len(self.vehicles.len(), self.goals.len())
+    }
+
+    /// The vehicles, in the order of the roadmap's starts.
+    pub fn vehicles(&self) -> impl ExactSizeIterator<Item = MissionVehicle> + '_ {
+        self.vehicles.iter().map(MissionVehicle::from_bytes)
+    }
+
+    /// The goals, in the order of the roadmap's.
+    pub fn goals(&self) -> impl ExactSizeIterator<Item = MissionGoal> + '_ {
+        self.goals.iter().map(MissionGoal::from_bytes)
+    }
+
+    /// Place of a vehicle in the mission.
+    pub fn index_of(&self, system_id: u8) -> Option<usize> {
+        self.vehicles().position(|vehicle| vehicle.task.id == system_id)
+    }
+
+    /// Whether it was made for this roadmap.
+    pub fn fits(&self, roadmap: &RoadmapView<'_>) -> bool {
+        let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
+        self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
+    }
+
+    /// What the whole swarm's planner is asked, over lists that the caller keeps, for vehicles with room for `gates_most`.
+    ///
+    /// # Errors
+    /// [`MissionError::RosterFull`] if there are more vehicles or goals than `V`.
+    pub fn request<'b, const V: usize>(
+        &self,
+        tasks: &'b mut Vec<VehicleTask, V>,
+        descents_m: &'b mut Vec<f32, V>,
+        gates_most: usize,
+    ) -> Result<PlanRequest<'b>, MissionError> {
+        if self.vehicles.len() > V || self.goals.len() > V {
+            return Err(MissionError::RosterFull);
+        }
+        tasks.clear();
+        tasks.extend(self.vehicles().map(|vehicle| vehicle.task));
+        descents_m.clear();
+        descents_m.extend(self.goals().map(|goal| goal.descent_m));
+        Ok(PlanRequest {
+            vehicles: tasks,
+            descents_m,
+            mode: self.header.mode,
+            schedule: self.header.schedule,
+            gates_most,
+        })
+    }
+
+    /// The settings of one vehicle's companion, with the defaults of what the mission does not say.
+    ///
+    /// # Errors
+    /// The vehicle is not in the mission, or the mission has more vehicles than `V`.
+    pub fn config<const V: usize>(&self, system_id: u8) -> Result<Config<V>, MissionError> {
+        let index = self.index_of(system_id).ok_or(MissionError::NotInRoster(system_id))?;
+        let own = MissionVehicle::from_bytes(&self.vehicles[index]);
+        if self.vehicles.len() > V {
+            return Err(MissionError::RosterFull);
+        }
+        let header = &self.header;
+        let mut config = Config::new(system_id, own.start, header.origin);
+        config.roster.clear();
+        config.roster.extend(self.vehicles().map(|v| RosterEntry { system_id: v.task.id, start: v.start }));
+        config.roster.sort_unstable_by_key(|entry| entry.system_id);
+        config.mission_crc = self.crc;
+        config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
+        config.climb_mps = header.schedule.vertical_mps;
+        config.radius_m = own.radius_m;
+        config.required_clearance_m = own.task.required_clearance_m;
+        config.safety_distance_m = header.safety_distance_m;
+        config.method = header.method;
+        config.geofence = header.geofence;
+        config.ground_stations = header.ground_stations;
+        Ok(config)
+    }
+}
+
+#[cfg(test)]
+mod tests;

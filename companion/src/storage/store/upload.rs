@@ -1,0 +1,142 @@
+//! A file coming in: from the first piece in the window to the seal.
+
+use planner_core::roadmap;
+
+use super::area::{Area, Condition, DATA_AT};
+use super::window::{Taken, WINDOW};
+use super::{Erasing, File, Store};
+use crate::storage::mission_file::MissionView;
+
+/// Why an upload came to nothing. What was there before is still there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UploadError {
+    /// An area would have to be erased, and the vehicle is armed.
+    Armed,
+    /// A roadmap waits for a restart, and the other slot is in use.
+    Waiting,
+    /// Pieces are missing.
+    Incomplete,
+    /// It is no such file, or damaged.
+    Damaged,
+    /// The flash failed.
+    Flash,
+}
+
+/// How far an upload has come.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UploadState {
+    /// Its area is being erased or marked.
+    Opening,
+    /// Pieces are taken.
+    Taking,
+    /// All was sent; it is written, read back and sealed.
+    Closing,
+    /// Over.
+    Ended(Result<(), UploadError>),
+}
+
+impl Store {
+    /// How far the upload has come, if there is one.
+    pub fn upload(&self) -> Option<UploadState> {
+        self.upload.map(|(_, state)| state)
+    }
+
+    /// Begins an upload; one under way is given up. Pieces are taken once [`Self::upload`] says so.
+    ///
+    /// # Errors
+    /// [`UploadError::Armed`] or [`UploadError::Waiting`].
+    pub fn open(&mut self, file: File, erasing: Erasing) -> Result<(), UploadError> {
+        if self.upload() == Some(UploadState::Closing) {
+            return Err(UploadError::Waiting);
+        }
+        self.abandon();
+        if self.layout.stalls && erasing == Erasing::Forbidden {
+            return Err(UploadError::Armed);
+        }
+        if file == File::Roadmap {
+            let slot = self.target().ok_or(UploadError::Waiting)?;
+            if self.slots[slot] != Condition::Clean && erasing == Erasing::Forbidden {
+                return Err(UploadError::Armed);
+            }
+            self.erasure_failed = false;
+        }
+        self.window.reset();
+        let state = if file == File::Roadmap { UploadState::Opening } else { UploadState::Taking };
+        self.upload = Some((file, state));
+        Ok(())
+    }
+
+    /// Takes a piece of the file.
+    pub fn take(&mut self, offset: u32, piece: &[u8]) -> Taken {
+        match self.upload {
+            Some((File::Mission, UploadState::Taking)) => self.window.take(offset, piece, WINDOW as u32),
+            Some((File::Roadmap, UploadState::Taking)) => {
+                self.window.take(offset, piece, self.layout.slot_len - DATA_AT)
+            }
+            _ => Taken::Later,
+        }
+    }
+
+    /// All was sent: the file is to be checked and kept. [`Self::upload`] tells when that has ended.
+    pub fn close(&mut self) {
+        let Some((file, UploadState::Taking)) = self.upload else { return };
+        let state = match (file, self.window.rest()) {
+            (_, Some([])) => UploadState::Ended(Err(UploadError::Damaged)),
+            (_, None) => UploadState::Ended(Err(UploadError::Incomplete)),
+            (File::Mission, Some(rest))
+                if MissionView::parse(rest).is_ok_and(|view| view.byte_len() == rest.len()) =>
+            {
+                UploadState::Closing
+            }
+            (File::Mission, Some(_)) => UploadState::Ended(Err(UploadError::Damaged)),
+            (File::Roadmap, Some(_)) => UploadState::Closing,
+        };
+        self.upload = Some((file, state));
+        if let UploadState::Ended(result) = state {
+            self.end(result);
+        }
+    }
+
+    /// Gives an upload up, unless all of it was sent: then it is kept.
+    pub fn abandon(&mut self) {
+        if !matches!(self.upload, Some((_, UploadState::Closing))) {
+            self.drop_job();
+            self.clear_slot();
+            self.upload = None;
+        }
+    }
+
+    pub(super) fn end(&mut self, result: Result<(), UploadError>) {
+        if let Some((file, _)) = self.upload {
+            self.upload = Some((file, UploadState::Ended(result)));
+        }
+        if result.is_err() {
+            self.clear_slot();
+        }
+    }
+
+    /// A slot that was being written is to be erased before it is written again.
+    fn clear_slot(&mut self) {
+        for slot in &mut self.slots {
+            if *slot == Condition::Open {
+                *slot = Condition::Dirty;
+            }
+        }
+    }
+
+    /// The slot that may be written: not in use, and not the newest.
+    pub(super) fn target(&self) -> Option<usize> {
+        let newest = self.newest();
+        (0..2).find(|i| Some(*i) != self.in_use && Some(*i) != newest)
+    }
+
+    /// The slot that is being written.
+    pub(super) fn open_slot(&self) -> Option<Area> {
+        self.slots.iter().position(|slot| *slot == Condition::Open).map(Area::Slot)
+    }
+
+    /// Whether the first bytes are those of a roadmap file of this length that can be read.
+    pub(super) fn is_roadmap(bytes: &[u8], len: u32) -> bool {
+        bytes.first_chunk().is_some_and(|head| roadmap::declared_len(head) == Ok(len as usize))
+    }
+}

@@ -1,0 +1,5 @@
+//! The other vehicles: what is heard of them, and ways around them.
+
+pub(crate) mod detour;
+pub mod neighbours;
+pub(crate) mod sweep;

@@ -1,0 +1,441 @@
+//! The neighbours as last heard on the swarm link, one slot for each system id, in the mission frame.
+//!
+//! From the byte to the speed scale: GLOBAL_POSITION_INT → [`Neighbours::handle_position`] → ENU in
+//! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
+//! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
+
+mod contact;
+mod met;
+mod places;
+pub(crate) mod relay;
+
+use heapless::Vec;
+use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::deconflict::Neighbour;
+use planner_core::frames::{self, Geodetic};
+
+use self::contact::Contact;
+pub(crate) use self::met::{Met, Reach};
+use crate::autopilot::telemetry::SequenceFilter;
+use crate::companion::STANDING_MPS;
+use crate::config::RosterEntry;
+use crate::link::echo::{Echo, Lateness};
+use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
+use crate::time::{Duration, Instant};
+
+/// A position older than the one held by less than this is late; by more, the sender was restarted.
+const RESTART_MS: u32 = 10_000;
+/// Heard within this time counts as heard: four positions and intents.
+const LATELY: Duration = Duration::from_millis(800);
+/// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
+/// 20 s later; this leaves it 20 s to come down.
+const DEAD: Duration = Duration::from_secs(45);
+/// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
+const DOWN: Duration = Duration::from_secs(75);
+/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
+const STRETCH_M: f32 = 6.0;
+/// And by so much for each second that messages are late, m/s.
+const STRETCH_MPS: f32 = 2.0;
+/// Spacing of the places on that stretch below which it may lie, metres.
+const STRETCH_STEP_M: f32 = 1.0;
+/// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
+/// ground.
+const COLUMN_M: f32 = 60.0;
+/// An airborne vehicle of which nothing is heard for this long may land before more is heard.
+const SILENT: Duration = Duration::from_secs(3);
+/// Further below a vehicle whose height is known there is time until it is nearer, metres.
+const BELOW_M: f32 = 15.0;
+/// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
+const LANDS_MPS: f32 = 2.0;
+/// A place older than this tells little of how low a vehicle is that lands, seconds.
+const OLD_S: f32 = 1.0;
+/// The same: what was heard within this time is no older.
+const FRESHLY: Duration = Duration::from_secs(1);
+/// A vehicle this little below may yet be above in a moment, metres.
+const LEVEL_M: f32 = 1.0;
+/// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
+const VAGUE_M: f32 = 0.5;
+/// What two vehicles in the air may stray together, one of which hovers, metres.
+const SWAY_M: f32 = 0.1;
+/// A position counts as the vehicle's of the roster if an intent of our mission was heard from it within this time: ten intents
+/// at the lowest rate.
+const BELONGS: Duration = Duration::from_secs(5);
+/// Most strangers that are kept; a full roster leaves room for one.
+const STRANGERS: usize = 4;
+/// A stranger that was not heard for this long is forgotten.
+const STRANGER_STAYS: Duration = Duration::from_secs(60);
+/// Rank of a stranger: behind everyone.
+const STRANGER: u16 = u16::MAX;
+/// A vehicle that stood for so long is not about to go on.
+const STANDS: Duration = Duration::from_secs(5);
+/// Progress is believed as if it were that of so much later, seconds: messages come up to a second late, and then at once.
+const LATE_S: f32 = 1.0;
+/// What progress may jump, metres: where a vehicle takes up its path again, its nearest point is new.
+const STRIDE_M: f32 = 1.0;
+/// For so long a vehicle that nobody hears may fly on at the top of its climb, seconds.
+const BEYOND_TOP_S: f32 = 1.2;
+/// A climb leads straight up, this little beside, metres.
+const CLIMB_BESIDE_M: f32 = 0.9;
+/// A top this little above is reached, metres.
+const TOP_M: f32 = 0.3;
+/// Further away than any vehicle.
+const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
+/// Nobody flies higher over another than this, metres.
+const SKY_M: f32 = 1000.0;
+
+/// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
+/// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
+#[derive(Clone, Debug)]
+pub struct Neighbours<const V: usize> {
+    contacts: Vec<Contact, V>,
+    heard: Vec<Neighbour, V>,
+    /// The first contacts are the roster, sorted by id; the rest are strangers.
+    roster: usize,
+    dropped: u32,
+    /// When it was last found that no vehicle that is out blocks the path.
+    clear_at: Instant,
+    /// No vehicle's progress grows faster, m/s.
+    fastest_mps: f32,
+}
+
+impl<const V: usize> Neighbours<V> {
+    /// The vehicles of a roster sorted by id, without the own one; nobody heard yet. None of them flies faster along its path
+    /// than `nominal_mps`, or than it lands.
+    pub fn new(roster: &[RosterEntry], own_id: u8, nominal_mps: f32) -> Self {
+        let mut table = Self {
+            contacts: Vec::new(),
+            heard: Vec::new(),
+            roster: 0,
+            dropped: 0,
+            clear_at: Instant::ZERO,
+            fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
+        };
+        for (rank, entry) in roster.iter().enumerate() {
+            if entry.system_id != own_id {
+                // A roster of at most V entries fits.
+                let _ = table.add(entry.system_id, rank as u16);
+            }
+        }
+        table.roster = table.contacts.len();
+        table
+    }
+
+    /// Vehicles that found no slot, by frames.
+    pub fn dropped(&self) -> u32 {
+        self.dropped
+    }
+
+    fn add(&mut self, id: u8, rank: u16) -> Option<usize> {
+        let state = Neighbour {
+            id,
+            rank,
+            position: Point::zeros(),
+            velocity: Point::zeros(),
+            age_s: 0.0,
+            progress_m: None,
+            grounded: false,
+            out: false,
+            detours: false,
+        };
+        let contact = Contact {
+            id,
+            rank,
+            sequence: SequenceFilter::default(),
+            heard_at: None,
+            position_at: None,
+            boot_ms: 0,
+            flags: 0,
+            out_at: None,
+            hears_us_at: None,
+            hears: 0,
+            relayed_m: None,
+            relayed_at: None,
+            intent_sequence: 0,
+            late: Lateness::default(),
+            belongs_at: None,
+            points: Vec::new(),
+            extent_m: 0.0,
+            column: false,
+            floor_m: f32::NAN,
+            speed_mps: 0.0,
+            shares_plan: false,
+            moved_at: Instant::ZERO,
+            furthest: None,
+            avoided: None,
+            state,
+        };
+        self.contacts.push(contact).ok()?;
+        Some(self.contacts.len() - 1)
+    }
+
+    /// Where in the roster a vehicle is whose intents are of our mission.
+    fn member(&self, id: u8, now: Instant) -> Option<usize> {
+        let at = self.in_roster(id)?;
+        self.contacts[at].belongs_at.is_some_and(|heard| now - heard < BELONGS).then_some(at)
+    }
+
+    fn in_roster(&self, id: u8) -> Option<usize> {
+        self.contacts[..self.roster].binary_search_by_key(&id, |c| c.id).ok()
+    }
+
+    fn stranger(&self, id: u8) -> Option<usize> {
+        let strangers = &self.contacts[self.roster..];
+        strangers.iter().position(|c| c.id == id).map(|at| at + self.roster)
+    }
+
+    /// Forgets strangers that do not meet the condition.
+    fn keep_strangers(&mut self, mut keep: impl FnMut(&Contact) -> bool) {
+        let mut at = self.roster;
+        while let Some(contact) = self.contacts.get(at) {
+            if keep(contact) {
+                at += 1;
+            } else {
+                self.contacts.remove(at);
+            }
+        }
+    }
+
+    /// The slot of a position's sender: that of the roster, or a stranger's, made if there is room.
+    fn placed(&mut self, id: u8, now: Instant) -> Option<&mut Contact> {
+        if let Some(at) = self.member(id, now).or_else(|| self.stranger(id)) {
+            return self.contacts.get_mut(at);
+        }
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
+        let room = self.contacts.len() - self.roster < STRANGERS;
+        match Some(id).filter(|_| room).and_then(|id| self.add(id, STRANGER)) {
+            Some(at) => self.contacts.get_mut(at),
+            None => {
+                self.dropped = self.dropped.wrapping_add(1);
+                None
+            }
+        }
+    }
+
+    /// Whether an intent of `id` is new: not repeated, not overtaken. To be asked only of one that decodes and is of our mission:
+    /// what anybody can send must not make the next true one look late. Positions carry their time instead.
+    pub fn accept(&mut self, id: u8, sequence: u8, now: Instant) -> bool {
+        self.in_roster(id).is_some_and(|at| {
+            let contact = &mut self.contacts[at];
+            let fresh = contact.sequence.accept(sequence, now);
+            if fresh {
+                contact.intent_sequence = sequence;
+            }
+            fresh
+        })
+    }
+
+    /// A neighbour's position. It is the roster's only if this vehicle's intents are of our mission; else it is a stranger's.
+    pub fn handle_position(
+        &mut self,
+        now: Instant,
+        origin: &Geodetic,
+        id: u8,
+        data: &GLOBAL_POSITION_INT_DATA,
+    ) {
+        let place = Geodetic {
+            lat_deg: f64::from(data.lat) * 1e-7,
+            lon_deg: f64::from(data.lon) * 1e-7,
+            alt_m: f64::from(data.alt) * 1e-3,
+        };
+        let Some(contact) = self.placed(id, now) else { return };
+        let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
+        if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
+            return;
+        }
+        contact.boot_ms = data.time_boot_ms;
+        contact.heard_at = Some(now);
+        contact.position_at = Some(now);
+        contact.state.position = frames::geodetic_to_enu(origin, &place);
+        let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
+        contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
+        contact.speed_mps = contact.state.velocity.norm();
+        if contact.speed_mps >= STANDING_MPS {
+            contact.moved_at = now;
+        }
+    }
+
+    /// A neighbour's intent. It counts only from a vehicle of the roster and with our mission's CRC, its progress only if the plan
+    /// is ours too. `rank` is our own.
+    pub fn handle_intent(
+        &mut self,
+        now: Instant,
+        rank: u16,
+        intent: &Intent,
+        mission_crc: u32,
+        plan_crc: Option<u32>,
+    ) {
+        let Some(at) = self.in_roster(intent.system_id).filter(|_| intent.mission_crc == mission_crc) else {
+            return;
+        };
+        // It is no stranger.
+        self.keep_strangers(|c| c.id != intent.system_id);
+        let contact = &mut self.contacts[at];
+        contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
+        let shared = intent.flags & ON_PLAN != 0 && contact.shares_plan;
+        (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
+        contact.flags = intent.flags;
+        let out = contact.tells(OUT) && contact.position_at.is_some();
+        contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
+        // Ranks beyond the bitmap are not reported.
+        if rank >= 32 || intent.heard & (1 << rank) != 0 {
+            contact.hears_us_at = Some(now);
+        }
+        contact.hears = intent.heard;
+        contact.points.clone_from(&intent.points);
+        let from = intent.points.first().copied().unwrap_or_default();
+        let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
+        contact.extent_m = libm::sqrtf(intent.points.iter().fold(0.0, most));
+        (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
+        contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
+        contact.state.progress_m =
+            shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
+    }
+
+    /// Every neighbour whose position or progress was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
+    /// whether it blocks the path ([`Self::found_clear`]).
+    pub fn at(&mut self, now: Instant) -> &[Neighbour] {
+        self.heard.clear();
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
+        for contact in &self.contacts {
+            let progress_m = contact.progress_m(now);
+            let placed_at = contact.position_at;
+            if placed_at.is_none() && progress_m.is_none() {
+                continue;
+            }
+            let dead = contact.is_dead(self.clear_at);
+            let state = Neighbour {
+                // Of one that was never heard itself only the progress is known.
+                position: placed_at.map_or(NOWHERE, |_| contact.state.position),
+                age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
+                rank: contact.rank,
+                progress_m,
+                grounded: contact.state.grounded || dead,
+                out: contact.out_at.is_some_and(|since| since <= self.clear_at) || dead,
+                detours: contact.tells(DETOURS),
+                ..contact.state
+            };
+            // As many slots as contacts.
+            let _ = self.heard.push(state);
+        }
+        &self.heard
+    }
+
+    /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
+    pub(crate) fn all_down(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, DOWN))
+    }
+
+    /// Whether a vehicle of the roster has landed, or is out of the plan.
+    pub(crate) fn rests(&self, id: u8, now: Instant) -> bool {
+        self.in_roster(id).is_some_and(|at| self.contacts[at].tells(LANDED) || self.contacts[at].is_out(now))
+    }
+
+    /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
+    pub(crate) fn is_not_started(&self, id: u8) -> bool {
+        let waits = |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT));
+        self.in_roster(id).is_some_and(|at| waits(&self.contacts[at]))
+    }
+
+    /// How late the messages of `id` are.
+    pub(crate) fn lateness(&mut self, id: u8) -> Option<&mut Lateness> {
+        let at = self.in_roster(id)?;
+        Some(&mut self.contacts[at].late)
+    }
+
+    /// How late the messages of those that are heard are at most, seconds.
+    pub(crate) fn latest_s(&self) -> f32 {
+        self.contacts[..self.roster].iter().fold(0.0, |most, c| libm::fmaxf(most, c.late.delay_s))
+    }
+
+    /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
+    pub(crate) fn is_deaf(&self, now: Instant) -> bool {
+        self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
+    }
+
+    /// The echo of one neighbour's last intent, of each in turn.
+    pub(crate) fn echo(&self, turn: usize, now: Instant) -> Option<Echo> {
+        let contact = self.contacts[..self.roster].get(turn % self.roster.max(1))?;
+        Echo::new(contact.rank, contact.intent_sequence, now - contact.belongs_at?)
+    }
+
+    /// Whom we heard lately, a bit for each rank.
+    pub fn heard_bits(&self, now: Instant) -> u32 {
+        let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, LATELY));
+        heard.fold(0, |bits, c| bits | 1 << c.rank)
+    }
+
+    /// Whether every other vehicle of the roster is out of the plan, or was lately heard to stand and wait.
+    pub fn all_wait(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.waits(now))
+    }
+
+    /// The same, but some may have claimed the turn to fly around.
+    pub fn all_stand(&self, now: Instant) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.waits(now) || c.claims(now))
+    }
+
+    /// Whether a vehicle with a lower system id than `id` claims the turn to fly around.
+    pub fn claimed_before(&self, id: u8, now: Instant) -> bool {
+        self.contacts.iter().any(|c| c.id < id && c.claims(now))
+    }
+
+    /// How many blocked vehicles have a lower system id than `id`.
+    pub fn blocked_before(&self, id: u8) -> u64 {
+        self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
+    }
+
+    /// A way around what rests now was planned.
+    pub fn avoid(&mut self, now: Instant) {
+        for contact in &mut self.contacts {
+            contact.avoided = contact.is_out(now).then_some(contact.state.position);
+        }
+    }
+
+    /// How many contacts there are.
+    pub fn len(&self) -> usize {
+        self.contacts.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
+    }
+
+    /// There is another plan: what was found, and who was flown around, does not count any more.
+    pub fn forget_plan(&mut self) {
+        self.clear_at = Instant::ZERO;
+        for contact in &mut self.contacts {
+            (contact.avoided, contact.furthest) = (None, None);
+            (contact.relayed_m, contact.relayed_at) = (None, None);
+        }
+    }
+
+    /// Whether a neighbour of the roster was heard within `span`, and one reported that it hears us.
+    pub fn linked_within(&self, now: Instant, span: Duration) -> bool {
+        let lately = |at: Option<Instant>| at.is_some_and(|at| now - at < span);
+        let roster = &self.contacts[..self.roster];
+        roster.iter().any(|c| lately(c.heard_at)) && roster.iter().any(|c| lately(c.hears_us_at))
+    }
+
+    /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
+    pub fn all_rest(&self) -> bool {
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT))
+    }
+
+    /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when
+    /// all of them have landed or are out, or there are none. Where neither ever was, the time since `since`.
+    pub fn silence(&self, now: Instant, since: Instant) -> Duration {
+        if self.all_rest() {
+            return Duration::default();
+        }
+        let others = || self.contacts[..self.roster].iter();
+        let heard = others().filter_map(|c| c.heard_at).max().unwrap_or(since);
+        let hears_us = others().filter_map(|c| c.hears_us_at).max().unwrap_or(since);
+        now - heard.min(hears_us).max(since)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,91 @@
+//! Where others are and may come to be, as the search for a way around asks for it.
+
+use planner_core::Point;
+use planner_core::detour::{KeepOff, Nature};
+
+use super::contact::Contact;
+use super::{Neighbours, SKY_M, VAGUE_M};
+use crate::link::intent::{GROUNDED, LANDED};
+use crate::time::Instant;
+
+impl<const V: usize> Neighbours<V> {
+    /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
+    /// is far enough.
+    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
+        let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
+        let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
+        if let Some(contact) = self.contacts.get(i).filter(unknown) {
+            contact.obstacles(now, apart_m, tell);
+        }
+    }
+
+    /// Every vehicle that was out at `at` was looked at, and none blocks the path.
+    pub fn found_clear(&mut self, at: Instant) {
+        self.clear_at = at;
+    }
+
+    /// Whether that was found at `at` or later.
+    pub fn is_clear_since(&self, at: Instant) -> bool {
+        self.clear_at >= at
+    }
+
+    /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
+    pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
+        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+    }
+
+    /// Where vehicles that land without looking may come nearer than `apart_m`.
+    pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
+    }
+
+    /// The same of contact `i`.
+    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
+        let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
+        if let Some(contact) = self.contacts.get(i).filter(landing) {
+            contact.columns(now, apart_m, tell);
+        }
+    }
+
+    /// Where a landing would end within `apart_m` of a vehicle that is there: flying over it is
+    /// allowed, ending there is not.
+    pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
+            let from = contact.state.position;
+            let to = from + Point::new(0.0, 0.0, SKY_M);
+            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Landing });
+        }
+    }
+
+    /// Everything above where contact `i` was last heard, within `apart_m` of its vertical, and as
+    /// near beside it.
+    pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+        if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
+            let from = contact.state.position;
+            let to = from + Point::new(0.0, 0.0, SKY_M);
+            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Solid });
+        }
+    }
+
+    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.
+    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, apart_m: f32) -> bool {
+        let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {
+            return false;
+        };
+        let (mut below, mut from) = (false, contact.state.position);
+        let mut near = |a: Point, b: Point| {
+            let (leg, away) = ((b - a).xy(), (place - a).xy());
+            let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
+            below |= (away - leg * share).norm_squared() < apart_m * apart_m;
+        };
+        contact.stretch(|at| near(core::mem::replace(&mut from, at), at));
+        below
+    }
+
+    /// Whether a neighbour was last heard lower than `position` and within `within_m` of its vertical.
+    pub fn any_below(&self, position: &Point, within_m: f32) -> bool {
+        let under = |p: &Point| p.z < position.z && (p - position).xy().norm() < within_m;
+        self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
+    }
+}

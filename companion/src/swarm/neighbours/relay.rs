@@ -1,0 +1,186 @@
+//! Progress of vehicles that a neighbour does not hear: a vehicle that hears them passes it on.
+//!
+//! The order of the schedule needs the progress of vehicles that may be out of radio range by then. So each vehicle reports,
+//! once a second at most, how far those have come that some neighbour of it does not hear: nothing at all while everybody
+//! hears everybody. Progress never falls, so it may be old. It opens gates; and a vehicle that is not heard, but was reported to
+//! follow the shared plan a moment ago, is neither lost nor somewhere about: gates keep it apart. What a vehicle itself
+//! reports goes before what others say of it.
+//!
+//! The payload of TUNNEL under a private payload type, little-endian, at most 126 bytes:
+//!
+//! | byte | type | field |
+//! |---|---|---|
+//! | 0 | u8 | version, 1 |
+//! | 1 | u8 | system id, the sender's |
+//! | 2 | u8 | number n of vehicles, 0…19 |
+//! | 3 | u8 | 0 |
+//! | 4 | u32 | CRC-32 of the mission file |
+//! | 8 | u32 | CRC-32 of the swarm's plan |
+//! | 12 + 6 i | u8 | rank in the roster sorted by system id |
+//! | 13 + 6 i | u8 | how old that is, 0.1 s; 255: so old or older |
+//! | 14 + 6 i | f32 | its progress on the plan, metres |
+
+use heapless::Vec;
+
+use super::contact::Contact;
+use super::{LATELY, Neighbours};
+use crate::time::{Duration, Instant};
+
+/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
+/// Most vehicles reported at once.
+const MOST: usize = 19;
+const VERSION: u8 = 1;
+const TUNNEL_HEAD: usize = 5;
+const HEAD: usize = 12;
+const ITEM: usize = 6;
+/// Longest payload with its head.
+pub(crate) const LENGTH: usize = TUNNEL_HEAD + HEAD + MOST * ITEM;
+/// Heard within this time a vehicle speaks for itself.
+const SPEAKS: Duration = Duration::from_secs(1);
+/// Unheard for so long a vehicle is out of range rather than a victim of lost messages.
+const FAR: Duration = Duration::from_secs(3);
+/// Reported to follow the plan within this time it still does: three hops, and the loss of a message.
+const RECENT: Duration = Duration::from_secs(6);
+/// What each hop adds to the age: longer than most messages take.
+const HOP_US: u64 = 500_000;
+const TICK_US: u64 = 100_000;
+
+/// How far the vehicle of a rank has come, and how old that is in 0.1 s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Item {
+    rank: u8,
+    age: u8,
+    progress_m: f32,
+}
+
+/// What a vehicle passes on.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Relay {
+    pub(crate) mission_crc: u32,
+    pub(crate) plan_crc: u32,
+    items: Vec<Item, MOST>,
+}
+
+impl Relay {
+    pub(crate) fn is_empty(&self) -> bool {
+        self.items.is_empty()
+    }
+
+    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    pub(crate) fn encode(&self, system_id: u8, out: &mut [u8; LENGTH]) -> usize {
+        let len = HEAD + ITEM * self.items.len();
+        out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+        (out[2], out[3], out[4]) = (0, 0, len as u8);
+        let body = &mut out[TUNNEL_HEAD..];
+        body[..4].copy_from_slice(&[VERSION, system_id, self.items.len() as u8, 0]);
+        body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
+        body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
+        for (to, item) in body[HEAD..].chunks_exact_mut(ITEM).zip(&self.items) {
+            (to[0], to[1]) = (item.rank, item.age);
+            to[2..].copy_from_slice(&item.progress_m.to_le_bytes());
+        }
+        TUNNEL_HEAD + len
+    }
+
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is not one of these.
+    pub(crate) fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
+        let body = padded[TUNNEL_HEAD..].get(..usize::from(padded[4]))?;
+        let is_ours = u16::from_le_bytes([padded[0], padded[1]]) == PAYLOAD_TYPE;
+        if !is_ours || body.len() < HEAD || body[0] != VERSION || body[1] != sender {
+            return None;
+        }
+        let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
+        let mut relay = Self { mission_crc: word(4), plan_crc: word(8), items: Vec::new() };
+        for item in body[HEAD..].get(..ITEM * usize::from(body[2]))?.chunks_exact(ITEM) {
+            let progress_m = f32::from_le_bytes([item[2], item[3], item[4], item[5]]);
+            let item = Item { rank: item[0], age: item[1], progress_m };
+            // Room for all that fits into a payload.
+            relay.items.push(item).ok().filter(|()| progress_m.is_finite())?;
+        }
+        Some(relay)
+    }
+}
+
+impl Contact {
+    /// Its progress on the shared plan, metres: as it reports it, or as others do while it is not heard. None if it was last
+    /// heard off the plan.
+    pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
+        let own_m = self.state.progress_m;
+        if self.heard_within(now, SPEAKS) || (own_m.is_none() && self.belongs_at.is_some()) {
+            return own_m;
+        }
+        let relayed_m = self.relayed_m?;
+        Some(own_m.map_or(relayed_m, |own_m| libm::fmaxf(own_m, relayed_m)))
+    }
+
+    /// When it was last known how it is: heard from itself, or on its way by others.
+    pub(super) fn known_at(&self) -> Option<Instant> {
+        self.heard_at.max(self.relayed_at)
+    }
+
+    /// Whether it is out of range, and was lately reported to follow the plan.
+    pub(super) fn is_far(&self, now: Instant) -> bool {
+        self.relayed_at.is_some_and(|at| now - at < RECENT)
+            && !self.heard_within(now, FAR)
+            && self.progress_m(now).is_some()
+    }
+
+    /// What is passed on of it: none off the plan.
+    fn item(&self, now: Instant) -> Option<Item> {
+        let progress_m = self.progress_m(now)?;
+        let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(TICK_US);
+        Some(Item { rank: self.rank as u8, age: age.min(u64::from(u8::MAX)) as u8, progress_m })
+    }
+}
+
+impl<const V: usize> Neighbours<V> {
+    /// What neighbours do not hear themselves. It begins with the vehicle of rank `next` and says with which to go on.
+    pub(crate) fn relay(&self, now: Instant, next: &mut u16, mission_crc: u32, plan_crc: u32) -> Relay {
+        let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
+        let roster = &self.contacts[..self.roster];
+        let speaking = || roster.iter().filter(|c| c.heard_within(now, LATELY));
+        // What one neighbour misses is reported to all.
+        let missed = |c: &Contact| speaking().any(|by| by.rank != c.rank && by.hears & (1 << c.rank) == 0);
+        let first = roster.partition_point(|c| c.rank < *next);
+        let turn = roster[first..].iter().chain(&roster[..first]);
+        for contact in turn.filter(|c| c.rank < 32 && missed(c)) {
+            let Some(item) = contact.item(now) else { continue };
+            if relay.items.push(item).is_err() {
+                *next = contact.rank;
+                break;
+            }
+        }
+        relay
+    }
+
+    /// Takes what a vehicle of the roster passes on of the plan that is ours.
+    pub(crate) fn handle_relay(&mut self, now: Instant, from: u8, relay: &Relay) {
+        if self.member(from, now).is_none() {
+            return;
+        }
+        for item in &relay.items {
+            let Some(at) = self.in_ranks(item.rank) else { continue };
+            let (fastest_mps, contact) = (self.fastest_mps, &mut self.contacts[at]);
+            if contact.heard_within(now, SPEAKS) {
+                continue;
+            }
+            let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
+            if item.progress_m > known_m {
+                // What others say of it is believed no faster than what it says itself.
+                let believed_m = contact.believed_m(item.progress_m, fastest_mps, now);
+                contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
+            }
+            let age_us = u64::from(item.age) * TICK_US + HOP_US;
+            let then = Instant::from_micros(now.micros().saturating_sub(age_us));
+            contact.relayed_at = contact.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
+        }
+    }
+
+    fn in_ranks(&self, rank: u8) -> Option<usize> {
+        self.contacts[..self.roster].binary_search_by_key(&u16::from(rank), |c| c.rank).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests;

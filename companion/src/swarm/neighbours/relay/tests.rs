@@ -1,0 +1,125 @@
+//! Progress reaches vehicles that are out of range, and is never more than was reported.
+
+extern crate std;
+use std::vec::Vec as List;
+
+use proptest::prelude::*;
+
+use super::*;
+use crate::config::RosterEntry;
+use crate::link::intent::{Intent, ON_PLAN};
+use planner_core::Point;
+
+const MISSION: u32 = 7;
+const PLAN: u32 = 9;
+/// A step of the swarm below.
+const STEP_MS: u64 = 200;
+
+fn padded(relay: &Relay) -> [u8; 255] {
+    let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+    let len = relay.encode(5, &mut out);
+    padded[..len].copy_from_slice(&out[..len]);
+    padded
+}
+
+#[test]
+fn comes_back_as_sent_and_refuses_the_unsound() {
+    for count in 0..=MOST as u8 {
+        let item = |rank: u8| Item { rank, age: 9 * rank, progress_m: 0.5 * f32::from(rank) - 3.0 };
+        let items = (0..count).map(item).collect();
+        let relay = Relay { mission_crc: 1, plan_crc: 2, items };
+        assert_eq!(Relay::decode(&padded(&relay), 5), Some(relay.clone()));
+        assert_eq!(Relay::decode(&padded(&relay), 6), None, "another sender");
+        for (at, value) in [(0, 0), (5, 9), (7, count + 1)] {
+            let mut bad = padded(&relay);
+            bad[at] = value;
+            assert_eq!(Relay::decode(&bad, 5), None, "byte {at}");
+        }
+    }
+    let nan = Item { rank: 0, age: 0, progress_m: f32::NAN };
+    let relay = Relay { mission_crc: 1, plan_crc: 2, items: [nan].into_iter().collect() };
+    assert_eq!(Relay::decode(&padded(&relay), 5), None);
+}
+
+/// A swarm in a row, each of which hears only its next; the progress of each grows with time.
+struct Swarm {
+    tables: List<Neighbours<8>>,
+    next: List<u16>,
+    now: Instant,
+}
+
+impl Swarm {
+    fn new(count: u8) -> Self {
+        let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
+        let roster: List<_> = (1..=count).map(entry).collect();
+        let tables = (1..=count).map(|id| Neighbours::new(&roster, id, 2.0)).collect();
+        Self { tables, next: std::vec![0; usize::from(count)], now: Instant::from_millis(1000) }
+    }
+
+    fn progress_m(&self, rank: usize) -> f32 {
+        self.now.micros() as f32 * 1e-6 + rank as f32
+    }
+
+    fn step(&mut self, on_plan: &[bool], lost: &[bool], relays: bool) {
+        self.now = self.now + Duration::from_millis(STEP_MS);
+        for from in 0..self.tables.len() {
+            let intent = Intent {
+                system_id: from as u8 + 1,
+                flags: if on_plan[from] { ON_PLAN } else { 0 },
+                mission_crc: MISSION,
+                plan_crc: PLAN,
+                progress_m: self.progress_m(from),
+                heard: self.tables[from].heard_bits(self.now),
+                ..Intent::default()
+            };
+            let relay = self.tables[from].relay(self.now, &mut self.next[from], MISSION, PLAN);
+            for to in [from.wrapping_sub(1), from + 1] {
+                let Some(table) = self.tables.get_mut(to).filter(|_| !lost[from]) else { continue };
+                table.handle_intent(self.now, to as u16, &intent, MISSION, Some(PLAN));
+                if relays {
+                    table.handle_relay(self.now, intent.system_id, &relay);
+                }
+            }
+        }
+    }
+
+    /// What vehicle `of` believes of `other`.
+    fn believed_m(&mut self, of: usize, other: usize) -> Option<f32> {
+        let (now, id) = (self.now, other as u8 + 1);
+        self.tables[of].at(now).iter().find(|n| n.id == id).and_then(|n| n.progress_m)
+    }
+}
+
+proptest! {
+    #[test]
+    fn progress_comes_to_the_far_end_and_is_never_too_great(
+        count in 3..8_u8, lost in proptest::collection::vec(0..4_u8, 8 * 60),
+    ) {
+        let mut swarm = Swarm::new(count);
+        for step in 0..60 {
+            let lost: List<_> = lost[step * 8..].iter().take(8).map(|draw| *draw == 0).collect();
+            swarm.step(&[true; 8], &lost, true);
+            for (of, other) in (0..usize::from(count)).flat_map(|a| (0..usize::from(count)).map(move |b| (a, b))) {
+                if let (true, Some(believed_m)) = (of != other, swarm.believed_m(of, other)) {
+                    prop_assert!(believed_m <= swarm.progress_m(other) + 1e-3);
+                }
+            }
+        }
+        let (last, true_m) = (usize::from(count) - 1, swarm.progress_m(0));
+        let believed_m = swarm.believed_m(last, 0);
+        prop_assert!(believed_m.is_some_and(|m| m > true_m - 10.0), "{believed_m:?} of {true_m}");
+    }
+}
+
+#[test]
+fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
+    let mut swarm = Swarm::new(3);
+    (0..30).for_each(|_| swarm.step(&[true; 3], &[false; 3], true));
+    assert!(swarm.believed_m(2, 0).is_some() && swarm.believed_m(1, 0).is_some());
+    // The one in the middle hears that it left the plan; from then on it is not heard any more.
+    swarm.step(&[false, true, true], &[false; 3], true);
+    (0..30).for_each(|_| swarm.step(&[true; 3], &[true, false, false], true));
+    assert_eq!(swarm.believed_m(1, 0), None);
+    let held_m = swarm.believed_m(2, 0);
+    assert!(held_m.is_some_and(|m| m < swarm.progress_m(0) - 5.0), "{held_m:?}");
+}

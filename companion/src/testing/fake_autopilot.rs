@@ -1,0 +1,285 @@
+//! A scripted autopilot, PX4 or ArduCopter, for unit tests: the modes, acks and streams that the
+//! companion relies on, and a vehicle that goes where the setpoint says at a limited speed. The real
+//! closed loop is host-sim's.
+
+extern crate std;
+use std::vec::Vec;
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::*;
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic};
+use planner_core::path::Path;
+use planner_core::schedule::VehiclePlan;
+
+use crate::autopilot::Kind;
+use crate::autopilot::px4;
+use crate::link::frame::{self, Frame, Framer, Header, MAX_SENT};
+use crate::link::intent;
+use crate::{Companion, Config, Duration, Event, Instant, Link};
+
+mod commands;
+mod flight;
+mod mission;
+mod neighbour;
+mod telemetry;
+
+pub(crate) use self::mission::*;
+
+pub type Small = Companion<4, 16, 8>;
+
+/// The autopilot, the radio's other end, and the companion between them.
+pub struct Bench {
+    pub kind: Kind,
+    /// ArduCopter: message ids whose streams were asked for.
+    pub streams: Vec<u16>,
+    /// ArduCopter: flags of EKF_STATUS_REPORT.
+    pub ekf_flags: u16,
+    /// ArduCopter: NAV_TAKEOFF lifted it off.
+    pub took_off: bool,
+    /// ArduCopter: how long the motors take to lift it off.
+    pub spool: Duration,
+    lifts_at: Instant,
+    pub timesyncs: Vec<(i64, i64)>,
+    pub companion: Small,
+    pub now: Instant,
+    pub enu: Point,
+    pub mode: u32,
+    pub armed: bool,
+    pub status: u8,
+    pub battery: i8,
+    /// Commands refused: `MAV_CMD` numbers.
+    pub refused: Vec<u16>,
+    /// No command is answered; a refused one is not answered either.
+    pub mute: bool,
+    /// SYS_STATUS does not come.
+    pub no_battery: bool,
+    /// The landing detector says ground, whatever the height.
+    pub false_ground: bool,
+    /// Vertical speed as reported, m/s.
+    pub climbs_mps: f32,
+    pub silent: bool,
+    pub no_position: bool,
+    /// What ESTIMATOR_STATUS reports, metres; none: it is not sent.
+    pub accuracy_m: Option<f32>,
+    /// ArduCopter: variance ratio of EKF_STATUS_REPORT.
+    pub variance: f32,
+    pub stays_armed: bool,
+    /// Arming is accepted, and undone by the pilot before a HEARTBEAT shows it.
+    pub never_arms: bool,
+    /// No setpoint moves it.
+    pub stuck: bool,
+    pub never_lands: bool,
+    pub events: Vec<Event>,
+    pub setpoints: Vec<(Instant, Point, u16)>,
+    pub commands: Vec<(u16, f32, f32, f32)>,
+    pub texts: Vec<std::string::String>,
+    pub swarm: Vec<Frame>,
+    pub acks: Vec<(u16, u8, u8, u8)>,
+    /// ArduCopter: the height NAV_TAKEOFF asked for.
+    pub takeoff_m: f32,
+    target: Option<Point>,
+    framers: [Framer; 2],
+    sequence: u8,
+    gcs_sequence: u8,
+    landed_at: Option<Instant>,
+    idle_since: Option<Instant>,
+    pub origin: Geodetic,
+    pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
+    /// Whether there is a way around: by y = 16.
+    pub answer_detour: Option<Result<(), crate::PlanFailure>>,
+    /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
+    /// flags of its intent, progress, CRC of its plan.
+    pub neighbour: Option<(Point, u8, f32, u32)>,
+    /// When it last knew where it is; none: always.
+    pub neighbour_clock: Option<Instant>,
+    neighbour_sequence: u8,
+}
+
+impl Bench {
+    pub fn new(config: Config<4>) -> Self {
+        Self {
+            kind: Kind::Px4,
+            streams: Vec::new(),
+            ekf_flags: 0x33F,
+            took_off: false,
+            spool: Duration::default(),
+            lifts_at: Instant::ZERO,
+            timesyncs: Vec::new(),
+            companion: Companion::new(config).unwrap(),
+            now: Instant::ZERO,
+            enu: Point::new(START.x, START.y, 0.0),
+            mode: px4::HOLD,
+            armed: false,
+            status: 3,
+            battery: 90,
+            refused: Vec::new(),
+            mute: false,
+            no_battery: false,
+            false_ground: false,
+            climbs_mps: 0.0,
+            silent: false,
+            no_position: false,
+            accuracy_m: Some(0.02),
+            variance: 0.1,
+            stays_armed: false,
+            never_arms: false,
+            stuck: false,
+            never_lands: false,
+            events: Vec::new(),
+            setpoints: Vec::new(),
+            commands: Vec::new(),
+            texts: Vec::new(),
+            swarm: Vec::new(),
+            acks: Vec::new(),
+            takeoff_m: 0.0,
+            target: None,
+            framers: [Framer::new(), Framer::new()],
+            sequence: 0,
+            gcs_sequence: 0,
+            landed_at: None,
+            idle_since: None,
+            origin: EKF_ORIGIN,
+            answer_plan: Some(Ok(plan())),
+            answer_detour: Some(Ok(())),
+            neighbour: None,
+            neighbour_clock: None,
+            neighbour_sequence: 0,
+        }
+    }
+
+    pub fn state(&self) -> crate::State {
+        self.companion.state()
+    }
+
+    pub fn ned(&self) -> Vector3<f64> {
+        let place = frames::enu_to_geodetic(&ORIGIN, &self.enu);
+        frames::geodetic_to_ned(self.kind.projection(), &self.origin, &place)
+    }
+
+    pub fn bytes<M: MessageData>(&mut self, message: &M) -> Vec<u8> {
+        let mut out = [0; MAX_SENT];
+        let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
+        self.sequence = self.sequence.wrapping_add(1);
+        let len = frame::encode(header, message, &mut out);
+        out[..len].to_vec()
+    }
+
+    pub fn send<M: MessageData>(&mut self, message: &M) {
+        let bytes = self.bytes(message);
+        self.companion.handle_bytes(Link::Autopilot, self.now, &bytes);
+        self.drain();
+    }
+
+    /// A command from the ground station, on the swarm link.
+    pub fn command(&mut self, command: MavCmd, param1: f32, system: u8, component: u8) {
+        let data = COMMAND_LONG_DATA {
+            command,
+            param1,
+            target_system: system,
+            target_component: component,
+            ..Default::default()
+        };
+        let mut out = [0; MAX_SENT];
+        let header = Header { system: 255, component: 190, sequence: self.gcs_sequence };
+        self.gcs_sequence = self.gcs_sequence.wrapping_add(1);
+        let len = frame::encode(header, &data, &mut out);
+        self.companion.handle_bytes(Link::Swarm, self.now, &out[..len]);
+        self.drain();
+    }
+
+    pub fn start(&mut self) {
+        self.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, crate::COMPONENT);
+    }
+
+    pub fn drain(&mut self) {
+        for link in [Link::Autopilot, Link::Swarm] {
+            let mut out = [0; MAX_SENT];
+            loop {
+                let len = self.companion.poll_transmit(link, &mut out);
+                if len == 0 {
+                    break;
+                }
+                let mut input = &out[..len];
+                let frame = self.framers[link as usize].next(self.now, &mut input).expect("a whole frame");
+                assert_eq!((frame.system, frame.component), (SYSTEM, crate::COMPONENT));
+                self.receive(link, frame);
+            }
+        }
+        while let Some(event) = self.companion.poll_event() {
+            self.events.push(event);
+            if let Some(request) = self.companion.detour(|_| {}) {
+                let answer = self.answer_detour.map(|answer| {
+                    answer.map(|()| {
+                        let mut path = Path::new();
+                        path.push(request.here, 1.2).unwrap();
+                        path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
+                        path.push(GOAL, 1.2).unwrap();
+                        VehiclePlan { path, ..plan() }
+                    })
+                });
+                if let (Event::PlanRequested, Some(answer)) = (event, answer) {
+                    self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+                }
+            } else if event == Event::PlanRequested
+                && let Some(answer) = self.answer_plan.clone()
+            {
+                self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+            }
+        }
+    }
+
+    /// An ArduCopter that has just booted.
+    pub fn ardupilot(config: Config<4>) -> Self {
+        Self { kind: Kind::ArduPilot, mode: 0, ..Self::new(config) }
+    }
+
+    /// 50 ms of flight and telemetry.
+    pub fn tick(&mut self) {
+        self.report_neighbour();
+        self.now = self.now + Duration::from_millis(50);
+        self.companion.handle_timeout(self.now);
+        self.drain();
+        self.fly();
+        self.report();
+    }
+
+    pub fn run(&mut self, seconds: f32) {
+        for _ in 0..(seconds * 20.0) as u32 {
+            self.tick();
+        }
+    }
+
+    /// Runs until a state is reached; panics with what happened if it is not within the time.
+    #[track_caller]
+    pub fn until(&mut self, state: crate::State, seconds: f32) {
+        for _ in 0..(seconds * 20.0) as u32 {
+            if self.state() == state {
+                return;
+            }
+            self.tick();
+        }
+        assert_eq!(self.state(), state, "{:?} at {:?}", self.texts, self.enu);
+    }
+
+    /// Started, while vehicle 77 stands on its pad, from where it follows the plan.
+    pub fn accompanied(config: Config<4>) -> Self {
+        let mut bench = Self::new(config);
+        bench.neighbour = Some((Point::new(8.0, 20.0, 0.0), intent::ON_PLAN | intent::GROUNDED, 0.0, 5));
+        bench.until(crate::State::Ready, 6.0);
+        bench.start();
+        bench
+    }
+
+    /// A bench in the middle of its path.
+    pub fn following(config: Config<4>) -> Self {
+        let mut bench = Self::new(config);
+        bench.until(crate::State::Ready, 6.0);
+        bench.start();
+        bench.until(crate::State::Follow, 20.0);
+        bench.run(2.0);
+        assert_eq!(bench.state(), crate::State::Follow);
+        bench
+    }
+}

@@ -1,0 +1,215 @@
+//! A simulated flash: words of 32 bytes that tear when the power goes, and may not be readable afterwards; and files to keep in it.
+
+extern crate std;
+use std::collections::HashSet;
+use std::ops::Range;
+use std::vec;
+use std::vec::Vec;
+
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::frames::Geodetic;
+use planner_core::plan::{Mode, VehicleTask};
+use planner_core::roadmap::{self, Edge, LANDMARKS, RoadmapHeader};
+use planner_core::schedule::ScheduleConfig;
+use rand_core::Rng;
+use rand_pcg::Pcg32;
+
+use crate::storage::mission_file::{self, MissionHeader, MissionVehicle};
+use crate::storage::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
+
+/// As the H743's bank, but smaller, so that many cuts are tried in little time.
+pub const LAYOUT: Layout =
+    Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
+pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
+
+/// The power went.
+#[derive(Debug)]
+pub struct Cut;
+
+pub struct Flash {
+    pub bytes: Vec<u8>,
+    pub torn: HashSet<u32>,
+    pub rng: Pcg32,
+    /// Words that may still be programmed or erased before the power goes.
+    pub power: Option<u32>,
+    pub programmed: u32,
+}
+
+impl Flash {
+    /// As it comes: anything may be in it, and some words cannot be read.
+    pub fn new(seed: u64) -> Self {
+        let mut rng = Pcg32::new(seed, 7);
+        let bytes = (0..LAYOUT.len()).map(|_| rng.next_u32() as u8).collect();
+        let torn = (0..50).map(|_| rng.next_u32() % (LAYOUT.len() / WORD as u32)).collect();
+        Self { bytes, torn, rng, power: None, programmed: 0 }
+    }
+
+    /// Whether the power goes at this word.
+    pub fn goes(&mut self) -> bool {
+        self.programmed += 1;
+        match &mut self.power {
+            Some(0) => true,
+            Some(left) => {
+                *left -= 1;
+                false
+            }
+            None => false,
+        }
+    }
+
+    /// A word the power went at: as it was, as it was to be, or anything between, readable or not.
+    pub fn tear(&mut self, at: usize, wanted: &[u8]) {
+        let kind = self.rng.next_u32() % 4;
+        for (i, byte) in wanted.iter().enumerate() {
+            let mask = self.rng.next_u32() as u8;
+            let old = self.bytes[at + i];
+            self.bytes[at + i] = match kind {
+                0 => old,
+                1 => *byte,
+                _ => old & mask | byte & !mask,
+            };
+        }
+        if kind == 3 {
+            self.torn.insert((at / WORD) as u32);
+        }
+    }
+
+    pub fn erase(&mut self, at: u32) -> Result<(), Cut> {
+        assert_eq!(at % LAYOUT.sector_len, 0);
+        let words = LAYOUT.sector_len as usize / WORD;
+        let goes = self.goes();
+        for i in 0..words {
+            let at = at as usize + i * WORD;
+            if goes && self.rng.next_u32().is_multiple_of(2) {
+                self.tear(at, &[0xFF; WORD]);
+            } else {
+                self.bytes[at..at + WORD].fill(0xFF);
+                self.torn.remove(&((at / WORD) as u32));
+            }
+        }
+        if goes { Err(Cut) } else { Ok(()) }
+    }
+
+    pub fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Cut> {
+        assert!(
+            (at as usize).is_multiple_of(WORD)
+                && bytes.len().is_multiple_of(WORD)
+                && (1..=BLOCK).contains(&bytes.len())
+        );
+        for (i, word) in bytes.chunks(WORD).enumerate() {
+            let at = at as usize + i * WORD;
+            let blank = self.bytes[at..at + WORD].iter().all(|b| *b == 0xFF);
+            assert!(blank && !self.torn.contains(&((at / WORD) as u32)), "programmed twice at {at:#x}");
+            if self.goes() {
+                self.tear(at, word);
+                return Err(Cut);
+            }
+            self.bytes[at..at + WORD].copy_from_slice(word);
+        }
+        Ok(())
+    }
+}
+
+impl ReadFlash for Flash {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+        let (start, end) = (at as usize, at as usize + out.len());
+        if (start / WORD..end.div_ceil(WORD)).any(|word| self.torn.contains(&(word as u32))) {
+            return Err(Fault);
+        }
+        out.copy_from_slice(&self.bytes[start..end]);
+        Ok(())
+    }
+}
+
+/// Does one thing that is asked; the bytes read are left in `read`.
+pub fn obey(
+    flash: &mut Flash,
+    request: FlashRequest<'_>,
+    erasing: Erasing,
+    read: &mut [u8; READ],
+) -> Result<Result<usize, Fault>, Cut> {
+    match request {
+        FlashRequest::Erase { at } => {
+            assert_eq!(erasing, Erasing::Allowed, "erased while armed");
+            flash.erase(at)?;
+            Ok(Ok(0))
+        }
+        FlashRequest::Program { at, bytes } => {
+            flash.program(at, bytes)?;
+            Ok(Ok(0))
+        }
+        FlashRequest::Read { at, len } => {
+            assert!(len <= READ && len > 0);
+            Ok(flash.read(at, &mut read[..len]).map(|()| len))
+        }
+    }
+}
+
+/// Does what the store asks until it asks for nothing.
+pub fn run(store: &mut Store, flash: &mut Flash, erasing: Erasing) -> Result<(), Cut> {
+    let mut read = [0; READ];
+    for _ in 0..100_000 {
+        let Some(request) = store.poll(erasing) else { return Ok(()) };
+        let outcome = obey(flash, request, erasing, &mut read)?;
+        store.handle(outcome.map(|len| &read[..len]));
+    }
+    panic!("it asks for ever");
+}
+
+/// Tidies the flash up as a board that stands idle does.
+pub fn started(flash: &mut Flash) -> Store {
+    let mut store = Store::mount(LAYOUT, flash);
+    run(&mut store, flash, Erasing::Allowed).expect("the power is on");
+    store
+}
+
+pub fn roadmap(nodes: usize) -> Vec<u8> {
+    let points: Vec<Point> = (0..nodes).map(|i| Point::new(i as f32, (i % 7) as f32, 2.0)).collect();
+    let edges: Vec<Edge> =
+        (1..nodes).map(|i| Edge { a: i as u16 - 1, b: i as u16, clearance_m: 1.0 }).collect();
+    let header = RoadmapHeader {
+        origin: ORIGIN,
+        edge_min_m: 0.5,
+        edge_max_m: 8.0,
+        tested_clearance_m: 0.8,
+        max_clearance_m: 6.0,
+        starts: 1,
+        goals: 1,
+    };
+    let mut bytes = vec![0; roadmap::encoded_len(nodes, edges.len(), LANDMARKS).unwrap()];
+    let mut workspace = std::boxed::Box::new(planner_core::search::SearchWorkspace::<1024>::new());
+    roadmap::write_with_landmarks(&header, &points, &edges, &[], &mut workspace, &mut bytes).unwrap();
+    bytes
+}
+
+pub fn mission(vehicles: u8) -> Vec<u8> {
+    let header = MissionHeader {
+        roadmap_crc: 1,
+        mode: Mode::Labelled,
+        method: Method::Priority,
+        origin: ORIGIN,
+        cruise_mps: 2.0,
+        schedule: ScheduleConfig {
+            separation_m: 2.0,
+            parked_separation_m: 1.75,
+            cruise_mps: 2.0,
+            vertical_mps: 1.0,
+        },
+        safety_distance_m: 1.5,
+        geofence: None,
+        ground_stations: crate::config::USUAL_GROUND_STATIONS,
+    };
+    let task = |id| VehicleTask { id, required_clearance_m: 0.8, climb_m: 1.0, goal: None };
+    let start = Point::new(1.0, 2.0, 3.0);
+    let roster: Vec<_> = (1..=vehicles)
+        .map(|id| MissionVehicle { task: task(id), start, radius_m: 0.3, speed_max_mps: 5.0 })
+        .collect();
+    let mut bytes = vec![0; mission_file::encoded_len(roster.len(), 0)];
+    mission_file::write(&header, &roster, &[], &mut bytes).unwrap();
+    bytes
+}
+
+pub fn held(flash: &Flash, extent: Option<Range<u32>>) -> Option<&[u8]> {
+    extent.map(|extent| &flash.bytes[extent.start as usize..extent.end as usize])
+}
