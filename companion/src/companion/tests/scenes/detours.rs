@@ -85,7 +85,7 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
     scenes.play(accompanied(Follow, 0.0), comes_down, Replanning, 6.0);
     // One that flies a way of its own stays in front of it.
     let stays_in_front = |b: &mut Bench| {
-        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS)
+        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS);
     };
     scenes.play(accompanied(Follow, 0.0), stays_in_front, Aborted, 140.0);
     // On its way back it yields to one that follows the plan, and lands in the end.
