@@ -1,7 +1,9 @@
 //! The companion itself: routes frames in, runs the mission table, makes frames out.
 
 mod frames;
+mod inputs;
 mod steps;
+mod transmit;
 
 use heapless::Deque;
 use planner_core::Point;
@@ -14,12 +16,9 @@ use crate::autopilot::telemetry::Telemetry;
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link};
 use crate::guidance::{Guidance, Scene, Stats};
-use crate::link::budget::Budget;
-use crate::link::commands::{Pending, Repeats};
-use crate::link::echo::Sent;
-use crate::link::frame::{Counters, Framer};
-use crate::link::outbox::Outbox;
-use crate::link::senders::Rates;
+use crate::link::commands::Pending;
+use crate::link::frame::Counters;
+use crate::link::{Fresh, Links};
 use crate::mission::waits::Waits;
 use crate::mission::{Interrupted, State};
 use crate::services::ftp::Ftp;
@@ -28,11 +27,12 @@ use crate::storage::store::Store;
 use crate::swarm::detour::{Around, Obstacles};
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
 
 /// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 /// A setpoint that is held, or an EKF origin that is not used, is reported no more often.
-const HELD_EVERY: Duration = Duration::from_secs(5);
+const REPORT_EVERY: Duration = Duration::from_secs(5);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// A hovering vehicle sways more slowly, m/s.
@@ -57,8 +57,9 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) untuned: bool,
     pub(crate) rank: u16,
     pub(crate) start: Point,
-    framers: [Framer; 2],
-    pub(crate) outboxes: [Outbox; 2],
+    pub(crate) now: Instant,
+    pub(crate) timers: Timers,
+    pub(crate) links: Links,
     pub(crate) telemetry: Telemetry,
     pub(crate) neighbours: Neighbours<V>,
     pub(crate) plan: Option<VehiclePlan<W, G>>,
@@ -74,39 +75,16 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) interrupted: Interrupted,
     pub(crate) pending: Pending,
     pub(crate) handshake: Handshake,
-    repeats: Repeats,
     /// What the autopilot's parameters allow.
     pub(crate) autopilot_limits: AutopilotLimits,
     /// Which of them were read, by bits, and how often they may still be requested.
     pub(crate) limits_read: u16,
     pub(crate) limits_tries: u8,
-    pub(crate) limits_at: Instant,
     pub(crate) waits: Waits,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
-    pub(crate) now: Instant,
-    /// When a setpoint that was held, and an EKF origin that is not used, may be reported again.
-    held_at: Instant,
-    far_at: Instant,
     stepped_at: Instant,
-    next_step: Instant,
-    next_heartbeat: Instant,
-    next_swarm: Instant,
-    pub(crate) retry_at: Instant,
-    pub(crate) origin_at: Instant,
-    pub(crate) streams_at: Instant,
     pub(crate) setup: usize,
-    pub(crate) setpoint_due: bool,
-    pub(crate) heartbeat_due: [bool; 2],
-    pub(crate) version_due: [bool; 2],
-    pub(crate) position_due: bool,
-    pub(crate) intent_due: bool,
-    /// What others do not hear may be passed on again, beginning with this rank.
-    pub(crate) relay_due: bool,
-    pub(crate) relay_next: u16,
-    pub(crate) radio: Budget,
-    pub(crate) sent: Sent,
-    pub(crate) rates: Rates,
     pub(crate) store: Option<Store>,
     pub(crate) parameters: Parameters,
     pub(crate) ftp: Ftp,
@@ -126,8 +104,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             untuned: false,
             rank,
             start,
-            framers: [Framer::new(), Framer::new()],
-            outboxes: [Outbox::default(), Outbox::default()],
+            now: Instant::ZERO,
+            timers: Timers::default(),
+            links: Links::default(),
             telemetry: Telemetry::new(config.mission_crc == 0),
             neighbours: Neighbours::new(
                 &config.roster,
@@ -145,35 +124,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             interrupted: Interrupted::default(),
             pending: Pending::default(),
             handshake: Handshake::default(),
-            repeats: Repeats::default(),
             autopilot_limits: AutopilotLimits::default_of(Kind::Px4),
             limits_read: 0,
             limits_tries: 0,
-            limits_at: Instant::ZERO,
             waits: Waits::default(),
             guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
             mode_before: 0,
-            now: Instant::ZERO,
-            held_at: Instant::ZERO,
-            far_at: Instant::ZERO,
             stepped_at: Instant::ZERO,
-            next_step: Instant::ZERO,
-            next_heartbeat: Instant::ZERO,
-            next_swarm: Instant::ZERO,
-            retry_at: Instant::ZERO,
-            origin_at: Instant::ZERO,
-            streams_at: Instant::ZERO,
             setup: usize::MAX,
-            setpoint_due: false,
-            heartbeat_due: [false; 2],
-            version_due: [false; 2],
-            position_due: false,
-            intent_due: false,
-            relay_due: false,
-            relay_next: 0,
-            radio: Budget::default(),
-            sent: Sent::default(),
-            rates: Rates::default(),
             store: None,
             parameters: Parameters::default(),
             ftp: Ftp::default(),
@@ -246,12 +204,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// What a link's framer counted.
     pub fn counters(&self, link: Link) -> Counters {
-        self.framers[link as usize].counters()
+        self.links.counters(link)
     }
 
     /// Messages dropped because a link's queue was full.
     pub fn dropped(&self, link: Link) -> u32 {
-        self.outboxes[link as usize].dropped()
+        self.links.dropped(link)
     }
 
     /// Takes bytes of a link in, all received by `now`.
@@ -259,7 +217,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.now = now;
         let mut input = bytes;
         let mut relevant = false;
-        while let Some(frame) = self.framers[link as usize].next(now, &mut input) {
+        while let Some(frame) = self.links.receive(link, now, &mut input) {
             relevant |= self.handle_frame(link, &frame);
         }
         if relevant {
@@ -274,18 +232,18 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // Frees what a partial frame held back.
             self.handle_bytes(link, now, &[]);
         }
-        if now >= self.next_step {
+        if self.timers.is_due(Timer::Step, now) {
             self.step();
         }
-        if now >= self.next_heartbeat {
-            self.next_heartbeat = now + HEARTBEAT_EVERY;
-            self.heartbeat_due = [true; 2];
-            self.relay_due = true;
+        if self.timers.take(Timer::Heartbeat, now, HEARTBEAT_EVERY) {
+            self.links.set_due(Link::Autopilot, Fresh::Heartbeat, true);
+            self.links.set_due(Link::Swarm, Fresh::Heartbeat, true);
+            self.links.set_due(Link::Swarm, Fresh::Relay, true);
         }
-        if now >= self.next_swarm {
-            self.next_swarm = now + Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
-            self.position_due = self.telemetry.position_at.is_some();
-            self.intent_due = true;
+        let every = Duration::from_millis(1000 / u64::from(self.config.swarm_hz));
+        if self.timers.take(Timer::Swarm, now, every) {
+            self.links.set_due(Link::Swarm, Fresh::Position, self.telemetry.position_at.is_some());
+            self.links.set_due(Link::Swarm, Fresh::Intent, true);
         }
     }
 
@@ -313,7 +271,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// When [`Self::handle_timeout`] is due.
     pub fn poll_timeout(&self) -> Option<Instant> {
-        Some(self.next_step.min(self.next_heartbeat).min(self.next_swarm))
+        Some(self.timers.next())
     }
 
     pub(crate) fn scene(&self) -> Scene<'_, W, G> {

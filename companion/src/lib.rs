@@ -29,6 +29,7 @@ pub mod swarm;
 #[cfg(test)]
 mod testing;
 pub mod time;
+mod timers;
 
 pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};

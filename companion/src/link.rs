@@ -1,4 +1,4 @@
-//! The two links, to the autopilot and to the swarm: framing and what uses it.
+//! The two links, to the autopilot and to the swarm: what comes in as frames, what waits to go out, and who is answered how often.
 
 pub mod budget;
 pub mod commands;
@@ -7,4 +7,181 @@ pub mod frame;
 pub mod intent;
 pub mod outbox;
 pub(crate) mod senders;
-mod transmit;
+
+use self::budget::Budget;
+use self::commands::{Command, Repeats};
+use self::echo::{Echo, Sent};
+use self::frame::{Counters, Frame, Framer, Header};
+use self::outbox::{Outbox, Outgoing};
+use self::senders::{Kind, Rates, Sender};
+use crate::events::Link;
+use crate::time::Instant;
+
+/// Entries of a link's queue that no answer takes: they are left for texts, acks of the own requests, and commands.
+const KEPT_FREE: usize = 8;
+const BOTH: [Link; 2] = [Link::Autopilot, Link::Swarm];
+
+/// What is made from the newest state when its link is polled, instead of waiting in a queue.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Fresh {
+    /// A setpoint.
+    Setpoint,
+    /// HEARTBEAT.
+    Heartbeat,
+    /// AUTOPILOT_VERSION.
+    Version,
+    /// GLOBAL_POSITION_INT.
+    Position,
+    /// The intent.
+    Intent,
+    /// What others do not hear of each other, passed on.
+    Relay,
+}
+
+/// Both links.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Links {
+    framers: [Framer; 2],
+    outboxes: [Outbox; 2],
+    /// Bits of [`Fresh`].
+    due: [u8; 2],
+    radio: Budget,
+    sent: Sent,
+    rates: Rates,
+    repeats: Repeats,
+}
+
+impl Links {
+    /// The next frame of the bytes received by `now`.
+    pub(crate) fn receive(&mut self, link: Link, now: Instant, input: &mut &[u8]) -> Option<Frame> {
+        self.framers[link as usize].next(now, input)
+    }
+
+    /// What a link's framer counted.
+    pub(crate) fn counters(&self, link: Link) -> Counters {
+        self.framers[link as usize].counters()
+    }
+
+    /// Messages dropped because a link's queue was full.
+    pub(crate) fn dropped(&self, link: Link) -> u32 {
+        self.outboxes[link as usize].dropped()
+    }
+
+    /// Something is to be made at the next poll, or not.
+    pub(crate) fn set_due(&mut self, link: Link, what: Fresh, due: bool) {
+        let bit = 1 << what as u8;
+        let bits = &mut self.due[link as usize];
+        *bits = if due { *bits | bit } else { *bits & !bit };
+    }
+
+    /// Whether it is to be made; it is no longer.
+    pub(crate) fn take_due(&mut self, link: Link, what: Fresh) -> bool {
+        let due = self.due[link as usize] & 1 << what as u8 != 0;
+        self.set_due(link, what, false);
+        due
+    }
+
+    /// Puts a message at the end of a link's queue.
+    pub(crate) fn push(&mut self, link: Link, message: Outgoing) {
+        self.outboxes[link as usize].push(message);
+    }
+
+    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    pub(crate) fn say(&mut self, warning: bool, text: &'static str) {
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+    }
+
+    /// The same with numbers: each `#` of the text stands for one.
+    pub(crate) fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
+        let numbers = [numbers[0], numbers[1], 0];
+        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+    }
+
+    /// Whether an answer may be queued now; if so, it is counted.
+    pub(crate) fn may_answer(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind) -> bool {
+        self.outboxes[link as usize].room() > KEPT_FREE && self.rates.take(now, link, sender, kind)
+    }
+
+    /// Queues an answer, unless its rate or the queue is used up.
+    pub(crate) fn answer(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind, answer: Outgoing) {
+        if self.may_answer(now, link, sender, kind) {
+            self.push(link, answer);
+        }
+    }
+
+    /// Says on both links what a sender did: each `#` of the text stands for a number.
+    pub(crate) fn say_of(
+        &mut self,
+        now: Instant,
+        sender: Sender,
+        warning: bool,
+        text: &'static str,
+        numbers: [u32; 3],
+    ) {
+        for link in BOTH {
+            self.answer(now, link, sender, Kind::Text, Outgoing::Count { warning, text, numbers });
+        }
+    }
+
+    /// Says who did something.
+    pub(crate) fn log_sender(&mut self, now: Instant, sender: Sender, text: &'static str, from: (u8, u8)) {
+        self.say_of(now, sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
+    }
+
+    /// Says by whom a command was given that took effect.
+    pub(crate) fn log_command(&mut self, now: Instant, sender: Sender, command: &Command) {
+        self.log_sender(now, sender, command.log_text(), command.from);
+    }
+
+    /// What this very command frame was answered lately, `Some(None)` if nothing; `None` for a frame not seen.
+    pub(crate) fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
+        self.repeats.answered(frame, now)
+    }
+
+    /// Remembers a command frame and its answer.
+    pub(crate) fn remember(&mut self, frame: &Frame, result: Option<u8>, now: Instant) {
+        self.repeats.remember(frame, result, now);
+    }
+
+    /// Whether the radio's budget lets another frame out.
+    pub(crate) fn radio_allows(&mut self, now: Instant, armed: bool) -> bool {
+        self.radio.allows(now, armed)
+    }
+
+    /// Whether half of the radio's budget is left.
+    pub(crate) fn radio_half_full(&self) -> bool {
+        self.radio.is_half_full()
+    }
+
+    /// Bytes that went out by radio beside the state.
+    pub(crate) fn spend(&mut self, bytes: usize) {
+        self.radio.spend(bytes);
+    }
+
+    /// The header of the next frame of a link.
+    pub(crate) fn header(&mut self, link: Link, system: u8) -> Header {
+        self.outboxes[link as usize].header(system)
+    }
+
+    /// The header of an intent: its number is remembered, so that an echo of it tells how late messages are.
+    pub(crate) fn intent_header(&mut self, system: u8, now: Instant) -> Header {
+        let header = self.header(Link::Swarm, system);
+        self.sent.note(header.sequence, now);
+        header
+    }
+
+    /// Intents sent.
+    pub(crate) fn intents_sent(&self) -> usize {
+        self.sent.count()
+    }
+
+    /// What a message takes one way, seconds, by an echo of an own intent.
+    pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
+        self.sent.delay_s(echo, now)
+    }
+
+    /// Writes the first message that waits on a link; 0 if none does.
+    pub(crate) fn transmit(&mut self, link: Link, system: u8, out: &mut [u8]) -> usize {
+        self.outboxes[link as usize].transmit(system, out)
+    }
+}

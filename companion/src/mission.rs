@@ -5,7 +5,6 @@
 //! a test compares the two.
 
 mod guard;
-mod inputs;
 mod state;
 pub mod table;
 pub(crate) mod waits;

@@ -51,7 +51,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let store = self.store.as_mut()?;
         self.ftp.advance(store, self.now, erasing);
         if let Some((warning, text)) = self.ftp.text() {
-            self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+            self.links.say(warning, text);
         }
         store.poll(erasing)
     }
@@ -93,7 +93,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 // From others not even answered: sessions are scarce.
                 if self.store.is_some() && sender == Sender::GroundStation {
                     if ftp::changes_files(p) {
-                        self.log_sender(sender, "File request from #/#", (frame.system, frame.component));
+                        self.links.log_sender(
+                            self.now,
+                            sender,
+                            "File request from #/#",
+                            (frame.system, frame.component),
+                        );
                     }
                     self.ftp.handle(link as usize, self.now, frame);
                 }
@@ -135,7 +140,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     let to = (frame.system, frame.component);
                     let tc1 = self.now.micros() as i64 * 1000;
                     let answer = Outgoing::Timesync { tc1, ts1: request.ts1, to };
-                    self.answer_to(link, sender, Kind::Time, answer);
+                    self.links.answer(self.now, link, sender, Kind::Time, answer);
                 }
             }
             _ => return false,
@@ -150,7 +155,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn tell_parameter(&mut self, link: Link, sender: Sender, index: usize) {
         if let Some((name, value)) = self.parameters().get(index) {
             let answer = Outgoing::ParameterValue { index, name, value };
-            self.answer_to(link, sender, Kind::Parameter, answer);
+            self.links.answer(self.now, link, sender, Kind::Parameter, answer);
         }
     }
 
@@ -177,7 +182,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         self.untuned |= result.is_ok();
         if result.is_ok() {
-            self.log_sender(sender, "Parameter set from #/#", (frame.system, frame.component));
+            self.links.log_sender(
+                self.now,
+                sender,
+                "Parameter set from #/#",
+                (frame.system, frame.component),
+            );
         }
         // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
         if let Some(index) = found {
@@ -203,7 +213,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     ) {
         let to = (frame.system, frame.component);
         let error = Outgoing::ParameterError { index, id, why: why as u8, to };
-        self.answer_to(link, sender, Kind::Parameter, error);
+        self.links.answer(self.now, link, sender, Kind::Parameter, error);
     }
 
     /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.

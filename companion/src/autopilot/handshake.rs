@@ -12,6 +12,7 @@ use crate::link::frame::Frame;
 use crate::link::outbox::Outgoing;
 use crate::mission::State;
 use crate::time::{Duration, Instant};
+use crate::timers::Timer;
 
 /// Before a landing is requested the safety filter has looked down: two steps.
 const LOOKS_DOWN: Duration = Duration::from_millis(100);
@@ -137,10 +138,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn ask_for_streams(&mut self) {
         self.setup = 0;
         self.ask_for_limits();
-        self.streams_at = self.now + STREAMS_EVERY;
+        self.timers.set(Timer::Streams, self.now + STREAMS_EVERY);
         if self.kind() == Kind::ArduPilot {
             let timeout = Outgoing::Parameter("GUID_TIMEOUT", self.guided_timeout_s());
-            self.outboxes[Link::Autopilot as usize].push(timeout);
+            self.links.push(Link::Autopilot, timeout);
         }
     }
 
@@ -157,12 +158,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         self.autopilot_limits = AutopilotLimits::default_of(self.kind());
         self.guidance.tune(&self.config, &self.autopilot_limits);
-        (self.limits_read, self.limits_tries, self.limits_at) = (0, LIMIT_TRIES, self.now);
+        (self.limits_read, self.limits_tries) = (0, LIMIT_TRIES);
+        self.timers.set(Timer::Limit, self.now);
     }
 
     /// Requests the next limit that was not read.
     fn repeat_limits(&mut self) {
-        if self.limits_tries == 0 || self.now < self.limits_at {
+        if self.limits_tries == 0 || !self.timers.is_due(Timer::Limit, self.now) {
             return;
         }
         let all = self.kind().limits();
@@ -175,8 +177,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return;
         };
         self.limits_tries -= 1;
-        self.limits_at = self.now + LIMIT_EVERY;
-        self.outboxes[Link::Autopilot as usize].push(Outgoing::ReadParameter(limit.name));
+        self.timers.set(Timer::Limit, self.now + LIMIT_EVERY);
+        self.links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
     }
 
     /// PARAM_VALUE of the autopilot. Read by field: a type newer than the crate's must not hide the value.
@@ -205,18 +207,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.repeat_limits();
         }
         let silent = self.telemetry.heartbeat_age(now) > HEARD;
-        if !silent && self.telemetry.position_age(now) > STREAMS_LOST && now >= self.streams_at {
+        if !silent
+            && self.telemetry.position_age(now) > STREAMS_LOST
+            && self.timers.is_due(Timer::Streams, now)
+        {
             self.ask_for_streams();
         }
-        let autopilot = &mut self.outboxes[Link::Autopilot as usize];
         let doubts = self.telemetry.doubts_origin();
-        if heard && (doubts || self.telemetry.ekf_origin.is_none()) && now >= self.origin_at {
-            self.origin_at = now + if doubts { ORIGIN_AGAIN } else { RETRY_EVERY };
-            autopilot.push(Outgoing::Request(GPS_GLOBAL_ORIGIN));
+        if heard && (doubts || self.telemetry.ekf_origin.is_none()) && self.timers.is_due(Timer::Origin, now)
+        {
+            self.timers.set(Timer::Origin, now + if doubts { ORIGIN_AGAIN } else { RETRY_EVERY });
+            self.links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
         }
         for _ in 0..SETUP_BURST {
             if let Some(&(id, interval_us)) = kind.streams().get(self.setup) {
-                autopilot.push(Outgoing::Interval(id, interval_us));
+                self.links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
                 self.setup += 1;
             }
         }
@@ -224,7 +229,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.state == State::Arming {
             self.handshake.gap |= silent;
             if self.handshake.asks_to_arm(now, self.telemetry.armed) {
-                self.outboxes[Link::Autopilot as usize].push(Outgoing::Arm(true));
+                self.links.push(Link::Autopilot, Outgoing::Arm(true));
             }
             return;
         }
@@ -232,35 +237,34 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let in_state = now - self.entered_at;
         let looks =
             self.state == State::Land && (in_state < LOOKS_DOWN || !self.guidance.filter.column_clear());
-        if now < self.retry_at || (looks && !self.must_land()) {
+        if !self.timers.is_due(Timer::Request, now) || (looks && !self.must_land()) {
             return;
         }
-        let autopilot = &mut self.outboxes[Link::Autopilot as usize];
-        self.retry_at = now + RETRY_EVERY;
+        self.timers.set(Timer::Request, now + RETRY_EVERY);
         let change_to = |custom_mode| {
             let (main, sub) = kind.mode_params(custom_mode);
             Outgoing::Mode(main, sub)
         };
         match self.state {
-            State::Engaging => autopilot.push(change_to(kind.setpoint_mode())),
+            State::Engaging => self.links.push(Link::Autopilot, change_to(kind.setpoint_mode())),
             // HEARTBEAT may not show the mode yet in which a landing was requested.
             State::LandingHeld if in_state < HEARD || self.telemetry.custom_mode != kind.setpoint_mode() => {
-                autopilot.push(change_to(kind.setpoint_mode()));
+                self.links.push(Link::Autopilot, change_to(kind.setpoint_mode()));
             }
-            State::CancelStart => autopilot.push(Outgoing::Arm(false)),
+            State::CancelStart => self.links.push(Link::Autopilot, Outgoing::Arm(false)),
             State::TakeOff => {
-                self.retry_at = now + TAKE_OFF_AFTER;
+                self.timers.set(Timer::Request, now + TAKE_OFF_AFTER);
                 let climb_m = self.plan.as_ref().map_or(0.0, |plan| plan.climb_m);
-                autopilot.push(Outgoing::TakeOff(self.telemetry.above_home_m + climb_m));
+                self.links.push(Link::Autopilot, Outgoing::TakeOff(self.telemetry.above_home_m + climb_m));
             }
             State::Land if self.telemetry.custom_mode != kind.land_mode() => {
-                autopilot.push(change_to(kind.land_mode()));
+                self.links.push(Link::Autopilot, change_to(kind.land_mode()));
             }
             State::Disarm => {
-                self.retry_at = now + DISARM_AFTER;
-                autopilot.push(Outgoing::Arm(false));
+                self.timers.set(Timer::Request, now + DISARM_AFTER);
+                self.links.push(Link::Autopilot, Outgoing::Arm(false));
                 if self.telemetry.custom_mode != kind.land_mode() {
-                    autopilot.push(change_to(kind.land_mode()));
+                    self.links.push(Link::Autopilot, change_to(kind.land_mode()));
                 }
             }
             _ => {}
@@ -271,13 +275,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn request_lost_streams(&mut self) {
         let (now, kind) = (self.now, self.kind());
         let asked = self.setup >= kind.streams().len() && self.telemetry.heartbeat_at.is_some();
-        if !asked || self.telemetry.heartbeat_age(now) > HEARD || now < self.streams_at {
+        if !asked || self.telemetry.heartbeat_age(now) > HEARD || !self.timers.is_due(Timer::Streams, now) {
             return;
         }
         for &(id, interval_us) in kind.streams().iter().filter(|(_, interval_us)| *interval_us > 0.0) {
             if self.telemetry.stream_age(u32::from(id), now) > STREAM_LOST {
-                self.streams_at = now + STREAMS_EVERY;
-                self.outboxes[Link::Autopilot as usize].push(Outgoing::Interval(id, interval_us));
+                self.timers.set(Timer::Streams, now + STREAMS_EVERY);
+                self.links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
             }
         }
     }
@@ -316,7 +320,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 ARM_DISARM => "Autopilot refuses to arm or disarm: # (result #)",
                 _ => "Autopilot refuses to take off: # (result #)",
             };
-            self.say_count(true, text, [u32::from(ack.command), u32::from(ack.result)]);
+            self.links.say_count(true, text, [u32::from(ack.command), u32::from(ack.result)]);
         }
     }
 }

@@ -6,38 +6,40 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_VALUE_DATA, TUNNEL_DATA,
 };
 
-use super::{Companion, HELD_EVERY, ORIGIN_AGAIN};
+use super::{Companion, ORIGIN_AGAIN, REPORT_EVERY};
 use crate::autopilot::telemetry::Change;
 use crate::events::Link;
-use crate::link::budget;
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
 use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::senders::{Kind as AnswerKind, Sender};
+use crate::link::{Fresh, budget};
 use crate::swarm::neighbours::relay::Relay;
+use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Returns whether the mission table should be looked at.
     pub(super) fn handle_frame(&mut self, link: Link, frame: &Frame) -> bool {
-        let sender = self.sender(link, frame);
+        let own = self.config.system_id;
+        let sender = Sender::of(link, frame.system, own, &self.config.ground_stations);
         if let Some(command) = commands::read(frame, self.config.system_id) {
             if sender != Sender::GroundStation && command.acts() {
                 self.deny(link, sender, &command);
                 return false;
             }
             let now = self.now;
-            let (result, relevant) = match self.repeats.answered(frame, now) {
+            let (result, relevant) = match self.links.answered(frame, now) {
                 Some(result) => (result, false),
                 None => {
                     let result = self.handle_command(link, sender, &command);
-                    self.repeats.remember(frame, result, now);
+                    self.links.remember(frame, result, now);
                     (result, true)
                 }
             };
             if let Some(result) = result {
                 let ack = Outgoing::Ack { command: command.command, result, to: command.from };
-                self.answer_to(link, sender, AnswerKind::Ack, ack);
+                self.links.answer(self.now, link, sender, AnswerKind::Ack, ack);
             }
             return relevant;
         }
@@ -59,21 +61,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 self.handshake.watch(self.state, &self.telemetry);
                 if change == Change::OriginDoubted {
-                    self.origin_at = self.origin_at.min(self.now + ORIGIN_AGAIN);
+                    self.timers.hasten(Timer::Origin, self.now + ORIGIN_AGAIN);
                     return self.telemetry.origin_moved;
                 }
                 if let Change::OriginFar(km) = change {
-                    if self.now >= self.far_at {
-                        self.far_at = self.now + HELD_EVERY;
-                        self.say_count(true, "EKF origin # km away: not used", [km, 0]);
+                    if self.timers.take(Timer::OriginReport, self.now, REPORT_EVERY) {
+                        self.links.say_count(true, "EKF origin # km away: not used", [km, 0]);
                     }
                     return true;
                 }
                 if change == Change::OriginLost {
-                    self.origin_at = self.now;
+                    self.timers.set(Timer::Origin, self.now);
                     // It may have been restarted and know nothing of the streams we asked for. Positions that jump
                     // again and again are no reason to flood it.
-                    if self.now >= self.streams_at {
+                    if self.timers.is_due(Timer::Streams, self.now) {
                         self.ask_for_streams();
                     }
                 }
@@ -105,12 +106,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if intent.mission_crc != self.config.mission_crc {
                 if self.config.roster.iter().any(|entry| entry.system_id == id) {
                     let text = "Vehicle # has another mission file";
-                    self.say_of(Sender::Other, true, text, [u32::from(id), 0, 0]);
+                    self.links.say_of(self.now, Sender::Other, true, text, [u32::from(id), 0, 0]);
                 }
                 return;
             }
             let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.rank);
-            let delay_s = echo.and_then(|echo| self.sent.delay_s(&echo, self.now));
+            let delay_s = echo.and_then(|echo| self.links.delay_s(&echo, self.now));
             if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
                 late.take(delay_s);
             }
@@ -133,10 +134,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn deny(&mut self, link: Link, sender: Sender, command: &Command) {
         if command.to_us {
             let ack = Outgoing::Ack { command: command.command, result: DENIED, to: command.from };
-            self.answer_to(link, sender, AnswerKind::Ack, ack);
+            self.links.answer(self.now, link, sender, AnswerKind::Ack, ack);
         }
         let numbers = [u32::from(command.command), u32::from(command.from.0), u32::from(command.from.1)];
-        self.say_of(sender, true, "Command # denied, not a ground station: #/#", numbers);
+        self.links.say_of(self.now, sender, true, "Command # denied, not a ground station: #/#", numbers);
     }
 
     /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
@@ -158,29 +159,29 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let restarts = command.command == commands::RESTART && result == ACCEPTED;
         if restarts || self.pending != before || self.obstacles.count() != known {
-            self.log_command(sender, command);
+            self.links.log_command(self.now, sender, command);
         }
         command.to_us.then_some(result)
     }
 
     pub(super) fn request(&mut self, link: Link, sender: Sender, message: f32) -> u8 {
-        if !self.may_answer(link, sender, AnswerKind::Message) {
+        if !self.links.may_answer(self.now, link, sender, AnswerKind::Message) {
             return TEMPORARILY_REJECTED;
         }
-        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
             return TEMPORARILY_REJECTED;
         }
         if message == HEARTBEAT_DATA::ID as f32 {
-            self.heartbeat_due[link as usize] = true;
+            self.links.set_due(link, Fresh::Heartbeat, true);
         } else if message == AUTOPILOT_VERSION_DATA::ID as f32 {
-            self.version_due[link as usize] = true;
+            self.links.set_due(link, Fresh::Version, true);
         } else if message == GLOBAL_POSITION_INT_DATA::ID as f32 && link == Link::Swarm {
-            self.position_due = self.telemetry.position_at.is_some();
+            self.links.set_due(link, Fresh::Position, self.telemetry.position_at.is_some());
         } else {
             return DENIED;
         }
         if link == Link::Swarm {
-            self.radio.spend(budget::POSITION);
+            self.links.spend(budget::POSITION);
         }
         ACCEPTED
     }

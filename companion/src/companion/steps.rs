@@ -1,14 +1,15 @@
 //! The step that is due, and what the rows of the table have done.
 
-use super::{Companion, DISARM_AFTER, HELD_EVERY, IDLE_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
+use super::{Companion, DISARM_AFTER, IDLE_EVERY, REPORT_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
 use crate::config::PlanFailure;
-use crate::events::Event;
+use crate::events::{Event, Link};
 use crate::guidance::Scene;
-use crate::link::outbox::Outgoing;
+use crate::link::Fresh;
 use crate::margins;
 use crate::mission::{self, Action, Guard, Row, State, To};
 use crate::storage::store::Erasing;
 use crate::swarm::detour::{Aim, Around};
+use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// One step of the control loop: reference, table, and what is asked for again.
@@ -26,21 +27,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (self.rank, self.config.system_id),
             self.around.flying,
         );
-        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s) && now >= self.held_at {
-            self.held_at = now + HELD_EVERY;
-            self.say(true, "Setpoint out of limits: holding");
+        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s)
+            && self.timers.take(Timer::HeldReport, now, REPORT_EVERY)
+        {
+            self.links.say(true, "Setpoint out of limits: holding");
         }
-        self.intent_due |= core::mem::take(&mut self.guidance.turned);
+        if core::mem::take(&mut self.guidance.turned) {
+            self.links.set_due(Link::Swarm, Fresh::Intent, true);
+        }
         self.name_who_never_starts();
         self.look_around();
         self.run_table();
         self.repeat_requests();
         let flows = self.state.streams_setpoints();
-        self.setpoint_due = flows;
+        self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
         let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
-        // Steps keep their rhythm; after a long gap the rhythm restarts instead of catching up.
-        let due = self.next_step + every;
-        self.next_step = if due > now { due } else { now + every };
+        self.timers.repeat(Timer::Step, now, every);
     }
 
     /// Compares the estimate's bound with what the margin leaves, and sets the pace.
@@ -68,7 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             _ if bound_m > 100.0 => (true, "Estimate of unknown accuracy: stopping"),
             _ => (true, "Estimate within # cm, margin # cm: stopping"),
         };
-        self.say_count(warning, text, [cm, room_cm]);
+        self.links.say_count(warning, text, [cm, room_cm]);
     }
 
     pub(super) fn run_table(&mut self) {
@@ -101,18 +103,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.handshake.state_changed(from, to);
         self.act(from, to, row);
         if !row.text.is_empty() {
-            let text = Outgoing::Text { warning: row.warning, text: row.text };
-            self.outboxes.iter_mut().for_each(|outbox| outbox.push(text));
+            self.links.say(row.warning, row.text);
         }
         if let Some(text) = self.interrupted.text(from, to) {
-            self.say(false, text);
+            self.links.say(false, text);
         }
         // Full only if the shell does not drain: then the newest is lost.
         let changed = Event::StateChanged { from, to, text: row.text, warning: row.warning };
         let _ = self.events.push_back(changed);
         // The step that the new state needs is due now.
         if to.streams_setpoints() && !from.streams_setpoints() {
-            self.next_step = now;
+            self.timers.set(Timer::Step, now);
         }
     }
 
@@ -134,11 +135,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
             Action::HoldHere => self.guidance.hold_at(position),
-            Action::HoldOver => self.retry_at = now,
-            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.retry_at = now,
+            Action::HoldOver => self.timers.set(Timer::Request, now),
+            Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.timers.set(Timer::Request, now),
             Action::AskLand => self.ask_land(from),
-            Action::AskDisarm if to == State::Disarm => self.retry_at = now + DISARM_AFTER,
-            Action::AskDisarm | Action::CancelStart => self.retry_at = now,
+            Action::AskDisarm if to == State::Disarm => self.timers.set(Timer::Request, now + DISARM_AFTER),
+            Action::AskDisarm | Action::CancelStart => self.timers.set(Timer::Request, now),
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
             Action::RequestDetour => self.request_detour(Aim::Goal),
@@ -169,7 +170,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(super) fn ask_land(&mut self, from: State) {
         use State::*;
-        self.retry_at = self.now;
+        self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
         match from {
             Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
@@ -184,7 +185,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn go_on(&mut self, from: State, to: State) {
         let (now, position) = (self.now, self.telemetry.position);
         match to {
-            State::TakeOff => self.retry_at = now,
+            State::TakeOff => self.timers.set(Timer::Request, now),
             State::Land => self.ask_land(from),
             _ => {
                 let climbs = matches!(self.interrupted.beneath(to), State::TakeOff | State::Climb);

@@ -71,6 +71,21 @@ impl Command {
         let restarts = self.command == RESTART && (self.to_component || self.param2 == 1.0);
         restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
     }
+
+    /// What is said once it took effect: the numbers are its sender.
+    pub(crate) fn log_text(&self) -> &'static str {
+        match self.command {
+            START => "Start from #/#",
+            PAUSE_CONTINUE if self.param1 == 0.0 => "Pause from #/#",
+            PAUSE_CONTINUE => "Resume from #/#",
+            LAND => "Landing from #/#",
+            RETURN => "Return from #/#",
+            EXCLUDE if self.param1 > 0.0 => "Obstacle from #/#",
+            EXCLUDE => "Obstacle revoked from #/#",
+            RESTART => "Restart from #/#",
+            _ => "Command from #/#",
+        }
+    }
 }
 
 /// Reads a command addressed to `system` or to all; `None` for other frames and other addressees.

@@ -7,11 +7,7 @@
 //!
 //! A system id is not a proof. What a forged one can do is in `SECURITY.md`.
 
-use crate::companion::Companion;
 use crate::events::Link;
-use crate::link::commands::{self, Command};
-use crate::link::frame::Frame;
-use crate::link::outbox::Outgoing;
 use crate::time::{Duration, Instant};
 
 /// Whose frame it is.
@@ -23,6 +19,19 @@ pub(crate) enum Sender {
     Autopilot,
     /// Any other.
     Other,
+}
+
+impl Sender {
+    /// By the system id of a frame, to the vehicle of system `own`.
+    pub(crate) fn of(link: Link, system: u8, own: u8, ground_stations: &[u8]) -> Self {
+        if system != 0 && ground_stations.contains(&system) {
+            Self::GroundStation
+        } else if link == Link::Autopilot && system == own {
+            Self::Autopilot
+        } else {
+            Self::Other
+        }
+    }
 }
 
 /// Kinds of answers.
@@ -64,9 +73,6 @@ const RATES: [[Rate; KINDS]; SENDERS] = [
     [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
 ];
 
-/// Entries of a link's queue that no answer takes: they are left for texts, acks of the own requests, and commands.
-const KEPT_FREE: usize = 8;
-
 /// For each link, sender and kind the time at which its bucket is full again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rates {
@@ -84,57 +90,6 @@ impl Rates {
             *full_at = next;
         }
         allowed
-    }
-}
-
-impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    pub(crate) fn sender(&self, link: Link, frame: &Frame) -> Sender {
-        if frame.system != 0 && self.config.ground_stations.contains(&frame.system) {
-            Sender::GroundStation
-        } else if link == Link::Autopilot && frame.system == self.config.system_id {
-            Sender::Autopilot
-        } else {
-            Sender::Other
-        }
-    }
-
-    /// Whether an answer may be queued now; if so, it is counted.
-    pub(crate) fn may_answer(&mut self, link: Link, sender: Sender, kind: Kind) -> bool {
-        self.outboxes[link as usize].room() > KEPT_FREE && self.rates.take(self.now, link, sender, kind)
-    }
-
-    /// Queues an answer, unless its rate or the queue is used up.
-    pub(crate) fn answer_to(&mut self, link: Link, sender: Sender, kind: Kind, answer: Outgoing) {
-        if self.may_answer(link, sender, kind) {
-            self.outboxes[link as usize].push(answer);
-        }
-    }
-
-    /// Says on both links what a sender did: each `#` of the text stands for a number.
-    pub(crate) fn say_of(&mut self, sender: Sender, warning: bool, text: &'static str, numbers: [u32; 3]) {
-        for link in [Link::Autopilot, Link::Swarm] {
-            self.answer_to(link, sender, Kind::Text, Outgoing::Count { warning, text, numbers });
-        }
-    }
-
-    /// Says by whom a command was given that took effect.
-    pub(crate) fn log_command(&mut self, sender: Sender, command: &Command) {
-        let text = match command.command {
-            commands::START => "Start from #/#",
-            commands::PAUSE_CONTINUE if command.param1 == 0.0 => "Pause from #/#",
-            commands::PAUSE_CONTINUE => "Resume from #/#",
-            commands::LAND => "Landing from #/#",
-            commands::RETURN => "Return from #/#",
-            commands::EXCLUDE if command.param1 > 0.0 => "Obstacle from #/#",
-            commands::EXCLUDE => "Obstacle revoked from #/#",
-            commands::RESTART => "Restart from #/#",
-            _ => "Command from #/#",
-        };
-        self.log_sender(sender, text, command.from);
-    }
-
-    pub(crate) fn log_sender(&mut self, sender: Sender, text: &'static str, from: (u8, u8)) {
-        self.say_of(sender, false, text, [u32::from(from.0), u32::from(from.1), 0]);
     }
 }
 

@@ -26,7 +26,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.waits = Waits { id, since: self.now };
         } else if self.now - self.waits.since >= NAMED_AFTER {
             self.waits.since = self.now;
-            self.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
+            self.links.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
             // Full only if the shell does not drain.
             let _ = self.events.push_back(Event::WaitsForStart { id });
         }

@@ -98,6 +98,8 @@ pub struct Neighbours<const V: usize> {
     clear_at: Instant,
     /// No vehicle's progress grows faster, m/s.
     fastest_mps: f32,
+    /// With the vehicle of this rank the next relay begins.
+    relay_next: u16,
 }
 
 impl<const V: usize> Neighbours<V> {
@@ -111,6 +113,7 @@ impl<const V: usize> Neighbours<V> {
             dropped: 0,
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
+            relay_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id != own_id {

@@ -43,19 +43,19 @@ impl Tree {
     fn of_root(root: &Path) -> Result<Self> {
         let mut tree = Self { sources: Vec::new(), modules: BTreeMap::new() };
         let folder = root.parent().context("a root lies in a folder")?;
-        tree.read(root, folder, Vec::new())?;
+        tree.read(root, folder, &[])?;
         Ok(tree)
     }
 
     /// Reads a file and those of its modules; `folder` is where they lie.
-    fn read(&mut self, path: &Path, folder: &Path, module: Vec<String>) -> Result<()> {
+    fn read(&mut self, path: &Path, folder: &Path, module: &[String]) -> Result<()> {
         let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
         let file = syn::parse_file(&text).with_context(|| path.display().to_string())?;
         let items: Vec<Item> = file.items.into_iter().filter(|item| !is_test(attributes(item))).collect();
         let at = self.sources.len();
-        self.modules.insert(module.clone(), at);
-        self.sources.push(Source { path: path.to_owned(), module: module.clone(), items: items.clone() });
-        self.read_modules(&items, path, folder, &module, at)
+        self.modules.insert(module.to_vec(), at);
+        self.sources.push(Source { path: path.to_owned(), module: module.to_vec(), items: items.clone() });
+        self.read_modules(&items, path, folder, module, at)
     }
 
     fn read_modules(
@@ -80,7 +80,7 @@ impl Tree {
             let places = [folder.join(format!("{name}.rs")), folder.join(&name).join("mod.rs")];
             let found = named.or_else(|| places.into_iter().find(|place| place.exists()));
             let found = found.with_context(|| format!("{}: no file of mod {name}", path.display()))?;
-            self.read(&found, &folder.join(&name), inner)?;
+            self.read(&found, &folder.join(&name), &inner)?;
         }
         Ok(())
     }

@@ -135,22 +135,24 @@ impl Contact {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// What neighbours do not hear themselves. It begins with the vehicle of rank `next` and says with which to go on.
-    pub(crate) fn relay(&self, now: Instant, next: &mut u16, mission_crc: u32, plan_crc: u32) -> Relay {
+    /// What neighbours do not hear themselves, beginning where the last one was full.
+    pub(crate) fn relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, LATELY));
         // What one neighbour misses is reported to all.
         let missed = |c: &Contact| speaking().any(|by| by.rank != c.rank && by.hears & (1 << c.rank) == 0);
-        let first = roster.partition_point(|c| c.rank < *next);
+        let first = roster.partition_point(|c| c.rank < self.relay_next);
+        let mut next = self.relay_next;
         let turn = roster[first..].iter().chain(&roster[..first]);
         for contact in turn.filter(|c| c.rank < 32 && missed(c)) {
             let Some(item) = contact.item(now) else { continue };
             if relay.items.push(item).is_err() {
-                *next = contact.rank;
+                next = contact.rank;
                 break;
             }
         }
+        self.relay_next = next;
         relay
     }
 

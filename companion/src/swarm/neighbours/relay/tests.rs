@@ -44,7 +44,6 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
 /// A swarm in a row, each of which hears only its next; the progress of each grows with time.
 struct Swarm {
     tables: List<Neighbours<8>>,
-    next: List<u16>,
     now: Instant,
 }
 
@@ -53,7 +52,7 @@ impl Swarm {
         let entry = |id: u8| RosterEntry { system_id: id, start: Point::zeros() };
         let roster: List<_> = (1..=count).map(entry).collect();
         let tables = (1..=count).map(|id| Neighbours::new(&roster, id, 2.0)).collect();
-        Self { tables, next: std::vec![0; usize::from(count)], now: Instant::from_millis(1000) }
+        Self { tables, now: Instant::from_millis(1000) }
     }
 
     fn progress_m(&self, rank: usize) -> f32 {
@@ -72,7 +71,7 @@ impl Swarm {
                 heard: self.tables[from].heard_bits(self.now),
                 ..Intent::default()
             };
-            let relay = self.tables[from].relay(self.now, &mut self.next[from], MISSION, PLAN);
+            let relay = self.tables[from].relay(self.now, MISSION, PLAN);
             for to in [from.wrapping_sub(1), from + 1] {
                 let Some(table) = self.tables.get_mut(to).filter(|_| !lost[from]) else { continue };
                 table.handle_intent(self.now, to as u16, &intent, MISSION, Some(PLAN));

@@ -7,12 +7,12 @@ use mavlink::dialects::ardupilotmega::{
 };
 use planner_core::{Point, frames};
 
-use crate::companion::Companion;
+use super::Companion;
 use crate::events::Link;
 use crate::guidance::Setpoint;
+use crate::link::Fresh;
 use crate::link::frame;
 use crate::link::intent::{self, Intent};
-use crate::link::outbox::Outgoing;
 use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
@@ -23,84 +23,81 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if out.len() < frame::MAX_SENT {
             return 0;
         }
-        let at = link as usize;
         let system = self.config.system_id;
         if link == Link::Autopilot
-            && core::mem::take(&mut self.setpoint_due)
+            && self.links.take_due(link, Fresh::Setpoint)
             && let Some(data) = self.setpoint()
         {
-            return frame::encode(self.outboxes[at].header(system), &data, out);
+            return frame::encode(self.links.header(link, system), &data, out);
         }
-        if core::mem::take(&mut self.heartbeat_due[at]) {
-            return frame::encode(self.outboxes[at].header(system), &self.heartbeat(), out);
+        if self.links.take_due(link, Fresh::Heartbeat) {
+            return frame::encode(self.links.header(link, system), &self.heartbeat(), out);
         }
-        if link == Link::Swarm && core::mem::take(&mut self.position_due) {
+        if link == Link::Swarm && self.links.take_due(link, Fresh::Position) {
             let data = self.global_position();
-            return frame::encode(self.outboxes[at].header(system), &data, out);
+            return frame::encode(self.links.header(link, system), &data, out);
         }
-        if link == Link::Swarm && core::mem::take(&mut self.intent_due) {
+        if link == Link::Swarm && self.links.take_due(link, Fresh::Intent) {
             let mut payload = [0; 133];
             let len = self.intent().encode(&mut payload);
-            let header = self.outboxes[at].header(system);
-            self.sent.note(header.sequence, self.now);
+            let header = self.links.intent_header(system, self.now);
             if self.guidance.hold.is_on() {
                 self.guidance.hold.note(self.now);
             }
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
-        if link == Link::Swarm && !self.radio.allows(self.now, self.telemetry.armed) {
+        if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
             return 0;
         }
         let relayed = if link == Link::Swarm { self.pass_on(out) } else { 0 };
         let length = if relayed > 0 { relayed } else { self.answer(link, out) };
         if link == Link::Swarm {
-            self.radio.spend(length);
+            self.links.spend(length);
         }
         length
     }
 
     /// What neighbours do not hear from others, while the account has enough for answers too.
     fn pass_on(&mut self, out: &mut [u8]) -> usize {
-        if !self.radio.is_half_full() || !core::mem::take(&mut self.relay_due) {
+        if !self.links.radio_half_full() || !self.links.take_due(Link::Swarm, Fresh::Relay) {
             return 0;
         }
         let plan_crc = self.plan.as_ref().map_or(0, |plan| plan.plan_crc);
         let crc = self.config.mission_crc;
-        let relay = self.neighbours.relay(self.now, &mut self.relay_next, crc, plan_crc);
+        let relay = self.neighbours.relay(self.now, crc, plan_crc);
         if relay.is_empty() {
             return 0;
         }
         let mut payload = [0; relay::LENGTH];
         let len = relay.encode(self.config.system_id, &mut payload);
-        let header = self.outboxes[Link::Swarm as usize].header(self.config.system_id);
+        let header = self.links.header(Link::Swarm, self.config.system_id);
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
     /// What was asked for, and what waits to be told.
     fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
-        let (at, system) = (link as usize, self.config.system_id);
-        if core::mem::take(&mut self.version_due[at]) {
-            return frame::encode(self.outboxes[at].header(system), &services::version(system), out);
+        let system = self.config.system_id;
+        if self.links.take_due(link, Fresh::Version) {
+            return frame::encode(self.links.header(link, system), &services::version(system), out);
         }
-        let length = self.outboxes[at].transmit(system, out);
+        let length = self.links.transmit(link, system, out);
         if length > 0 {
             return length;
         }
-        let Some(payload) = self.ftp.poll(at) else { return 0 };
-        let header = self.outboxes[at].header(system);
+        let Some(payload) = self.ftp.poll(link as usize) else { return 0 };
+        let header = self.links.header(link, system);
         let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
         frame::encode_raw(header, id, extra, &payload, out)
     }
 
     /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
     pub fn say(&mut self, warning: bool, text: &'static str) {
-        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
+        self.links.say(warning, text);
     }
 
     /// The same with numbers: each `#` of the text stands for one.
     pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
-        let numbers = [numbers[0], numbers[1], 0];
-        self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
+        self.links.say_count(warning, text, numbers);
     }
 
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
@@ -218,7 +215,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             speed_mps: self.telemetry.velocity.norm(),
             floor_m: plan.map_or(self.start.z, |plan| self.guidance.ground_m(plan)),
             column,
-            echo: self.neighbours.echo(self.sent.count(), self.now),
+            echo: self.neighbours.echo(self.links.intents_sent(), self.now),
             points,
         }
     }

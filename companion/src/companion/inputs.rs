@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-use crate::companion::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
+use super::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
 use crate::config::PlanFailure;
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};

@@ -1,0 +1,78 @@
+//! The one table of what is due when.
+//!
+//! Three timers wake the shell ([`Timers::next`]): the step of the control loop, heartbeats, and the swarm's state. The rest are looked
+//! at in each step: what they name happens in the first step at or after their time.
+
+use crate::time::{Duration, Instant};
+
+/// What can be due.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Timer {
+    /// A step of the control loop.
+    Step,
+    /// Heartbeats on both links.
+    Heartbeat,
+    /// Position and intent to the swarm.
+    Swarm,
+    /// The request that the state repeats: mode, take-off, landing, disarming.
+    Request,
+    /// A request for the EKF origin.
+    Origin,
+    /// Streams may be requested again.
+    Streams,
+    /// A request for a limit of the autopilot's.
+    Limit,
+    /// A setpoint that was held may be reported again.
+    HeldReport,
+    /// An EKF origin that is not used may be reported again.
+    OriginReport,
+}
+
+const TIMERS: usize = 9;
+/// Those that wake the shell.
+const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
+
+/// When each is due; at the start all are.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Timers {
+    due_at: [Instant; TIMERS],
+}
+
+impl Timers {
+    /// Due at this time, whatever was set.
+    pub(crate) fn set(&mut self, timer: Timer, at: Instant) {
+        self.due_at[timer as usize] = at;
+    }
+
+    /// Due at this time, or earlier if it already was.
+    pub(crate) fn hasten(&mut self, timer: Timer, at: Instant) {
+        let due_at = &mut self.due_at[timer as usize];
+        *due_at = (*due_at).min(at);
+    }
+
+    /// Whether it is due.
+    pub(crate) fn is_due(&self, timer: Timer, now: Instant) -> bool {
+        now >= self.due_at[timer as usize]
+    }
+
+    /// Whether it is due; if so, it is next due after `every`.
+    pub(crate) fn take(&mut self, timer: Timer, now: Instant, every: Duration) -> bool {
+        let due = self.is_due(timer, now);
+        if due {
+            self.set(timer, now + every);
+        }
+        due
+    }
+
+    /// Due again `every` after it was due: a rhythm, which begins again after a gap instead of catching up.
+    pub(crate) fn repeat(&mut self, timer: Timer, now: Instant, every: Duration) {
+        let due = self.due_at[timer as usize] + every;
+        self.set(timer, if due > now { due } else { now + every });
+    }
+
+    /// When the shell is to call again.
+    pub(crate) fn next(&self) -> Instant {
+        WAKE.iter()
+            .fold(self.due_at[Timer::Step as usize], |next, timer| next.min(self.due_at[*timer as usize]))
+    }
+}
