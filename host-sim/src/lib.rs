@@ -1,9 +1,11 @@
 //! The desk side of Flockmate: maps, planning, simulated autopilots and swarm simulation.
 #![forbid(unsafe_code)]
 
+pub mod area;
 pub mod autopilot;
 pub mod capacity;
 pub mod commands;
+pub mod coverage;
 pub mod files;
 pub mod flash;
 pub mod link;

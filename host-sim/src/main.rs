@@ -28,6 +28,8 @@ enum Command {
     Plan(commands::plan::Args),
     /// Plan and fly a scenario with simulated autopilots
     Fly(commands::fly::FlyArgs),
+    /// Plan how a fleet photographs an area; no flight
+    Cover(commands::cover::Args),
     /// Simulate one autopilot for any MAVLink client
     Autopilot(autopilot::server::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
@@ -61,6 +63,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Roadmap(args) => commands::roadmap::run(&args),
         Command::Plan(args) => commands::plan::run(&args),
         Command::Fly(args) => commands::fly::run(&args),
+        Command::Cover(args) => commands::cover::run(&args),
         Command::Autopilot(args) => autopilot::server::run(&args),
         Command::Companion(args) => commands::companion::run(&args),
         Command::Upload(args) => commands::upload::run(&args),

@@ -6,6 +6,7 @@
 #![forbid(unsafe_code)]
 
 pub mod assignment;
+pub mod coverage;
 pub mod deconflict;
 pub mod detour;
 pub mod file;

@@ -31,8 +31,10 @@ const vehicles = report.vehicles.map((v, i) => ({
   planned: decode(v.planned, Float32Array),
   track: decode(v.track, Float32Array),
 }));
+const outlines = (report.outlines ?? []).map((o) => ({ ...o, points: decode(o.points, Float32Array) }));
+
 // A plan alone has no tracks, and none of the figures that only a flight can give.
-const flown = vehicles.some((v) => v.track.length > 0);
+const flown = report.command !== "cover" && vehicles.some((v) => v.track.length > 0);
 const vehicleById = new Map(vehicles.map((v) => [v.id, v]));
 
 const plots = report.plots.map((p) => ({

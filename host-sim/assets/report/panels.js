@@ -44,7 +44,7 @@ const SAFETY_ORDER = ["wall_contacts", "violations", "deadlocks", "min_separatio
 
 // The figures of one section of the result, the safety figures in order and with their limits.
 function rows(list, section, figures) {
-  const keys = Object.keys(figures).filter((key) => key !== "safety_distance_m" || !("min_separation_m" in figures));
+  const keys = Object.keys(figures).filter((key) => key !== "safety_distance_m" || !("min_separation_m" in figures)).filter((key) => !Array.isArray(figures[key]));
   if (section === "safety") keys.sort((a, b) => SAFETY_ORDER.indexOf(a) - SAFETY_ORDER.indexOf(b));
   for (const key of keys) {
     const [name, unit] = nameAndUnit(key);
@@ -69,7 +69,7 @@ function buildSummary() {
   const host = byId("summary");
   const result = report.result ?? {};
   const ends = Array.isArray(result.vehicles) ? result.vehicles : [];
-  if (!flown && ends.length > 0) {
+  if (!flown && ends.length > 0 && report.command !== "cover") {
     const assigned = ends.filter((v) => isNumber(v.goal)).length;
     row(host.appendChild(element("dl")), "Given a goal", `${assigned} of ${ends.length}`);
   }
@@ -96,7 +96,20 @@ function buildSummary() {
     const box = host.appendChild(element(folded ? "details" : "div"));
     box.append(element(folded ? "summary" : "h3", name));
     rows(box.appendChild(element("dl")), section, figures);
+    if (Array.isArray(figures.routes)) box.append(costBars(figures));
   }
+}
+
+// Each route's cost as a bar, with a line at the lower bound.
+function costBars({ routes, max_cost_s, lower_bound_s }) {
+  const host = element("div", null, { class: "bars" });
+  for (const route of routes) {
+    const bar = host.appendChild(element("div", `UAV ${route.vehicle}: ${fixed(route.cost_s, 1)} s`, { class: "bar" }));
+    const color = cssColor(vehicleById.get(route.vehicle)?.color ?? [99, 197, 176]);
+    bar.style.background = `linear-gradient(90deg, ${color} ${(100 * route.cost_s) / max_cost_s}%, transparent 0)`;
+    bar.append(element("i", null, { style: `left: ${(100 * lower_bound_s) / max_cost_s}%`, title: "no division ends before" }));
+  }
+  return host;
 }
 
 // The table; `onSelect(id)` when a row is clicked. Returns `mark(id)`.
@@ -200,6 +213,7 @@ function buildLayers(view, asked) {
     if (report.map.creases.length > 0) check("Edges", true, (shown) => { view.map.creases.visible = shown; });
   }
   layer("Roadmap", "roadmap", true);
+  layer("Area", "outlines", true);
   layer("Planned paths", "planned", true);
   layer("Flown tracks", "track", true);
   layer("Starts □ and goals ◇", "terminals", true);
@@ -209,7 +223,8 @@ function buildLayers(view, asked) {
   layer("Obstacles", "obstacles", true);
   layer("Grid", "grid", true);
   const notices = [];
-  if (vehicles.length > 0 && !flown) notices.push("Planned only: nothing was flown");
+  if (report.command === "cover") notices.push("Planned only: vehicles move as planned, at cruise speed");
+  else if (vehicles.length > 0 && !flown) notices.push("Planned only: nothing was flown");
   if (report.map && report.map.drawn_m > report.map.resolution_m) notices.push(`Map drawn at ${report.map.drawn_m} m, planned at ${report.map.resolution_m} m`);
   byId("notice").hidden = notices.length === 0;
   byId("notice").textContent = notices.join(". ");

@@ -12,6 +12,7 @@ const extent = (() => {
   };
   if (report.map) { add(report.map.min); add(report.map.max); }
   if (roadmap) addAll(roadmap.nodes, 3, 0);
+  for (const o of outlines) addAll(o.points, 3, 0);
   for (const v of vehicles) { add(v.start); add(v.goal); addAll(v.planned, 3, 0); addAll(v.track, 4, 1); }
   if (min[0] > max[0]) { add([-5, -5, 0]); add([5, 5, 5]); }
   const center = min.map((c, a) => (c + max[a]) / 2);
@@ -91,6 +92,12 @@ function buildRoadmap() {
   lines.renderOrder = 1;
   lines.frustumCulled = false;
   return lines;
+}
+
+// The border of an area, closed.
+function buildOutline(outline) {
+  const color = { area: 0xd8e2ec, hole: 0x8a97a5, "no-fly": 0xff6370 }[outline.kind];
+  return fatLine([...outline.points, ...outline.points.subarray(0, 3)], color, 2, 0.9);
 }
 
 // A polyline some pixels wide; `xyz` holds at least two points.

@@ -25,10 +25,11 @@ function buildView(host, onPick) {
   sun.position.set(0.5, -0.8, 1.2);
   scene.add(new THREE.HemisphereLight(0xdfe9f5, 0x39424c, 1.5), sun);
 
-  const layers = { grid: new THREE.Group(), roadmap: new THREE.Group(), planned: new THREE.Group(), track: new THREE.Group(), vehicles: new THREE.Group(), terminals: new THREE.Group(), obstacles: new THREE.Group() };
+  const layers = { grid: new THREE.Group(), outlines: new THREE.Group(), roadmap: new THREE.Group(), planned: new THREE.Group(), track: new THREE.Group(), vehicles: new THREE.Group(), terminals: new THREE.Group(), obstacles: new THREE.Group() };
   for (const layer of Object.values(layers)) scene.add(layer);
   layers.grid.add(buildGrid());
   if (roadmap) layers.roadmap.add(buildRoadmap());
+  for (const o of outlines) layers.outlines.add(buildOutline(o));
   const map = report.map && buildMap(report.map);
   if (map) scene.add(map.group);
   const safetyDistance = report.result?.safety?.safety_distance_m ?? 0;

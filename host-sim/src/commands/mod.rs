@@ -1,6 +1,7 @@
 //! The commands of `host-sim` that work on a scenario.
 
 pub mod companion;
+pub mod cover;
 pub mod fly;
 pub mod plan;
 pub mod radio;

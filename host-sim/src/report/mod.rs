@@ -32,6 +32,8 @@ pub struct ReportData {
     pub roadmap: Option<RoadmapLines>,
     /// Vehicles in the order of the table.
     pub vehicles: Vec<VehicleTrack>,
+    /// Borders on the ground: the area of a coverage mission.
+    pub outlines: Vec<Outline>,
     /// Obstacles that are not in the map.
     pub obstacles: Vec<SphereObstacle>,
     /// What happened, in any order.
@@ -42,6 +44,28 @@ pub struct ReportData {
     pub result: serde_json::Value,
     /// What `timing.json` holds.
     pub timing: Option<serde_json::Value>,
+}
+
+/// A closed border on the ground.
+#[derive(Clone, Debug, Serialize)]
+pub struct Outline {
+    /// What it encloses.
+    pub kind: OutlineKind,
+    /// Its corners, metres.
+    #[serde(serialize_with = "pack::points")]
+    pub points: Vec<Point>,
+}
+
+/// What a border encloses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutlineKind {
+    /// Area to photograph.
+    Area,
+    /// A part of it that is left out.
+    Hole,
+    /// Nobody enters it.
+    NoFly,
 }
 
 /// Nodes and edges of a roadmap.

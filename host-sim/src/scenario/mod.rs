@@ -4,6 +4,7 @@
 //! two values that cannot both hold are errors that name file, line and column. Lengths are metres in the mission's
 //! ENU frame. Keys for what is not built yet are read and then refused by name: see [`Scenario::check_supported`].
 
+pub mod coverage;
 mod error;
 mod sections;
 #[cfg(test)]
@@ -195,6 +196,12 @@ pub struct Vehicle {
     pub ekf_origin: Option<Geodetic>,
     /// Where its companion runs.
     pub companion: Companion,
+    /// Coverage: its share of the work beside those of the others.
+    pub weight: Option<f32>,
+    /// Coverage: speed of climb, metres a second.
+    pub climb_mps: Option<f32>,
+    /// Coverage: speed of descent, metres a second.
+    pub descend_mps: Option<f32>,
 }
 
 /// Where a companion runs.
@@ -314,6 +321,23 @@ impl Scenario {
 
 /// Reads a scenario file; paths in it are relative to its folder.
 pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
+    let (text, name, folder) = text(path)?;
+    sections::parse(&text, &name, &folder)
+}
+
+/// Reads the scenario file of a coverage mission; paths in it are relative to its folder.
+pub fn load_coverage(path: &Path) -> Result<coverage::Coverage, ScenarioError> {
+    let (text, name, folder) = text(path)?;
+    sections::area::coverage(&text, &name, &folder)
+}
+
+/// The same of a text; `name` names it in errors, and paths in it are relative to the working directory.
+pub fn parse_coverage(text: &str, name: &str) -> Result<coverage::Coverage, ScenarioError> {
+    sections::area::coverage(text, name, Path::new(""))
+}
+
+/// A scenario file's text, its name in errors, and its folder.
+fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     let name = quoted_path(path);
     let fail = |why: String| ScenarioError { file: name.clone(), place: None, why, hint: None };
     let text = files::read_text(path).map_err(|e| {
@@ -323,7 +347,7 @@ pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
         ScenarioError { hint, ..fail(format!("cannot read it: {e}")) }
     })?;
     let folder = path.parent().map(PathBuf::from).unwrap_or_default();
-    sections::parse(&text, &name, &folder)
+    Ok((text, name, folder))
 }
 
 /// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working directory.

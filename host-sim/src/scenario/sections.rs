@@ -1,5 +1,6 @@
 //! The tables of a scenario, one function each.
 
+pub(super) mod area;
 mod checks;
 mod simulation;
 
@@ -34,6 +35,11 @@ const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 7
 
 pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let text = Text { file, text };
+    root(text, |root| goals_mission(text, root, folder))
+}
+
+/// What a scenario's root table says, if it is TOML and all its keys are known.
+fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let what = quoted(error.message().lines().next().unwrap_or_default());
@@ -55,8 +61,17 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         "formation",
     ]);
     root.finish()?;
+    read(&root)
+}
+
+/// The scenario of a mission with goals.
+fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
+    if let (None, Some(area)) = (root.get("map"), root.get("area")) {
+        let hint = "`host-sim cover` plans it";
+        return Err(text.with_hint(&area.span, "not available yet: flying an [area]", hint));
+    }
     let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -86,8 +101,8 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
         }
         None => Vec::new(),
     };
-    let area = unbuilt(&root, "area", &mut unsupported)?;
-    let formation = unbuilt(&root, "formation", &mut unsupported)?;
+    let area = unbuilt(root, "area", &mut unsupported)?;
+    let formation = unbuilt(root, "formation", &mut unsupported)?;
     if let (Mode::Coverage | Mode::Formation, Some(span)) = (mission.mode, &mode_span) {
         unsupported.push(not_yet(text, span, "this mission.mode"));
     }
@@ -100,9 +115,8 @@ pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     if let Some(span) = &estimator_span {
         check_margins(text, span, &roadmap, &deconfliction, &simulation, &vehicles)?;
     }
-    let path = file.to_owned();
     Ok(Scenario {
-        path,
+        path: text.file.to_owned(),
         text: text.text.to_owned(),
         seed,
         map,
@@ -432,8 +446,11 @@ fn vehicle(
         home: table.get("home").map(|v| geodetic(&v)).transpose()?,
         ekf_origin: table.get("ekf_origin").map(|v| geodetic(&v)).transpose()?,
         companion,
+        weight: table.optional_f32("weight", 0.0..=1000.0)?,
+        climb_mps: table.optional_f32("climb_mps", 0.01..=100.0)?,
+        descend_mps: table.optional_f32("descend_mps", 0.01..=100.0)?,
     };
-    for key in ["altitude_m", "endurance_s", "payload_kg"] {
+    for key in ["altitude_m", "endurance_s", "payload_kg", "weight", "climb_mps", "descend_mps"] {
         if let Some(value) = table.get(key) {
             unsupported.push(not_yet(table.text, &value.span, key));
         }

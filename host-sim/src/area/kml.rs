@@ -1,0 +1,48 @@
+//! KML: polygons of placemarks, in documents and folders. Longitude and latitude.
+
+use kml::Kml;
+use kml::types::{Geometry, LinearRing, Polygon};
+
+use super::{AreaFileError, Polygons, RingXy};
+
+/// Folders in folders, at most: a file that goes deeper is refused before it is read.
+const DEPTH: usize = 64;
+
+pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
+    // The reader calls itself for each folder and geometry within another one.
+    let nested = ["<Folder", "<Document", "<MultiGeometry"];
+    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > DEPTH {
+        return Err(AreaFileError::malformed("KML that can be read", &"it has more than 64 folders"));
+    }
+    let file: Kml<f64> = text.parse().map_err(|error: kml::Error| AreaFileError::malformed("KML", &error))?;
+    let mut polygons = Polygons::default();
+    add(&file, &mut polygons);
+    Ok(polygons)
+}
+
+fn add(element: &Kml<f64>, polygons: &mut Polygons) {
+    match element {
+        Kml::KmlDocument(document) => document.elements.iter().for_each(|e| add(e, polygons)),
+        Kml::Document { elements, .. } => elements.iter().for_each(|e| add(e, polygons)),
+        Kml::Folder(folder) => folder.elements.iter().for_each(|e| add(e, polygons)),
+        Kml::Placemark(placemark) => {
+            placemark.geometry.iter().for_each(|geometry| add_geometry(geometry, polygons));
+        }
+        Kml::MultiGeometry(many) => many.geometries.iter().for_each(|g| add_geometry(g, polygons)),
+        Kml::Polygon(polygon) => polygons.add(rings(polygon)),
+        _ => {}
+    }
+}
+
+fn add_geometry(geometry: &Geometry<f64>, polygons: &mut Polygons) {
+    match geometry {
+        Geometry::Polygon(polygon) => polygons.add(rings(polygon)),
+        Geometry::MultiGeometry(many) => many.geometries.iter().for_each(|g| add_geometry(g, polygons)),
+        _ => {}
+    }
+}
+
+fn rings(polygon: &Polygon<f64>) -> Vec<RingXy> {
+    let ring = |ring: &LinearRing<f64>| ring.coords.iter().map(|c| [c.x, c.y]).collect();
+    std::iter::once(&polygon.outer).chain(&polygon.inner).map(ring).collect()
+}

@@ -1,0 +1,104 @@
+//! QGroundControl `.plan`: the polygons of its surveys, else its inclusion fences; exclusion fences are no-fly zones.
+//!
+//! Format: <https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html>. Latitude stands first in it.
+
+use serde::Deserialize;
+
+use super::{AreaFileError, Polygons, RingXy};
+
+/// Corners of the polygon around a circular fence.
+const CIRCLE_CORNERS: usize = 32;
+/// Metres of one degree of latitude, on a sphere as QGroundControl draws.
+const M_PER_DEG: f64 = 111_319.49;
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct File {
+    file_type: String,
+    version: u32,
+    mission: Mission,
+    #[serde(default)]
+    geo_fence: Fence,
+}
+
+#[derive(Deserialize)]
+struct Mission {
+    #[serde(default)]
+    items: Vec<Item>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Item {
+    complex_item_type: Option<String>,
+    polygon: Option<Vec<[f64; 2]>>,
+}
+
+#[derive(Deserialize, Default)]
+struct Fence {
+    #[serde(default)]
+    polygons: Vec<FencePolygon>,
+    #[serde(default)]
+    circles: Vec<FenceCircle>,
+}
+
+#[derive(Deserialize)]
+struct FencePolygon {
+    inclusion: bool,
+    polygon: Vec<[f64; 2]>,
+}
+
+#[derive(Deserialize)]
+struct FenceCircle {
+    inclusion: bool,
+    circle: Circle,
+}
+
+#[derive(Deserialize)]
+struct Circle {
+    center: [f64; 2],
+    radius: f64,
+}
+
+pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
+    const FORMAT: &str = "a plan of QGroundControl";
+    let file: File = serde_json::from_str(text).map_err(|error| AreaFileError::malformed(FORMAT, &error))?;
+    if file.file_type != "Plan" || file.version != 1 {
+        let why = format!("fileType {:?}, version {}: expected \"Plan\", 1", file.file_type, file.version);
+        return Err(AreaFileError::malformed(FORMAT, &why));
+    }
+    let surveys = file.mission.items.into_iter();
+    let surveys = surveys.filter(|item| item.complex_item_type.as_deref() == Some("survey"));
+    let mut polygons = Polygons {
+        outers: surveys.filter_map(|item| item.polygon).map(|ring| longitude_first(&ring)).collect(),
+        ..Polygons::default()
+    };
+    let has_survey = !polygons.outers.is_empty();
+    let fences = file.geo_fence.polygons.into_iter().map(|f| (f.inclusion, longitude_first(&f.polygon)));
+    let circles = file.geo_fence.circles.into_iter().map(|f| (f.inclusion, around(&f.circle, f.inclusion)));
+    for (inclusion, ring) in fences.chain(circles) {
+        match (inclusion, has_survey) {
+            (false, _) => polygons.no_fly.push(ring),
+            (true, false) => polygons.outers.push(ring),
+            (true, true) => {}
+        }
+    }
+    Ok(polygons)
+}
+
+fn longitude_first(ring: &[[f64; 2]]) -> RingXy {
+    ring.iter().map(|&[lat, lon]| [lon, lat]).collect()
+}
+
+/// A circle as a polygon: inside it where it is included, around it where it is excluded.
+fn around(circle: &Circle, inclusion: bool) -> RingXy {
+    let [lat, lon] = circle.center;
+    let half = std::f64::consts::PI / CIRCLE_CORNERS as f64;
+    let radius = if inclusion { circle.radius } else { circle.radius / half.cos() };
+    let corner = |i: usize| {
+        let (sin, cos) = (2.0 * half * i as f64).sin_cos();
+        let east = radius * cos / (M_PER_DEG * lat.to_radians().cos());
+        [lon + east, lat + radius * sin / M_PER_DEG]
+    };
+    (0..CIRCLE_CORNERS).map(corner).collect()
+}

@@ -1,0 +1,45 @@
+//! Well-known text: POLYGON, MULTIPOLYGON and collections of them.
+
+use std::str::FromStr as _;
+
+use wkt::Wkt;
+use wkt::types::{LineString, Polygon};
+
+use super::{AreaFileError, Polygons, RingXy};
+
+/// Collections in a file, at most: the reader calls itself for each collection within another one.
+const COLLECTIONS: usize = 64;
+
+pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
+    if text.to_ascii_uppercase().matches("COLLECTION").count() > COLLECTIONS {
+        return Err(AreaFileError::malformed("WKT that can be read", &"it has more than 64 collections"));
+    }
+    // PostGIS writes the reference system before it; [area] says what the coordinates are.
+    let text = text.trim();
+    let text = match text.split_once(';') {
+        Some((system, rest)) if system.to_ascii_uppercase().starts_with("SRID=") => rest,
+        _ => text,
+    };
+    let geometry = Wkt::<f64>::from_str(text).map_err(|error| AreaFileError::malformed("WKT", &error))?;
+    let mut polygons = Polygons::default();
+    add(&geometry, &mut polygons);
+    Ok(polygons)
+}
+
+fn add(geometry: &Wkt<f64>, polygons: &mut Polygons) {
+    match geometry {
+        Wkt::Polygon(polygon) => polygons.add(rings(polygon)),
+        Wkt::MultiPolygon(many) => {
+            many.polygons().iter().for_each(|polygon| polygons.add(rings(polygon)));
+        }
+        Wkt::GeometryCollection(many) => {
+            many.geometries().iter().for_each(|geometry| add(geometry, polygons));
+        }
+        _ => {}
+    }
+}
+
+fn rings(polygon: &Polygon<f64>) -> Vec<RingXy> {
+    let ring = |line: &LineString<f64>| line.coords().iter().map(|c| [c.x, c.y]).collect();
+    polygon.rings().iter().map(ring).collect()
+}

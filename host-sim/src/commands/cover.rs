@@ -1,0 +1,258 @@
+//! `host-sim cover`: a fleet's plan to photograph an area; no flight.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use planner_core::coverage::pack::Route;
+use serde::Serialize;
+
+use crate::coverage::check::{self, Findings, Flown};
+use crate::coverage::flight::{Stop, stops, times_s};
+use crate::coverage::{Planned, export, page};
+use crate::files::Results;
+use crate::output;
+use crate::report;
+use crate::result::{self, Timing, Totals, VehicleResult, rounded};
+use crate::say;
+use crate::scenario::coverage::{Coverage, Method};
+use crate::scenario::load_coverage;
+
+/// Arguments of `host-sim cover`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// The scenario, with an `[area]`
+    scenario: PathBuf,
+    /// Directory for `result.json`, `timing.json`, `report.html`, `waypoints.csv`, `area.geojson`, and for each vehicle's
+    /// `vehicle-N.plan` and `vehicle-N.waypoints`
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+    /// Divide the work so, whatever the scenario says: simple-binpat, binpat, powell-binpat or exact
+    #[arg(long, value_name = "METHOD", value_parser = Method::named)]
+    method: Option<Method>,
+}
+
+/// `result.json` of a coverage plan.
+#[derive(Debug, Serialize)]
+struct CoverResult {
+    command: &'static str,
+    scenario: String,
+    seed: u64,
+    method: &'static str,
+    complete: bool,
+    vehicles: Vec<VehicleResult>,
+    totals: Totals,
+    coverage: CoverageResult,
+}
+
+/// Its `coverage`.
+#[derive(Debug, Serialize)]
+struct CoverageResult {
+    covered_share: f64,
+    waypoints: u32,
+    lanes: usize,
+    lane_m: f64,
+    waypoint_m: f64,
+    angle_deg: f64,
+    max_cost_s: f64,
+    mean_cost_s: f64,
+    sd_cost_s: f64,
+    max_cost_m: f64,
+    lower_bound_s: f64,
+    gap: f64,
+    photos: u64,
+    twice: u64,
+    left: u64,
+    routes: Vec<RouteResult>,
+}
+
+/// One route.
+#[derive(Debug, Serialize)]
+struct RouteResult {
+    vehicle: u8,
+    first: u32,
+    last: u32,
+    backward: bool,
+    layer_m: f64,
+    cost_s: f64,
+    cost_m: f64,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// Bad input, by name and place.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    let scenario = load_coverage(&args.scenario)?;
+    let files = files(&scenario);
+    let names: Vec<&str> = output::NAMES.into_iter().chain(files.iter().map(String::as_str)).collect();
+    let mut results = Results::open(&args.out, &names)?;
+    let planned = Planned::new(&scenario, args.method.unwrap_or(scenario.area.method))?;
+    let flights: Vec<(Route, Vec<Stop>, Vec<f32>)> = planned
+        .plan
+        .routes
+        .iter()
+        .map(|route| {
+            let stops = stops(&planned, route);
+            let times = times_s(&planned, route, &stops);
+            (*route, stops, times)
+        })
+        .collect();
+    let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
+    let findings = check::check(&planned, &flown);
+    let result = described(&planned, &findings);
+    add_flights(&planned, &flights, &mut results)?;
+    results.add(output::NAMES[0], result::json(&result)?.as_bytes())?;
+    let timing = Timing {
+        search_s: planned.seconds[0] + planned.seconds[1],
+        assignment_s: planned.seconds[2],
+        plan_s: planned.seconds.iter().sum(),
+        wall_s: began.elapsed().as_secs_f64(),
+        ..Timing::default()
+    };
+    results.add(output::NAMES[1], result::json(&timing)?.as_bytes())?;
+    let mut page = page::page(&planned, &flights, &findings, serde_json::to_value(&result)?);
+    page.timing = Some(serde_json::to_value(&timing)?);
+    results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
+    results.keep()?;
+    print(&result, &findings, &args.out);
+    Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// Names of the files beside the usual ones.
+fn files(scenario: &Coverage) -> Vec<String> {
+    let own = |id: u8| [format!("vehicle-{id}.plan"), format!("vehicle-{id}.waypoints")];
+    let shared = ["waypoints.csv", "area.geojson"].map(str::to_owned);
+    scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
+}
+
+fn add_flights(
+    planned: &Planned<'_>,
+    flights: &[(Route, Vec<Stop>, Vec<f32>)],
+    results: &mut Results,
+) -> anyhow::Result<()> {
+    for (route, stops, _) in flights {
+        let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
+        let items = export::items(planned, route, stops);
+        let plan = result::json(&export::plan(planned, route, &items))?;
+        results.add(&format!("vehicle-{id}.plan"), plan.as_bytes())?;
+        let waypoints = export::waypoints(planned, route, &items);
+        results.add(&format!("vehicle-{id}.waypoints"), waypoints.as_bytes())?;
+    }
+    results.add("waypoints.csv", export::csv(planned, flights).as_bytes())?;
+    results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())
+}
+
+fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
+    let scenario = planned.scenario;
+    let routes = &planned.plan.routes;
+    let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
+        let route = routes.iter().find(|route| usize::from(route.vehicle) == index);
+        VehicleResult {
+            id: vehicle.id,
+            goal: None,
+            reached: false,
+            landed: false,
+            path_m: route.map_or(0.0, |route| rounded(route.cost_m)),
+            flown_m: 0.0,
+            flight_time_s: route.map_or(0.0, |route| rounded(route.cost_s)),
+            end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
+        }
+    });
+    let vehicles: Vec<VehicleResult> = vehicles.collect();
+    let heights = scenario.area.heights;
+    let route = |route: &Route| RouteResult {
+        vehicle: scenario.vehicles[usize::from(route.vehicle)].id,
+        first: route.first,
+        last: route.end - 1,
+        backward: route.ends().0 != route.first,
+        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
+        cost_s: rounded(route.cost_s),
+        cost_m: rounded(route.cost_m),
+    };
+    let max_cost_s = planned.plan.max_cost_s();
+    let costs: Vec<f64> = routes.iter().map(|route| f64::from(route.cost_s)).collect();
+    let (mean, sd) = mean_and_sd(&costs);
+    let along = planned.tracks.along();
+    CoverResult {
+        command: "cover",
+        scenario: scenario.path.clone(),
+        seed: scenario.seed,
+        method: planned.method.name(),
+        complete: findings.is_clean(),
+        totals: Totals {
+            path_m: rounded(routes.iter().map(|route| route.cost_m).sum()),
+            makespan_s: rounded(max_cost_s),
+        },
+        coverage: CoverageResult {
+            covered_share: findings.covered_share,
+            waypoints: planned.tracks.waypoint_count(),
+            lanes: planned.tracks.lanes().len(),
+            lane_m: rounded(scenario.area.spacing.lane_m),
+            waypoint_m: rounded(scenario.area.spacing.waypoint_m),
+            angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
+            max_cost_s: rounded(max_cost_s),
+            mean_cost_s: rounded(mean as f32),
+            sd_cost_s: rounded(sd as f32),
+            max_cost_m: rounded(routes.iter().map(|route| route.cost_m).fold(0.0, f32::max)),
+            lower_bound_s: rounded(planned.lower_bound_s),
+            gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
+            photos: findings.photos,
+            twice: findings.twice,
+            left: findings.left,
+            routes: routes.iter().map(route).collect(),
+        },
+        vehicles,
+    }
+}
+
+/// Mean, and the sample's standard deviation: 0 for one value.
+fn mean_and_sd(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count.max(1.0);
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, if values.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 })
+}
+
+fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
+    let coverage = &result.coverage;
+    say!("vehicle  waypoints         layer m   cost s   cost m");
+    for route in &coverage.routes {
+        let (first, last) =
+            if route.backward { (route.last, route.first) } else { (route.first, route.last) };
+        say!(
+            "{:>7}  {:<16}  {:>7.1}  {:>7.1}  {:>7.1}",
+            route.vehicle,
+            format!("{first} to {last}"),
+            route.layer_m,
+            route.cost_s,
+            route.cost_m
+        );
+    }
+    for vehicle in result.vehicles.iter().filter(|v| v.flight_time_s == 0.0) {
+        say!("{:>7}  {}", vehicle.id, vehicle.end);
+    }
+    say!();
+    say!("{}", if result.complete { "complete" } else { "NOT COMPLETE" });
+    say!(
+        "area       {:.2} % photographed ({} cells of {:.2} m), {} waypoints on {} lanes at {:.1}°",
+        100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
+        findings.cells,
+        findings.cell_m,
+        coverage.waypoints,
+        coverage.lanes,
+        coverage.angle_deg
+    );
+    if findings.forbidden > 0 {
+        say!("no-fly     {} legs enter a no-fly zone", findings.forbidden);
+    }
+    say!(
+        "cost       {:.1} s, {:.1} % above the bound of {:.1} s ({})",
+        coverage.max_cost_s,
+        100.0 * coverage.gap,
+        coverage.lower_bound_s,
+        result.method
+    );
+    say!("report     {}", dir.join("report.html").display());
+}

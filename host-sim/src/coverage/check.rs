@@ -1,0 +1,243 @@
+//! The one checker of coverage plans: is everything photographed, every waypoint once, on routes without a break, outside
+//! no-fly zones?
+//!
+//! It looks at the flights as they are written, in f64, and shares no code with the planner. Cells are a tenth of the lane
+//! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
+//! all its corners, or, where overlaps are less than a cell, if pictures show each of them.
+
+use planner_core::coverage::Flat;
+use planner_core::coverage::area::RingKind;
+
+use super::Planned;
+use super::flight::{Act, Stop};
+
+/// Most cells looked at; larger areas are looked at in larger cells.
+const MOST_CELLS: f64 = 4e7;
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Findings {
+    /// Share of the cells that are photographed.
+    pub covered_share: f64,
+    /// Cells that count.
+    pub cells: u64,
+    /// Side of a cell, metres.
+    pub cell_m: f64,
+    /// Pictures taken.
+    pub photos: u64,
+    /// Waypoints flown by nobody.
+    pub left: u64,
+    /// Waypoints flown more than once.
+    pub twice: u64,
+    /// Routes whose waypoints do not follow each other.
+    pub broken: u64,
+    /// Legs that enter a no-fly zone.
+    pub forbidden: u64,
+    /// When each picture first showed a cell: time and number of cells, by rising time.
+    pub over_time: Vec<(f32, u64)>,
+}
+
+impl Findings {
+    /// Whether nothing is wrong.
+    pub fn is_clean(&self) -> bool {
+        self.covered_share >= 1.0 && self.left + self.twice + self.broken + self.forbidden == 0
+    }
+}
+
+/// One vehicle's flight: its stops, and when it passes each.
+pub struct Flown<'a> {
+    /// The stops.
+    pub stops: &'a [Stop],
+    /// Seconds.
+    pub times_s: &'a [f32],
+}
+
+/// Checks flights against the area.
+pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
+    let mut findings = Findings::default();
+    count_waypoints(planned, flights, &mut findings);
+    for flight in flights {
+        let enters = |pair: &&[Stop]| enters_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
+        findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
+    }
+    Cells::new(planned).judge(planned, flights, &mut findings);
+    findings
+}
+
+fn count_waypoints(planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
+    let mut times = vec![0u32; planned.tracks.waypoint_count() as usize];
+    for flight in flights {
+        let photos = flight.stops.iter().filter_map(|stop| match stop.act {
+            Act::Photo(number) => Some(number),
+            _ => None,
+        });
+        let numbers: Vec<u32> = photos.collect();
+        numbers.iter().for_each(|number| times[*number as usize] += 1);
+        findings.photos += numbers.len() as u64;
+        let step = |by: i64| numbers.windows(2).all(|pair| i64::from(pair[1]) - i64::from(pair[0]) == by);
+        findings.broken += u64::from(!step(1) && !step(-1));
+    }
+    findings.left = times.iter().filter(|times| **times == 0).count() as u64;
+    findings.twice = times.iter().filter(|times| **times > 1).count() as u64;
+}
+
+/// Whether a straight leg enters a no-fly zone: its middle between two edges that it crosses is inside, or an end is.
+fn enters_zone(planned: &Planned<'_>, from: &Flat, to: &Flat) -> bool {
+    let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
+    let (a, b) = (wide(from), wide(to));
+    planned.scenario.area.rings_of(RingKind::NoFly).any(|ring| {
+        let ring: Vec<[f64; 2]> = ring.iter().map(wide).collect();
+        let mut shares = vec![0.0, 1.0];
+        for (c, d) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+            let (rx, ry, sx, sy) = (b[0] - a[0], b[1] - a[1], d[0] - c[0], d[1] - c[1]);
+            let cross = rx * sy - ry * sx;
+            let share = ((c[0] - a[0]) * sy - (c[1] - a[1]) * sx) / cross;
+            if share > 0.0 && share < 1.0 {
+                shares.push(share);
+            }
+        }
+        shares.sort_by(f64::total_cmp);
+        shares.windows(2).filter(|pair| pair[1] - pair[0] > 1e-9).any(|pair| {
+            let share = (pair[0] + pair[1]) / 2.0;
+            holds(&ring, [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share])
+        })
+    })
+}
+
+fn holds(ring: &[[f64; 2]], place: [f64; 2]) -> bool {
+    let mut inside = false;
+    for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+        if (a[1] <= place[1]) != (b[1] <= place[1]) {
+            inside ^= place[0] < a[0] + (place[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1]);
+        }
+    }
+    inside
+}
+
+/// Cells along and across the lanes.
+struct Cells {
+    along: [f64; 2],
+    low: [f64; 2],
+    side: f64,
+    size: [usize; 2],
+}
+
+impl Cells {
+    fn new(planned: &Planned<'_>) -> Self {
+        let along = planned.tracks.along();
+        let along = [f64::from(along.x), f64::from(along.y)];
+        let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
+        let mut high = [f64::NEG_INFINITY; 2];
+        for vertex in planned.scenario.area.rings_of(RingKind::Outer).flatten() {
+            let place = cells.rotated(vertex);
+            for axis in 0..2 {
+                cells.low[axis] = cells.low[axis].min(place[axis]);
+                high[axis] = high[axis].max(place[axis]);
+            }
+        }
+        let [wide, tall] = [high[0] - cells.low[0], high[1] - cells.low[1]];
+        let lane_m = f64::from(planned.scenario.area.spacing.lane_m);
+        cells.side = (lane_m / 10.0).max((wide * tall / MOST_CELLS).sqrt());
+        cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
+        cells
+    }
+
+    fn rotated(&self, place: &Flat) -> [f64; 2] {
+        let (x, y) = (f64::from(place.x), f64::from(place.y));
+        [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
+    }
+
+    /// Whether each cell counts, row by row.
+    fn counted(&self, planned: &Planned<'_>) -> Vec<bool> {
+        let area = &planned.scenario.area;
+        let rings = |kind| {
+            let turned = |ring: &[Flat]| ring.iter().map(|v| self.rotated(v)).collect::<Vec<_>>();
+            area.rings_of(kind).map(turned).collect::<Vec<_>>()
+        };
+        let wanted: Vec<_> = rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
+        let mut counted = vec![false; self.size[0] * self.size[1]];
+        for (row, line) in counted.chunks_mut(self.size[0]).enumerate() {
+            let v = self.low[1] + (row as f64 + 0.5) * self.side;
+            self.fill(line, &wanted, v, |cell| *cell = !*cell);
+            for zone in rings(RingKind::NoFly) {
+                self.fill(line, &[zone], v, |cell| *cell = false);
+            }
+        }
+        counted
+    }
+
+    /// Does something to the cells of a row whose middles are inside rings.
+    fn fill(&self, row: &mut [bool], rings: &[Vec<[f64; 2]>], v: f64, mut to: impl FnMut(&mut bool)) {
+        let mut crossings = Vec::new();
+        for ring in rings {
+            for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
+                if (a[1] <= v) != (b[1] <= v) {
+                    crossings.push(a[0] + (v - a[1]) * (b[0] - a[0]) / (b[1] - a[1]));
+                }
+            }
+        }
+        crossings.sort_by(f64::total_cmp);
+        for pair in crossings.chunks_exact(2) {
+            let index = |u: f64| ((u - self.low[0]) / self.side - 0.5).ceil().max(0.0) as usize;
+            let (from, end) = (index(pair[0]), index(pair[1]).min(row.len()));
+            row.get_mut(from..end).into_iter().flatten().for_each(&mut to);
+        }
+    }
+
+    fn judge(&self, planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
+        let spacing = planned.scenario.area.spacing;
+        let counted = self.counted(planned);
+        // Where pictures overlap by a cell, one of them must show all its corners.
+        let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
+            .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
+            >= self.side;
+        let mut photos: Vec<(f32, [f64; 2])> = Vec::new();
+        for flight in flights {
+            for (stop, time) in flight.stops.iter().zip(flight.times_s) {
+                if matches!(stop.act, Act::Photo(_)) {
+                    photos.push((*time, self.rotated(&stop.position.xy())));
+                }
+            }
+        }
+        photos.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let half = [f64::from(spacing.footprint.along_m) / 2.0, f64::from(spacing.footprint.across_m) / 2.0];
+        let [columns, rows] = self.size;
+        let mut corners = vec![false; (columns + 1) * (rows + 1)];
+        let mut shown = vec![false; counted.len()];
+        for (time, place) in photos {
+            // Corners in the picture; a rounding beyond it is in it.
+            let range = |axis: usize, most: usize| {
+                let from = (place[axis] - half[axis] - self.low[axis]) / self.side;
+                let to = (place[axis] + half[axis] - self.low[axis]) / self.side;
+                let to = (to + 1e-3).floor().clamp(-1.0, most as f64);
+                ((from - 1e-3).ceil().max(0.0) as i64, to as i64)
+            };
+            let ((c0, c1), (r0, r1)) = (range(0, columns), range(1, rows));
+            for row in r0..=r1 {
+                for column in c0..=c1 {
+                    corners[row as usize * (columns + 1) + column as usize] = true;
+                }
+            }
+            // Cells of which a corner is new: one more each way where other pictures show the rest.
+            let more = i64::from(!whole);
+            let mut new = 0;
+            for row in (r0 - more).max(0)..(r1 + more).min(rows as i64) {
+                for column in (c0 - more).max(0)..(c1 + more).min(columns as i64) {
+                    let (row, column) = (row as usize, column as usize);
+                    let corner = |r: usize, c: usize| corners[(row + r) * (columns + 1) + column + c];
+                    let all = corner(0, 0) && corner(0, 1) && corner(1, 0) && corner(1, 1);
+                    let cell = row * columns + column;
+                    if all && counted[cell] && !shown[cell] {
+                        shown[cell] = true;
+                        new += 1;
+                    }
+                }
+            }
+            findings.over_time.push((time, new));
+        }
+        findings.cell_m = self.side;
+        findings.cells = counted.iter().filter(|counted| **counted).count() as u64;
+        let good = counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
+        findings.covered_share = if findings.cells == 0 { 1.0 } else { good as f64 / findings.cells as f64 };
+    }
+}

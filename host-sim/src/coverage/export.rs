@@ -1,0 +1,264 @@
+//! Flights as ground stations read them: QGroundControl `.plan`, `.waypoints` (QGC WPL 110), CSV and GeoJSON.
+//!
+//! A flight is NAV_TAKEOFF (22), DO_CHANGE_SPEED (178), waypoints (16), the camera's trigger, and
+//! NAV_RETURN_TO_LAUNCH (20) above the pad. Heights are relative to the vehicle's home (frame 3), so that neither map nor
+//! geoid matters. Between both ends of a lane nothing is written where the autopilot triggers by distance.
+
+use planner_core::Point;
+use planner_core::coverage::area::RingKind;
+use planner_core::coverage::pack::Route;
+use planner_core::frames::{Geodetic, enu_to_geodetic};
+use serde_json::{Value, json};
+
+use super::Planned;
+use super::flight::{Act, Stop, heading_deg};
+use crate::scenario::Personality;
+use crate::scenario::coverage::{Heading, Trigger};
+
+const NAV_WAYPOINT: u16 = 16;
+const NAV_RETURN_TO_LAUNCH: u16 = 20;
+const NAV_TAKEOFF: u16 = 22;
+const DO_CHANGE_SPEED: u16 = 178;
+const DO_DIGICAM_CONTROL: u16 = 203;
+const DO_SET_CAM_TRIGG_DIST: u16 = 206;
+/// MAV_FRAME_GLOBAL_RELATIVE_ALT: for what has a place.
+const FRAME_RELATIVE: u8 = 3;
+/// MAV_FRAME_MISSION: for what has none.
+const FRAME_MISSION: u8 = 2;
+
+/// One item of a mission.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Item {
+    /// MAV_CMD.
+    pub command: u16,
+    /// MAV_FRAME.
+    pub frame: u8,
+    /// Parameters 1 to 4; none is NaN, "as it is".
+    pub params: [Option<f64>; 4],
+    /// Latitude, longitude, metres above home; zeros where the item has no place.
+    pub place: [f64; 3],
+}
+
+impl Item {
+    fn command(command: u16, params: [f64; 4]) -> Self {
+        Self { command, frame: FRAME_MISSION, params: params.map(Some), place: [0.0; 3] }
+    }
+}
+
+/// The place where a vehicle stands.
+fn home(planned: &Planned<'_>, route: &Route) -> Geodetic {
+    let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
+    enu_to_geodetic(&planned.scenario.area.origin, &start)
+}
+
+/// Which lane is flown at a stop and which way a vehicle looks there, degrees from north.
+fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
+    let along = planned.tracks.along();
+    let sweep = heading_deg(&Point::zeros(), &Point::new(along.x, along.y, 0.0));
+    let own = stops[index].lane;
+    let neighbours = [index.checked_sub(1).map(|i| (i, index)), Some((index, index + 1))];
+    let step = neighbours.into_iter().flatten().find_map(|(a, b)| {
+        let (from, to) = (stops.get(a)?, stops.get(b)?);
+        (own.is_some() && from.lane == own && to.lane == own)
+            .then(|| heading_deg(&from.position, &to.position))
+    });
+    let yaw = match planned.scenario.area.heading {
+        Heading::Sweep => sweep,
+        Heading::Lane => step.unwrap_or(sweep),
+    };
+    f64::from((yaw * 100.0).round() / 100.0)
+}
+
+/// All items of a flight.
+pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> {
+    let scenario = planned.scenario;
+    let home = home(planned, route);
+    let start = scenario.vehicles[usize::from(route.vehicle)].start;
+    let place = |position: &Point| {
+        let place = enu_to_geodetic(&scenario.area.origin, position);
+        // The height is about the tangent plane, as the plan is; over the area that is flat to centimetres.
+        [round(place.lat_deg, 1e9), round(place.lon_deg, 1e9), round(f64::from(position.z - start.z), 1e3)]
+    };
+    let waypoint = |index: usize| Item {
+        command: NAV_WAYPOINT,
+        frame: FRAME_RELATIVE,
+        params: [Some(0.0), Some(0.0), Some(0.0), Some(yaw_deg(planned, stops, index))],
+        place: place(&stops[index].position),
+    };
+    let speed = f64::from(planned.vehicles[usize::from(route.vehicle)].cruise_mps);
+    let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
+    let mut items = vec![
+        Item {
+            command: NAV_TAKEOFF,
+            frame: FRAME_RELATIVE,
+            params: [Some(0.0), Some(0.0), Some(0.0), None],
+            place: [round(home.lat_deg, 1e9), round(home.lon_deg, 1e9), round(top, 1e3)],
+        },
+        Item::command(DO_CHANGE_SPEED, [1.0, round(speed, 1e3), -1.0, 0.0]),
+    ];
+    for (index, stop) in stops.iter().enumerate().skip(2) {
+        let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
+        let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
+        let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
+        match (stop.act, scenario.area.trigger) {
+            (Act::Pad, _) => items.push(Item::command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
+            (Act::Photo(_), Trigger::Waypoint) => {
+                items.push(waypoint(index));
+                items.push(Item::command(DO_DIGICAM_CONTROL, [0.0; 4]));
+                // Parameter 5 asks for a picture.
+                if let Some(last) = items.last_mut() {
+                    last.place[0] = 1.0;
+                }
+            }
+            (Act::Photo(_), trigger) => {
+                if begins || ends {
+                    items.push(waypoint(index));
+                }
+                if trigger == Trigger::Distance && begins {
+                    let next = stops.get(index + 1).filter(|next| next.lane == stop.lane);
+                    let step = next.map_or(planned.scenario.area.spacing.waypoint_m, |next| {
+                        (next.position - stop.position).norm()
+                    });
+                    // The first picture at once, the others each so far from the last.
+                    let trigger = [round(f64::from(step), 1e3), 0.0, 1.0, 0.0];
+                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, trigger));
+                }
+                if trigger == Trigger::Distance && ends {
+                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, [0.0; 4]));
+                }
+            }
+            (Act::Transit | Act::Lane, _) => items.push(waypoint(index)),
+        }
+    }
+    items
+}
+
+fn round(value: f64, by: f64) -> f64 {
+    (value * by).round() / by
+}
+
+/// A QGroundControl plan.
+pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
+    let home = home(planned, route);
+    let vehicle = &planned.scenario.vehicles[usize::from(route.vehicle)];
+    let item = |(index, item): (usize, &Item)| {
+        let mut params: Vec<Value> = item.params.iter().map(|p| p.map_or(Value::Null, Value::from)).collect();
+        params.extend(item.place.map(Value::from));
+        let mut value = json!({
+            "autoContinue": true,
+            "command": item.command,
+            "doJumpId": index + 1,
+            "frame": item.frame,
+            "params": params,
+            "type": "SimpleItem",
+        });
+        if item.frame == FRAME_RELATIVE {
+            value["AMSLAltAboveTerrain"] = Value::Null;
+            value["Altitude"] = json!(item.place[2]);
+            value["AltitudeMode"] = json!(1);
+        }
+        value
+    };
+    let firmware = match vehicle.personality {
+        Personality::Px4 => 12,
+        Personality::Ardupilot => 3,
+    };
+    let speed = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
+    json!({
+        "fileType": "Plan",
+        "geoFence": { "circles": [], "polygons": [], "version": 2 },
+        "groundStation": "QGroundControl",
+        "mission": {
+            "cruiseSpeed": speed,
+            "firmwareType": firmware,
+            "globalPlanAltitudeMode": 1,
+            "hoverSpeed": speed,
+            "items": items.iter().enumerate().map(item).collect::<Vec<_>>(),
+            "plannedHomePosition": [round(home.lat_deg, 1e9), round(home.lon_deg, 1e9), round(home.alt_m, 1e3)],
+            "vehicleType": 2,
+            "version": 2,
+        },
+        "rallyPoints": { "points": [], "version": 2 },
+        "version": 1,
+    })
+}
+
+/// The same as `.waypoints`: one item a line, the home first.
+pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String {
+    let home = home(planned, route);
+    let mut text = "QGC WPL 110\n".to_owned();
+    let mut line = |index: usize, current: u8, frame: u8, command: u16, params: [f64; 4], place: [f64; 3]| {
+        let numbers: Vec<String> = params.iter().map(|p| format!("{p:.8}")).collect();
+        let [lat, lon, alt] = place;
+        text += &format!(
+            "{index}\t{current}\t{frame}\t{command}\t{}\t{lat:.9}\t{lon:.9}\t{alt:.6}\t1\n",
+            numbers.join("\t")
+        );
+    };
+    line(0, 1, 0, NAV_WAYPOINT, [0.0; 4], [home.lat_deg, home.lon_deg, home.alt_m]);
+    for (index, item) in items.iter().enumerate() {
+        line(index + 1, 0, item.frame, item.command, item.params.map(|p| p.unwrap_or(0.0)), item.place);
+    }
+    text
+}
+
+/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames.
+pub fn csv(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> String {
+    let mut text = "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m\n".to_owned();
+    for (route, stops, times) in flights {
+        let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
+        for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
+            let (act, number) = match stop.act {
+                Act::Pad => ("pad", String::new()),
+                Act::Transit => ("transit", String::new()),
+                Act::Lane => ("lane", String::new()),
+                Act::Photo(number) => ("photo", number.to_string()),
+            };
+            let p = stop.position;
+            let place = enu_to_geodetic(&planned.scenario.area.origin, &p);
+            text += &format!(
+                "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3}\n",
+                place.lat_deg, place.lon_deg, p.x, p.y, p.z
+            );
+        }
+    }
+    text
+}
+
+/// The area, its zones and every vehicle's lanes, for maps.
+pub fn geojson(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> Value {
+    let place = |x: f32, y: f32| {
+        let place = enu_to_geodetic(&planned.scenario.area.origin, &Point::new(x, y, 0.0));
+        json!([round(place.lon_deg, 1e9), round(place.lat_deg, 1e9)])
+    };
+    let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];
+    let mut features = Vec::new();
+    for (kind, name) in kinds {
+        for ring in planned.scenario.area.rings_of(kind) {
+            let mut places: Vec<Value> = ring.iter().map(|v| place(v.x, v.y)).collect();
+            places.extend(places.first().cloned());
+            features.push(json!({
+                "type": "Feature",
+                "properties": { "kind": name },
+                "geometry": { "type": "Polygon", "coordinates": [places] },
+            }));
+        }
+    }
+    for (route, stops, _) in flights {
+        let photos = stops.iter().filter(|stop| matches!(stop.act, Act::Photo(_) | Act::Lane));
+        let places: Vec<Value> = photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
+        let geometry = match places.as_slice() {
+            [one] => json!({ "type": "Point", "coordinates": one }),
+            all => json!({ "type": "LineString", "coordinates": all }),
+        };
+        features.push(json!({
+            "type": "Feature",
+            "properties": {
+                "kind": "route",
+                "vehicle": planned.scenario.vehicles[usize::from(route.vehicle)].id,
+            },
+            "geometry": geometry,
+        }));
+    }
+    json!({ "type": "FeatureCollection", "features": features })
+}

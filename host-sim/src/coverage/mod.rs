@@ -1,0 +1,189 @@
+//! Coverage on the desk: from a scenario to each vehicle's flight.
+//!
+//! `planner_core::coverage` plans; this lends it memory, turns routes into flights ([`flight`]), writes them for ground
+//! stations ([`export`]) and checks what came out ([`check`]).
+
+pub mod check;
+pub mod export;
+pub mod flight;
+pub mod page;
+
+use std::time::Instant;
+
+use anyhow::bail;
+use planner_core::coverage::area::Area;
+use planner_core::coverage::bound::lower_bound_s;
+use planner_core::coverage::pack::{PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::transit::Transit;
+use planner_core::coverage::{CoverageError, exact, powell};
+
+use crate::area::MOST_VERTICES;
+use crate::scenario::coverage::{Coverage, Method};
+
+/// Most vehicles of a coverage mission.
+pub const VEHICLES: usize = 32;
+/// Most lanes on the desk.
+pub const LANES: usize = 8192;
+/// Most outward corners of no-fly zones on the desk.
+pub const CORNERS: usize = 256;
+/// Changes of the lanes' order that the desk looks at.
+pub const LOOKS: u32 = 20_000_000;
+/// V_a where a vehicle has none of its own, metres a second.
+const CLIMB_MPS: f32 = 3.0;
+/// V_d likewise.
+const DESCEND_MPS: f32 = 1.0;
+
+/// A planned coverage mission.
+pub struct Planned<'a> {
+    /// What was asked for.
+    pub scenario: &'a Coverage,
+    /// Its area.
+    pub area: Area<'a>,
+    /// How work was divided.
+    pub method: Method,
+    /// Vehicles as the planner sees them, in the scenario's order.
+    pub vehicles: Vec<Vehicle>,
+    /// The lanes.
+    pub tracks: Box<Tracks<LANES>>,
+    /// Ways around no-fly zones.
+    pub transit: Box<Transit<'a, CORNERS>>,
+    /// The routes.
+    pub plan: Plan<VEHICLES>,
+    /// No division can end before, seconds.
+    pub lower_bound_s: f32,
+    /// What lanes, ways and routes took of the clock, seconds.
+    pub seconds: [f64; 3],
+}
+
+impl<'a> Planned<'a> {
+    /// Plans a mission.
+    ///
+    /// # Errors
+    /// There is no plan: why, and where in the scenario.
+    pub fn new(scenario: &'a Coverage, method: Method) -> anyhow::Result<Self> {
+        let area = Area::new(&scenario.area.vertices, &scenario.area.rings)
+            .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", scenario.area.place))?;
+        let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| vehicle(v, scenario)).collect();
+        if let Some(index) = vehicles.iter().position(|vehicle| area.forbids(&vehicle.place)) {
+            let place = &scenario.vehicle_places[index];
+            bail!(
+                "bad vehicle: {place}: vehicle {} starts inside a no-fly zone",
+                scenario.vehicles[index].id
+            );
+        }
+        let failed = |error: CoverageError| explained(error, scenario);
+        let began = Instant::now();
+        let mut transit = Box::new(Transit::empty());
+        transit.learn(area).map_err(failed)?;
+        let ways = began.elapsed().as_secs_f64();
+        let began = Instant::now();
+        let pattern = Pattern {
+            spacing: scenario.area.spacing,
+            angle_deg: scenario.area.angle_deg,
+            margin_m: scenario.area.margin_m,
+            looks: LOOKS,
+        };
+        let mut tracks = Box::new(Tracks::new());
+        let mut workspace = Box::new(tracks::Workspace::<MOST_VERTICES>::new());
+        tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;
+        let lanes = began.elapsed().as_secs_f64();
+        let began = Instant::now();
+        let work = Work {
+            tracks: &tracks,
+            transit: &transit,
+            vehicles: &vehicles,
+            heights: scenario.area.heights,
+            unit: if method == Method::SimpleBinpat { Unit::Lane } else { Unit::Waypoint },
+        };
+        let mut plan = Plan::new();
+        divide(&work, method, &mut plan).map_err(failed)?;
+        let routes = began.elapsed().as_secs_f64();
+        let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
+        let seconds = [lanes, ways, routes];
+        let planned =
+            Self { scenario, area, method, vehicles, tracks, transit, plan, lower_bound_s, seconds };
+        planned.check_endurance()?;
+        Ok(planned)
+    }
+
+    /// Nobody is sent out for longer than its battery lasts.
+    fn check_endurance(&self) -> anyhow::Result<()> {
+        for route in &self.plan.routes {
+            let index = usize::from(route.vehicle);
+            let vehicle = &self.scenario.vehicles[index];
+            let Some(endurance_s) = vehicle.endurance_s.filter(|s| *s < route.cost_s) else { continue };
+            bail!(
+                "area too large: {}: vehicle {} would fly {:.0} s, its endurance_s is {endurance_s:.0}\nhint: more \
+                 vehicles, wider lanes or a higher cruise_mps take less time",
+                self.scenario.vehicle_places[index],
+                vehicle.id,
+                route.cost_s
+            );
+        }
+        Ok(())
+    }
+}
+
+/// A vehicle as the planner sees it.
+fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Coverage) -> Vehicle {
+    let place = vehicle.start.xy();
+    Vehicle {
+        place,
+        home: place,
+        cruise_mps: scenario.cruise_mps.min(vehicle.speed_max_mps),
+        climb_mps: vehicle.climb_mps.unwrap_or(CLIMB_MPS),
+        descend_mps: vehicle.descend_mps.unwrap_or(DESCEND_MPS),
+        weight: vehicle.weight.unwrap_or(1.0),
+    }
+}
+
+/// Divides the path by a method.
+///
+/// # Errors
+/// As the method.
+pub fn divide<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    method: Method,
+    plan: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    match method {
+        Method::SimpleBinpat | Method::Binpat => binpat(work, &mut PackWorkspace::<K>::new(), plan),
+        Method::PowellBinpat => {
+            powell::powell(work, &powell::Config::USUAL, &mut powell::Workspace::<K>::new(), plan)
+        }
+        Method::Exact => {
+            let count = work.tracks.waypoint_count() as usize;
+            let [ways, reaches, states] = exact::Workspace::lengths(work.vehicles.len(), count);
+            let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
+            let mut states = vec![(0, 0); states];
+            let mut ws = exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
+            exact::exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)
+        }
+    }
+}
+
+/// Why there is no plan, for a person.
+fn explained(error: CoverageError, scenario: &Coverage) -> anyhow::Error {
+    let place = &scenario.area.place;
+    let why = match error {
+        CoverageError::Area(area) => format!("{area:?}"),
+        CoverageError::Setting(name) => format!("{name} is out of its range"),
+        CoverageError::Gaps => "the spacings leave gaps between the pictures".to_owned(),
+        CoverageError::LanesFull => {
+            format!("it takes more than {LANES} lanes\nhint: a greater height_m or lane_m takes fewer")
+        }
+        CoverageError::NoFlyFull => {
+            format!("no-fly zones have more than {CORNERS} outward corners\nhint: draw them with fewer")
+        }
+        CoverageError::NothingToCover => "no-fly zones hold the whole area".to_owned(),
+        CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),
+        CoverageError::Unreachable => "no-fly zones leave no way to a part of it".to_owned(),
+        CoverageError::Vehicles => {
+            let most = if scenario.vehicles.len() > VEHICLES { VEHICLES } else { exact::MOST_VEHICLES };
+            format!("it takes 1 to {most} vehicles, not {}", scenario.vehicles.len())
+        }
+        CoverageError::WorkspaceTooSmall => "the planner's memory is too small for it".to_owned(),
+    };
+    anyhow::anyhow!("cannot cover the area: {place}: {why}")
+}

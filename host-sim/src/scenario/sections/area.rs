@@ -1,0 +1,385 @@
+//! `[area]`, and the scenario of a coverage mission around it.
+
+use std::path::Path;
+
+use planner_core::coverage::area::{MAX_COORDINATE_M, Ring, RingKind, SAME_M};
+use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
+use planner_core::coverage::pack::Heights;
+use planner_core::coverage::{CoverageError, Flat, area as core_area};
+use planner_core::frames::{Geodetic, geodetic_to_enu};
+
+use super::checks::check_apart;
+use super::{ORIGIN, empty, geodetic, root, vehicles};
+use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
+use crate::quote::quoted_path;
+use crate::scenario::coverage::{Area, Coverage, Heading, Method, Trigger};
+use crate::scenario::error::ScenarioError;
+use crate::scenario::reader::{Result, Span, Table, Text, Value};
+use crate::scenario::{Mode, Vehicle};
+
+/// Metres that are no more than this across are taken for degrees.
+const DEGREES_M: f64 = 0.5;
+
+/// What the numbers of a polygon are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Coordinates {
+    Wgs84,
+    Metres,
+}
+
+/// Reads the scenario of a coverage mission.
+pub(in crate::scenario) fn coverage(text: &str, file: &str, folder: &Path) -> Result<Coverage> {
+    let text = Text { file, text };
+    root(text, |root| {
+        let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
+        let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
+        let area_table = root.need("area", hint)?.table()?;
+        let area = self::area(&area_table, folder)?;
+        let mission = root.get("mission").map(|v| v.table()).transpose()?;
+        let mission = mission.unwrap_or_else(|| empty(text, "mission"));
+        let cruise_mps = mission.f32("cruise_mps", 2.0, 0.01..=100.0)?;
+        if let Some(mode) = mission.get("mode") {
+            mode.word(&[("coverage", Mode::Coverage)])?;
+        }
+        mission.expect(&["objective", "goals", "goals_file", "geofence", "ground_stations"]);
+        mission.finish()?;
+        let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
+        let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
+        let deconfliction = super::deconfliction(&deconfliction)?;
+        let mut unsupported = Vec::new();
+        let hint = "add a `[[vehicles]]` with `id` and `start` for each";
+        let vehicles_value = root.need("vehicles", hint)?;
+        let vehicles = vehicles(&vehicles_value, Some(&area.origin), &mut unsupported)?;
+        check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+        let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
+        Ok(Coverage {
+            path: file.to_owned(),
+            text: text.text.to_owned(),
+            seed,
+            area,
+            cruise_mps,
+            separation_m: deconfliction.separation_m,
+            safety_distance_m: deconfliction.safety_distance_m,
+            vehicles: vehicles.into_iter().map(|(vehicle, _): (Vehicle, _)| vehicle).collect(),
+            vehicle_places,
+        })
+    })
+}
+
+fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
+    let (polygons, coordinates, source) = polygons(table, folder)?;
+    let given = table.get("origin").map(|v| geodetic(&v)).transpose()?;
+    let first = polygons.outers[0][0];
+    let origin = given.unwrap_or(match coordinates {
+        Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
+        Coordinates::Metres => ORIGIN,
+    });
+    let (vertices, rings) = flat(table, &source, &polygons, coordinates, &origin)?;
+    let camera = table.get("camera").map(|v| camera(&v)).transpose()?;
+    let (height_m, spacing) = spacing(table, camera.as_ref())?;
+    let layer_m = table.f32("layer_m", 5.0, 0.1..=1000.0)?;
+    let method = table.get("method").map(|v| v.word(&Method::NAMES)).transpose()?;
+    let area = Area {
+        place: table.text.line(&source),
+        vertices,
+        rings,
+        origin,
+        camera,
+        spacing,
+        heights: Heights { mission_m: height_m, layer_m },
+        angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
+        margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
+        method: method.unwrap_or(Method::PowellBinpat),
+        heading: table.word(
+            "heading",
+            Heading::Sweep,
+            &[("sweep", Heading::Sweep), ("lane", Heading::Lane)],
+        )?,
+        trigger: table.word(
+            "trigger",
+            Trigger::Distance,
+            &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
+        )?,
+    };
+    for key in ["terrain", "terrain_tolerance_m", "batteries"] {
+        if let Some(value) = table.get(key) {
+            return Err(value.error("is not available yet"));
+        }
+    }
+    table.finish()?;
+    Ok(area)
+}
+
+/// The polygons of the table, what their numbers are, and where they stand.
+fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, Span)> {
+    let (file, polygon) = (table.get("file"), table.get("polygon"));
+    let words =
+        [("wgs84", Coordinates::Wgs84), ("metres", Coordinates::Metres), ("meters", Coordinates::Metres)];
+    let said = table.get("coordinates").map(|v| v.word(&words)).transpose()?;
+    let (mut polygons, usual, span) = match (&file, &polygon) {
+        (Some(_), Some(polygon)) => {
+            return Err(polygon.error("cannot stand beside area.file: give one of them"));
+        }
+        (None, None) => {
+            let hint = "add `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
+            return Err(table.text.with_hint(&table.span, "area.file is missing", hint));
+        }
+        (Some(file), None) => {
+            let path = folder.join(file.str()?);
+            let polygons = area::read(&path)
+                .map_err(|error| file.error(&format!("is no area: {}: {error}", quoted_path(&path))))?;
+            let metres = Format::of(&path) == Some(Format::Wkt);
+            let usual = if metres { Coordinates::Metres } else { Coordinates::Wgs84 };
+            (polygons, usual, file.span.clone())
+        }
+        (None, Some(polygon)) => {
+            let (ring, coordinates) = ring(polygon)?;
+            let polygons = Polygons { outers: vec![ring], ..Polygons::default() };
+            (polygons, coordinates, polygon.span.clone())
+        }
+    };
+    let coordinates = said.unwrap_or(usual);
+    for (key, rings) in [("holes", &mut polygons.holes), ("no_fly", &mut polygons.no_fly)] {
+        let Some(value) = table.get(key) else { continue };
+        for item in value.items()? {
+            let (ring, own) = ring(&item)?;
+            if own == Coordinates::Wgs84 && coordinates == Coordinates::Metres {
+                let hint = "give [x, y] in metres";
+                let why = format!("{} is in degrees and the area in metres", item.name);
+                return Err(table.text.with_hint(&item.span, why, hint));
+            }
+            rings.push(ring);
+        }
+    }
+    let count = polygons.vertex_count();
+    if count > MOST_VERTICES {
+        let why = format!("area has {count} vertices; at most {MOST_VERTICES} can be used");
+        return Err(table.text.error(&span, why));
+    }
+    Ok((polygons, coordinates, span))
+}
+
+/// One ring: `[[x, y], …]` is metres unless `coordinates` says else, `[{ lat_deg, lon_deg }, …]` is degrees.
+fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
+    let items = value.items()?;
+    let degrees = items.first().is_some_and(Value::is_table);
+    let mut ring = RingXy::with_capacity(items.len());
+    for item in &items {
+        ring.push(match degrees {
+            true => {
+                let table = item.table()?;
+                let hint = "a place is { lat_deg = …, lon_deg = … }";
+                let lat = table.need("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
+                let lon = table.need("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
+                table.expect(&["alt_m"]);
+                table.finish()?;
+                [lon, lat]
+            }
+            false => {
+                let pair = item.items()?;
+                let [x, y] = pair.as_slice() else { return Err(item.error("must be two numbers, x and y")) };
+                let range = -1e7..=1e7;
+                [x.f64(&range)?, y.f64(&range)?]
+            }
+        });
+    }
+    area::open(&mut ring);
+    if ring.len() < 3 {
+        return Err(value.error("must have at least three places that differ"));
+    }
+    Ok((ring, if degrees { Coordinates::Wgs84 } else { Coordinates::Metres }))
+}
+
+/// The rings in the mission frame, checked.
+fn flat(
+    table: &Table<'_>,
+    source: &Span,
+    polygons: &Polygons,
+    coordinates: Coordinates,
+    origin: &Geodetic,
+) -> Result<(Vec<Flat>, Vec<Ring>)> {
+    let bad = |why: String, hint: &str| match hint {
+        "" => Err(table.text.error(source, why)),
+        hint => Err(table.text.with_hint(source, why, hint)),
+    };
+    let (mut vertices, mut rings) = (Vec::new(), Vec::new());
+    let kinds = [
+        (RingKind::Outer, &polygons.outers),
+        (RingKind::Hole, &polygons.holes),
+        (RingKind::NoFly, &polygons.no_fly),
+    ];
+    for (kind, ring) in kinds.iter().flat_map(|(kind, rings)| rings.iter().map(move |ring| (*kind, ring))) {
+        let begin = vertices.len();
+        for &[x, y] in ring {
+            let place = match coordinates {
+                Coordinates::Metres => Flat::new(x as f32, y as f32),
+                Coordinates::Wgs84 => {
+                    let place = Geodetic { lat_deg: y, lon_deg: x, alt_m: origin.alt_m };
+                    if !place.is_valid() {
+                        let why = format!("area: longitude {x}, latitude {y} is no place on earth");
+                        return bad(why, "metres need `coordinates = \"metres\"`");
+                    }
+                    geodetic_to_enu(origin, &place).xy()
+                }
+            };
+            // Two that f32 or the user makes one are one.
+            let repeats = vertices[begin..].last().is_some_and(|last: &Flat| (place - last).amax() < SAME_M);
+            if !repeats {
+                vertices.push(place);
+            }
+        }
+        while vertices.len() > begin + 1 && (vertices[begin] - vertices[vertices.len() - 1]).amax() < SAME_M {
+            vertices.pop();
+        }
+        rings.push(Ring { end: vertices.len() as u16, kind });
+    }
+    let wide = |axis: usize| {
+        let along = || polygons.outers.iter().flatten().map(|place| place[axis]);
+        along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
+    };
+    if coordinates == Coordinates::Metres && wide(0).max(wide(1)) < DEGREES_M {
+        let why = format!("area is {:.6} by {:.6} m", wide(0), wide(1));
+        return bad(why, "degrees need `coordinates = \"wgs84\"`");
+    }
+    match core_area::Area::new(&vertices, &rings) {
+        Ok(_) => Ok((vertices, rings)),
+        Err(error) => {
+            let far = matches!(error, core_area::AreaError::TooFar { .. });
+            let near = "metres are about area.origin, and origin must be near the area";
+            bad(format!("area: {}", reason(error, &rings)), if far { near } else { "" })
+        }
+    }
+}
+
+/// What is wrong with an area, for a person.
+fn reason(error: core_area::AreaError, rings: &[Ring]) -> String {
+    use core_area::AreaError as E;
+    let ring = |index: u16| {
+        let kind = rings[usize::from(index)].kind;
+        let before = rings[..usize::from(index)].iter().filter(|ring| ring.kind == kind).count();
+        let name = match kind {
+            RingKind::Outer => "polygon",
+            RingKind::Hole => "hole",
+            RingKind::NoFly => "no-fly zone",
+        };
+        format!("{name} {before}")
+    };
+    let vertex = |index: u16| {
+        let of = rings.iter().position(|ring| index < ring.end).unwrap_or(0);
+        let start = if of == 0 { 0 } else { rings[of - 1].end };
+        format!("vertex {} of {}", index - start, ring(of as u16))
+    };
+    match error {
+        E::NoOuter => "there is no polygon".to_owned(),
+        E::Shape => "its rings are out of order".to_owned(),
+        E::TooFewVertices { ring: r } => format!("{} has fewer than three vertices that differ", ring(r)),
+        E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
+        E::TooFar { vertex: v } => {
+            format!("{} is more than {} km from the origin", vertex(v), MAX_COORDINATE_M / 1e3)
+        }
+        E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
+        E::NoArea { ring: r } => format!("{} encloses nothing: its vertices lie on one line", ring(r)),
+        E::SelfCrossing { vertex: v } => format!("the edge from {} crosses another one of it", vertex(v)),
+        E::RingsCross { ring: r, other } => format!("{} and {} cross", ring(r), ring(other)),
+        E::HoleOutside { ring: r } => format!("{} lies outside every polygon", ring(r)),
+        E::OuterInside { ring: r } => format!("{} lies inside another polygon", ring(r)),
+        E::AreaFull => "it has too many vertices".to_owned(),
+    }
+}
+
+fn camera(value: &Value<'_>) -> Result<Camera> {
+    let table = value.table()?;
+    let sensor = table.get("sensor_mm");
+    let camera = match &sensor {
+        Some(sensor) => {
+            let side = 0.1..=1000.0;
+            let sides_mm = pair(sensor, |v| v.f64(&side).map(|n| n as f32))?;
+            let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
+            let focal_mm = table.need("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
+            let pixels = match table.get("pixels") {
+                Some(pixels) => pair(&pixels, |v| v.whole(1..=1_000_000).map(|n| n as u32))?,
+                None => return Err(value.error("needs pixels beside sensor_mm")),
+            };
+            Camera::Sensor { sides_mm, focal_mm, pixels }
+        }
+        None => {
+            let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
+            let fov_deg = table.need("fov_deg", hint)?.f64(&(0.1..=175.0))? as f32;
+            Camera::Diagonal { fov_deg, aspect: table.f32("aspect", 1.5, 0.05..=20.0)? }
+        }
+    };
+    table.finish()?;
+    Ok(camera)
+}
+
+fn pair<T: Copy>(value: &Value<'_>, item: impl Fn(&Value<'_>) -> Result<T>) -> Result<[T; 2]> {
+    let items = value.items()?;
+    let [a, b] = items.as_slice() else { return Err(value.error("must be two numbers")) };
+    Ok([item(a)?, item(b)?])
+}
+
+/// Height of the pictures; footprint and spacings.
+fn spacing(table: &Table<'_>, camera: Option<&Camera>) -> Result<(f32, Spacing)> {
+    let height = table.get("height_m");
+    let gsd = table.get("gsd_m");
+    let height_m = match (&height, &gsd) {
+        (Some(_), Some(gsd)) => return Err(gsd.error("cannot stand beside area.height_m: give one of them")),
+        (Some(height), None) => height.f64(&(0.1..=5000.0))? as f32,
+        (None, Some(gsd)) => {
+            let gsd_m = gsd.f64(&(1e-4..=100.0))? as f32;
+            let Some(camera) = camera else { return Err(gsd.error("needs area.camera")) };
+            camera.height_for_gsd(gsd_m).map_err(|_| gsd.error("needs a camera with pixels"))?
+        }
+        (None, None) => 35.0,
+    };
+    let distances = 0.1..=10_000.0;
+    let lane = table.get("lane_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
+    let waypoint = table.get("waypoint_m").map(|v| v.f64(&distances).map(|n| (n as f32, v))).transpose()?;
+    for (overlap, spacing) in [("overlap_side", &lane), ("overlap_front", &waypoint)] {
+        if let (Some(value), Some(_)) = (table.get(overlap), spacing) {
+            return Err(
+                value.error("cannot stand beside the distance that follows from it: give one of them")
+            );
+        }
+    }
+    let side = table.f32("overlap_side", 0.6, 0.0..=0.95)?;
+    let front = table.f32("overlap_front", 0.7, 0.0..=0.95)?;
+    let footprint = match camera {
+        Some(camera) => camera.footprint(height_m).map_err(|error| wrong(table, &error))?,
+        // Without a camera the spacings are what one picture shows.
+        None => match (&lane, &waypoint) {
+            (Some((lane_m, _)), Some((waypoint_m, _))) => {
+                Footprint { along_m: *waypoint_m, across_m: *lane_m }
+            }
+            (Some((lane_m, _)), None) => Footprint { along_m: *lane_m, across_m: *lane_m },
+            _ => {
+                let hint = "add `camera = { fov_deg = 73.7, aspect = 1.5 }`, or lane_m and waypoint_m";
+                return Err(table.text.with_hint(&table.span, "area.camera is missing", hint));
+            }
+        },
+    };
+    let lane_m = lane.as_ref().map_or(footprint.across_m * (1.0 - side), |(m, _)| *m);
+    let waypoint_m = match (&waypoint, camera) {
+        (Some((m, _)), _) => *m,
+        (None, Some(_)) => footprint.along_m * (1.0 - front),
+        (None, None) => footprint.along_m,
+    };
+    let spacing = Spacing { footprint, lane_m, waypoint_m };
+    match spacing.check() {
+        Ok(()) => Ok((height_m, spacing)),
+        Err(CoverageError::Gaps) => {
+            let wide = lane_m > footprint.across_m;
+            let (key, side) = if wide { (&lane, footprint.across_m) } else { (&waypoint, footprint.along_m) };
+            let why = format!("leaves gaps: one picture shows {side:.2} m from {height_m} m");
+            match key {
+                Some((_, value)) => Err(value.error(&why)),
+                None => Err(table.text.error(&table.span, format!("area {why}"))),
+            }
+        }
+        Err(error) => Err(wrong(table, &error)),
+    }
+}
+
+fn wrong(table: &Table<'_>, error: &CoverageError) -> ScenarioError {
+    table.text.error(&table.span, format!("area: {error:?}"))
+}

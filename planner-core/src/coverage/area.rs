@@ -1,0 +1,328 @@
+//! The area: polygons to photograph, holes in them, and zones that nobody enters; checked before anything is computed.
+//!
+//! Vertices of all rings lie in one slice, ring after ring, the first vertex of a ring not repeated. Which way a ring
+//! turns does not matter: a place is in the area if it is inside an odd number of outer rings and holes. Cost: O(n²) in
+//! the edges for the check, O(n) for a question.
+
+use libm::{fabs, sqrt};
+
+use super::Flat;
+
+/// Furthest coordinate, metres: at 20 km f32 still steps by 2 mm.
+pub const MAX_COORDINATE_M: f32 = 20_000.0;
+/// Vertices nearer than this are one, metres.
+pub const SAME_M: f32 = 1e-3;
+/// Edges cross if each reaches so far beyond the other, metres: neighbouring fields share borders, and coordinates are
+/// rounded.
+const CROSSING_M: f64 = 0.01;
+
+/// What a ring encloses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RingKind {
+    /// Area to photograph.
+    Outer,
+    /// Not photographed, flown over.
+    Hole,
+    /// Neither photographed nor flown over, transit included.
+    NoFly,
+}
+
+/// One ring: its vertices end before `end`, and begin where the ring before it ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ring {
+    /// Index after the last vertex.
+    pub end: u16,
+    /// What it encloses.
+    pub kind: RingKind,
+}
+
+/// Why rings are no area. Numbers are indices of rings and of vertices, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AreaError {
+    /// There is no outer ring.
+    NoOuter,
+    /// The rings do not end in rising order with the vertices.
+    Shape,
+    /// A ring has fewer than three vertices.
+    TooFewVertices {
+        /// The ring.
+        ring: u16,
+    },
+    /// A vertex is NaN or infinite.
+    NotFinite {
+        /// The vertex.
+        vertex: u16,
+    },
+    /// A vertex is further than [`MAX_COORDINATE_M`] from the origin.
+    TooFar {
+        /// The vertex.
+        vertex: u16,
+    },
+    /// A vertex is the same place as the one before it.
+    Duplicate {
+        /// The vertex.
+        vertex: u16,
+    },
+    /// A ring encloses nothing: its vertices lie on one line.
+    NoArea {
+        /// The ring.
+        ring: u16,
+    },
+    /// Two edges of one ring cross.
+    SelfCrossing {
+        /// The vertex at which one of them begins.
+        vertex: u16,
+    },
+    /// Edges of two outer rings or holes cross.
+    RingsCross {
+        /// One of them.
+        ring: u16,
+        /// The other one.
+        other: u16,
+    },
+    /// A hole lies outside every outer ring.
+    HoleOutside {
+        /// The hole.
+        ring: u16,
+    },
+    /// An outer ring lies inside another one.
+    OuterInside {
+        /// The inner one.
+        ring: u16,
+    },
+    /// There are more vertices than the memory holds.
+    AreaFull,
+}
+
+/// Polygons that were checked.
+#[derive(Clone, Copy, Debug)]
+pub struct Area<'a> {
+    vertices: &'a [Flat],
+    rings: &'a [Ring],
+}
+
+impl<'a> Area<'a> {
+    /// No rings at all.
+    pub(super) const NOWHERE: Self = Self { vertices: &[], rings: &[] };
+
+    /// Checks the rings.
+    ///
+    /// # Errors
+    /// What is wrong with them, and where.
+    pub fn new(vertices: &'a [Flat], rings: &'a [Ring]) -> Result<Self, AreaError> {
+        let area = Self { vertices, rings };
+        area.check_shape()?;
+        area.check_rings()?;
+        area.check_crossings()?;
+        area.check_nesting()?;
+        Ok(area)
+    }
+
+    /// All vertices, ring after ring.
+    pub fn vertices(&self) -> &'a [Flat] {
+        self.vertices
+    }
+
+    /// The rings.
+    pub fn rings(&self) -> &'a [Ring] {
+        self.rings
+    }
+
+    /// Whether there is a no-fly zone.
+    pub fn has_no_fly(&self) -> bool {
+        self.rings.iter().any(|ring| ring.kind == RingKind::NoFly)
+    }
+
+    /// Vertices of one ring.
+    pub fn ring(&self, index: usize) -> &'a [Flat] {
+        let start = if index == 0 { 0 } else { usize::from(self.rings[index - 1].end) };
+        &self.vertices[start..usize::from(self.rings[index].end)]
+    }
+
+    /// Each ring's kind and vertices.
+    pub(super) fn each(&self) -> impl Iterator<Item = (RingKind, &'a [Flat])> + Clone + use<'a> {
+        let area = *self;
+        area.rings.iter().enumerate().map(move |(i, ring)| (ring.kind, area.ring(i)))
+    }
+
+    /// Edges of the outer rings and of the holes, as their two ends.
+    pub(super) fn edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
+        self.each().filter(|(kind, _)| *kind != RingKind::NoFly).flat_map(|(_, ring)| edges_of(ring))
+    }
+
+    /// Edges of the no-fly zones.
+    pub(super) fn no_fly_edges(&self) -> impl Iterator<Item = (Flat, Flat)> + Clone + use<'a> {
+        self.each().filter(|(kind, _)| *kind == RingKind::NoFly).flat_map(|(_, ring)| edges_of(ring))
+    }
+
+    /// Whether a place is to be photographed: inside outer rings and holes an odd number of times. No-fly zones are not
+    /// looked at.
+    pub fn holds(&self, place: &Flat) -> bool {
+        let rings = self.each().filter(|(kind, _)| *kind != RingKind::NoFly);
+        rings.filter(|(_, ring)| is_inside(ring, place)).count() % 2 == 1
+    }
+
+    /// Whether a place is inside a no-fly zone.
+    pub fn forbids(&self, place: &Flat) -> bool {
+        self.each().any(|(kind, ring)| kind == RingKind::NoFly && is_inside(ring, place))
+    }
+
+    fn check_shape(&self) -> Result<(), AreaError> {
+        if !self.rings.iter().any(|ring| ring.kind == RingKind::Outer) {
+            return Err(AreaError::NoOuter);
+        }
+        let mut start = 0;
+        for (i, ring) in self.rings.iter().enumerate() {
+            let end = usize::from(ring.end);
+            if end < start || end > self.vertices.len() {
+                return Err(AreaError::Shape);
+            }
+            if end - start < 3 {
+                return Err(AreaError::TooFewVertices { ring: i as u16 });
+            }
+            start = end;
+        }
+        if start != self.vertices.len() || self.rings.len() > usize::from(u16::MAX) {
+            return Err(AreaError::Shape);
+        }
+        for (i, vertex) in self.vertices.iter().enumerate() {
+            if !(vertex.x.is_finite() && vertex.y.is_finite()) {
+                return Err(AreaError::NotFinite { vertex: i as u16 });
+            }
+            if vertex.amax() > MAX_COORDINATE_M {
+                return Err(AreaError::TooFar { vertex: i as u16 });
+            }
+        }
+        Ok(())
+    }
+
+    fn check_rings(&self) -> Result<(), AreaError> {
+        let mut start = 0;
+        for (i, (_, ring)) in self.each().enumerate() {
+            for (k, (a, b)) in edges_of(ring).enumerate() {
+                if (b - a).amax() < SAME_M {
+                    return Err(AreaError::Duplicate { vertex: (start + (k + 1) % ring.len()) as u16 });
+                }
+            }
+            let (area, around) = (signed_area(ring), perimeter(ring));
+            // A strip as long as half its border and a millimetre wide.
+            if fabs(area) < around * f64::from(SAME_M) / 2.0 {
+                return Err(AreaError::NoArea { ring: i as u16 });
+            }
+            start += ring.len();
+        }
+        Ok(())
+    }
+
+    fn check_crossings(&self) -> Result<(), AreaError> {
+        let mut start = 0;
+        for (i, (kind, ring)) in self.each().enumerate() {
+            for (k, (a, b)) in edges_of(ring).enumerate() {
+                if edges_of(ring).skip(k + 1).any(|(c, d)| cross(&a, &b, &c, &d)) {
+                    return Err(AreaError::SelfCrossing { vertex: (start + k) as u16 });
+                }
+            }
+            start += ring.len();
+            if kind == RingKind::NoFly {
+                continue;
+            }
+            for (j, (other, far)) in self.each().enumerate().skip(i + 1) {
+                let meets = |(a, b): (Flat, Flat)| edges_of(far).any(|(c, d)| cross(&a, &b, &c, &d));
+                if other != RingKind::NoFly && edges_of(ring).any(meets) {
+                    return Err(AreaError::RingsCross { ring: i as u16, other: j as u16 });
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Rings that do not cross lie inside or outside each other as any of their inner places does.
+    fn check_nesting(&self) -> Result<(), AreaError> {
+        for (i, (kind, ring)) in self.each().enumerate() {
+            if kind == RingKind::NoFly {
+                continue;
+            }
+            let inner = inner_place(ring);
+            let around = |(j, (other, far)): (usize, (RingKind, &[Flat]))| {
+                j != i && other == RingKind::Outer && is_inside(far, &inner)
+            };
+            let inside = self.each().enumerate().any(around);
+            match kind {
+                RingKind::Outer if inside => return Err(AreaError::OuterInside { ring: i as u16 }),
+                RingKind::Hole if !inside => return Err(AreaError::HoleOutside { ring: i as u16 }),
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The edges of a ring, the one that closes it last.
+pub(super) fn edges_of(ring: &[Flat]) -> impl Iterator<Item = (Flat, Flat)> + Clone + '_ {
+    let next = ring.iter().skip(1).chain(ring.first());
+    ring.iter().copied().zip(next.copied())
+}
+
+/// Twice the usual: positive where the ring turns left. f64, since it is a difference of large numbers.
+pub(super) fn signed_area(ring: &[Flat]) -> f64 {
+    let base = ring[0];
+    let twice: f64 = edges_of(ring).map(|(a, b)| cross_f64(&(a - base), &(b - base))).sum();
+    twice / 2.0
+}
+
+fn perimeter(ring: &[Flat]) -> f64 {
+    edges_of(ring).map(|(a, b)| f64::from((b - a).norm())).sum()
+}
+
+fn cross_f64(a: &Flat, b: &Flat) -> f64 {
+    f64::from(a.x) * f64::from(b.y) - f64::from(a.y) * f64::from(b.x)
+}
+
+/// Whether a place is inside a ring, by the edges that a ray to the east crosses.
+pub(super) fn is_inside(ring: &[Flat], place: &Flat) -> bool {
+    let crossed = |(a, b): &(Flat, Flat)| {
+        (a.y <= place.y) != (b.y <= place.y) && place.x < a.x + (place.y - a.y) * (b.x - a.x) / (b.y - a.y)
+    };
+    edges_of(ring).filter(crossed).count() % 2 == 1
+}
+
+/// A place inside a ring: the middle of the longest stretch of a line across it that misses every vertex.
+fn inner_place(ring: &[Flat]) -> Flat {
+    let (low, high) = ring.iter().fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| {
+        (libm::fminf(low, v.y), libm::fmaxf(high, v.y))
+    });
+    // The line lies in the middle of the widest step between two vertices' heights near the middle of the ring.
+    let middle = (low + high) / 2.0;
+    let below = ring.iter().map(|v| v.y).filter(|y| *y <= middle).fold(low, libm::fmaxf);
+    let above = ring.iter().map(|v| v.y).filter(|y| *y > middle).fold(high, libm::fminf);
+    let y = (below + above) / 2.0;
+    let mut best = (0.0, ring[0]);
+    for (a, b) in edges_of(ring).filter(|(a, b)| (a.y <= y) != (b.y <= y)) {
+        let x = a.x + (y - a.y) * (b.x - a.x) / (b.y - a.y);
+        let crossing = |(c, d): (Flat, Flat)| c.x + (y - c.y) * (d.x - c.x) / (d.y - c.y);
+        let crossings = edges_of(ring).filter(|(c, d)| (c.y <= y) != (d.y <= y)).map(crossing);
+        let next = crossings.filter(|other| *other > x).fold(f32::INFINITY, libm::fminf);
+        let place = Flat::new((x + next) / 2.0, y);
+        if next.is_finite() && next - x > best.0 && is_inside(ring, &place) {
+            best = (next - x, place);
+        }
+    }
+    best.1
+}
+
+/// Whether the segments `a b` and `c d` cross, each reaching at least [`CROSSING_M`] beyond the other.
+fn cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
+    let apart = |p: f32, q: f32, r: f32, s: f32| {
+        libm::fmaxf(p, q) < libm::fminf(r, s) || libm::fmaxf(r, s) < libm::fminf(p, q)
+    };
+    if apart(a.x, b.x, c.x, d.x) || apart(a.y, b.y, c.y, d.y) {
+        return false;
+    }
+    let beyond = |from: &Flat, to: &Flat, p: &Flat, q: &Flat| {
+        let along = to - from;
+        let length = sqrt(cross_f64(&along, &Flat::new(-along.y, along.x)));
+        let (p, q) = (cross_f64(&along, &(p - from)), cross_f64(&along, &(q - from)));
+        p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > CROSSING_M * length
+    };
+    beyond(a, b, c, d) && beyond(c, d, a, b)
+}

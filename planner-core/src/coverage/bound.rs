@@ -1,0 +1,80 @@
+//! A lower bound on max C_k of every contiguous division of a path.
+//!
+//! Two arguments, the larger counts. (1) If m vehicles fly, their routes leave out at most the m − 1 longest steps between
+//! waypoints, each vehicle has at least the way to the nearest waypoint and back, and the layers are all different; the
+//! largest cost is no less than the mean. The least over m. (2) Somebody flies to the waypoint that is furthest from
+//! everybody. O(n · K).
+
+use libm::{fmaxf, fminf};
+
+use super::CoverageError;
+use super::pack::Work;
+
+/// Most vehicles that are told apart.
+const MOST: usize = 32;
+
+/// The bound, seconds.
+///
+/// # Errors
+/// As [`Work::check`] for at most 32 vehicles.
+pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> Result<f32, CoverageError> {
+    work.check::<MOST>()?;
+    let fastest = |speed: fn(&super::pack::Vehicle) -> f32| work.vehicles.iter().map(speed).fold(0.0, fmaxf);
+    let cruise_mps = fastest(|v| v.cruise_mps);
+    let vertical = |layer: u8| {
+        let delays = work.vehicles.iter().map(|vehicle| work.altitude_delay_s(vehicle, layer));
+        delays.fold(f32::INFINITY, fminf)
+    };
+    let mut longest = Largest::new();
+    let mut furthest_s: f32 = 0.0;
+    let mut nearest_m = [f32::INFINITY; MOST];
+    for lane in work.tracks.lanes() {
+        let step = lane.length_m() / fmaxf((lane.count - 1) as f32, 1.0);
+        for k in 0..lane.count {
+            let place = lane.waypoint(k);
+            let mut least_s = f32::INFINITY;
+            for (near, vehicle) in nearest_m.iter_mut().zip(work.vehicles) {
+                // Straight: no way is shorter.
+                let there_m = (place - vehicle.place).norm() + (place - vehicle.home).norm();
+                *near = fminf(*near, there_m);
+                least_s = fminf(least_s, there_m / vehicle.cruise_mps);
+            }
+            furthest_s = fmaxf(furthest_s, least_s);
+            if k > 0 {
+                longest.take(step);
+            }
+        }
+    }
+    for pair in work.tracks.lanes().windows(2) {
+        longest.take(pair[1].start_m - pair[0].start_m - pair[0].length_m());
+    }
+    let nearest_m = &mut nearest_m[..work.vehicles.len()];
+    nearest_m.sort_unstable_by(f32::total_cmp);
+    let (mut ground_m, mut delay_s, mut least_s) = (work.tracks.length_m(), 0.0, f32::INFINITY);
+    for (flying, near) in nearest_m.iter().enumerate() {
+        ground_m += near - if flying > 0 { longest.values[flying - 1] } else { 0.0 };
+        delay_s += vertical(flying as u8 + 1);
+        let mean = (ground_m / cruise_mps + delay_s) / (flying + 1) as f32;
+        least_s = fminf(least_s, mean);
+    }
+    Ok(fmaxf(least_s, furthest_s + vertical(1)))
+}
+
+/// The largest of many numbers, falling.
+struct Largest {
+    values: [f32; MOST],
+}
+
+impl Largest {
+    fn new() -> Self {
+        Self { values: [0.0; MOST] }
+    }
+
+    fn take(&mut self, value: f32) {
+        let at = self.values.partition_point(|held| *held >= value);
+        if at < MOST {
+            self.values[at..].rotate_right(1);
+            self.values[at] = value;
+        }
+    }
+}

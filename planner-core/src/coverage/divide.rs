@@ -1,0 +1,79 @@
+//! What is left of a path after a loss, as a path of its own: [`super::pack::binpat`] then divides it among the rest.
+//!
+//! A pure function of the path and of what is done or promised, so that every vehicle computes the same bits. Waypoints
+//! that are left keep the order and the lane they have; parts of the path between them are transit.
+
+use super::CoverageError;
+use super::tracks::{Lane, Tracks};
+use super::transit::Transit;
+
+/// Waypoints `first` up to before `end`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// The first number.
+    pub first: u32,
+    /// After the last number.
+    pub end: u32,
+}
+
+/// Sets `left` to the lanes without these waypoints. Ranges are in rising order and do not overlap. The number that a
+/// waypoint had before is [`original`].
+///
+/// # Errors
+/// [`CoverageError::Setting`] for ranges that are out of order, [`CoverageError::LanesFull`],
+/// [`CoverageError::NothingToCover`] where all is done, [`CoverageError::Unreachable`].
+pub fn left<const L: usize, const N: usize>(
+    tracks: &Tracks<L>,
+    done: &[Range],
+    transit: &Transit<'_, N>,
+    left: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
+    let in_order = done.iter().all(|range| range.first <= range.end)
+        && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
+        && done.last().is_none_or(|range| range.end <= tracks.waypoint_count());
+    if !in_order {
+        return Err(CoverageError::Setting("done"));
+    }
+    left.lanes.clear();
+    left.along = tracks.along;
+    for lane in tracks.lanes() {
+        let end = lane.first + lane.count;
+        let mut from = lane.first;
+        for range in done.iter().filter(|range| range.first < end && range.end > lane.first) {
+            keep(lane, from, range.first.max(lane.first), left)?;
+            from = range.end.min(end);
+        }
+        keep(lane, from, end, left)?;
+    }
+    if left.lanes.is_empty() {
+        return Err(CoverageError::NothingToCover);
+    }
+    left.measure(transit)
+}
+
+fn keep<const L: usize>(lane: &Lane, from: u32, end: u32, left: &mut Tracks<L>) -> Result<(), CoverageError> {
+    if from >= end {
+        return Ok(());
+    }
+    let part = Lane {
+        from: lane.waypoint(from - lane.first),
+        to: lane.waypoint(end - 1 - lane.first),
+        first: 0,
+        count: end - from,
+        start_m: 0.0,
+        strip: lane.strip,
+    };
+    left.lanes.push(part).map_err(|_| CoverageError::LanesFull)
+}
+
+/// The number that waypoint `number` of what is left had on the whole path.
+pub fn original(done: &[Range], number: u32) -> u32 {
+    let mut whole = number;
+    for range in done.iter().filter(|range| range.first < range.end) {
+        if whole < range.first {
+            break;
+        }
+        whole += range.end - range.first;
+    }
+    whole
+}

@@ -1,0 +1,183 @@
+//! The least max C_k of all contiguous divisions, subsets of vehicles, layers and directions: what the other methods are
+//! measured by. For a desk: 10 vehicles take 2²⁰ states.
+//!
+//! Whether all can be done within T seconds is a dynamic program. `reach[vehicles][layers]` is the most waypoints, counted
+//! from the first, that these vehicles in these layers can photograph within T. A route's cost falls neither if it ends
+//! later nor if it begins earlier, by the triangle inequality; so each step takes as much as fits, which two pointers find
+//! for every beginning at once. T is halved down to [`RESOLUTION`].
+//!
+//! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
+
+use super::CoverageError;
+use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_layers};
+
+/// Most vehicles.
+pub const MOST_VEHICLES: usize = 10;
+/// T is found to this share of itself.
+pub const RESOLUTION: f32 = 1e-5;
+
+/// Memory lent: lengths by [`Workspace::lengths`].
+pub struct Workspace<'a> {
+    /// Ways from every vehicle's place to every waypoint, and from there home.
+    pub ways_m: &'a mut [f32],
+    /// How far each vehicle in each layer comes from each waypoint.
+    pub reaches: &'a mut [u32],
+    /// States of the dynamic program: most waypoints done, and the step that led there.
+    pub states: &'a mut [(u32, u16)],
+}
+
+impl Workspace<'_> {
+    /// Lengths of the three for so many vehicles and waypoints.
+    pub fn lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
+        let vehicles = vehicles.min(MOST_VEHICLES);
+        [2 * vehicles * waypoints, vehicles * vehicles * (waypoints + 1), 1 << (2 * vehicles)]
+    }
+}
+
+/// The best plan there is.
+///
+/// # Errors
+/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MOST_VEHICLES`]; [`CoverageError::WorkspaceTooSmall`].
+pub fn exact<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    ws: &mut Workspace<'_>,
+    pack: &mut PackWorkspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    work.check::<K>()?;
+    let (count, waypoints) = (work.vehicles.len(), work.tracks.waypoint_count() as usize);
+    if count > MOST_VEHICLES {
+        return Err(CoverageError::Vehicles);
+    }
+    let [ways, reaches, states] = Workspace::lengths(count, waypoints);
+    if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
+        return Err(CoverageError::WorkspaceTooSmall);
+    }
+    // What BINPAT finds can be done; nothing can be done in no time.
+    binpat(work, pack, out)?;
+    let mut table = Table { work, ws, count, waypoints };
+    table.measure();
+    let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + RESOLUTION));
+    if table.reach(high) {
+        table.read(out);
+    }
+    while high - low > high * RESOLUTION {
+        let middle = low + (high - low) / 2.0;
+        if table.reach(middle) {
+            table.read(out);
+            high = libm::fminf(middle, out.max_cost_s());
+        } else {
+            low = middle;
+        }
+    }
+    Ok(())
+}
+
+struct Table<'t, 'w, 'm, const L: usize, const N: usize> {
+    work: &'t Work<'w, L, N>,
+    ws: &'t mut Workspace<'m>,
+    count: usize,
+    waypoints: usize,
+}
+
+impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
+    fn measure(&mut self) {
+        for (v, vehicle) in self.work.vehicles.iter().enumerate() {
+            for i in 0..self.waypoints {
+                let Some(place) = self.work.tracks.waypoint(i as u32) else { continue };
+                let to = self.work.transit.distance_m(&vehicle.place, &place);
+                let home = if vehicle.place == vehicle.home {
+                    to
+                } else {
+                    self.work.transit.distance_m(&place, &vehicle.home)
+                };
+                self.ws.ways_m[2 * v * self.waypoints + i] = to;
+                self.ws.ways_m[(2 * v + 1) * self.waypoints + i] = home;
+            }
+        }
+    }
+
+    /// Whether a vehicle can photograph `from` up to before `end` over `most_m` of ground.
+    fn fits(&self, v: usize, from: usize, end: usize, most_m: f32) -> bool {
+        let to = &self.ws.ways_m[2 * v * self.waypoints..][..self.waypoints];
+        let home = &self.ws.ways_m[(2 * v + 1) * self.waypoints..][..self.waypoints];
+        let along = |i: usize| self.work.tracks.along_m(i as u32);
+        let transit = libm::fminf(to[from] + home[end - 1], to[end - 1] + home[from]);
+        along(end - 1) - along(from) + transit <= most_m
+    }
+
+    /// Fills the states for T = `time_s`; whether everything is done.
+    fn reach(&mut self, time_s: f32) -> bool {
+        let (count, waypoints) = (self.count, self.waypoints);
+        for v in 0..count {
+            let vehicle = self.work.vehicles[v];
+            for layer in 0..count {
+                let left_s = time_s - self.work.altitude_delay_s(&vehicle, layer as u8 + 1);
+                let most_m = left_s * vehicle.cruise_mps;
+                let mut end = 0;
+                for from in 0..waypoints {
+                    end = end.max(from);
+                    while end < waypoints && self.fits(v, from, end + 1, most_m) {
+                        end += 1;
+                    }
+                    self.ws.reaches[(v * count + layer) * (waypoints + 1) + from] = end as u32;
+                }
+                self.ws.reaches[(v * count + layer) * (waypoints + 1) + waypoints] = waypoints as u32;
+            }
+        }
+        let sets = 1usize << count;
+        self.ws.states[..sets * sets].fill((0, u16::MAX));
+        for flying in 0..sets {
+            for layers in (0..sets).filter(|layers| layers.count_ones() == flying.count_ones()) {
+                let done = self.ws.states[flying * sets + layers].0;
+                for v in (0..count).filter(|v| flying >> v & 1 == 0) {
+                    for layer in (0..count).filter(|layer| layers >> layer & 1 == 0) {
+                        let end = self.ws.reaches[(v * count + layer) * (waypoints + 1) + done as usize];
+                        let next = (flying | 1 << v) * sets + (layers | 1 << layer);
+                        if end > self.ws.states[next].0 {
+                            self.ws.states[next] = (end, (v * count + layer) as u16);
+                        }
+                    }
+                }
+            }
+        }
+        self.whole().is_some()
+    }
+
+    /// The state with the fewest vehicles in which everything is done.
+    fn whole(&self) -> Option<usize> {
+        let all = |state: &usize| self.ws.states[*state].0 as usize == self.waypoints;
+        (0..1usize << (2 * self.count)).filter(all).min_by_key(|state| state.count_ones())
+    }
+
+    /// The plan that the states hold.
+    fn read<const K: usize>(&self, out: &mut Plan<K>) {
+        let Some(mut state) = self.whole() else { return };
+        let (count, sets) = (self.count, 1usize << self.count);
+        let stride = self.waypoints + 1;
+        out.routes.clear();
+        while self.ws.states[state].1 != u16::MAX {
+            let (end, step) = self.ws.states[state];
+            let (v, layer) = (usize::from(step) / count, usize::from(step) % count);
+            state = ((state / sets) & !(1 << v)) * sets + ((state % sets) & !(1 << layer));
+            let first = self.ws.states[state].0;
+            debug_assert_eq!(self.ws.reaches[usize::from(step) * stride + first as usize], end);
+            let (ground_m, heading) = self.work.ground_m(&self.work.vehicles[v], first, end);
+            let route = Route {
+                vehicle: v as u8,
+                first,
+                end,
+                heading,
+                layer: layer as u8 + 1,
+                ground_m,
+                cost_m: 0.0,
+                cost_s: 0.0,
+            };
+            if end > first {
+                let _ = out.routes.push(route);
+            }
+        }
+        out.routes.reverse();
+        set_layers(self.work, out);
+    }
+}

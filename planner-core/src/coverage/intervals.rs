@@ -1,0 +1,108 @@
+//! Sets of numbers as sorted intervals that do not touch.
+
+use heapless::Vec;
+
+use super::CoverageError;
+
+/// From, to.
+pub(super) type Span = [f32; 2];
+
+/// A set of numbers: at most `N` intervals.
+#[derive(Default)]
+pub(super) struct Intervals<const N: usize> {
+    spans: Vec<Span, N>,
+}
+
+impl<const N: usize> Intervals<N> {
+    pub(super) const fn new() -> Self {
+        Self { spans: Vec::new() }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.spans.clear();
+    }
+
+    pub(super) fn spans(&self) -> &[Span] {
+        &self.spans
+    }
+
+    /// Adds an interval to the set.
+    pub(super) fn add(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
+        // Those it touches are one with it: they follow each other.
+        let first = self.spans.partition_point(|span| span[1] < from);
+        let after = self.spans.partition_point(|span| span[0] <= to);
+        if first < after {
+            let low = libm::fminf(from, self.spans[first][0]);
+            let high = libm::fmaxf(to, self.spans[after - 1][1]);
+            self.spans[first] = [low, high];
+            let len = self.spans.len();
+            self.spans.copy_within(after..len, first + 1);
+            self.spans.truncate(len - (after - first - 1));
+            return Ok(());
+        }
+        self.spans.insert(first, [from, to]).map_err(|_| CoverageError::LanesFull)
+    }
+
+    /// Drops intervals that are shorter than this.
+    pub(super) fn drop_shorter(&mut self, least: f32) {
+        self.spans.retain(|[from, to]| to - from >= least);
+    }
+
+    /// Takes an interval out of the set; its ends stay.
+    pub(super) fn remove(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
+        let mut i = self.spans.partition_point(|span| span[1] <= from);
+        while i < self.spans.len() && self.spans[i][0] < to {
+            let [low, high] = self.spans[i];
+            match (low < from, high > to) {
+                (true, true) => {
+                    self.spans[i][1] = from;
+                    return self.spans.insert(i + 1, [to, high]).map_err(|_| CoverageError::LanesFull);
+                }
+                (true, false) => {
+                    self.spans[i][1] = from;
+                    i += 1;
+                }
+                (false, true) => {
+                    self.spans[i][0] = to;
+                    return Ok(());
+                }
+                (false, false) => {
+                    self.spans.remove(i);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn adding_and_removing_agree_with_cells() {
+        // A generator of our own is enough: what matters is that many small cases are seen.
+        let mut state = 7u32;
+        let mut next = |most: u32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 16) % most
+        };
+        for _ in 0..3000 {
+            let mut set = Intervals::<16>::new();
+            let mut cells = [false; 20];
+            for _ in 0..6 {
+                let (from, adds) = (next(19), next(3) > 0);
+                let to = from + 1 + next(20 - from - 1);
+                let span = [from as f32, to as f32];
+                if adds { set.add(span) } else { set.remove(span) }.expect("room");
+                cells[from as usize..to as usize].fill(adds);
+                for (i, cell) in cells.iter().enumerate() {
+                    let place = i as f32 + 0.5;
+                    let held = set.spans().iter().any(|s| s[0] <= place && place <= s[1]);
+                    assert_eq!(held, *cell, "{i} of {:?}", set.spans());
+                }
+                assert!(set.spans().is_sorted_by(|a, b| a[1] <= b[0]));
+            }
+        }
+    }
+}

@@ -1,0 +1,159 @@
+//! The order in which lanes are flown, and each one's direction: the shortest way from lane to lane.
+//!
+//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1). Elsewhere a first order takes the
+//! nearest end each time; then parts are turned round (2-opt) and up to three lanes moved (Or-opt) as long as that
+//! shortens the way, or until the looks are used up. Both ends of the way are free. O(n²) distances a round, bounded by
+//! `looks`.
+
+use super::Flat;
+use super::tracks::Lane;
+use super::transit::Transit;
+
+/// Gains below it are rounding, metres.
+const GAIN_M: f32 = 1e-3;
+/// Most lanes that Or-opt moves together.
+const MOVED: usize = 3;
+
+/// Sorts lanes into the order and the directions in which they are flown.
+pub(super) fn sort<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>, looks: u32) {
+    if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
+        for lane in lanes.iter_mut().skip(1).step_by(2) {
+            lane.turn();
+        }
+        return;
+    }
+    nearest_first(lanes, transit);
+    let mut search = Search { transit, looks };
+    while search.turn_parts(lanes) | search.move_lanes(lanes) {}
+}
+
+/// From the first lane on, always the nearest end.
+fn nearest_first<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
+    for done in 1..lanes.len() {
+        let here = lanes[done - 1].to;
+        let mut best = (f32::INFINITY, done, false);
+        for (i, lane) in lanes.iter().enumerate().skip(done) {
+            for (end, turned) in [(lane.from, false), (lane.to, true)] {
+                // No way is shorter than the straight one.
+                if (end - here).norm() < best.0 {
+                    let way = transit.distance_m(&here, &end);
+                    if way < best.0 {
+                        best = (way, i, turned);
+                    }
+                }
+            }
+        }
+        lanes.swap(done, best.1);
+        if best.2 {
+            lanes[done].turn();
+        }
+    }
+}
+
+struct Search<'t, 'a, const N: usize> {
+    transit: &'t Transit<'a, N>,
+    looks: u32,
+}
+
+impl<const N: usize> Search<'_, '_, N> {
+    /// Whether another look may be taken.
+    fn look(&mut self) -> bool {
+        let left = self.looks > 0;
+        self.looks = self.looks.saturating_sub(1);
+        left
+    }
+
+    /// The way between two ends, none where the path begins or ends.
+    fn way(&self, from: Option<Flat>, to: Option<Flat>) -> f32 {
+        match (from, to) {
+            (Some(from), Some(to)) => self.transit.distance_m(&from, &to),
+            _ => 0.0,
+        }
+    }
+
+    /// 2-opt: turns parts round where that shortens the way.
+    fn turn_parts(&mut self, lanes: &mut [Lane]) -> bool {
+        let mut gained = false;
+        for i in 0..lanes.len() {
+            for j in i..lanes.len() {
+                if !self.look() {
+                    return false;
+                }
+                let before = i.checked_sub(1).map(|k| lanes[k].to);
+                let after = lanes.get(j + 1).map(|lane| lane.from);
+                let (from, to) = (lanes[i].from, lanes[j].to);
+                let old = self.way(before, Some(from)) + self.way(Some(to), after);
+                // No way is shorter than the straight one.
+                if straight(before, to) + straight(after, from) > old - GAIN_M {
+                    continue;
+                }
+                let new = self.way(before, Some(to)) + self.way(Some(from), after);
+                if new < old - GAIN_M {
+                    turn(&mut lanes[i..=j]);
+                    gained = true;
+                }
+            }
+        }
+        gained
+    }
+
+    /// Or-opt: moves up to [`MOVED`] lanes that follow each other, as they are or turned round.
+    fn move_lanes(&mut self, lanes: &mut [Lane]) -> bool {
+        let mut gained = false;
+        let count = lanes.len();
+        for len in 1..=MOVED.min(count.saturating_sub(1)) {
+            for i in 0..=count - len {
+                let Some((to, turned)) = self.better_place(lanes, i, len) else { continue };
+                if turned {
+                    turn(&mut lanes[i..i + len]);
+                }
+                if to < i {
+                    lanes[to..i + len].rotate_right(len);
+                } else {
+                    lanes[i..to].rotate_left(len);
+                }
+                gained = true;
+            }
+        }
+        gained && self.looks > 0
+    }
+
+    /// The best place for `len` lanes from `i` on: they would stand before the lane that is at it now.
+    fn better_place(&mut self, lanes: &[Lane], i: usize, len: usize) -> Option<(usize, bool)> {
+        let (from, to) = (lanes[i].from, lanes[i + len - 1].to);
+        let before = i.checked_sub(1).map(|k| lanes[k].to);
+        let after = lanes.get(i + len).map(|lane| lane.from);
+        let saved = self.way(before, Some(from)) + self.way(Some(to), after) - self.way(before, after);
+        let mut best = (GAIN_M, None);
+        for place in (0..i).chain(i + len + 1..=lanes.len()) {
+            if !self.look() {
+                break;
+            }
+            let left = place.checked_sub(1).map(|k| lanes[k].to);
+            let right = lanes.get(place).map(|lane| lane.from);
+            let gap = self.way(left, right);
+            for (first, last, turned) in [(from, to, false), (to, from, true)] {
+                if saved + gap - straight(left, first) - straight(right, last) <= best.0 {
+                    continue;
+                }
+                let gain = saved + gap - self.way(left, Some(first)) - self.way(Some(last), right);
+                if gain > best.0 {
+                    best = (gain, Some((place, turned)));
+                }
+            }
+        }
+        best.1
+    }
+}
+
+fn straight(from: Option<Flat>, to: Flat) -> f32 {
+    from.map_or(0.0, |from| (to - from).norm())
+}
+
+/// Flies lanes the other way, the last one first.
+fn turn(lanes: &mut [Lane]) {
+    lanes.reverse();
+    for lane in lanes {
+        lane.turn();
+    }
+}

@@ -1,0 +1,396 @@
+//! SIMPLE-BINPAT and BINPAT: the path is cut into contiguous routes, and routes go to vehicles.
+//!
+//! Source: CPP §3.2.2, Algorithms 1 and 2 as SPEC §7 reads them. CBinPack fills one bin after the other with tracks until
+//! its share of the whole length is full; the track that would exceed the share goes in only where the result is nearer to
+//! it. The last bin with a share takes the rest. Bins go to vehicles by linear sum assignment over the way from a vehicle's
+//! place to the first waypoint and from the last one home, in the better of both directions. The higher the cost, the
+//! lower the layer. `H_d = (h_m + Δh) / V_a + (h_m + Δh) / V_d` (CPP eq. 4).
+//!
+//! Δh is at least one layer: a vehicle in transit never is at the height at which others photograph.
+//!
+//! Cost: K vehicles, n lanes: K · log n, K² ways, one assignment (K³).
+
+use heapless::Vec;
+use libm::fmaxf;
+
+use super::tracks::Tracks;
+use super::transit::Transit;
+use super::{CoverageError, Flat};
+use crate::assignment::{AssignmentWorkspace, assign};
+
+/// One vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Vehicle {
+    /// Where its transit to the first waypoint begins.
+    pub place: Flat,
+    /// Where its transit home ends.
+    pub home: Flat,
+    /// Speed over ground, metres a second.
+    pub cruise_mps: f32,
+    /// V_a, metres a second.
+    pub climb_mps: f32,
+    /// V_d, metres a second.
+    pub descend_mps: f32,
+    /// W_k: its share of the work is this by the sum of all.
+    pub weight: f32,
+}
+
+/// Heights of a mission.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Heights {
+    /// h_m: the height at which pictures are taken, above the ground from which vehicles take off, metres.
+    pub mission_m: f32,
+    /// From one transit layer to the next, metres.
+    pub layer_m: f32,
+}
+
+/// What a track is: the smallest part of the path that goes to one vehicle as a whole.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Unit {
+    /// A lane: the simple back-and-forth pattern, SIMPLE-BINPAT.
+    Lane,
+    /// A waypoint and the way to it: the sampled pattern, BINPAT.
+    Waypoint,
+}
+
+/// Which way a route is flown.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heading {
+    /// By rising number of the waypoints.
+    Forward,
+    /// By falling number.
+    Backward,
+}
+
+/// What one vehicle flies: waypoints `first` up to before `end`, without a break.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Route {
+    /// Index of the vehicle.
+    pub vehicle: u8,
+    /// The waypoint with the lowest number.
+    pub first: u32,
+    /// After the one with the highest.
+    pub end: u32,
+    /// Which way it is flown.
+    pub heading: Heading,
+    /// The layer of its transit, from 1: layers above the height of the mission.
+    pub layer: u8,
+    /// Way over ground: to the first waypoint, along the route, home; metres.
+    pub ground_m: f32,
+    /// The same with climb and descent, metres.
+    pub cost_m: f32,
+    /// C_k, seconds: way over ground at cruise speed, and H_d.
+    pub cost_s: f32,
+}
+
+impl Route {
+    /// The waypoint that is flown to first, and the last one.
+    pub fn ends(&self) -> (u32, u32) {
+        match self.heading {
+            Heading::Forward => (self.first, self.end - 1),
+            Heading::Backward => (self.end - 1, self.first),
+        }
+    }
+
+    /// Numbers of its waypoints in the order in which they are flown.
+    pub fn waypoints(&self) -> impl Iterator<Item = u32> + use<> {
+        let Self { first, end, heading, .. } = *self;
+        (first..end).map(move |i| match heading {
+            Heading::Forward => i,
+            Heading::Backward => end - 1 - (i - first),
+        })
+    }
+}
+
+/// All routes, in the order of the path: at most one a vehicle. A vehicle without one stays on the ground.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plan<const K: usize> {
+    /// The routes.
+    pub routes: Vec<Route, K>,
+}
+
+impl<const K: usize> Plan<K> {
+    /// No routes.
+    pub const fn new() -> Self {
+        Self { routes: Vec::new() }
+    }
+
+    /// max C_k, seconds: when the last vehicle is done.
+    pub fn max_cost_s(&self) -> f32 {
+        self.routes.iter().map(|route| route.cost_s).fold(0.0, fmaxf)
+    }
+}
+
+/// Memory lent for at most `K` vehicles.
+pub struct PackWorkspace<const K: usize> {
+    transits_m: Vec<f32, 1024>,
+    columns: [Option<u16>; K],
+    assignment: AssignmentWorkspace<K>,
+    ends: [u32; K],
+    pub(super) shares: [f32; K],
+}
+
+impl<const K: usize> PackWorkspace<K> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        assert!(K * K <= 1024, "the cost matrix has room for 32 vehicles");
+        Self {
+            transits_m: Vec::new(),
+            columns: [None; K],
+            assignment: AssignmentWorkspace::new(),
+            ends: [0; K],
+            shares: [0.0; K],
+        }
+    }
+}
+
+impl<const K: usize> Default for PackWorkspace<K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What is divided: the path, the ways around what is in between, the vehicles.
+#[derive(Clone, Copy)]
+pub struct Work<'a, const L: usize, const N: usize> {
+    /// The lanes.
+    pub tracks: &'a Tracks<L>,
+    /// Ways around no-fly zones.
+    pub transit: &'a Transit<'a, N>,
+    /// Who flies.
+    pub vehicles: &'a [Vehicle],
+    /// Heights.
+    pub heights: Heights,
+    /// What a track is.
+    pub unit: Unit,
+}
+
+impl<const L: usize, const N: usize> Work<'_, L, N> {
+    /// Whether all settings are what they may be.
+    ///
+    /// # Errors
+    /// The setting that is not; [`CoverageError::Vehicles`] for none or more than `K`; [`CoverageError::NothingToCover`].
+    pub fn check<const K: usize>(&self) -> Result<(), CoverageError> {
+        if self.vehicles.is_empty() || self.vehicles.len() > K.min(usize::from(u8::MAX)) {
+            return Err(CoverageError::Vehicles);
+        }
+        if self.tracks.lanes().is_empty() {
+            return Err(CoverageError::NothingToCover);
+        }
+        let heights = [("height_m", self.heights.mission_m), ("layer_m", self.heights.layer_m)];
+        crate::all_positive(&heights).map_err(|error| CoverageError::Setting(error.0))?;
+        for vehicle in self.vehicles {
+            let speeds = [
+                ("cruise_mps", vehicle.cruise_mps),
+                ("climb_mps", vehicle.climb_mps),
+                ("descend_mps", vehicle.descend_mps),
+            ];
+            crate::all_positive(&speeds).map_err(|error| CoverageError::Setting(error.0))?;
+            if !(vehicle.weight >= 0.0 && vehicle.weight.is_finite()) {
+                return Err(CoverageError::Setting("weight"));
+            }
+            if !(vehicle.place.norm_squared() + vehicle.home.norm_squared()).is_finite() {
+                return Err(CoverageError::Setting("place"));
+            }
+        }
+        if self.vehicles.iter().all(|vehicle| vehicle.weight == 0.0) {
+            return Err(CoverageError::Setting("weight"));
+        }
+        Ok(())
+    }
+
+    /// H_d of a vehicle in a layer, seconds.
+    pub fn altitude_delay_s(&self, vehicle: &Vehicle, layer: u8) -> f32 {
+        let top_m = self.heights.mission_m + f32::from(layer) * self.heights.layer_m;
+        top_m / vehicle.climb_mps + top_m / vehicle.descend_mps
+    }
+
+    /// The way of a vehicle over ground if it flies from waypoint `from` to waypoint `to`, without the route between
+    /// them.
+    fn transit_m(&self, vehicle: &Vehicle, from: u32, to: u32) -> f32 {
+        let place = |number| self.tracks.waypoint(number).unwrap_or(vehicle.place);
+        self.transit.distance_m(&vehicle.place, &place(from))
+            + self.transit.distance_m(&place(to), &vehicle.home)
+    }
+
+    /// A vehicle's way over ground for waypoints `first` up to before `end`, in the better direction.
+    pub(super) fn ground_m(&self, vehicle: &Vehicle, first: u32, end: u32) -> (f32, Heading) {
+        let inside = self.tracks.along_m(end - 1) - self.tracks.along_m(first);
+        let forward = self.transit_m(vehicle, first, end - 1);
+        let backward = if vehicle.place == vehicle.home {
+            // The same ways the other way round.
+            forward
+        } else {
+            self.transit_m(vehicle, end - 1, first)
+        };
+        match backward < forward {
+            true => (backward + inside, Heading::Backward),
+            false => (forward + inside, Heading::Forward),
+        }
+    }
+}
+
+/// BINPAT, or SIMPLE-BINPAT where a track is a lane: shares by the vehicles' weights.
+///
+/// # Errors
+/// See [`Work::check`]; [`CoverageError::Unreachable`].
+pub fn binpat<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    ws: &mut PackWorkspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    work.check::<K>()?;
+    for (share, vehicle) in ws.shares.iter_mut().zip(work.vehicles) {
+        *share = vehicle.weight;
+    }
+    let alike = work.vehicles.iter().all(|vehicle| vehicle.weight == work.vehicles[0].weight);
+    pack(work, if alike { Bins::Anyone } else { Bins::SameWeight }, ws, out)
+}
+
+/// Which vehicles a bin may go to.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Bins {
+    /// Any.
+    Anyone,
+    /// Those with the weight that the bin was filled by.
+    SameWeight,
+}
+
+/// Cuts, assigns, layers, by `ws.shares`.
+pub(super) fn pack<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    bins: Bins,
+    ws: &mut PackWorkspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    let count = work.vehicles.len();
+    cbinpack(work.tracks, work.unit, &ws.shares[..count], &mut ws.ends[..count]);
+    assign_bins(work, bins, ws, out)?;
+    set_layers(work, out);
+    Ok(())
+}
+
+/// CBinPack: `ends[k]` becomes the number after bin `k`'s last waypoint.
+pub fn cbinpack<const L: usize>(tracks: &Tracks<L>, unit: Unit, shares: &[f32], ends: &mut [u32]) {
+    let whole: f32 = shares.iter().sum();
+    let total_m = tracks.length_m();
+    let last = shares.iter().rposition(|share| *share > 0.0).unwrap_or(0);
+    let mut end = 0;
+    // Length of the path that is in bins: up to and with the last track packed.
+    let mut packed_m = 0.0;
+    for (k, (share, slot)) in shares.iter().zip(ends).enumerate() {
+        if k >= last {
+            end = tracks.waypoint_count();
+        } else if *share > 0.0 {
+            (end, packed_m) = fill(tracks, unit, end, packed_m + total_m * share / whole);
+        }
+        *slot = end;
+    }
+}
+
+/// Puts tracks from waypoint `from` on into a bin that is full at `full_m` along the path: the number after its last
+/// waypoint, and how far along the path that is.
+fn fill<const L: usize>(tracks: &Tracks<L>, unit: Unit, from: u32, full_m: f32) -> (u32, f32) {
+    let lanes = tracks.lanes();
+    // The lane in which the bin gets full.
+    let lane = lanes.partition_point(|lane| lane.start_m + lane.length_m() <= full_m);
+    let before = |lane: usize| {
+        let end = lanes.get(lane).map_or(tracks.waypoint_count(), |lane| lane.first);
+        let last = lane.checked_sub(1).map(|lane| &lanes[lane]);
+        (end, last.map_or(0.0, |lane| lane.start_m + lane.length_m()))
+    };
+    let (fits, more) = match (unit, lanes.get(lane)) {
+        (_, None) => return before(lane),
+        (Unit::Lane, Some(_)) => (before(lane), before(lane + 1)),
+        (Unit::Waypoint, Some(inside)) => {
+            let step_m = inside.length_m() / fmaxf((inside.count - 1) as f32, 1.0);
+            let into_m = full_m - inside.start_m;
+            if into_m < 0.0 {
+                (before(lane), (inside.first + 1, inside.start_m))
+            } else {
+                let k = if step_m > 0.0 { (into_m / step_m) as u32 } else { 0 };
+                let at = |k: u32| (inside.first + k + 1, inside.start_m + step_m * k as f32);
+                let k = k.min(inside.count - 1);
+                (at(k), at((k + 1).min(inside.count - 1)))
+            }
+        }
+    };
+    let nearer = more.1 - full_m < full_m - fits.1;
+    let best = if nearer { more } else { fits };
+    // A bin never gives back what the one before it holds.
+    if best.0 >= from { best } else { (from, if from > 0 { tracks.along_m(from - 1) } else { 0.0 }) }
+}
+
+/// Gives each bin that holds something to the vehicle for which the sum of all transits is least.
+fn assign_bins<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    bins: Bins,
+    ws: &mut PackWorkspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    let count = work.vehicles.len();
+    out.routes.clear();
+    ws.transits_m.clear();
+    let mut start = 0;
+    for k in 0..count {
+        let end = ws.ends[k];
+        if end <= start {
+            continue;
+        }
+        let route = Route {
+            vehicle: 0,
+            first: start,
+            end,
+            heading: Heading::Forward,
+            layer: 0,
+            ground_m: 0.0,
+            cost_m: 0.0,
+            cost_s: 0.0,
+        };
+        let inside = work.tracks.along_m(end - 1) - work.tracks.along_m(start);
+        for vehicle in work.vehicles {
+            let may = bins == Bins::Anyone || vehicle.weight == work.vehicles[k].weight;
+            let ground = work.ground_m(vehicle, start, end).0;
+            let _ = ws.transits_m.push(if may { ground - inside } else { f32::INFINITY });
+        }
+        out.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
+        start = end;
+    }
+    let rows = out.routes.len();
+    let columns = &mut ws.columns[..rows];
+    let found = assign(&ws.transits_m, rows, count, &mut ws.assignment, columns);
+    if found.map_err(|_| CoverageError::WorkspaceTooSmall)?.pairs < rows {
+        return Err(CoverageError::Unreachable);
+    }
+    for (row, route) in out.routes.iter_mut().enumerate() {
+        let vehicle = usize::from(ws.columns[row].ok_or(CoverageError::Unreachable)?);
+        route.vehicle = vehicle as u8;
+        (route.ground_m, route.heading) = work.ground_m(&work.vehicles[vehicle], route.first, route.end);
+        if !route.ground_m.is_finite() {
+            return Err(CoverageError::Unreachable);
+        }
+    }
+    Ok(())
+}
+
+/// Gives the lowest layer to the route that takes longest, and so on; then the costs.
+pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    plan: &mut Plan<K>,
+) {
+    let seconds = |route: &Route| route.ground_m / work.vehicles[usize::from(route.vehicle)].cruise_mps;
+    for i in 0..plan.routes.len() {
+        let own = seconds(&plan.routes[i]);
+        let longer = plan.routes.iter().enumerate().filter(|(j, other)| {
+            let theirs = seconds(other);
+            theirs > own || (theirs == own && *j < i)
+        });
+        plan.routes[i].layer = longer.count() as u8 + 1;
+    }
+    for route in &mut plan.routes {
+        let vehicle = &work.vehicles[usize::from(route.vehicle)];
+        let top_m = work.heights.mission_m + f32::from(route.layer) * work.heights.layer_m;
+        route.cost_m = route.ground_m + 2.0 * top_m;
+        route.cost_s = seconds(route) + work.altitude_delay_s(vehicle, route.layer);
+    }
+}

@@ -1,0 +1,200 @@
+//! POWELL-BINPAT: the shares W, 0 ≤ W_k ≤ 1, that make max C_k least; a share of nothing leaves a vehicle on the ground.
+//!
+//! Source: CPP §3.2.3; M. J. D. Powell, "An efficient method for finding the minimum of a function of several variables
+//! without calculating derivatives", Computer Journal 7 (1964). Own and bounded: at most `evaluations` packings.
+//!
+//! max C_k over W is a staircase with flat steps (a waypoint goes to one vehicle or to the other), so a line search looks
+//! at points all along the line first and narrows around the best. Each bin's share is taken by the sum of all, as in
+//! [`super::pack::cbinpack`]. The start is BINPAT with equal shares, and the best plan seen is kept: never worse than that.
+
+use super::CoverageError;
+use super::pack::{Bins, PackWorkspace, Plan, Work, pack};
+
+/// How long POWELL looks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// Packings looked at, at most.
+    pub evaluations: u32,
+}
+
+impl Config {
+    /// What the plans of `host-sim` take.
+    pub const USUAL: Self = Self { evaluations: 4000 };
+}
+
+/// Points of a line search along the whole line.
+const ALONG: u32 = 8;
+/// Halvings of the step around the best of them.
+const HALVINGS: u32 = 7;
+/// A round that gains less than this share of the cost was the last.
+const GAIN: f32 = 1e-4;
+
+/// The shares, and the directions along which they are searched.
+pub struct Workspace<const K: usize> {
+    /// Of the packings.
+    pub pack: PackWorkspace<K>,
+    best: [f32; K],
+    here: [f32; K],
+    directions: [[f32; K]; K],
+    plan: Plan<K>,
+}
+
+impl<const K: usize> Workspace<K> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self {
+            pack: PackWorkspace::new(),
+            best: [0.0; K],
+            here: [0.0; K],
+            directions: [[0.0; K]; K],
+            plan: Plan::new(),
+        }
+    }
+}
+
+impl<const K: usize> Default for Workspace<K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The plan of the best shares found.
+///
+/// # Errors
+/// As [`super::pack::binpat`].
+pub fn powell<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    config: &Config,
+    ws: &mut Workspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    work.check::<K>()?;
+    let count = work.vehicles.len();
+    let mut search = Search { work, left: config.evaluations.max(1), least: f32::INFINITY, ws, out };
+    let weights = work.vehicles.iter().map(|vehicle| vehicle.weight);
+    let largest = weights.clone().fold(0.0, libm::fmaxf);
+    for (share, weight) in search.ws.here.iter_mut().zip(weights) {
+        *share = weight / largest;
+    }
+    let mut cost = search.cost()?;
+    search.reset(count);
+    loop {
+        let before = cost;
+        let from = search.ws.here;
+        let (mut largest, mut at) = (0.0, 0);
+        for k in 0..count {
+            let line = search.ws.directions[k];
+            let found = search.along(&line, count, cost)?;
+            if cost - found > largest {
+                (largest, at) = (cost - found, k);
+            }
+            cost = found;
+        }
+        // The whole step takes the place of the direction that gained most.
+        let mut whole = search.ws.here;
+        whole.iter_mut().zip(from).for_each(|(to, from)| *to -= from);
+        if whole[..count].iter().any(|step| *step != 0.0) {
+            cost = search.along(&whole, count, cost)?;
+            search.ws.directions[at] = whole;
+        }
+        if search.left == 0 || before - cost <= before * GAIN {
+            break;
+        }
+    }
+    let Search { ws, .. } = search;
+    ws.pack.shares = ws.best;
+    Ok(())
+}
+
+struct Search<'s, 'w, const L: usize, const N: usize, const K: usize> {
+    work: &'s Work<'w, L, N>,
+    left: u32,
+    least: f32,
+    ws: &'s mut Workspace<K>,
+    out: &'s mut Plan<K>,
+}
+
+impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
+    fn reset(&mut self, count: usize) {
+        for (k, line) in self.ws.directions[..count].iter_mut().enumerate() {
+            line.fill(0.0);
+            line[k] = 1.0;
+        }
+    }
+
+    /// max C_k of the shares `here`; the best plan is kept.
+    fn cost(&mut self) -> Result<f32, CoverageError> {
+        self.left = self.left.saturating_sub(1);
+        let ws = &mut *self.ws;
+        if ws.here[..self.work.vehicles.len()].iter().all(|share| *share <= 0.0) {
+            return Ok(f32::INFINITY);
+        }
+        ws.pack.shares = ws.here;
+        pack(self.work, Bins::Anyone, &mut ws.pack, &mut ws.plan)?;
+        let cost = ws.plan.max_cost_s();
+        if cost < self.least {
+            self.least = cost;
+            ws.best = ws.here;
+            self.out.routes.clone_from(&ws.plan.routes);
+        }
+        Ok(cost)
+    }
+
+    /// The least cost along a line through `here`, inside the box; `here` moves there.
+    fn along(&mut self, line: &[f32; K], count: usize, cost: f32) -> Result<f32, CoverageError> {
+        let from = self.ws.here;
+        let Some((low, high)) = range(&from[..count], &line[..count]) else { return Ok(cost) };
+        let mut best = (cost, 0.0);
+        let step = (high - low) / ALONG as f32;
+        for k in 0..=ALONG {
+            self.look(&from, line, low + step * k as f32, &mut best)?;
+        }
+        let mut step = step;
+        for _ in 0..HALVINGS {
+            step /= 2.0;
+            let middle = best.1;
+            for at in [middle - step, middle + step] {
+                if (low..=high).contains(&at) {
+                    self.look(&from, line, at, &mut best)?;
+                }
+            }
+        }
+        self.step(&from, line, best.1);
+        Ok(best.0)
+    }
+
+    fn look(
+        &mut self,
+        from: &[f32; K],
+        line: &[f32; K],
+        at: f32,
+        best: &mut (f32, f32),
+    ) -> Result<(), CoverageError> {
+        if self.left == 0 {
+            return Ok(());
+        }
+        self.step(from, line, at);
+        let cost = self.cost()?;
+        if cost < best.0 {
+            *best = (cost, at);
+        }
+        Ok(())
+    }
+
+    fn step(&mut self, from: &[f32; K], line: &[f32; K], at: f32) {
+        for (share, (from, line)) in self.ws.here.iter_mut().zip(from.iter().zip(line)) {
+            *share = (from + line * at).clamp(0.0, 1.0);
+        }
+    }
+}
+
+/// How far the line may be followed back and forth inside the box; none for a line of no length.
+fn range(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
+    let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
+    for (from, step) in from.iter().zip(line).filter(|(_, step)| **step != 0.0) {
+        let (a, b) = (-from / step, (1.0 - from) / step);
+        low = libm::fmaxf(low, libm::fminf(a, b));
+        high = libm::fminf(high, libm::fmaxf(a, b));
+    }
+    (low.is_finite() && high.is_finite() && low < high).then_some((low, high))
+}

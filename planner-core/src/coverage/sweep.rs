@@ -1,0 +1,97 @@
+//! The direction of the lanes: along the side of the hull across which it is least wide, so that there are the fewest
+//! lanes and turns.
+//!
+//! Source: CPP §3.2.1 (after Huang 2001); rotating calipers: Shamos 1978. The hull is Andrew's monotone chain. O(n log n).
+
+use heapless::Vec;
+
+use super::area::{Area, AreaError, RingKind};
+use super::{CoverageError, Flat};
+
+/// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both have length 1.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// Along the lanes.
+    pub along: Flat,
+    /// From lane to lane.
+    pub across: Flat,
+}
+
+impl Direction {
+    /// Lanes at an angle, degrees from east to the left.
+    pub fn at_deg(angle_deg: f32) -> Self {
+        let (sin, cos) = libm::sincosf(angle_deg.to_radians());
+        Self::of(Flat::new(cos, sin))
+    }
+
+    fn of(along: Flat) -> Self {
+        Self { along, across: Flat::new(-along.y, along.x) }
+    }
+}
+
+/// The direction across which the area's outer rings are least wide. `hull` is memory lent: as many places as the outer
+/// rings have vertices.
+///
+/// # Errors
+/// `AreaFull` where `hull` is too small.
+pub fn least_width<const V: usize>(
+    area: &Area<'_>,
+    hull: &mut Vec<Flat, V>,
+) -> Result<Direction, CoverageError> {
+    convex_hull(area, hull)?;
+    let n = hull.len();
+    let mut best = (f32::INFINITY, Direction::of(Flat::new(1.0, 0.0)));
+    let mut far = 1;
+    for i in 0..n {
+        let (from, to) = (hull[i], hull[(i + 1) % n]);
+        let Some(along) = (to - from).try_normalize(0.0) else { continue };
+        let direction = Direction::of(along);
+        let height = |k: usize| direction.across.dot(&(hull[k % n] - from));
+        // Around the hull the furthest corner only moves on, n steps in all for all sides.
+        if i == 0 {
+            far = (0..n).max_by(|a, b| height(*a).total_cmp(&height(*b))).unwrap_or(0);
+        }
+        let mut steps = 0;
+        while steps < n && height(far + 1) > height(far) {
+            far = (far + 1) % n;
+            steps += 1;
+        }
+        if height(far) < best.0 {
+            best = (height(far), direction);
+        }
+    }
+    Ok(best.1)
+}
+
+/// The corners of the convex hull of the outer rings, turning left.
+fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Result<(), CoverageError> {
+    hull.clear();
+    let mut sorted: Vec<Flat, V> = Vec::new();
+    for (_, ring) in area.each().filter(|(kind, _)| *kind == RingKind::Outer) {
+        sorted.extend_from_slice(ring).map_err(|_| AreaError::AreaFull)?;
+    }
+    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    let count = sorted.len();
+    // The lower side from left to right, then the upper one back.
+    let mut side = 0;
+    for step in 0..2 * count {
+        let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
+        if step == count {
+            side = hull.len().saturating_sub(1);
+        }
+        while hull.len() >= side + 2 {
+            let (a, b) = (hull[hull.len() - 2], hull[hull.len() - 1]);
+            if (b - a).perp(&(place - b)) > 0.0 {
+                break;
+            }
+            hull.pop();
+        }
+        if hull.last() != Some(&place) {
+            hull.push(place).map_err(|_| AreaError::AreaFull)?;
+        }
+    }
+    if hull.len() > 1 && hull.first() == hull.last() {
+        hull.pop();
+    }
+    Ok(())
+}

@@ -1,0 +1,397 @@
+//! Back-and-forth lanes over an area: concave, with holes and no-fly zones.
+//!
+//! Source: CPP §3.2.1, Fig. 4. The area is cut into strips as wide as the lane spacing or a little less, all alike. In
+//! each strip the lane runs along the middle. It reaches from border to border along that line, and further where the
+//! strip's area would else lie beyond the last picture. "Simple" and "sampled" patterns are the same lanes: the first
+//! packs whole lanes, the second waypoints ([`super::pack::Unit`]).
+//!
+//! Frame: `u` along the lanes, `v` across them, metres from the first vertex. O(lanes · vertices), and the order of the
+//! lanes ([`super::order`]).
+
+use heapless::Vec;
+use libm::{ceilf, fmaxf, fminf};
+
+use super::area::{Area, AreaError, RingKind, edges_of};
+use super::footprint::Spacing;
+use super::intervals::{Intervals, Span};
+use super::order;
+use super::patches;
+use super::sweep::{Direction, least_width};
+use super::transit::{CLEARANCE_M, Transit};
+use super::{CoverageError, Flat};
+
+/// What lanes follow from, besides the area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pattern {
+    /// Footprint and spacings.
+    pub spacing: Spacing,
+    /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
+    pub angle_deg: Option<f32>,
+    /// Lanes begin and end so far beyond the edge, metres.
+    pub margin_m: f32,
+    /// Changes of the lanes' order that are looked at, at most: each costs a few distances.
+    pub looks: u32,
+}
+
+/// One lane. Waypoint `k` lies `k / (count − 1)` of the way from `from` to `to`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lane {
+    /// Where it begins.
+    pub from: Flat,
+    /// Where it ends.
+    pub to: Flat,
+    /// Number of its first waypoint, counted along the whole path.
+    pub first: u32,
+    /// Waypoints on it, at least 1.
+    pub count: u32,
+    /// Length of the whole path before its first waypoint, metres.
+    pub start_m: f32,
+    /// The strip it lies in.
+    pub strip: u16,
+}
+
+impl Lane {
+    /// From end to end, metres.
+    pub fn length_m(&self) -> f32 {
+        (self.to - self.from).norm()
+    }
+
+    /// Waypoint `k` of it, from 0.
+    pub fn waypoint(&self, k: u32) -> Flat {
+        if self.count < 2 { self.from } else { self.from + (self.to - self.from) * self.share(k) }
+    }
+
+    fn share(&self, k: u32) -> f32 {
+        if self.count < 2 { 0.0 } else { k as f32 / (self.count - 1) as f32 }
+    }
+
+    /// The same lane flown the other way.
+    pub(super) fn turn(&mut self) {
+        core::mem::swap(&mut self.from, &mut self.to);
+    }
+}
+
+/// All lanes in the order in which one vehicle would fly them: at most `L`.
+#[derive(Clone, Debug, Default)]
+pub struct Tracks<const L: usize> {
+    pub(super) lanes: Vec<Lane, L>,
+    pub(super) along: Flat,
+}
+
+impl<const L: usize> Tracks<L> {
+    /// No lanes.
+    pub const fn new() -> Self {
+        Self { lanes: Vec::new(), along: Flat::new(1.0, 0.0) }
+    }
+
+    /// The direction along the lanes, of length 1.
+    pub fn along(&self) -> Flat {
+        self.along
+    }
+
+    /// The lanes.
+    pub fn lanes(&self) -> &[Lane] {
+        &self.lanes
+    }
+
+    /// How many waypoints there are.
+    pub fn waypoint_count(&self) -> u32 {
+        self.lanes.last().map_or(0, |lane| lane.first + lane.count)
+    }
+
+    /// Length of the whole path, metres.
+    pub fn length_m(&self) -> f32 {
+        self.lanes.last().map_or(0.0, |lane| lane.start_m + lane.length_m())
+    }
+
+    /// The lane of a waypoint, by number: the last lane for numbers beyond.
+    pub fn lane_of(&self, waypoint: u32) -> usize {
+        self.lanes.partition_point(|lane| lane.first <= waypoint).saturating_sub(1)
+    }
+
+    /// Where a waypoint is.
+    pub fn waypoint(&self, number: u32) -> Option<Flat> {
+        let lane = self.lanes.get(self.lane_of(number))?;
+        let k = number.checked_sub(lane.first).filter(|k| *k < lane.count)?;
+        Some(lane.waypoint(k))
+    }
+
+    /// Length of the path up to a waypoint, metres.
+    pub fn along_m(&self, number: u32) -> f32 {
+        let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
+        lane.start_m + lane.length_m() * lane.share(number - lane.first)
+    }
+
+    /// Numbers the waypoints and measures the way.
+    pub(super) fn number<const N: usize>(
+        &mut self,
+        spacing: &Spacing,
+        transit: &Transit<'_, N>,
+    ) -> Result<(), CoverageError> {
+        for lane in &mut self.lanes {
+            let steps = ceilf(lane.length_m() / spacing.waypoint_m - 1e-3);
+            lane.count = if lane.length_m() < super::area::SAME_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
+        }
+        self.measure(transit)
+    }
+
+    /// Numbers waypoints that each lane has already, and measures the way.
+    pub(super) fn measure<const N: usize>(&mut self, transit: &Transit<'_, N>) -> Result<(), CoverageError> {
+        let (mut first, mut start_m) = (0, 0.0);
+        let mut before: Option<Flat> = None;
+        for lane in &mut self.lanes {
+            if let Some(before) = before {
+                start_m += transit.distance_m(&before, &lane.from);
+            }
+            (lane.first, lane.start_m) = (first, start_m);
+            first += lane.count;
+            start_m += lane.length_m();
+            before = Some(lane.to);
+        }
+        if start_m.is_finite() { Ok(()) } else { Err(CoverageError::Unreachable) }
+    }
+}
+
+/// Memory lent: `V` is at least the number of the area's vertices.
+pub struct Workspace<const V: usize> {
+    hull: Vec<Flat, V>,
+    pub(super) crossings: Vec<f32, V>,
+    pub(super) need: Intervals<V>,
+    pub(super) line: Intervals<V>,
+    pub(super) free: Intervals<V>,
+}
+
+impl<const V: usize> Workspace<V> {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            hull: Vec::new(),
+            crossings: Vec::new(),
+            need: Intervals::new(),
+            line: Intervals::new(),
+            free: Intervals::new(),
+        }
+    }
+}
+
+impl<const V: usize> Default for Workspace<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Lanes over an area, in the order in which they are flown.
+///
+/// # Errors
+/// Settings that are wrong, memory that is too small, [`CoverageError::NothingToCover`].
+pub fn build<const L: usize, const V: usize, const N: usize>(
+    area: &Area<'_>,
+    pattern: &Pattern,
+    transit: &Transit<'_, N>,
+    ws: &mut Workspace<V>,
+    out: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
+    pattern.spacing.check()?;
+    if !(pattern.margin_m >= 0.0 && pattern.margin_m.is_finite()) {
+        return Err(CoverageError::Setting("margin_m"));
+    }
+    if area.vertices().len() > V {
+        return Err(AreaError::AreaFull.into());
+    }
+    let direction = match pattern.angle_deg {
+        Some(angle) if angle.is_finite() => Direction::at_deg(angle),
+        Some(_) => return Err(CoverageError::Setting("angle_deg")),
+        None => least_width(area, &mut ws.hull)?,
+    };
+    let strips = Strips::new(area, pattern, direction)?;
+    if strips.count > L {
+        return Err(CoverageError::LanesFull);
+    }
+    out.lanes.clear();
+    out.along = direction.along;
+    for strip in 0..strips.count {
+        let span = strips.span(strip);
+        strips.need(span, ws)?;
+        strips.lay(strip as u16, strips.middle(span), ws, out)?;
+    }
+    if area.has_no_fly() {
+        patches::lay(&strips, ws, out)?;
+    }
+    if out.lanes.is_empty() {
+        return Err(CoverageError::NothingToCover);
+    }
+    order::sort(&mut out.lanes, transit, pattern.looks);
+    out.number(&pattern.spacing, transit)
+}
+
+/// The area in strips.
+pub(super) struct Strips<'a> {
+    pub(super) area: Area<'a>,
+    pub(super) pattern: Pattern,
+    direction: Direction,
+    base: Flat,
+    low: f32,
+    pub(super) wide: f32,
+    pub(super) count: usize,
+}
+
+impl<'a> Strips<'a> {
+    fn new(area: &Area<'a>, pattern: &Pattern, direction: Direction) -> Result<Self, CoverageError> {
+        let base = area.vertices()[0];
+        let outer = area.each().filter(|(kind, _)| *kind == RingKind::Outer).flat_map(|(_, ring)| ring);
+        let (low, high) = outer
+            .map(|vertex| direction.across.dot(&(vertex - base)))
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (fminf(low, v), fmaxf(high, v)));
+        // A width that is a whole number of lanes is often a rounding above it.
+        let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - 1e-3), 1.0);
+        if count > f32::from(u16::MAX) {
+            return Err(CoverageError::LanesFull);
+        }
+        let wide = (high - low) / count;
+        Ok(Self { area: *area, pattern: *pattern, direction, base, low, wide, count: count as usize })
+    }
+
+    /// A strip's borders across.
+    pub(super) fn span(&self, strip: usize) -> Span {
+        let low = self.low + strip as f32 * self.wide;
+        [low, low + self.wide]
+    }
+
+    pub(super) fn middle(&self, [low, high]: Span) -> f32 {
+        (low + high) / 2.0
+    }
+
+    /// A place in the lanes' frame.
+    pub(super) fn rotated(&self, place: &Flat) -> (f32, f32) {
+        let from_base = place - self.base;
+        (self.direction.along.dot(&from_base), self.direction.across.dot(&from_base))
+    }
+
+    /// The place of a point of the lanes' frame.
+    fn place(&self, u: f32, v: f32) -> Flat {
+        self.base + self.direction.along * u + self.direction.across * v
+    }
+
+    /// Where the line `v` crosses these edges, in rising order.
+    fn crossings<const V: usize>(
+        &self,
+        edges: impl Iterator<Item = (Flat, Flat)>,
+        v: f32,
+        out: &mut Vec<f32, V>,
+    ) -> Result<(), CoverageError> {
+        out.clear();
+        for (a, b) in edges {
+            let ((au, av), (bu, bv)) = (self.rotated(&a), self.rotated(&b));
+            if (av <= v) != (bv <= v) {
+                let u = au + (v - av) * (bu - au) / (bv - av);
+                out.push(u).map_err(|_| CoverageError::LanesFull)?;
+            }
+        }
+        out.sort_unstable_by(f32::total_cmp);
+        Ok(())
+    }
+
+    /// Adds every `u` at which these rings hold a place between two `v`: those of the places on the lines at both
+    /// borders, and those of the rings' own edges between them. Whoever is inside without being on a border line crosses
+    /// an edge before it.
+    fn shadow<const V: usize>(
+        &self,
+        edges: impl Iterator<Item = (Flat, Flat)> + Clone,
+        [low, high]: Span,
+        grown: f32,
+        crossings: &mut Vec<f32, V>,
+        out: &mut Intervals<V>,
+    ) -> Result<(), CoverageError> {
+        for v in [low, high] {
+            self.crossings(edges.clone(), v, crossings)?;
+            for pair in crossings.chunks_exact(2) {
+                out.add([pair[0] - grown, pair[1] + grown])?;
+            }
+        }
+        for (a, b) in edges {
+            let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
+            if a.1 > b.1 {
+                core::mem::swap(&mut a, &mut b);
+            }
+            if a.1 > high || b.1 < low {
+                continue;
+            }
+            let at = |v: f32| a.0 + (v - a.1) * (b.0 - a.0) / (b.1 - a.1);
+            let from = if a.1 < low { at(low) } else { a.0 };
+            let to = if b.1 > high { at(high) } else { b.0 };
+            out.add([fminf(from, to) - grown, fmaxf(from, to) + grown])?;
+        }
+        Ok(())
+    }
+
+    /// Sets `ws.need` to every `u` at which there is something to photograph between two `v`.
+    pub(super) fn need<const V: usize>(
+        &self,
+        span: Span,
+        ws: &mut Workspace<V>,
+    ) -> Result<(), CoverageError> {
+        ws.need.clear();
+        // What only touches the border of a strip is its neighbour's.
+        let inset = self.wide * 1e-4;
+        let span = [span[0] + inset, span[1] - inset];
+        self.shadow(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
+    }
+
+    /// Takes from `ws.free` every `u` at which the line `v` comes nearer than the clearance to a no-fly zone.
+    fn unblock<const V: usize>(&self, v: f32, ws: &mut Workspace<V>) -> Result<(), CoverageError> {
+        ws.line.clear();
+        let clear = CLEARANCE_M;
+        for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            let span = [v - clear, v + clear];
+            self.shadow(edges_of(ring), span, clear, &mut ws.crossings, &mut ws.line)?;
+        }
+        for span in ws.line.spans() {
+            ws.free.remove(*span)?;
+        }
+        Ok(())
+    }
+
+    /// Lays lanes along the line `v` for what `ws.need` holds.
+    pub(super) fn lay<const L: usize, const V: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        ws: &mut Workspace<V>,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        ws.free.clear();
+        self.crossings(self.area.edges(), v, &mut ws.crossings)?;
+        for &need in ws.need.spans() {
+            let inside = ws.crossings.iter().copied().filter(|u| (need[0]..=need[1]).contains(u));
+            let line = inside
+                .fold([f32::INFINITY, f32::NEG_INFINITY], |line, u| [fminf(line[0], u), fmaxf(line[1], u)]);
+            ws.free.add(self.extent(need, line))?;
+        }
+        if self.area.has_no_fly() {
+            self.unblock(v, ws)?;
+        }
+        for &[from, to] in ws.free.spans() {
+            let lane = Lane {
+                from: self.place(from, v),
+                to: self.place(to, v),
+                first: 0,
+                count: 0,
+                start_m: 0.0,
+                strip,
+            };
+            out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)?;
+        }
+        Ok(())
+    }
+
+    /// From where to where a lane runs for an area that reaches over `need` in its strip and over `line` along it: from
+    /// border to border, further where the first or last picture would else leave something out.
+    fn extent(&self, need: Span, line: Span) -> Span {
+        let half = self.pattern.spacing.footprint.along_m / 2.0;
+        let reach = half - fminf(self.wide / 10.0, half / 2.0);
+        let (from, to) = (fminf(line[0], need[0] + reach), fmaxf(line[1], need[1] - reach));
+        let middle = (need[0] + need[1]) / 2.0;
+        let [from, to] = if from <= to { [from, to] } else { [middle, middle] };
+        [from - self.pattern.margin_m, to + self.pattern.margin_m]
+    }
+}

@@ -1,0 +1,159 @@
+//! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the zones.
+//!
+//! Method: a visibility graph over the zones' outward corners, each pushed out by [`CLEARANCE_M`]; shortest ways between
+//! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the corners that both see
+//! (n² and 2 n segment checks of one comparison an edge). All in metres.
+
+use heapless::Vec;
+use libm::fminf;
+
+use super::area::{Area, RingKind, signed_area};
+use super::{CoverageError, Flat};
+
+/// Ways and lanes keep this from no-fly zones, metres: more than rounding, less than anybody's margin. A margin for the
+/// vehicle belongs into the zone.
+pub const CLEARANCE_M: f32 = 0.25;
+
+/// What shortest ways are asked of: corners and the ways between them, of at most `N` corners: 4 · N² bytes.
+pub struct Transit<'a, const N: usize> {
+    area: Area<'a>,
+    corners: Vec<Flat, N>,
+    between_m: [[f32; N]; N],
+}
+
+/// The memory of a [`Transit`], before it knows an area.
+impl<const N: usize> Transit<'_, N> {
+    /// For an area that is not known yet.
+    pub const fn empty() -> Self {
+        Self { area: Area::NOWHERE, corners: Vec::new(), between_m: [[0.0; N]; N] }
+    }
+}
+
+impl<'a, const N: usize> Transit<'a, N> {
+    /// Learns an area's no-fly zones.
+    ///
+    /// # Errors
+    /// [`CoverageError::NoFlyFull`] where they have more than `N` outward corners.
+    pub fn learn(&mut self, area: Area<'a>) -> Result<(), CoverageError> {
+        self.area = area;
+        self.corners.clear();
+        for (_, ring) in area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            let left = signed_area(ring) > 0.0;
+            for (i, corner) in ring.iter().enumerate() {
+                let (before, after) = (ring[(i + ring.len() - 1) % ring.len()], ring[(i + 1) % ring.len()]);
+                let (into, out) = ((corner - before).normalize(), (after - corner).normalize());
+                let turn = into.perp(&out);
+                if (turn > 0.0) != left {
+                    continue;
+                }
+                // Away from both edges: along their bisector, as far as keeps the clearance from both.
+                let outward = (into - out).try_normalize(1e-6);
+                let Some(outward) = outward else { continue };
+                let half = libm::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
+                let far = CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_of(half), 0.25), 4.0);
+                let place = corner + outward * far;
+                if !area.forbids(&place) {
+                    self.corners.push(place).map_err(|_| CoverageError::NoFlyFull)?;
+                }
+            }
+        }
+        self.measure();
+        Ok(())
+    }
+
+    fn measure(&mut self) {
+        let n = self.corners.len();
+        for i in 0..n {
+            for j in 0..n {
+                let (a, b) = (self.corners[i], self.corners[j]);
+                self.between_m[i][j] = if self.is_clear(&a, &b) { (b - a).norm() } else { f32::INFINITY };
+            }
+            self.between_m[i][i] = 0.0;
+        }
+        for over in 0..n {
+            for i in 0..n {
+                let first = self.between_m[i][over];
+                if first.is_infinite() {
+                    continue;
+                }
+                for j in 0..n {
+                    let whole = first + self.between_m[over][j];
+                    self.between_m[i][j] = fminf(self.between_m[i][j], whole);
+                }
+            }
+        }
+    }
+
+    /// Whether a straight way meets no no-fly zone.
+    pub fn is_clear(&self, from: &Flat, to: &Flat) -> bool {
+        let (low, high) = (from.inf(to), from.sup(to));
+        let meets = |(a, b): (Flat, Flat)| {
+            let (c, d) = (a.inf(&b), a.sup(&b));
+            if c.x > high.x || d.x < low.x || c.y > high.y || d.y < low.y {
+                return false;
+            }
+            let (along, edge) = (to - from, b - a);
+            let (p, q) = (along.perp(&(a - from)), along.perp(&(b - from)));
+            let (r, s) = (edge.perp(&(from - a)), edge.perp(&(to - a)));
+            p * q <= 0.0 && r * s <= 0.0
+        };
+        !self.area.no_fly_edges().any(meets)
+    }
+
+    /// The length of the shortest way; infinite where there is none.
+    pub fn distance_m(&self, from: &Flat, to: &Flat) -> f32 {
+        if self.is_clear(from, to) {
+            return (to - from).norm();
+        }
+        let mut ends: Vec<(usize, f32), N> = Vec::new();
+        for (i, corner) in self.corners.iter().enumerate() {
+            if self.is_clear(corner, to) {
+                let _ = ends.push((i, (to - corner).norm()));
+            }
+        }
+        let mut least = f32::INFINITY;
+        for (i, corner) in self.corners.iter().enumerate() {
+            let first = (corner - from).norm();
+            let rest = ends.iter().map(|&(j, last)| self.between_m[i][j] + last);
+            let whole = first + rest.fold(f32::INFINITY, fminf);
+            // A look costs more than the sums: only at what would be shorter.
+            if whole < least && self.is_clear(from, corner) {
+                least = whole;
+            }
+        }
+        least
+    }
+
+    /// The corners of the shortest way between two places, in order, without the places themselves.
+    ///
+    /// # Errors
+    /// [`CoverageError::Unreachable`] where there is none.
+    pub fn way(&self, from: &Flat, to: &Flat, corners: &mut Vec<Flat, N>) -> Result<(), CoverageError> {
+        corners.clear();
+        let mut here = *from;
+        // Each step is to a corner from which the rest is shorter: no more steps than corners.
+        while !self.is_clear(&here, to) {
+            let mut best = (f32::INFINITY, None);
+            for corner in self.corners.iter().filter(|corner| **corner != here) {
+                let whole = (corner - here).norm() + self.distance_m(corner, to);
+                if whole < best.0 && self.is_clear(&here, corner) {
+                    best = (whole, Some(*corner));
+                }
+            }
+            here = best.1.ok_or(CoverageError::Unreachable)?;
+            corners.push(here).map_err(|_| CoverageError::Unreachable)?;
+        }
+        Ok(())
+    }
+}
+
+impl<const N: usize> Default for Transit<'_, N> {
+    fn default() -> Self {
+        Self::empty()
+    }
+}
+
+/// The cosine from the sine of an angle of at most 90°.
+fn cos_of(sine: f32) -> f32 {
+    libm::sqrtf(libm::fmaxf(1.0 - sine * sine, 0.0))
+}
