@@ -3,8 +3,36 @@
 //! **Contract.** The shell owns links, clock and planner. It calls [`Companion::handle_bytes`] with what a link received,
 //! [`Companion::handle_timeout`] when [`Companion::poll_timeout`] is due, and [`Companion::handle_plan`] with the answer to
 //! [`Event::PlanRequested`]. After *each* `handle_*` call it drains [`Companion::poll_transmit`] for both links until 0
-//! and [`Companion::poll_event`] until `None`; with a flash ([`Companion::mount`]) also [`Companion::poll_flash`], and tells
-//! [`Companion::handle_flash`] how each went, whenever that is. Times never go back. Every call does bounded work.
+//! and [`Companion::poll_event`] until `None`; with a flash ([`Companion::mount`]) also [`Companion::poll_flash`], and answers
+//! each by [`Companion::handle_flash`], whenever it is done. Times never go back. Every call does bounded work.
+//!
+//! ```
+//! use companion::link::frame::MAX_SENT;
+//! use companion::{Companion, Config, Instant, Link};
+//! use planner_core::Point;
+//! use planner_core::frames::Geodetic;
+//!
+//! let origin = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+//! let config = Config::new(1, Point::new(0.0, 0.0, 2.0), origin);
+//! let mut companion: Companion<8, 64, 64> = Companion::new(config)?; // vehicles, waypoints, gates
+//! let now = Instant::from_millis(200);
+//! let mut sent = 0;
+//! companion.handle_bytes(Link::Swarm, now, b"noise is skipped");
+//! companion.handle_timeout(now);
+//! let mut buffer = [0; MAX_SENT];
+//! for link in [Link::Autopilot, Link::Swarm] {
+//!     while let length @ 1.. = companion.poll_transmit(link, &mut buffer) {
+//!         sent += length; // the shell writes `buffer[..length]` to the port
+//!     }
+//! }
+//! while let Some(event) = companion.poll_event() {
+//!     panic!("nothing has happened yet: {event:?}");
+//! }
+//! assert!(sent > 0, "a heartbeat on each link");
+//! # Ok::<(), companion::ConfigError>(())
+//! ```
+//!
+//! `examples/run_loop.rs` is a whole run loop.
 //!
 //! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
 //! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`link::outbox::DEPTH`]; when it is full

@@ -112,7 +112,7 @@ const ROUNDING_M: f32 = 0.05;
 const AT_GATE_M: f32 = 0.1;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
-/// each gate within reach, and for each neighbour without a plan [`LOOKS`] points of the own path.
+/// each gate within reach, and for each neighbour without a plan 16 points (`LOOKS`) of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &Own<'_, W>,

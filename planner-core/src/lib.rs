@@ -2,6 +2,29 @@
 //!
 //! No allocation, no I/O, no clock, no protocol. Lengths are metres, times seconds, angles degrees where a name says
 //! `_deg` and radians otherwise. Points are ENU (east, north, up) in the mission frame.
+//!
+//! The caller owns all memory. A map is a slice of words, and a function that needs scratch memory takes a workspace:
+//!
+//! ```
+//! use planner_core::Point;
+//! use planner_core::segment::segment_is_clear;
+//! use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+//!
+//! // A room of 8 m × 4 m × 4 m in cells of 0.5 m, with a pillar in one column of cells.
+//! let shape = GridShape { dims: [16, 8, 8], min: Point::zeros(), resolution_m: 0.5 };
+//! let mut words = vec![0; shape.brick_count()];
+//! for k in 0..8 {
+//!     let (word, bit) = shape.address([8, 4, k]);
+//!     words[word] |= bit;
+//! }
+//! let grid = VoxelGrid::new(shape, Outside::Blocked, &words)?;
+//! let (a, b) = (Point::new(1.0, 1.5, 2.0), Point::new(7.0, 1.5, 2.0));
+//! assert!(segment_is_clear(&grid, &a, &b, 0.4), "it passes the pillar at 0.5 m");
+//! assert!(!segment_is_clear(&grid, &a, &b, 0.6));
+//! # Ok::<(), planner_core::voxel::GridError>(())
+//! ```
+//!
+//! `examples/ten_uavs.rs` goes on from there: roadmap, assignment, paths, schedule and gates of ten UAVs.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -6,7 +6,7 @@
 //! ([`segment_is_clear`]). The edges are the same set as an all-pairs loop finds ([`connect_all_pairs`]); what differs is the way:
 //!
 //! 1. nodes are sorted into cubes ([`Workspace`]), so that only near pairs are measured;
-//! 2. around a node the largest empty box in a fixed order of growth is taken ([`free_box`]): a neighbour inside it is clear,
+//! 2. around a node the largest empty box in a fixed order of growth is taken (`prm/free_box.rs`): a neighbour inside it is clear,
 //!    and a ray that leaves it mostly does so into a wall. Both answers are taken only where f32 cannot be wrong;
 //! 3. of what is left the part outside the box goes to the exact check.
 //!

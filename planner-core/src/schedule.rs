@@ -351,8 +351,8 @@ fn left_at_m<const W: usize>(q: &Piece, flight: &Flight<W>) -> f32 {
 /// Where flight `index` waits for the others, in the order along its path. A gate that an earlier one for the same vehicle
 /// implies is left out.
 ///
-/// More than `G` are made fewer: a gate then stands for those that follow within [`MERGED_M`] of it as well. Only gates are
-/// merged that the schedule has open by the time of the first, so the order of labels stays as it is.
+/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it (`MERGED_M`), or for
+/// all behind it. Only gates are merged that the schedule has open by the time of the first, so the order of labels stays as it is.
 pub fn gates<const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],

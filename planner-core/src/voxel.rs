@@ -14,7 +14,7 @@ pub const BRICK_CELLS: u32 = 4;
 pub enum GridError {
     /// A dimension is zero or beyond [`MAX_DIM`], or all together are more words than 32 bits can index.
     Dimensions,
-    /// The word slice is not [`brick_count`] long.
+    /// The word slice is not [`GridShape::brick_count`] long.
     WordCount,
     /// The corner or the resolution is not finite, or the resolution is not positive.
     NotFinite,

@@ -30,6 +30,11 @@ fn steps(args: &Args) -> Result<()> {
             "warnings",
         ]))
     })?;
+    step("documents", || {
+        let mut doc = cargo();
+        doc.args(["doc", "--no-deps", "--locked", "-p", "planner-core", "-p", "companion"]);
+        shell::run(doc.env("RUSTDOCFLAGS", "-D warnings"))
+    })?;
     if args.quick {
         return step("host tests", || {
             shell::run(cargo().args(["test", "--workspace", "--no-fail-fast", "--locked"]))

@@ -3,12 +3,12 @@
 //! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
 //! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
 //! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
-//! anew and [`SETTLE`] has passed without another jump.
+//! again and [`SETTLE`] has passed without another jump.
 //!
 //! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
 //! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
-//! named no other for [`DOUBT`]; then it has moved, and the mission lands. An origin further than [`ORIGIN_MOST_M`] from the mission's
-//! counts as none.
+//! named no other for 0.8 s (`DOUBT`); then it has moved, and the mission lands. An origin further than 30 km (`ORIGIN_MOST_M`)
+//! from the mission's counts as none.
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{

@@ -7,7 +7,7 @@
 //!
 //! Requests may be lost, repeated and overtaken. Those that change nothing twice (reading, listing, writing the same bytes to the
 //! same place) are simply done again. Those that would (opening, closing, removing, resetting) are remembered for a while
-//! and only answered again ([`memory`]); a session that nothing was written to is not opened anew for its client. What cannot be
+//! and only answered again (`ftp/memory.rs`); a session that nothing was written to is not opened again for its client. What cannot be
 //! taken now is not answered: clients ask again. One session at a time; one request at a time, the others wait in a short queue.
 //! An answer that needs the flash is given when the flash is done.
 

@@ -44,7 +44,7 @@ pub fn write(
     Ok(seal(out))
 }
 
-/// As [`write`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
+/// As [`write()`], with the ways to [`LANDMARKS`] landmarks, which spare a search half its nodes in a building: node 0, a start
 /// where there are any, and the node farthest from it. Adds a search from each.
 ///
 /// `heights_m` are those of the nodes over the ground, infinite where there is none; or there are none at all.
