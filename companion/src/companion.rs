@@ -7,7 +7,7 @@ mod transmit;
 
 use heapless::Deque;
 use planner_core::Point;
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::Kind;
 use crate::autopilot::handshake::Handshake;

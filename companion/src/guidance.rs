@@ -21,8 +21,8 @@ mod waypoints;
 
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Own};
-use planner_core::path::{Path, TrackConfig, Tracker};
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::{TrackConfig, Tracker};
 
 use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
@@ -46,7 +46,7 @@ pub use self::setpoint::Setpoint;
 const ARRIVED_M: f32 = 0.35;
 /// So near its reference a vehicle reports no less than this short of it, metres: 0.05 m less than what gates allow
 /// (`PROGRESS_ERROR_M`), since it stops short of a gate by a little.
-const REPORTED_SHORT_M: f32 = planner_core::schedule::PROGRESS_ERROR_M - 0.05;
+const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
 /// Slower than this counts as standing at the end of the path, m/s.
 const STANDING_MPS: f32 = 0.5;
 /// A setpoint slower than this stands, m/s.

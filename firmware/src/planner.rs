@@ -5,9 +5,10 @@ use companion::PlanFailure;
 use companion::storage::mission_file::MissionView;
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::flight::VehiclePlan;
 use planner_core::plan::{self, PlanError, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
-use planner_core::schedule::{ScheduleError, VehiclePlan};
+use planner_core::schedule::ScheduleError;
 use planner_core::search::SearchError;
 
 use crate::boards;

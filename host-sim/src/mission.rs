@@ -10,11 +10,11 @@ use companion::PlanFailure;
 use companion::storage::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
+use planner_core::flight::{PathError, VehiclePlan};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
-use planner_core::path::PathError;
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::roadmap::RoadmapView;
-use planner_core::schedule::{ScheduleConfig, ScheduleError, VehiclePlan};
+use planner_core::schedule::{ScheduleConfig, ScheduleError};
 use planner_core::search::SearchWorkspace;
 
 use crate::capacity::{Board, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};

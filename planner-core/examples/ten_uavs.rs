@@ -1,11 +1,12 @@
 //! Plans ten UAVs past a wall: map, roadmap, goals, paths, schedule, gates. `cargo run -p planner-core --example ten_uavs`
 
 use planner_core::Point;
+use planner_core::flight::VehiclePlan;
 use planner_core::frames::Geodetic;
 use planner_core::plan::{self, Mode, Objective, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask};
 use planner_core::prm::{self, Sampling};
 use planner_core::roadmap::{self, RoadmapHeader, RoadmapView};
-use planner_core::schedule::{ScheduleConfig, VehiclePlan};
+use planner_core::schedule::ScheduleConfig;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 
 fn main() {

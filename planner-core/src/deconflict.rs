@@ -7,8 +7,7 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::path::Path;
-use crate::schedule::Gate;
+use crate::flight::{Gate, Path};
 use crate::{ConfigError, Point, all_positive};
 
 /// Which rule keeps vehicles apart.

@@ -11,9 +11,9 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::path::{Path, PathError};
+use crate::flight::{Path, PathError, VehiclePlan};
+use crate::geometry::segments_distance_sq;
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::{VehiclePlan, segments_distance_sq};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::{ConfigError, Point};
 

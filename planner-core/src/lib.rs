@@ -33,8 +33,9 @@ pub mod coverage;
 pub mod deconflict;
 pub mod detour;
 pub mod file;
+pub mod flight;
 pub mod frames;
-pub mod path;
+mod geometry;
 pub mod plan;
 pub mod prm;
 pub mod roadmap;
@@ -42,6 +43,7 @@ pub mod safety;
 pub mod schedule;
 pub mod search;
 pub mod segment;
+pub mod track;
 pub mod voxel;
 
 /// A point or vector in the mission frame: east, north, up, in metres.

@@ -16,10 +16,10 @@ use heapless::Vec;
 
 use crate::ConfigError;
 use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
-use crate::path::{Path, PathError};
+use crate::flight::{Flight, Path, PathError, VehiclePlan};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::SippWorkspace;
-use crate::schedule::{self, Flight, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
+use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::search::{self, SearchError, SearchWorkspace};
 
 /// What an assignment makes small.

@@ -14,7 +14,7 @@
 use heapless::Vec;
 use libm::sqrtf;
 
-use crate::schedule::segments_distance_sq;
+use crate::geometry::segments_distance_sq;
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision to the first motion that follows it, seconds: two setpoints.

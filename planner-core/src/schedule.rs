@@ -14,6 +14,7 @@
 //!
 //! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
 
+mod config;
 mod near;
 mod pieces;
 pub mod sipp;
@@ -23,180 +24,15 @@ pub(crate) mod tests;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-use self::pieces::{cut, parts};
-use crate::path::Path;
-use crate::{ConfigError, Point, all_positive};
+pub use self::config::{ScheduleConfig, ScheduleError};
+pub use self::pieces::{PIECE_M, PIECES};
+use self::pieces::{Piece, conflict, cut};
+use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 
-/// Longest timed segment, metres: finer lets vehicles follow one another closer, coarser costs less.
-pub const PIECE_M: f32 = 1.5;
-/// Most timed segments of one flight; on a flight that would need more they are longer.
-pub const PIECES: usize = 320;
-/// A vehicle that stands reports its progress at most this wrong, metres.
-pub const PROGRESS_ERROR_M: f32 = 0.25;
 /// Most forbidden intervals kept apart while a delay is sought; more are merged, which only forbids more.
 const INTERVALS: usize = 128;
-/// Timed segments grow at most this often, by two: to 1.5 km.
-const DOUBLINGS: usize = 10;
-/// A pad is held for at least this long after take-off, seconds: a vehicle that stands on it has not left it.
-const OFF_PAD_S: f32 = 0.05;
 /// This far above its pad a vehicle has left it at the least, metres.
 const OFF_PAD_M: f32 = 0.02;
-
-/// Tunables of the schedule.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ScheduleConfig {
-    /// Distance kept between the paths of two vehicles that move: the safety distance and what both stray from their
-    /// paths, metres.
-    pub separation_m: f32,
-    /// Distance kept from a vehicle that stands on the ground, metres.
-    pub parked_separation_m: f32,
-    /// Nominal speed along paths, m/s.
-    pub cruise_mps: f32,
-    /// Nominal speed of take-off and landing, m/s.
-    pub vertical_mps: f32,
-}
-
-impl ScheduleConfig {
-    /// Whether all are positive and finite; the error names the first that is not.
-    pub fn check(&self) -> Result<(), ConfigError> {
-        all_positive(&[
-            ("separation_m", self.separation_m),
-            ("parked_separation_m", self.parked_separation_m),
-            ("cruise_mps", self.cruise_mps),
-            ("vertical_mps", self.vertical_mps),
-        ])
-    }
-}
-
-/// One vehicle's way from its pad to the ground below its goal.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Flight<const W: usize> {
-    /// Id of the vehicle, unique in the swarm.
-    pub id: u8,
-    /// Index of the goal flown to; `None` stays on its pad.
-    pub goal: Option<u16>,
-    /// Air part, start to goal, labelled with seconds after take-off.
-    pub path: Path<W>,
-    /// Height of the start above the pad, metres.
-    pub climb_m: f32,
-    /// Height of the goal above the ground there, metres.
-    pub descent_m: f32,
-    /// Scheduled take-off, seconds after the start at nominal speeds.
-    pub depart_s: f32,
-    /// Longest timed segment of this flight, metres: [`PIECE_M`], or more on a flight that is long.
-    pub piece_m: f32,
-}
-
-impl<const W: usize> Flight<W> {
-    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`PIECES`].
-    pub(crate) fn fit_pieces(&mut self) {
-        self.piece_m = PIECE_M;
-        for _ in 0..DOUBLINGS {
-            if self.pieces() <= PIECES {
-                break;
-            }
-            self.piece_m *= 2.0;
-        }
-    }
-
-    /// From take-off to landing, seconds; nothing for a vehicle that stays on its pad.
-    pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
-        let landed_s = |w: &crate::path::Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
-        self.path.waypoints().last().filter(|_| self.goal.is_some()).map_or(0.0, landed_s)
-    }
-
-    /// Timed segments that [`cut`] makes of it.
-    pub(crate) fn pieces(&self) -> usize {
-        let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
-        let lengths = [self.climb_m, self.descent_m].into_iter().chain(legs);
-        let moving = lengths.map(|length_m| parts(length_m, self.piece_m)).fold(0, u32::saturating_add);
-        let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
-        (moving as usize).saturating_add(2 + holds)
-    }
-}
-
-/// "Before my arc length `at_m`, vehicle `id` must have come past `until_m` of its own path."
-///
-/// Progress is what opens a gate, so a vehicle must report it by these rules:
-/// - On its pad it reports −climb. In the climb it reports what is left of it, negative; in the descent the path's length and
-///   how far it has come down.
-/// - It reports no more than the reference that it follows has come to, and at most [`PROGRESS_ERROR_M`] less once it stands.
-/// - It reports more than the path's length and the descent only when it stands on the ground, disarmed.
-///
-/// A vehicle that waits where it is sent reports enough to open every gate that waits for what lies behind it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Gate {
-    /// Where to wait, metres along the own path; −climb is the pad.
-    pub at_m: f32,
-    /// Which vehicle to wait for: its id.
-    pub id: u8,
-    /// Progress of the other that opens the gate, metres along its path.
-    pub until_m: f32,
-}
-
-/// What one companion needs of the swarm's plan.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct VehiclePlan<const W: usize, const G: usize> {
-    /// Index of the goal flown to; `None` when none is left for this vehicle.
-    pub goal: Option<u16>,
-    /// Air part, start to goal.
-    pub path: Path<W>,
-    /// Height of the start above the pad, metres.
-    pub climb_m: f32,
-    /// Height of the goal above the ground there, metres.
-    pub descent_m: f32,
-    /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad instead of in the air.
-    pub depart_s: f32,
-    /// Where to wait for whom.
-    pub gates: Vec<Gate, G>,
-    /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every gate.
-    pub plan_crc: u32,
-}
-
-impl<const W: usize, const G: usize> VehiclePlan<W, G> {
-    /// One that stays on its pad. All zeros, so a static costs .bss alone.
-    pub const fn new() -> Self {
-        Self {
-            goal: None,
-            path: Path::new(),
-            climb_m: 0.0,
-            descent_m: 0.0,
-            depart_s: 0.0,
-            gates: Vec::new(),
-            plan_crc: 0,
-        }
-    }
-}
-
-/// Why a schedule could not be made.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum ScheduleError {
-    /// More than [`PIECES`] pieces in one flight.
-    PiecesFull,
-    /// More than `G` gates for one vehicle.
-    GatesFull,
-    /// No delay keeps this vehicle clear of those already scheduled.
-    Blocked,
-    /// A flight or a node with an index that there is none of.
-    BadIndex,
-}
-
-/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
-/// landing place to +∞.
-#[derive(Clone, Copy, Debug)]
-struct Piece {
-    from: Point,
-    to: Point,
-    /// Where the vehicle waits before this segment, metres along its path: nobody waits within a climb or a descent.
-    from_m: f32,
-    /// Where it ends, metres.
-    to_m: f32,
-    /// When it may have to be free: when its vehicle leaves the place where it waits before it.
-    from_s: f32,
-    /// When the vehicle has left it.
-    to_s: f32,
-    parked: bool,
-}
 
 /// Scratch of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
@@ -211,33 +47,6 @@ impl ScheduleWorkspace {
     pub const fn new() -> Self {
         Self { own: Vec::new(), other: Vec::new(), forbidden: Vec::new() }
     }
-}
-
-/// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
-pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
-    let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
-    let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
-    let share = |n: f32, d: f32| if d > 0.0 { (n / d).clamp(0.0, 1.0) } else { 0.0 };
-    let (b, c) = (d1.dot(&d2), d1.dot(&r));
-    let s = share(b * f - c * e, a * e - b * b);
-    let t = share(b * s + f, e);
-    // With t clamped, s follows from it again.
-    let s = share(b * t - c, a);
-    let t = share(b * s + f, e);
-    (r + d1 * s - d2 * t).norm_squared()
-}
-
-/// Whether two pieces come nearer than may be at the same time.
-fn conflict(cfg: &ScheduleConfig, p: &Piece, q: &Piece) -> bool {
-    if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
-        // Two pads, or two landing places: their distance is the mission's, not the schedule's.
-        return false;
-    }
-    let apart = if p.parked || q.parked { cfg.parked_separation_m } else { cfg.separation_m };
-    let reach = apart + 0.5 * (p.to_m - p.from_m + q.to_m - q.from_m);
-    let middles = (p.from + p.to - q.from - q.to) * 0.5;
-    middles.norm_squared() < reach * reach
-        && segments_distance_sq((&p.from, &p.to), (&q.from, &q.to)) < apart * apart
 }
 
 /// Intervals of time that do not overlap.

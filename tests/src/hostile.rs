@@ -11,8 +11,8 @@ use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, Ro
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
+use planner_core::flight::Path;
 use planner_core::frames::{self, Geodetic};
-use planner_core::path::Path;
 
 use crate::meeting::autopilot::Autopilot;
 use crate::meeting::dice::Dice;
@@ -94,7 +94,7 @@ fn plan() -> Plan16 {
     Plan16 { goal: Some(0), path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
-type Plan16 = planner_core::schedule::VehiclePlan<16, 8>;
+type Plan16 = planner_core::flight::VehiclePlan<16, 8>;
 
 /// Phases of a mission in which it is attacked.
 pub const PHASES: usize = 8;

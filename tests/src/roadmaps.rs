@@ -11,15 +11,15 @@ use std::collections::{BinaryHeap, VecDeque};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec as Few;
 use planner_core::Point;
+use planner_core::flight::{Flight, Path};
 use planner_core::frames::Geodetic;
-use planner_core::path::Path;
 use planner_core::prm::squared_length;
 use planner_core::roadmap::{
     Edge, HEADER_LEN, HalfEdge, LANDMARKS, RoadmapError, RoadmapHeader, RoadmapView, encoded_len,
     write_with_landmarks,
 };
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
-use planner_core::schedule::{Flight, PIECE_M, ScheduleConfig};
+use planner_core::schedule::{PIECE_M, ScheduleConfig};
 use planner_core::search::{SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row};
 
 use crate::hostile::{Bytes, Entropy};

@@ -2,12 +2,13 @@
 
 use host_sim::capacity::on_heap;
 use planner_core::Point;
+use planner_core::flight::{Flight, VehiclePlan};
 use planner_core::frames::Geodetic;
 use planner_core::plan::{
     self, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::{self, Edge, RoadmapHeader, RoadmapView};
-use planner_core::schedule::{Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
+use planner_core::schedule::{ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

@@ -17,8 +17,8 @@ use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, SET_POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
 };
 use planner_core::Point;
+use planner_core::flight::Path;
 use planner_core::frames::geodetic_to_enu;
-use planner_core::path::Path;
 
 use crate::board::{Downfall, Emulated};
 

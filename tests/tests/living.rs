@@ -5,8 +5,7 @@ use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
 use host_sim::autopilot::{self, Autopilot, Mode, Personality, ardupilot};
 use planner_core::Point;
-use planner_core::path::Path;
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::{Path, VehiclePlan};
 
 const STEP_US: u64 = 4_000;
 const START: Point = Point::new(0.0, 0.0, 2.0);

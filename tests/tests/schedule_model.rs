@@ -22,7 +22,7 @@ use std::collections::{HashSet, VecDeque};
 
 use flockmate_tests::swarms::{self, Plan, Random, Swarm, end_m, place};
 use planner_core::Point;
-use planner_core::schedule::{Gate, PROGRESS_ERROR_M};
+use planner_core::flight::{Gate, PROGRESS_ERROR_M};
 use rayon::prelude::*;
 
 /// Plans searched of each number of vehicles, all of them with a gate that matters.

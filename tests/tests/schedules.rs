@@ -9,8 +9,9 @@
 use std::collections::BTreeMap;
 
 use flockmate_tests::swarms::{self, Own, Plan, Random, Swarm, WAYPOINTS, end_m, place};
+use planner_core::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use planner_core::plan::PlanError;
-use planner_core::schedule::{Flight, Gate, PROGRESS_ERROR_M, ScheduleError};
+use planner_core::schedule::ScheduleError;
 use rayon::prelude::*;
 
 /// Swarms flown where nothing else is asked for.

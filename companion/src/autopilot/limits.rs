@@ -5,7 +5,7 @@
 
 use libm::{fmaxf, fminf};
 use planner_core::deconflict::DeconflictConfig;
-use planner_core::path::TrackConfig;
+use planner_core::track::TrackConfig;
 use planner_core::{ConfigError, Point};
 
 use crate::autopilot::Kind;

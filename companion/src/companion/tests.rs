@@ -232,7 +232,7 @@ fn the_heartbeat_is_believed_and_no_ack() {
 #[test]
 fn an_unsound_plan_is_refused() {
     let mut elsewhere = plan();
-    elsewhere.path = planner_core::path::Path::new();
+    elsewhere.path = planner_core::flight::Path::new();
     elsewhere.path.push(Point::new(1.0, 1.0, 1.5), 1.0).unwrap();
     for answer in [Ok(elsewhere), Err(PlanFailure::Unreachable)] {
         let mut bench = Bench::new(config());
@@ -249,7 +249,7 @@ fn an_unsound_plan_is_refused() {
 #[test]
 fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
     let mut gated = plan();
-    gated.gates.push(planner_core::schedule::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+    gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
     let mut bench = Bench::new(two_vehicles());
     bench.answer_plan = Some(Ok(gated));
     bench.until(State::Ready, 6.0);
@@ -277,7 +277,7 @@ fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
     let flying = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;
     for (flags, expected) in [(None, 2..5), (Some(grounded), 2..5), (Some(flying), 0..1)] {
         let mut gated = plan();
-        gated.gates.push(planner_core::schedule::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
+        gated.gates.push(planner_core::flight::Gate { at_m: -1.5, id: 77, until_m: 6.0 }).unwrap();
         let mut bench = Bench::new(two_vehicles());
         bench.answer_plan = Some(Ok(gated));
         bench.until(State::Ready, 6.0);

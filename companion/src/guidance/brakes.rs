@@ -1,7 +1,7 @@
 //! Where the reference stops on its path, and when it steps back from there.
 
 use planner_core::deconflict::Advice;
-use planner_core::path::Path;
+use planner_core::flight::Path;
 
 use super::{Guidance, Phase};
 use crate::guidance::retreat::{self, Shelter};

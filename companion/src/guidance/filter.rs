@@ -12,9 +12,9 @@ mod conflict;
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::path::{Path, TrackConfig};
+use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{Bounds, Braking, REACTION_S, Set};
-use planner_core::schedule::VehiclePlan;
+use planner_core::track::TrackConfig;
 
 use super::{Guidance, Scene};
 use crate::mission::State;

@@ -1,8 +1,8 @@
 //! Parts of a flight, and how it goes from one to the next, back and on after an interruption.
 
 use planner_core::Point;
-use planner_core::path::{Path, Tracker};
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::Tracker;
 
 use super::door::TICK_S;
 use super::progress::nearest_m;

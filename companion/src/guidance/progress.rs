@@ -1,8 +1,7 @@
 //! How far the vehicle has come along its flight, and which parts of it are flown.
 
 use planner_core::Point;
-use planner_core::path::Path;
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::{Path, VehiclePlan};
 
 use super::{
     ARRIVED_M, AT_END_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, STANDING_MPS, Scene,

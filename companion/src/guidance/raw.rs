@@ -2,8 +2,8 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Advice;
-use planner_core::path::{self, Path, Reference, Tracker};
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::{self, Reference, Tracker};
 
 use super::door::TICK_S;
 use super::{FENCE_MARGIN_M, Guidance, JOIN_MPS, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
@@ -59,7 +59,7 @@ impl Guidance {
         }
         let Some(leg) = &self.leg else { return raw };
         let advice = Advice::FREE;
-        let reference = path::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
+        let reference = track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
         self.lead_m = LEG_LEAD_M;
         if self.phase == Phase::Descent && self.leg_tracker.speed_mps > 0.0 {
             self.progress_at = now;
@@ -106,7 +106,7 @@ impl Guidance {
             self.fenced = true;
         }
         let Reference { position, lead_m, .. } =
-            path::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
+            track::advance(&self.track, path, &mut self.tracker, &advice, TICK_S)?;
         self.lead_m = lead_m;
         Some(position)
     }
@@ -147,7 +147,7 @@ impl Guidance {
             advice.stop_within_m = braking_m;
             self.fenced = true;
         }
-        let reference = path::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
+        let reference = track::advance(&self.track, leg, &mut self.leg_tracker, &advice, TICK_S)?;
         self.lead_m = LEG_LEAD_M;
         self.tracker.speed_mps = self.leg_tracker.speed_mps;
         let length_m = path.length_m();

@@ -11,7 +11,8 @@
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::KeepOff;
-use planner_core::path::{Path, Tracker};
+use planner_core::flight::Path;
+use planner_core::track::Tracker;
 
 use crate::swarm::sweep::Sweep;
 

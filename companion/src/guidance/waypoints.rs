@@ -6,7 +6,7 @@
 //! from a corner's clearance, no reference that waits, no guided descent. The paper does not state `Wp_radius`.
 
 use planner_core::Point;
-use planner_core::path::Path;
+use planner_core::flight::Path;
 
 /// Within this distance a waypoint is reached, metres: nearer than what the referee counts as reached, by the greatest
 /// error of an RTK estimate.

@@ -18,8 +18,8 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
+use planner_core::flight::VehiclePlan;
 use planner_core::frames::{self, Geodetic};
-use planner_core::schedule::VehiclePlan;
 
 use crate::companion::{Companion, STANDING_MPS};
 use crate::config::PlanFailure;

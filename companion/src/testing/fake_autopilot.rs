@@ -9,9 +9,8 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
+use planner_core::flight::{Path, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
-use planner_core::path::Path;
-use planner_core::schedule::VehiclePlan;
 
 use crate::autopilot::Kind;
 use crate::autopilot::px4;

@@ -6,11 +6,12 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
+use planner_core::flight::Path;
 use planner_core::frames::{self, Geodetic, Projection};
-use planner_core::path::{self, Path, TrackConfig, Tracker};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{Bounds, Braking, Heard, Set, conflicts};
 use planner_core::segment::{self, MAX_SNAPPED};
+use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
 /// Numbers that break what does not look at them.
@@ -285,36 +286,38 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
 }
 
 fn paths(to: &mut Answers<'_, impl Listener>) {
-    let mut path: Path<4> = to.call("path::Path::new", Path::new);
+    let mut path: Path<4> = to.call("flight::Path::new", Path::new);
     let track = TrackConfig::default();
     let advice =
         |scale: f32, within_m: f32| Advice { speed_scale: scale, stop_within_m: within_m, waiting_for: 0 };
-    assert!(path::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
+    assert!(track::advance(&track, &path, &mut Tracker::default(), &Advice::FREE, 0.05).is_none());
     assert!(path.point_at(f32::NAN).is_none() && path.points_from(0.0, 1.0).next().is_none());
     for round in 0..3 {
         for p in points() {
             let before = path.waypoints().len();
-            let pushed = to.call("path::Path::push", || path.push(p, p.x));
+            let pushed = to.call("flight::Path::push", || path.push(p, p.x));
             assert!(pushed.is_ok() || path.waypoints().len() == before);
             assert!(pushed.is_err() || p.iter().all(|c| c.is_finite()));
         }
         let _ = path.push(Point::new(round as f32, 0.0, 1.0), 1.0);
-        let length_m = to.call("path::Path::length_m", || path.length_m());
+        let length_m = to.call("flight::Path::length_m", || path.length_m());
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
         for (i, &hard) in HARD.iter().enumerate() {
             let other = HARD[(i * 5 + round) % HARD.len()];
-            to.call("path::Path::label", || path.label(hard, other));
-            to.call("path::Path::label_last", || path.label_last(hard, other));
-            let at = to.call("path::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
-            let count = to.call("path::Path::points_from", || path.points_from(hard, other).take(20).count());
+            to.call("flight::Path::label", || path.label(hard, other));
+            to.call("flight::Path::label_last", || path.label_last(hard, other));
+            let at =
+                to.call("flight::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
+            let count =
+                to.call("flight::Path::points_from", || path.points_from(hard, other).take(20).count());
             assert_eq!(count, 20);
-            let along_m = to.call("path::Path::project", || path.project(&at, hard, other));
+            let along_m = to.call("flight::Path::project", || path.project(&at, hard, other));
             to.add(along_m);
             for dt_s in [0.05, hard] {
                 let mut tracker = Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 };
                 let reference = to
-                    .call("path::advance", || {
-                        path::advance(&track, &path, &mut tracker, &advice(hard, other), dt_s)
+                    .call("track::advance", || {
+                        track::advance(&track, &path, &mut tracker, &advice(hard, other), dt_s)
                     })
                     .expect("a path with waypoints");
                 assert!(reference.position.iter().all(|c| c.is_finite()), "{hard} {other} {reference:?}");
@@ -323,16 +326,16 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
                 assert!(!waits || tracker == Tracker { along_m: 0.5 * length_m, speed_mps: 1.0 });
             }
             let config = TrackConfig { accel_mps2: hard, response_s: other, ..track };
-            let checked = to.call("path::TrackConfig::check", || config.check());
+            let checked = to.call("track::TrackConfig::check", || config.check());
             let good = |x: f32| x > 0.0 && x.is_finite();
             assert_eq!(checked.is_ok(), good(hard) && good(other));
-            path::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
+            track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
         }
         to.count(to_len(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
     }
-    assert!(!to.call("path::Path::waypoints", || path.waypoints().is_empty()));
+    assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
 }
 
 fn to_len<const W: usize>(path: &Path<W>) -> usize {
@@ -356,7 +359,7 @@ fn neighbours(to: &mut Answers<'_, impl Listener>) {
                 ..Neighbour::default()
             })
             .collect();
-        let gates = [hard, p.x, -hard].map(|at_m| planner_core::schedule::Gate { at_m, id: 2, until_m: p.y });
+        let gates = [hard, p.x, -hard].map(|at_m| planner_core::flight::Gate { at_m, id: 2, until_m: p.y });
         for method in [Method::Off, Method::Algorithm2, Method::Priority] {
             let cfg = DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 };
             for path in [&path, &empty] {

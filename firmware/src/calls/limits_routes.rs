@@ -3,13 +3,13 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
-use planner_core::path::Path;
+use planner_core::flight::{Flight, Gate, Path, VehiclePlan};
 use planner_core::plan::{
     self, Goals, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
 };
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
-use planner_core::schedule::{self, Flight, ScheduleConfig, ScheduleError, ScheduleWorkspace, VehiclePlan};
+use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use planner_core::search::SearchWorkspace;
 
 use super::limits::{Answers, HARD, Listener, points};
@@ -160,14 +160,14 @@ fn schedules(
     plan: &mut Plan,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
-    to.call("schedule::VehiclePlan::new", || size_of_val(&VehiclePlan::<1, 1>::new()));
+    to.call("flight::VehiclePlan::new", || size_of_val(&VehiclePlan::<1, 1>::new()));
     to.call("schedule::ScheduleWorkspace::new", || size_of_val(&ScheduleWorkspace::new()));
     to.call("sipp::SippWorkspace::new", || size_of_val(&SippWorkspace::<1, 1>::new()));
     for index in [0, 1, 2, usize::MAX] {
         let told = to
             .call("plan::vehicle_plan", || plan::vehicle_plan(plan, index, &SCHEDULE, &mut ws.schedule, own));
         assert_eq!(told, if index < 2 { Ok(()) } else { Err(ScheduleError::BadIndex) });
-        let mut none: Vec<schedule::Gate, 0> = Vec::new();
+        let mut none: Vec<Gate, 0> = Vec::new();
         let told = to.call("schedule::gates", || {
             schedule::gates(&SCHEDULE, &plan.flights, index, &mut ws.schedule, &mut none)
         });

@@ -270,7 +270,7 @@ fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
 
 fn vehicle_result(
     member: &Member,
-    flight: &planner_core::schedule::Flight<{ crate::capacity::WAYPOINTS }>,
+    flight: &planner_core::flight::Flight<{ crate::capacity::WAYPOINTS }>,
     flown_m: f64,
     nearest_goal_m: f32,
     now_s: f64,

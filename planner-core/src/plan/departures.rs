@@ -13,6 +13,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
+use crate::flight::Flight;
 use crate::schedule::{self, ScheduleError};
 
 /// Comparisons of a take-off time with a scheduled flight: a third of a second on a board.
@@ -116,7 +117,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
         // Even a move to the same place ends the search some time.
         looks = looks.saturating_sub(1);
     }
-    let makespan_s = |flights: &[schedule::Flight<W>]| {
+    let makespan_s = |flights: &[Flight<W>]| {
         flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)
     };
     let before_s = makespan_s(&out.flights);

@@ -9,10 +9,10 @@ use libm::fmaxf;
 
 use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
 use crate::Point;
-use crate::path::{Path, PathError};
+use crate::flight::{Flight, Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, Route};
-use crate::schedule::{self, Flight, PIECE_M, PIECES, ScheduleError};
+use crate::schedule::{self, PIECE_M, PIECES, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 
 /// Schedules the longest path first, and where that leads to no schedule the shortest.

@@ -5,7 +5,7 @@
 
 use libm::{fmaxf, fminf};
 
-use super::Piece;
+use super::pieces::Piece;
 
 /// Cells along one side.
 const SIDE: usize = 32;
@@ -92,7 +92,8 @@ fn half_length(piece: &Piece) -> f32 {
 mod tests {
     use super::*;
     use crate::Point;
-    use crate::schedule::{ScheduleConfig, conflict};
+    use crate::schedule::ScheduleConfig;
+    use crate::schedule::pieces::conflict;
     use heapless::Vec;
     use proptest::prelude::*;
 

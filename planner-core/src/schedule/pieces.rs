@@ -3,8 +3,64 @@
 use heapless::Vec;
 use libm::fmaxf;
 
-use super::{Flight, OFF_PAD_S, PIECES, Piece, ScheduleConfig, ScheduleError};
+use super::config::{ScheduleConfig, ScheduleError};
 use crate::Point;
+use crate::flight::{Flight, Waypoint};
+use crate::geometry::segments_distance_sq;
+
+/// Longest timed segment, metres: finer lets vehicles follow one another closer, coarser costs less.
+pub const PIECE_M: f32 = 1.5;
+/// Most timed segments of one flight; on a flight that would need more they are longer.
+pub const PIECES: usize = 320;
+/// Timed segments grow at most this often, by two: to 1.5 km.
+const DOUBLINGS: usize = 10;
+/// A pad is held for at least this long after take-off, seconds: a vehicle that stands on it has not left it.
+pub(super) const OFF_PAD_S: f32 = 0.05;
+
+/// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
+/// landing place to +∞.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub(super) from: Point,
+    pub(super) to: Point,
+    /// Where the vehicle waits before this segment, metres along its path: nobody waits within a climb or a descent.
+    pub(super) from_m: f32,
+    /// Where it ends, metres.
+    pub(super) to_m: f32,
+    /// When it may have to be free: when its vehicle leaves the place where it waits before it.
+    pub(super) from_s: f32,
+    /// When the vehicle has left it.
+    pub(super) to_s: f32,
+    pub(super) parked: bool,
+}
+
+impl<const W: usize> Flight<W> {
+    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`PIECES`].
+    pub(crate) fn fit_pieces(&mut self) {
+        self.piece_m = PIECE_M;
+        for _ in 0..DOUBLINGS {
+            if self.pieces() <= PIECES {
+                break;
+            }
+            self.piece_m *= 2.0;
+        }
+    }
+
+    /// From take-off to landing, seconds; nothing for a vehicle that stays on its pad.
+    pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
+        let landed_s = |w: &Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
+        self.path.waypoints().last().filter(|_| self.goal.is_some()).map_or(0.0, landed_s)
+    }
+
+    /// Timed segments that [`cut`] makes of it.
+    pub(crate) fn pieces(&self) -> usize {
+        let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
+        let lengths = [self.climb_m, self.descent_m].into_iter().chain(legs);
+        let moving = lengths.map(|length_m| parts(length_m, self.piece_m)).fold(0, u32::saturating_add);
+        let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
+        (moving as usize).saturating_add(2 + holds)
+    }
+}
 
 /// Cuts a flight into timed segments of at most `flight.piece_m`.
 ///
@@ -125,4 +181,17 @@ impl Leg {
 /// Timed segments of a stretch of this length; none of one without length.
 pub(super) fn parts(length_m: f32, piece_m: f32) -> u32 {
     libm::ceilf(length_m / piece_m) as u32
+}
+
+/// Whether two pieces come nearer than may be at the same time.
+pub(super) fn conflict(cfg: &ScheduleConfig, p: &Piece, q: &Piece) -> bool {
+    if p.parked && q.parked && p.from_s.is_infinite() == q.from_s.is_infinite() {
+        // Two pads, or two landing places: their distance is the mission's, not the schedule's.
+        return false;
+    }
+    let apart = if p.parked || q.parked { cfg.parked_separation_m } else { cfg.separation_m };
+    let reach = apart + 0.5 * (p.to_m - p.from_m + q.to_m - q.from_m);
+    let middles = (p.from + p.to - q.from - q.to) * 0.5;
+    middles.norm_squared() < reach * reach
+        && segments_distance_sq((&p.from, &p.to), (&q.from, &q.to)) < apart * apart
 }

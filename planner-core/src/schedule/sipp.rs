@@ -11,14 +11,12 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+use super::config::{ScheduleConfig, ScheduleError};
 use super::near::Cells;
-use super::pieces::{Leg, Stops, cut, parts};
-use super::{
-    Flight, Forbidden, OFF_PAD_S, PIECE_M, Piece, ScheduleConfig, ScheduleError, conflict, first_allowed,
-    forbid, last_allowed,
-};
+use super::pieces::{Leg, OFF_PAD_S, PIECE_M, PIECES, Piece, Stops, conflict, cut, parts};
+use super::{Forbidden, first_allowed, forbid, last_allowed};
 use crate::Point;
-use crate::path::Path;
+use crate::flight::{Flight, Path};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::heap::{Heap, SETTLED};
 
@@ -53,7 +51,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     /// First state of each node, plus one.
     first: [u16; N],
     heap: Heap<N>,
-    cut: Vec<Piece, { super::PIECES }>,
+    cut: Vec<Piece, PIECES>,
     forbidden: Forbidden,
 }
 
@@ -126,7 +124,7 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     let vertical =
         [flight.climb_m, flight.descent_m].map(|length_m| parts(length_m, flight.piece_m) as usize);
     let whole = flight.piece_m >= PIECE_M && flight.piece_m.is_finite();
-    if !whole || vertical[0].max(vertical[1]) > super::PIECES {
+    if !whole || vertical[0].max(vertical[1]) > PIECES {
         return Err(ScheduleError::PiecesFull);
     }
     load(cfg, route.parked, scheduled, ws)?;

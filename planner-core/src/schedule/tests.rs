@@ -1,6 +1,8 @@
 pub(crate) mod checker;
 
 use super::*;
+use crate::Point;
+use crate::flight::Path;
 use proptest::prelude::*;
 
 const CFG: ScheduleConfig =

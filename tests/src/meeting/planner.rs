@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::detour::{DetourRequest, KeepOff, Nature};
-use planner_core::path::Path;
+use planner_core::flight::Path;
 
 use super::oracle;
 use super::scene::Plan;

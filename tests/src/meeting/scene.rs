@@ -6,7 +6,8 @@ mod ways;
 
 use companion::autopilot::Kind;
 use planner_core::Point;
-use planner_core::schedule::{self, Flight, ScheduleConfig, ScheduleWorkspace, VehiclePlan};
+use planner_core::flight::{Flight, VehiclePlan};
+use planner_core::schedule::{self, ScheduleConfig, ScheduleWorkspace};
 
 use self::happenings::happenings;
 pub use self::passing::{PASSINGS, passing};

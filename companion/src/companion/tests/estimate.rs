@@ -34,7 +34,7 @@ fn the_pace_follows_the_estimate() {
         );
     }
     let mut long = plan();
-    long.path = planner_core::path::Path::new();
+    long.path = planner_core::flight::Path::new();
     for point in [START, Point::new(80.0, 12.0, 1.5)] {
         long.path.push(point, 1.2).unwrap();
     }

@@ -436,7 +436,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);
     b.drain();
     let request = b.companion.detour(|_| {}).expect("planning");
-    let mut path = planner_core::path::Path::new();
+    let mut path = planner_core::flight::Path::new();
     for point in [request.here, Point::new(13.0, 16.0, 2.0), GOAL] {
         path.push(point, 1.2).unwrap();
     }

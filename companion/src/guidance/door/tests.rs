@@ -3,7 +3,8 @@
 extern crate std;
 
 use planner_core::deconflict::Advice;
-use planner_core::path::{self, Path, TrackConfig, Tracker};
+use planner_core::flight::Path;
+use planner_core::track::{self, TrackConfig, Tracker};
 use proptest::prelude::*;
 
 use super::*;
@@ -60,7 +61,7 @@ proptest! {
                 if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !door.allows(&ahead)) {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
-                let reference = path::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
+                let reference = track::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
                 door.push(reference.position);
             }
             door.finish();

@@ -1,9 +1,8 @@
 //! Which neighbour's set meets that of the vehicle, and which of the two goes first.
 
 use planner_core::Point;
-use planner_core::path::Path;
+use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, Bounds, REACTION_S, Set};
-use planner_core::schedule::VehiclePlan;
 
 use super::super::{Guidance, Phase, Scene};
 use super::STRANGER;

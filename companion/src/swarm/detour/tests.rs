@@ -6,7 +6,7 @@ use crate::link::commands::EXCLUDE;
 use crate::link::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
 use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
-use planner_core::schedule::Gate;
+use planner_core::flight::Gate;
 
 fn sphere(at: Point, radius_m: f32) -> Command {
     let place = frames::enu_to_geodetic(&ORIGIN, &at);

@@ -2,9 +2,8 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
+use planner_core::flight::{Path, VehiclePlan};
 use planner_core::frames::Geodetic;
-use planner_core::path::Path;
-use planner_core::schedule::VehiclePlan;
 
 use crate::{Config, RosterEntry};
 

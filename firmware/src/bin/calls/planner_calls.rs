@@ -10,15 +10,16 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{Advice, Method};
 use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
+use planner_core::flight::{Flight, Path, VehiclePlan};
 use planner_core::frames::{self, Geodetic, Projection};
-use planner_core::path::{self, Path, TrackConfig, Tracker};
 use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::prm::{self, Config};
 use planner_core::roadmap::{self, HalfEdge, RoadmapHeader, RoadmapView};
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
-use planner_core::schedule::{self, Flight, ScheduleWorkspace, VehiclePlan};
+use planner_core::schedule::{self, ScheduleWorkspace};
 use planner_core::search::{self, SearchWorkspace, WithLengths};
 use planner_core::segment;
+use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{Outside, VoxelGrid};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
@@ -206,7 +207,7 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
         }
         let mut path = Path::new();
         way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
-        meter.call("path::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
+        meter.call("flight::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
         let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::PIECE_M);
         let flight = Flight { id, goal: Some(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
@@ -269,18 +270,18 @@ fn paths(meter: &mut impl Meter) {
         let mut path: Path<WAYPOINTS> = Path::new();
         for waypoint in flight::random_path(&mut rng).waypoints() {
             let (next, clearance_m) = (waypoint.position, waypoint.clearance_m);
-            meter.call("path::Path::push", 0, || path.push(next, clearance_m)).expect("there is room");
+            meter.call("flight::Path::push", 0, || path.push(next, clearance_m)).expect("there is room");
         }
         let length_m = path.length_m();
         let along_m = uniform(&mut rng, 0.0, length_m);
         let near = anywhere(&mut rng, 30.0);
-        meter.call("path::Path::point_at", 0, || path.point_at(along_m));
-        meter.call("path::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
-        meter.call("path::Path::project", 0, || path.project(&near, along_m, length_m));
+        meter.call("flight::Path::point_at", 0, || path.point_at(along_m));
+        meter.call("flight::Path::points_from, 16", 0, || path.points_from(along_m, 0.5).take(16).count());
+        meter.call("flight::Path::project", 0, || path.project(&near, along_m, length_m));
         let track = TrackConfig { cruise_mps: flight::CRUISE_MPS, ..TrackConfig::default() };
         let mut tracker = Tracker { along_m, speed_mps: track.cruise_mps, ..Tracker::default() };
-        meter.call("path::advance", size_of::<Tracker>(), || {
-            path::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
+        meter.call("track::advance", size_of::<Tracker>(), || {
+            track::advance(&track, &path, &mut tracker, &Advice::FREE, 0.05)
         });
         let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
         meter.call("detour::is_blocked", 0, || {

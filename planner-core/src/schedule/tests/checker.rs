@@ -5,6 +5,7 @@ extern crate std;
 use std::vec::Vec as StdVec;
 
 use super::super::*;
+use crate::Point;
 
 /// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the smallest distance
 /// between two of which one moves, or who was still under way after `steps` of 50 ms.

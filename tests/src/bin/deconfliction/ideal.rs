@@ -6,8 +6,8 @@
 use host_sim::capacity::WAYPOINTS;
 use host_sim::mission::{Mission, SwarmPlan};
 use planner_core::Point;
-use planner_core::path::Path;
-use planner_core::schedule::{Flight, PIECE_M, ScheduleWorkspace, earliest_departure};
+use planner_core::flight::{Flight, Path};
+use planner_core::schedule::{PIECE_M, ScheduleWorkspace, earliest_departure};
 use planner_core::segment::segment_is_clear;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

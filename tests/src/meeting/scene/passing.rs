@@ -1,7 +1,8 @@
 //! Two vehicles that pass as near as their schedule lets them.
 
 use planner_core::Point;
-use planner_core::schedule::{self, Flight, ScheduleWorkspace};
+use planner_core::flight::Flight;
+use planner_core::schedule::{self, ScheduleWorkspace};
 
 use super::ways::{Way, at_height, flight};
 use super::{Happening, SCHEDULE, START_S, Scene, WAYPOINTS, What, vehicle};

@@ -1,8 +1,8 @@
 //! Ways of a meeting's vehicles: the geometries in which they come close.
 
 use planner_core::Point;
-use planner_core::path::Path;
-use planner_core::schedule::{self, Flight};
+use planner_core::flight::{Flight, Path};
+use planner_core::schedule;
 
 use super::{SAFETY_M, SCHEDULE, WAYPOINTS};
 use crate::meeting::dice::Dice;

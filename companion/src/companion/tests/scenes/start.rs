@@ -1,6 +1,6 @@
 //! From the plan to the lift-off.
 
-use planner_core::schedule::Gate;
+use planner_core::flight::Gate;
 
 use super::State::*;
 use super::*;

@@ -1,4 +1,4 @@
-//! A timed polyline and the reference point that moves along it.
+//! The reference point that moves along a path.
 //!
 //! The reference is what the autopilot is sent: it runs along the path no faster than corners, walls and other vehicles
 //! allow, and waits for a vehicle that lags. A corner of angle θ taken at speed v asks the vehicle for a sudden change of
@@ -7,158 +7,11 @@
 //! leaves. Between corners the acceleration goes along as feed-forward, so that braking is followed without a lag.
 //! (P2D §4 reports collisions as soon as a waypoint counted as reached from a metre away.)
 
-use heapless::Vec;
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 
 use crate::deconflict::Advice;
+use crate::flight::{Path, Waypoint};
 use crate::{ConfigError, Point, all_positive};
-
-/// A corner of a path.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Waypoint {
-    /// Place, ENU metres.
-    pub position: Point,
-    /// Clearance of the leg that ends here, metres from its line to the nearest obstacle.
-    pub clearance_m: f32,
-    /// Arc length from the first waypoint, metres.
-    pub along_m: f32,
-    /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its order matters in flight.
-    pub at_s: f32,
-    /// The same of the departure: later than `at_s` where the schedule lets somebody pass.
-    pub leave_s: f32,
-}
-
-/// Why a path was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PathError {
-    /// More than `W` waypoints.
-    PathFull,
-    /// A coordinate, a clearance or the length is NaN or infinite.
-    NotFinite,
-}
-
-/// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0 at the first
-/// waypoint; take-off lies before 0, landing beyond [`Path::length_m`].
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Path<const W: usize> {
-    waypoints: Vec<Waypoint, W>,
-}
-
-impl<const W: usize> Path<W> {
-    /// A path without waypoints.
-    pub const fn new() -> Self {
-        Self { waypoints: Vec::new() }
-    }
-
-    /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of the two.
-    pub fn push(&mut self, position: Point, clearance_m: f32) -> Result<(), PathError> {
-        if !(position.iter().all(|c| c.is_finite()) && clearance_m.is_finite()) {
-            return Err(PathError::NotFinite);
-        }
-        let along_m = match self.waypoints.last_mut() {
-            Some(last) => {
-                let along_m = last.along_m + (position - last.position).norm();
-                if !along_m.is_finite() {
-                    return Err(PathError::NotFinite);
-                }
-                if along_m == last.along_m {
-                    last.clearance_m = fminf(last.clearance_m, clearance_m);
-                    return Ok(());
-                }
-                along_m
-            }
-            None => 0.0,
-        };
-        let waypoint = Waypoint { position, clearance_m, along_m, at_s: 0.0, leave_s: 0.0 };
-        self.waypoints.push(waypoint).map_err(|_| PathError::PathFull)
-    }
-
-    /// Labels every waypoint without a stop: the first at `first_s`, the others after their arc length at `speed_mps`.
-    pub fn label(&mut self, first_s: f32, speed_mps: f32) {
-        for waypoint in &mut self.waypoints {
-            waypoint.at_s = first_s + waypoint.along_m / speed_mps;
-            waypoint.leave_s = waypoint.at_s;
-        }
-    }
-
-    /// Labels the last waypoint.
-    pub fn label_last(&mut self, at_s: f32, leave_s: f32) {
-        if let Some(last) = self.waypoints.last_mut() {
-            (last.at_s, last.leave_s) = (at_s, leave_s);
-        }
-    }
-
-    /// The waypoints in order.
-    pub fn waypoints(&self) -> &[Waypoint] {
-        &self.waypoints
-    }
-
-    /// Arc length of the whole path, metres; 0 for an empty path.
-    pub fn length_m(&self) -> f32 {
-        self.waypoints.last().map_or(0.0, |w| w.along_m)
-    }
-
-    /// The point at an arc length, clamped to the path; `None` on an empty path.
-    pub fn point_at(&self, along_m: f32) -> Option<Point> {
-        self.point_on(self.leg_at(along_m), along_m)
-    }
-
-    /// The points at `from_m`, `from_m + step_m` and so on (a positive step), each as [`Self::point_at`] has it, in one
-    /// walk along the path; none on an empty path.
-    pub fn points_from(&self, from_m: f32, step_m: f32) -> impl Iterator<Item = Point> {
-        let mut leg = self.leg_at(from_m);
-        let mut steps = 0u16;
-        core::iter::from_fn(move || {
-            let along_m = from_m + f32::from(steps) * step_m;
-            steps = steps.saturating_add(1);
-            while leg < self.waypoints.len() && along_m > self.waypoints[leg].along_m {
-                leg += 1;
-            }
-            self.point_on(leg, along_m)
-        })
-    }
-
-    /// Index of the waypoint that ends the leg on which an arc length lies; beyond the last waypoint there is none.
-    fn leg_at(&self, along_m: f32) -> usize {
-        self.waypoints.partition_point(|w| w.along_m < along_m)
-    }
-
-    /// The point at an arc length on the leg that ends at a waypoint.
-    fn point_on(&self, leg: usize, along_m: f32) -> Option<Point> {
-        let (first, last) = (self.waypoints.first()?, self.waypoints.last()?);
-        let Some(to) = self.waypoints.get(leg) else { return Some(last.position) };
-        if leg == 0 || along_m <= 0.0 {
-            return Some(first.position);
-        }
-        let from = &self.waypoints[leg - 1];
-        let share = (along_m - from.along_m) / (to.along_m - from.along_m);
-        Some(from.position + (to.position - from.position) * share)
-    }
-
-    /// Arc length of the point of the path nearest to `position` within `window_m` of `near_m`: how far a vehicle has
-    /// come, without jumping to another stretch that passes close by.
-    pub fn project(&self, position: &Point, near_m: f32, window_m: f32) -> f32 {
-        let (low, high) = (near_m - window_m, near_m + window_m);
-        let mut best = (f32::INFINITY, near_m);
-        let first = self.leg_at(low).max(1);
-        for leg in self.waypoints.get(first - 1..).unwrap_or_default().windows(2) {
-            if leg[0].along_m > high {
-                break;
-            }
-            let direction = leg[1].position - leg[0].position;
-            let share = (position - leg[0].position).dot(&direction) / direction.norm_squared();
-            let length = leg[1].along_m - leg[0].along_m;
-            // Not `clamp`: it panics where the window is NaN or negative.
-            let along_m = fminf(fmaxf(leg[0].along_m + share.clamp(0.0, 1.0) * length, low), high);
-            let share = ((along_m - leg[0].along_m) / length).clamp(0.0, 1.0);
-            let distance = (leg[0].position + direction * share - position).norm_squared();
-            if distance < best.0 {
-                best = (distance, along_m);
-            }
-        }
-        best.1
-    }
-}
 
 /// Tunables of [`advance`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -388,18 +241,6 @@ mod tests {
     }
 
     #[test]
-    fn a_walk_along_the_path_sees_what_single_looks_see() {
-        let path = corner_path(0.8);
-        for (from_m, step_m) in [(0.0, 0.5), (-1.0, 0.7), (5.9, 0.1), (6.0, 3.0), (11.0, 0.4), (20.0, 1.0)] {
-            for (k, point) in path.points_from(from_m, step_m).take(20).enumerate() {
-                assert_eq!(Some(point), path.point_at(from_m + k as f32 * step_m), "{from_m} {step_m} {k}");
-            }
-        }
-        assert_eq!(Path::<4>::new().points_from(0.0, 1.0).next(), None);
-        assert_eq!(Path::<4>::new().point_at(0.0), None);
-    }
-
-    #[test]
     fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {
         let (cfg, path) = (TrackConfig::default(), corner_path(0.8));
         let mut tracker = Tracker::default();
@@ -464,23 +305,5 @@ mod tests {
             }
         }
         assert!(steps < 400, "{steps}");
-    }
-
-    #[test]
-    fn projection_stays_on_the_stretch_at_hand() {
-        let mut path = Path::<8>::new();
-        for (x, y) in [(0.0, 0.0), (5.0, 0.0), (5.0, 0.5), (0.0, 0.5)] {
-            path.push(Point::new(x, y, 1.0), 1.0).unwrap();
-        }
-        let along = path.project(&Point::new(2.0, 0.4, 1.0), 1.5, 2.0);
-        assert!((along - 2.0).abs() < 1e-4, "{along}");
-    }
-
-    #[test]
-    fn refuses_nan_and_overflow_by_name() {
-        let mut path = Path::<1>::new();
-        assert_eq!(path.push(Point::new(f32::NAN, 0.0, 0.0), 1.0), Err(PathError::NotFinite));
-        path.push(Point::zeros(), 1.0).unwrap();
-        assert_eq!(path.push(Point::new(1.0, 0.0, 0.0), 1.0), Err(PathError::PathFull));
     }
 }

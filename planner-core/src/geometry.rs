@@ -1,0 +1,17 @@
+//! Distances between lines, metres.
+
+use crate::Point;
+
+/// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
+pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
+    let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);
+    let (a, e, f) = (d1.norm_squared(), d2.norm_squared(), d2.dot(&r));
+    let share = |n: f32, d: f32| if d > 0.0 { (n / d).clamp(0.0, 1.0) } else { 0.0 };
+    let (b, c) = (d1.dot(&d2), d1.dot(&r));
+    let s = share(b * f - c * e, a * e - b * b);
+    let t = share(b * s + f, e);
+    // With t clamped, s follows from it again.
+    let s = share(b * t - c, a);
+    let t = share(b * s + f, e);
+    (r + d1 * s - d2 * t).norm_squared()
+}
