@@ -1,5 +1,6 @@
 //! The companion itself: routes frames in, runs the mission table, makes frames out.
 
+mod board;
 mod frames;
 mod inputs;
 mod steps;
@@ -10,8 +11,7 @@ use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::Kind;
-use crate::autopilot::handshake::Handshake;
-use crate::autopilot::limits::AutopilotLimits;
+use crate::autopilot::requests::{Requests, Situation};
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link};
@@ -21,9 +21,7 @@ use crate::link::frame::Counters;
 use crate::link::{Fresh, Links};
 use crate::mission::waits::Waits;
 use crate::mission::{Interrupted, State};
-use crate::services::ftp::Ftp;
-use crate::services::parameters::Parameters;
-use crate::storage::store::Store;
+use crate::services::Services;
 use crate::swarm::detour::{Around, Obstacles};
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
@@ -38,9 +36,9 @@ const IDLE_EVERY: Duration = Duration::from_millis(200);
 /// A hovering vehicle sways more slowly, m/s.
 pub(crate) const STANDING_MPS: f32 = 0.3;
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
-pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
-/// While another EKF origin is in doubt the autopilot is asked this often.
-pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
+/// After so long without setpoints Guided stops, seconds: between these, the time in which cruise speed flies the margin.
+/// ArduCopter's own 3 s would fly the last velocity on through walls while a link stalls; the shortest are four setpoints.
+const GUID_TIMEOUT_S: (f32, f32) = (0.2, 0.5);
 /// Rows taken at one instant; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
 const EVENTS: usize = 16;
@@ -49,12 +47,8 @@ const EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
-    /// Cruise and climb of the mission, which parameters may limit.
-    pub(crate) nominal_mps: [f32; 2],
     /// Since when the estimate is worse than the margin leaves at a crawl.
     pub(crate) vague_since: Option<Instant>,
-    /// A parameter was set that is not in use yet.
-    pub(crate) untuned: bool,
     pub(crate) rank: u16,
     pub(crate) start: Point,
     pub(crate) now: Instant,
@@ -74,20 +68,12 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) pilot_since: Instant,
     pub(crate) interrupted: Interrupted,
     pub(crate) pending: Pending,
-    pub(crate) handshake: Handshake,
-    /// What the autopilot's parameters allow.
-    pub(crate) autopilot_limits: AutopilotLimits,
-    /// Which of them were read, by bits, and how often they may still be requested.
-    pub(crate) limits_read: u16,
-    pub(crate) limits_tries: u8,
+    pub(crate) requests: Requests,
     pub(crate) waits: Waits,
     pub(crate) guidance: Guidance,
     pub(crate) mode_before: u32,
     stepped_at: Instant,
-    pub(crate) setup: usize,
-    pub(crate) store: Option<Store>,
-    pub(crate) parameters: Parameters,
-    pub(crate) ftp: Ftp,
+    pub(crate) services: Services,
     pub(crate) events: Deque<Event, EVENTS>,
 }
 
@@ -99,9 +85,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
         let start = own.start;
         Ok(Self {
-            nominal_mps: [config.cruise_mps, config.climb_mps],
             vague_since: None,
-            untuned: false,
             rank,
             start,
             now: Instant::ZERO,
@@ -123,18 +107,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             pilot_since: Instant::ZERO,
             interrupted: Interrupted::default(),
             pending: Pending::default(),
-            handshake: Handshake::default(),
-            autopilot_limits: AutopilotLimits::default_of(Kind::Px4),
-            limits_read: 0,
-            limits_tries: 0,
+            requests: Requests::default(),
             waits: Waits::default(),
-            guidance: Guidance::new(&config, &AutopilotLimits::default_of(Kind::Px4)),
+            guidance: Guidance::new(&config, &Kind::default().default_limits()),
             mode_before: 0,
             stepped_at: Instant::ZERO,
-            setup: usize::MAX,
-            store: None,
-            parameters: Parameters::default(),
-            ftp: Ftp::default(),
+            services: Services::new(&config),
             events: Deque::new(),
             config,
         })
@@ -157,7 +135,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Which autopilot flies the vehicle; PX4 while none was heard.
     pub(crate) fn kind(&self) -> Kind {
-        self.telemetry.kind.unwrap_or_default()
+        self.telemetry.kind()
     }
 
     /// System id of the vehicle waited for; 0 when free.
@@ -281,6 +259,30 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             (self.rank, self.config.system_id),
             self.around.flying,
         )
+    }
+
+    /// What requests to the autopilot follow from.
+    fn situation(&self) -> Situation {
+        let in_state = self.now - self.entered_at;
+        let margin_m = self.config.required_clearance_m - self.config.radius_m;
+        let timeout_s = (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_S.0, GUID_TIMEOUT_S.1);
+        let column_clear = self.guidance.filter.column_clear();
+        Situation {
+            now: self.now,
+            state: self.state,
+            in_state,
+            climb_m: self.plan.as_ref().map_or(0.0, |plan| plan.climb_m),
+            guided_timeout_s: timeout_s,
+            may_land: Situation::may_land(in_state, column_clear, self.must_land()),
+        }
+    }
+
+    /// Requests the streams, and on the ground the limits.
+    fn connect(&mut self) {
+        let situation = self.situation();
+        if self.requests.begin(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+            self.guidance.tune(&self.config, self.requests.limits());
+        }
     }
 
     /// When the mission was started.

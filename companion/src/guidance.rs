@@ -12,6 +12,7 @@ mod fence;
 pub(crate) mod filter;
 mod follower;
 mod hold;
+pub(crate) mod limits;
 mod phase;
 mod progress;
 mod raw;
@@ -27,11 +28,12 @@ use planner_core::track::{TrackConfig, Tracker};
 use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
 use self::hold::Hold;
+use self::limits::{Limits, Settings};
 use self::phase::Phase;
 use self::progress::nearest_m;
 use self::setpoint::correction;
 use self::waypoints::Waypoints;
-use crate::autopilot::limits::{AutopilotLimits, Limits, Settings};
+use crate::autopilot::limits::AutopilotLimits;
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
 use crate::guidance::retreat::Search;
@@ -39,7 +41,7 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-pub use self::door::{SMOOTH_MOST_S, Stats};
+pub use self::door::Stats;
 pub use self::setpoint::Setpoint;
 
 /// This near the end of the climb or of the path counts as there, metres.
@@ -57,8 +59,6 @@ const CLIMBED_M: f32 = 0.12;
 const DESCENDED_M: f32 = 0.2;
 /// In a climb, a descent or a join the setpoint is at most this far ahead of the vehicle, metres.
 const LEG_LEAD_M: f32 = 1.5;
-/// Speed of the join to the path, m/s.
-pub(crate) const JOIN_MPS: f32 = 1.0;
 /// Before the take-off the setpoint follows the estimate of a vehicle that stands no faster than this, m/s.
 const DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
@@ -334,7 +334,7 @@ impl Guidance {
             self.door.close();
             return true;
         }
-        let kind = scene.telemetry.kind.unwrap_or_default();
+        let kind = scene.telemetry.kind();
         let taken = matches!(state, State::PilotControl | State::Land | State::LandingHeld | State::Disarm)
             && scene.telemetry.custom_mode != kind.setpoint_mode();
         self.lost |= !known || state == State::PositionLost;

@@ -11,138 +11,131 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_REQUEST_READ_DATA, PARAM_SET_DATA, TIMESYNC_DATA,
 };
 
+use self::ftp::Ftp;
 use self::parameters::{Parameters, Refused};
-use crate::companion::Companion;
-use crate::events::{Event, Link};
-use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use crate::config::Config;
+use crate::events::Link;
+use crate::link::Links;
 use crate::link::frame::Frame;
 use crate::link::outbox::Outgoing;
 use crate::link::senders::{Kind, Sender};
-use crate::mission::State;
 use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
-use crate::time::{Duration, Instant};
+use crate::time::Instant;
 
 /// `MAV_PARAM_TYPE_REAL32`.
 const REAL32: u8 = 9;
-/// Without an autopilot this long after the start, there is none that could be armed.
-const ALONE_AFTER: Duration = Duration::from_secs(10);
 
-impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
-    /// forgotten.
-    pub fn mount(&mut self, store: Store) {
+/// A frame, from which link and sender it came, and when.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Heard<'a> {
+    pub(crate) link: Link,
+    pub(crate) sender: Sender,
+    pub(crate) frame: &'a Frame,
+    pub(crate) now: Instant,
+    /// System id of this vehicle.
+    pub(crate) own: u8,
+}
+
+impl Heard<'_> {
+    /// System and component of the sender.
+    fn from(&self) -> (u8, u8) {
+        (self.frame.system, self.frame.component)
+    }
+
+    /// Queues an answer, unless its rate or the queue is used up.
+    fn answer(&self, links: &mut Links, kind: Kind, answer: Outgoing) {
+        links.answer(self.now, self.link, self.sender, kind, answer);
+    }
+}
+
+/// Files and parameters, and the flash that keeps them.
+#[derive(Clone, Debug)]
+pub(crate) struct Services {
+    store: Option<Store>,
+    /// Those in use where there is no flash.
+    parameters: Parameters,
+    ftp: Ftp,
+    /// Cruise and climb of the mission, m/s, which parameters may limit.
+    nominal_mps: [f32; 2],
+    /// A parameter was set that is not in use yet.
+    untuned: bool,
+}
+
+impl Services {
+    /// Without a flash.
+    pub(crate) fn new<const V: usize>(config: &Config<V>) -> Self {
+        let nominal_mps = [config.cruise_mps, config.climb_mps];
+        let (parameters, ftp) = (Parameters::default(), Ftp::default());
+        Self { store: None, parameters, ftp, nominal_mps, untuned: false }
+    }
+
+    /// Keeps files and parameters in a flash from now on.
+    pub(crate) fn mount(&mut self, store: Store) {
         self.store = Some(store);
-        self.tune();
+    }
+
+    /// Whether a parameter was set that is not in use yet.
+    pub(crate) fn is_untuned(&self) -> bool {
+        self.untuned
     }
 
     /// Puts the parameters to use.
-    pub(crate) fn tune(&mut self) {
+    pub(crate) fn tune<const V: usize>(&mut self, config: &mut Config<V>) {
         self.untuned = false;
-        [self.config.cruise_mps, self.config.climb_mps] = self.nominal_mps;
-        let parameters = *self.parameters();
-        parameters.apply(&mut self.config);
-        self.guidance.tune(&self.config, &self.autopilot_limits);
+        [config.cruise_mps, config.climb_mps] = self.nominal_mps;
+        self.parameters().apply(config);
     }
 
-    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
-    /// other `poll_*`, but it may take long: nothing else waits for it.
-    pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
-        let erasing = self.erasing();
+    /// What the flash is to do next.
+    pub(crate) fn poll_flash(
+        &mut self,
+        now: Instant,
+        erasing: Erasing,
+        links: &mut Links,
+    ) -> Option<FlashRequest<'_>> {
         let store = self.store.as_mut()?;
-        self.ftp.advance(store, self.now, erasing);
+        self.ftp.advance(store, now, erasing);
         if let Some((warning, text)) = self.ftp.text() {
-            self.links.say(warning, text);
+            links.say(warning, text);
         }
         store.poll(erasing)
     }
 
-    /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
-    pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], Fault>) {
-        self.now = now;
+    /// Takes in how the flash did it: the bytes read, none for an erasure or a program.
+    pub(crate) fn handle_flash(&mut self, outcome: Result<&[u8], Fault>) {
         if let Some(answer) = self.store.as_mut().and_then(|store| store.handle(outcome)) {
             self.ftp.answer(answer);
         }
     }
 
-    /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
-    pub(crate) fn erasing(&self) -> Erasing {
-        let idle = matches!(
-            self.state,
-            State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
-        );
-        let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
-        match self.state {
-            _ if self.telemetry.armed => Erasing::Forbidden,
-            _ if idle && known => Erasing::Allowed,
-            _ if idle => Erasing::NotYet,
-            State::Planning => Erasing::NotYet,
-            _ => Erasing::Forbidden,
-        }
+    /// The next FTP packet for a link.
+    pub(crate) fn poll_ftp(&mut self, link: Link) -> Option<[u8; ftp::PAYLOAD_LEN]> {
+        self.ftp.poll(link as usize)
     }
 
     /// Serves a frame, if it is one for the services; whether it was.
-    pub(crate) fn serve(&mut self, link: Link, sender: Sender, frame: &Frame) -> bool {
-        let p = frame.padded();
-        let own = (self.config.system_id, crate::COMPONENT);
-        if (frame.system, frame.component) == own {
+    pub(crate) fn serve(&mut self, heard: &Heard<'_>, links: &mut Links) -> bool {
+        let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPONENT));
+        if heard.from() == own {
             return false;
         }
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
-        match frame.message_id {
+        match heard.frame.message_id {
             ftp::MESSAGE if (p[1], p[2]) == own => {
                 // From others not even answered: sessions are scarce.
-                if self.store.is_some() && sender == Sender::GroundStation {
+                if self.store.is_some() && heard.sender == Sender::GroundStation {
                     if ftp::changes_files(p) {
-                        self.links.log_sender(
-                            self.now,
-                            sender,
-                            "File request from #/#",
-                            (frame.system, frame.component),
-                        );
+                        links.log_sender(heard.now, heard.sender, "File request from #/#", heard.from());
                     }
-                    self.ftp.handle(link as usize, self.now, frame);
+                    self.ftp.handle(heard.link as usize, heard.now, heard.frame);
                 }
             }
             PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::COUNT).for_each(|index| self.tell_parameter(link, sender, index));
+                (0..parameters::COUNT).for_each(|index| self.tell_parameter(heard, index, links));
             }
-            PARAM_REQUEST_READ_DATA::ID if for_us(2) => {
-                let index = i16::from_le_bytes([p[0], p[1]]);
-                let found = match usize::try_from(index) {
-                    Ok(index) => Some(index).filter(|index| *index < parameters::COUNT),
-                    Err(_) => Parameters::index_of(name(&p[4..20])),
-                };
-                match found {
-                    Some(index) => self.tell_parameter(link, sender, index),
-                    None if p[3] == own.1 => {
-                        let mut id = [0; 16];
-                        id.copy_from_slice(&p[4..20]);
-                        self.refuse_parameter(
-                            link,
-                            sender,
-                            frame,
-                            index,
-                            id,
-                            MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
-                        );
-                    }
-                    None => {}
-                }
-            }
-            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(link, sender, frame),
-            TIMESYNC_DATA::ID => {
-                // Bytes 16 and 17 name an addressee, 0 for all.
-                let to_us = (p[16] == 0 || p[16] == own.0) && (p[17] == 0 || p[17] == own.1);
-                if let Some(request) = frame.decode::<TIMESYNC_DATA>()
-                    && request.tc1 == 0
-                    && to_us
-                {
-                    let to = (frame.system, frame.component);
-                    let tc1 = self.now.micros() as i64 * 1000;
-                    let answer = Outgoing::Timesync { tc1, ts1: request.ts1, to };
-                    self.links.answer(self.now, link, sender, Kind::Time, answer);
-                }
-            }
+            PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.read_parameter(heard, links),
+            PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(heard, links),
+            TIMESYNC_DATA::ID => answer_time(heard, links),
             _ => return false,
         }
         true
@@ -152,84 +145,85 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.store.as_ref().map_or(&self.parameters, Store::parameters)
     }
 
-    fn tell_parameter(&mut self, link: Link, sender: Sender, index: usize) {
-        if let Some((name, value)) = self.parameters().get(index) {
-            let answer = Outgoing::ParameterValue { index, name, value };
-            self.links.answer(self.now, link, sender, Kind::Parameter, answer);
+    fn read_parameter(&self, heard: &Heard<'_>, links: &mut Links) {
+        let p = heard.frame.padded();
+        let index = i16::from_le_bytes([p[0], p[1]]);
+        let found = match usize::try_from(index) {
+            Ok(index) => Some(index).filter(|index| *index < parameters::COUNT),
+            Err(_) => Parameters::index_of(name(&p[4..20])),
+        };
+        match found {
+            Some(index) => self.tell_parameter(heard, index, links),
+            None if p[3] == crate::COMPONENT => {
+                let why = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
+                refuse_parameter(heard, index, &p[4..20], why, links);
+            }
+            None => {}
         }
     }
 
-    fn set_parameter(&mut self, link: Link, sender: Sender, frame: &Frame) {
-        let p = frame.padded();
+    fn tell_parameter(&self, heard: &Heard<'_>, index: usize, links: &mut Links) {
+        if let Some((name, value)) = self.parameters().get(index) {
+            let count = parameters::COUNT as u16;
+            let answer = Outgoing::ParameterValue { index, count, name, value };
+            heard.answer(links, Kind::Parameter, answer);
+        }
+    }
+
+    /// Sets a parameter; it is in use from the next [`Self::tune`] on.
+    pub(crate) fn set(&mut self, index: usize, value: f32) -> Result<(), Refused> {
+        match &mut self.store {
+            Some(store) => store.set_parameter(index, value),
+            None => self.parameters.set(index, value).map(|_| ()),
+        }
+    }
+
+    fn set_parameter(&mut self, heard: &Heard<'_>, links: &mut Links) {
+        let p = heard.frame.padded();
         let (value, kind) = (f32::from_le_bytes([p[0], p[1], p[2], p[3]]), p[22]);
         let found = Parameters::index_of(name(&p[6..22]));
         let result = match found {
             None => Err(MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST),
-            Some(_) if sender != Sender::GroundStation => {
+            Some(_) if heard.sender != Sender::GroundStation => {
                 Err(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED)
             }
             Some(_) if kind != REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
-            Some(index) => {
-                let result = match &mut self.store {
-                    Some(store) => store.set_parameter(index, value),
-                    None => self.parameters.set(index, value).map(|_| ()),
-                };
-                result.map_err(|why| match why {
-                    Refused::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
-                    Refused::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
-                })
-            }
+            Some(index) => self.set(index, value).map_err(|why| match why {
+                Refused::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
+                Refused::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
+            }),
         };
         self.untuned |= result.is_ok();
         if result.is_ok() {
-            self.links.log_sender(
-                self.now,
-                sender,
-                "Parameter set from #/#",
-                (frame.system, frame.component),
-            );
+            links.log_sender(heard.now, heard.sender, "Parameter set from #/#", heard.from());
         }
         // Refused or not: the value that stands, for tools that know no PARAM_ERROR.
         if let Some(index) = found {
-            self.tell_parameter(link, sender, index);
+            self.tell_parameter(heard, index, links);
         }
         if let Err(why) = result
             && p[5] == crate::COMPONENT
         {
-            let mut id = [0; 16];
-            id.copy_from_slice(&p[6..22]);
-            self.refuse_parameter(link, sender, frame, -1, id, why);
+            refuse_parameter(heard, -1, &p[6..22], why, links);
         }
     }
+}
 
-    fn refuse_parameter(
-        &mut self,
-        link: Link,
-        sender: Sender,
-        frame: &Frame,
-        index: i16,
-        id: [u8; 16],
-        why: MavParamError,
-    ) {
-        let to = (frame.system, frame.component);
-        let error = Outgoing::ParameterError { index, id, why: why as u8, to };
-        self.links.answer(self.now, link, sender, Kind::Parameter, error);
-    }
+fn refuse_parameter(heard: &Heard<'_>, index: i16, name: &[u8], why: MavParamError, links: &mut Links) {
+    let mut id = [0; 16];
+    id.copy_from_slice(name);
+    let error = Outgoing::ParameterError { index, id, why: why as u8, to: heard.from() };
+    heard.answer(links, Kind::Parameter, error);
+}
 
-    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.
-    pub(crate) fn restart(&mut self, command: &Command) -> u8 {
-        let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
-        if !asked {
-            return DENIED;
-        }
-        if self.telemetry.armed {
-            return TEMPORARILY_REJECTED;
-        }
-        // Full only if the shell does not drain: then it is asked again.
-        match self.events.push_back(Event::RestartRequested) {
-            Ok(()) => ACCEPTED,
-            Err(_) => TEMPORARILY_REJECTED,
-        }
+/// TIMESYNC: bytes 16 and 17 name an addressee, 0 for all.
+fn answer_time(heard: &Heard<'_>, links: &mut Links) {
+    let p = heard.frame.padded();
+    let to_us = (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPONENT);
+    let request = heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_us);
+    if let Some(request) = request {
+        let tc1 = heard.now.micros() as i64 * 1000;
+        heard.answer(links, Kind::Time, Outgoing::Timesync { tc1, ts1: request.ts1, to: heard.from() });
     }
 }
 

@@ -22,7 +22,7 @@ pub fn run() -> Result<()> {
     for name in CRATES {
         for tree in Tree::of_crate(Path::new(name))? {
             for cycle in imports::cycles(&tree) {
-                println!("{name}: import cycle: {}", cycle.join(" → "));
+                println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
                 wrong += 1;
             }
             for (what, reason) in shape::beyond(&tree) {

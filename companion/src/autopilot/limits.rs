@@ -1,23 +1,7 @@
-//! What a vehicle can fly: the mission's limits, and the autopilot's where it has lower ones.
+//! What the autopilot's parameters allow: limits of speed, acceleration and jerk.
 //!
-//! The autopilot's own limits are parameters, read on connecting. A value that did not come, or that no vehicle has, counts
-//! as the default of its kind. Source: PX4 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
-
-use libm::{fmaxf, fminf};
-use planner_core::deconflict::DeconflictConfig;
-use planner_core::track::TrackConfig;
-use planner_core::{ConfigError, Point};
-
-use crate::autopilot::Kind;
-use crate::config::Config;
-use crate::guidance::{JOIN_MPS, SMOOTH_MOST_S, filter};
-
-/// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get that.
-pub const JERK_MPS3: f32 = 4.0;
-/// The same while the safety filter stops a vehicle, m/s³.
-pub const URGENT_JERK_MPS3: f32 = 8.0;
-/// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
-const CORNER_SHARE: f32 = 1.5;
+//! They are read on connecting. A value that did not come, or that no vehicle has, counts as the default of its kind. Source: PX4
+//! 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
 
 /// What an autopilot's parameter limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,10 +58,10 @@ pub struct AutopilotLimits {
 }
 
 impl AutopilotLimits {
-    /// The defaults of a kind.
-    pub(crate) fn default_of(kind: Kind) -> Self {
+    /// The defaults of parameters.
+    pub(crate) fn of(parameters: &[LimitParameter]) -> Self {
         let mut limits = Self { values: [f32::INFINITY; LIMITS] };
-        for parameter in kind.limits() {
+        for parameter in parameters {
             limits.values[parameter.limit as usize] = parameter.default * parameter.unit;
         }
         limits
@@ -95,176 +79,5 @@ impl AutopilotLimits {
             return false;
         }
         core::mem::replace(&mut self.values[parameter.limit as usize], value) != value
-    }
-}
-
-/// Limits of one vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Limits {
-    /// Along the path, m/s.
-    pub speed_mps: f32,
-    /// Upwards, m/s.
-    pub climb_mps: f32,
-    /// Downwards, m/s.
-    pub descend_mps: f32,
-    /// Across, m/s².
-    pub accel_mps2: f32,
-    /// Upwards and downwards, m/s².
-    pub accel_z_mps2: f32,
-    /// Of a setpoint, across and vertically, m/s²: a corner adds to what is braked and gained before and behind it.
-    pub most_mps2: [f32; 2],
-    /// Of a setpoint, m/s³.
-    pub jerk_mps3: f32,
-}
-
-impl Limits {
-    /// The mission's limits, lowered to what the autopilot flies.
-    pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
-        let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
-        // What the door's longest average smooths to that jerk.
-        let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
-        let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
-        let (across_mps2, vertical_mps2) =
-            (least(&[Limit::Accel]), least(&[Limit::AccelUp, Limit::AccelDown]));
-        Self {
-            speed_mps: fminf(config.cruise_mps, least(&[Limit::Speed])),
-            climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
-            descend_mps: fminf(config.climb_mps, least(&[Limit::Descend])),
-            accel_mps2: fminf(accel_mps2, across_mps2),
-            accel_z_mps2: fminf(accel_mps2, vertical_mps2),
-            most_mps2: [across_mps2, vertical_mps2].map(|most| fminf(CORNER_SHARE * accel_mps2, most)),
-            jerk_mps3,
-        }
-    }
-
-    /// Greatest jerk, m/s³.
-    pub(crate) fn jerk(&self, urgent: bool) -> f32 {
-        if urgent { fminf(URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
-    }
-
-    /// Greatest acceleration along a direction (a unit vector, or nearly none), m/s².
-    pub(crate) fn accel_along(&self, direction: &Point) -> f32 {
-        let (across, up) = (libm::hypotf(direction.x, direction.y), libm::fabsf(direction.z));
-        let least = fminf(self.accel_mps2 / fmaxf(across, 1e-3), self.accel_z_mps2 / fmaxf(up, 1e-3));
-        fminf(least, fmaxf(self.accel_mps2, self.accel_z_mps2))
-    }
-
-    /// The nearest acceleration that may be asked for, m/s².
-    pub(crate) fn within(&self, accel: &Point) -> Point {
-        let across = libm::hypotf(accel.x, accel.y);
-        let [most, most_z] = self.most_mps2;
-        let share = most / fmaxf(across, most);
-        let z = fmaxf(fminf(accel.z, most_z), -most_z);
-        Point::new(accel.x * share, accel.y * share, z)
-    }
-
-    /// No setpoint moves faster, m/s.
-    pub(crate) fn fastest_mps(&self) -> f32 {
-        fmaxf(self.speed_mps, fmaxf(self.climb_mps, self.descend_mps))
-    }
-}
-
-/// What guidance gives to planner-core's calls.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Settings {
-    /// Along the path.
-    pub(crate) track: TrackConfig,
-    /// Along the way to it, and in climb and descent.
-    pub(crate) leg_track: TrackConfig,
-    /// Of advice.
-    pub(crate) deconflict: DeconflictConfig,
-}
-
-impl Settings {
-    /// Those of a vehicle with these limits.
-    pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let limits = Limits::new(config, autopilot);
-        let track = TrackConfig {
-            cruise_mps: limits.speed_mps,
-            climb_mps: autopilot.get(Limit::Climb),
-            descend_mps: autopilot.get(Limit::Descend),
-            accel_mps2: limits.accel_mps2,
-            accel_z_mps2: limits.accel_z_mps2,
-            radius_m: config.radius_m,
-            ..TrackConfig::default()
-        };
-        let leg_track = TrackConfig {
-            cruise_mps: limits.fastest_mps().min(JOIN_MPS.max(limits.climb_mps)),
-            climb_mps: limits.climb_mps,
-            descend_mps: limits.descend_mps,
-            ..track
-        };
-        let deconflict = DeconflictConfig {
-            method: config.method,
-            safety_distance_m: config.safety_distance_m,
-            cruise_mps: config.cruise_mps,
-            accel_mps2: config.accel_mps2,
-        };
-        Self { track, leg_track, deconflict }
-    }
-
-    /// Whether planner-core can work with them, those of the safety filter among them.
-    pub(crate) fn check(&self) -> Result<(), ConfigError> {
-        self.track.check()?;
-        self.leg_track.check()?;
-        self.deconflict.check()?;
-        filter::bounds(&self.track).check()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    extern crate std;
-
-    use planner_core::frames::Geodetic;
-
-    use super::*;
-
-    fn config() -> Config<1> {
-        Config::new(1, Point::zeros(), Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 })
-    }
-
-    #[test]
-    fn defaults_leave_the_missions_limits_but_brake_vertically_as_arducopter_can() {
-        for kind in [Kind::Px4, Kind::ArduPilot] {
-            let limits = Limits::new(&config(), &AutopilotLimits::default_of(kind));
-            assert_eq!((limits.speed_mps, limits.climb_mps, limits.descend_mps), (2.0, 1.0, 1.0));
-            // ArduCopter ran 1.03 m wide of vertical corners with 1.5.
-            let accel_z_mps2 = if kind == Kind::Px4 { 1.5 } else { 1.0 };
-            assert_eq!((limits.accel_mps2, limits.accel_z_mps2, limits.jerk_mps3), (1.5, accel_z_mps2, 4.0));
-        }
-    }
-
-    proptest::proptest! {
-        /// Whatever is read, limits stay between those of a slow vehicle and those of the mission.
-        #[test]
-        fn no_value_makes_a_limit_senseless(
-            read in proptest::collection::vec((0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0), 0..40),
-            px4 in proptest::prelude::any::<bool>(),
-        ) {
-            let kind = if px4 { Kind::Px4 } else { Kind::ArduPilot };
-            let mut autopilot = AutopilotLimits::default_of(kind);
-            for (index, bits, near) in read {
-                let Some(parameter) = kind.limits().get(index) else { continue };
-                // Bits of an integer, NaN and infinities among them.
-                autopilot.set(parameter, f32::from_bits(bits));
-                autopilot.set(parameter, near);
-            }
-            let l = Limits::new(&config(), &autopilot);
-            proptest::prop_assert_eq!(Settings::new(&config(), &autopilot).check(), Ok(()));
-            for (value, least, most) in [
-                (l.speed_mps, 0.1, 2.0),
-                (l.climb_mps, 0.1, 1.0),
-                (l.descend_mps, 0.1, 1.0),
-                (l.accel_mps2, 0.2, 1.5),
-                (l.accel_z_mps2, 0.2, 1.5),
-                (l.most_mps2[0], 0.2, 2.25),
-                (l.most_mps2[1], 0.2, 2.25),
-                (l.jerk_mps3, 1.0, 4.0),
-            ] {
-                proptest::prop_assert!((least..=most).contains(&value), "{l:?}");
-            }
-        }
     }
 }

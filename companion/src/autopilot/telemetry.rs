@@ -156,6 +156,11 @@ impl Telemetry {
         Self { battery_percent: -1, anywhere, ..Self::default() }
     }
 
+    /// Which autopilot flies the vehicle; PX4 while none was heard.
+    pub(crate) fn kind(&self) -> Kind {
+        self.kind.unwrap_or_default()
+    }
+
     /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
     pub fn is_critical(&self) -> bool {
         self.system_status >= CRITICAL

@@ -6,7 +6,8 @@ use mavlink::dialects::ardupilotmega::{
     PARAM_VALUE_DATA, TUNNEL_DATA,
 };
 
-use super::{Companion, ORIGIN_AGAIN, REPORT_EVERY};
+use super::{Companion, REPORT_EVERY};
+use crate::autopilot::requests::ORIGIN_AGAIN;
 use crate::autopilot::telemetry::Change;
 use crate::events::Link;
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
@@ -15,6 +16,7 @@ use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::senders::{Kind as AnswerKind, Sender};
 use crate::link::{Fresh, budget};
+use crate::services::Heard;
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
 
@@ -43,7 +45,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             return relevant;
         }
-        if self.serve(link, sender, frame) {
+        let heard = Heard { link, sender, frame, now: self.now, own };
+        if self.services.serve(&heard, &mut self.links) {
             return false;
         }
         match link {
@@ -52,14 +55,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     return false;
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
-                    self.handle_limit(frame);
+                    let changed = self.requests.handle_limit(&self.telemetry, frame);
+                    if changed && !self.state.streams_setpoints() {
+                        self.guidance.tune(&self.config, self.requests.limits());
+                    }
                     return false;
                 }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
                 if let Some(ack) = self.telemetry.ack.take() {
-                    self.handle_ack(&ack);
+                    self.requests.handle_ack(&ack, own, self.state, self.now, &mut self.links);
                 }
-                self.handshake.watch(self.state, &self.telemetry);
+                self.requests.watch(self.state, &self.telemetry);
                 if change == Change::OriginDoubted {
                     self.timers.hasten(Timer::Origin, self.now + ORIGIN_AGAIN);
                     return self.telemetry.origin_moved;
@@ -75,7 +81,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     // It may have been restarted and know nothing of the streams we asked for. Positions that jump
                     // again and again are no reason to flood it.
                     if self.timers.is_due(Timer::Streams, self.now) {
-                        self.ask_for_streams();
+                        self.connect();
                     }
                 }
                 change == Change::Updated && frame.message_id != LOCAL_POSITION_NED_DATA::ID

@@ -3,6 +3,7 @@
 use planner_core::Point;
 
 use super::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
+use crate::autopilot::requests::battery_reported;
 use crate::config::PlanFailure;
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};
@@ -22,7 +23,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
     pub(crate) fn inputs(&self) -> Inputs {
         let (t, now, scene) = (&self.telemetry, self.now, self.scene());
-        let kind = self.kind();
+        let (kind, handshake) = (self.kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.state {
             State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
@@ -76,16 +77,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             turn_back: self.pending.turn_back && !self.guidance.returning,
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
-            armed_unseen: self.handshake.is_armed_unseen(now),
-            arming_unanswered: self.handshake.is_unanswered(now),
-            disarm_refused: self.handshake.disarm_refused,
-            ours: self.handshake.ours,
+            armed_unseen: handshake.is_armed_unseen(now),
+            arming_unanswered: handshake.is_unanswered(now),
+            disarm_refused: handshake.is_disarm_refused(),
+            ours: handshake.is_ours(),
             landing: t.custom_mode == kind.land_mode(),
             offboard,
             mode_foreign,
             critical: t.is_critical(),
             on_ground: t.on_ground == Some(true),
-            flown: self.handshake.flown,
+            flown: handshake.has_flown(),
             vertical: t.position_age(now) < FRESH && t.velocity.z.abs() > RESTING_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
@@ -93,7 +94,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.guidance.filter.column_clear()
                 && self.departure_due()
                 && !self.pending.pause
-                && self.battery_reported()
+                && battery_reported(t, self.config.battery_low_percent, now)
                 && !self.around.blocked
                 && self.neighbours.is_clear_since(self.entered_at)
                 && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),

@@ -1,6 +1,7 @@
 //! The step that is due, and what the rows of the table have done.
 
-use super::{Companion, DISARM_AFTER, IDLE_EVERY, REPORT_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
+use super::{Companion, IDLE_EVERY, REPORT_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
+use crate::autopilot::requests::DISARM_AFTER;
 use crate::config::PlanFailure;
 use crate::events::{Event, Link};
 use crate::guidance::Scene;
@@ -15,7 +16,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// One step of the control loop: reference, table, and what is asked for again.
     pub(super) fn step(&mut self) {
         let now = self.now;
-        if self.untuned && self.erasing() == Erasing::Allowed {
+        if self.services.is_untuned() && self.erasing() == Erasing::Allowed {
             self.tune();
         }
         self.watch_estimate();
@@ -38,7 +39,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.name_who_never_starts();
         self.look_around();
         self.run_table();
-        self.repeat_requests();
+        let situation = self.situation();
+        if self.requests.poll(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
+            self.guidance.tune(&self.config, self.requests.limits());
+        }
         let flows = self.state.streams_setpoints();
         self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
         let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
@@ -100,7 +104,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let ends = matches!(to, State::Aborted | State::Done)
             || matches!(row.action, Action::ForgetStart | Action::CancelStart);
         self.pending.state_changed(row.guard, to, ends);
-        self.handshake.state_changed(from, to);
+        self.requests.state_changed(from, to);
         self.act(from, to, row);
         if !row.text.is_empty() {
             self.links.say(row.warning, row.text);
@@ -123,7 +127,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let position = self.telemetry.position;
         match row.action {
             Action::None | Action::ForgetStart => {}
-            Action::Connect => self.ask_for_streams(),
+            Action::Connect => self.connect(),
             Action::RequestPlan => {
                 self.plan = None;
                 self.plan_failure = None;

@@ -84,7 +84,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if length > 0 {
             return length;
         }
-        let Some(payload) = self.ftp.poll(link as usize) else { return 0 };
+        let Some(payload) = self.services.poll_ftp(link) else { return 0 };
         let header = self.links.header(link, system);
         let (id, extra) = (FILE_TRANSFER_PROTOCOL_DATA::ID, FILE_TRANSFER_PROTOCOL_DATA::EXTRA_CRC);
         frame::encode_raw(header, id, extra, &payload, out)

@@ -23,16 +23,14 @@ use planner_core::Point;
 
 use super::fence::Fence;
 use super::follower::{Motion, shortened};
-use crate::autopilot::limits::Limits;
+use super::limits::{Limits, SMOOTH_MOST_S};
 
 /// Time between two raw points, seconds: the rate of the setpoints.
 pub const TICK_S: f32 = 0.05;
 /// Raw points taken in one call at most: a step that is later moves the setpoint no further.
 pub const TICKS: u8 = 4;
-/// Longest average, in ticks: lower limits of jerk lower the acceleration ([`Limits`]).
-const MOST_N: usize = 24;
-/// The same in seconds.
-pub const SMOOTH_MOST_S: f32 = MOST_N as f32 * TICK_S;
+/// Longest average, in ticks.
+const MOST_N: usize = (SMOOTH_MOST_S / TICK_S + 0.5) as usize;
 /// Shortest.
 const LEAST_N: usize = 8;
 /// The averages leave so much of the jerk to corners and to the clock.

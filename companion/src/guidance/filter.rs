@@ -13,18 +13,14 @@ mod conflict;
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{Bounds, Braking, REACTION_S, Set};
-use planner_core::track::TrackConfig;
+use planner_core::safety::{REACTION_S, Set};
 
+use super::limits::bounds;
 use super::{Guidance, Scene};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-/// Change of acceleration in a stop by the filter, m/s³.
-const JERK_MPS3: f32 = 8.0;
-/// An unheard vehicle has stopped by then, seconds: it notices after 1.8 s and brakes.
-const SILENT_S: f32 = 3.0;
 /// So much of the way has to be free before the vehicle goes on, metres.
 const RESUME_M: f32 = 1.0;
 /// And for so long.
@@ -185,12 +181,6 @@ impl Filter {
     pub(super) fn backs_up(&self, now: Instant) -> bool {
         self.yields && self.stopped_for(now) >= BACK_UP
     }
-}
-
-/// What is expected of vehicles that fly as this one does.
-pub(crate) fn bounds(track: &TrackConfig) -> Bounds {
-    let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: JERK_MPS3 };
-    Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: SILENT_S }
 }
 
 impl Guidance {

@@ -16,7 +16,7 @@ use libm::fmaxf;
 use planner_core::Point;
 
 use super::fence::Fence;
-use crate::autopilot::limits::Limits;
+use super::limits::Limits;
 
 /// Rate of the loop, as a share of jerk over acceleration: twice the rate is how fast a change of velocity dies away.
 const RATE_SHARE: f32 = 0.45;

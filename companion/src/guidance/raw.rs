@@ -6,7 +6,8 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::{self, Reference, Tracker};
 
 use super::door::TICK_S;
-use super::{FENCE_MARGIN_M, Guidance, JOIN_MPS, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
+use super::limits::JOIN_MPS;
+use super::{FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
 use crate::guidance::retreat;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;

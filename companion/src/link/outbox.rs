@@ -11,7 +11,6 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use crate::link::frame::{self, Header};
-use crate::services::parameters;
 
 /// Entries a link holds.
 pub const DEPTH: usize = 32;
@@ -44,6 +43,8 @@ pub enum Outgoing {
     ParameterValue {
         /// Its index.
         index: usize,
+        /// How many there are.
+        count: u16,
         /// Its name.
         name: &'static str,
         /// Its value.
@@ -164,10 +165,10 @@ impl Outbox {
                 };
                 return frame::encode(header, &set, out);
             }
-            Outgoing::ParameterValue { index, name, value } => {
+            Outgoing::ParameterValue { index, count, name, value } => {
                 let told = PARAM_VALUE_DATA {
                     param_value: value,
-                    param_count: parameters::COUNT as u16,
+                    param_count: count,
                     param_index: index as u16,
                     param_id: name.into(),
                     param_type: MavParamType::MAV_PARAM_TYPE_REAL32,

@@ -6,7 +6,9 @@ use std::vec::Vec;
 use mavlink::dialects::ardupilotmega::*;
 
 use super::*;
+use crate::events::Event;
 use crate::link::frame::{self, Framer, Header};
+use crate::mission::State;
 use crate::services::parameters::TABLE;
 use crate::storage::store::READ;
 use crate::testing::fake_autopilot::*;

@@ -10,7 +10,7 @@ use super::sources::{Source, Tree};
 /// `pub use` of a `pub use` at most so many times.
 const PASSED_ON: usize = 6;
 
-/// Every set of files that import each other, by path.
+/// Every set of files that import each other: the imports within it.
 pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
     let imports: Vec<BTreeSet<usize>> = (0..tree.sources.len()).map(|at| of_file(tree, at)).collect();
     let reach: Vec<BTreeSet<usize>> = (0..imports.len()).map(|at| reached(&imports, at)).collect();
@@ -23,9 +23,20 @@ pub fn cycles(tree: &Tree) -> Vec<Vec<String>> {
         let cycle: Vec<usize> =
             from_here.iter().copied().filter(|other| reach[*other].contains(&at)).collect();
         seen.extend(&cycle);
-        found.push(cycle.iter().map(|file| tree.sources[*file].path.display().to_string()).collect());
+        found.push(edges(tree, &imports, &cycle));
     }
     found
+}
+
+fn edges(tree: &Tree, imports: &[BTreeSet<usize>], cycle: &[usize]) -> Vec<String> {
+    let name = |file: usize| tree.sources[file].path.display().to_string();
+    let of =
+        |from: usize| cycle.iter().filter(move |to| imports[from].contains(to)).map(move |to| (from, *to));
+    cycle
+        .iter()
+        .flat_map(|from| of(*from))
+        .map(|(from, to)| format!("{} → {}", name(from), name(to)))
+        .collect()
 }
 
 fn reached(imports: &[BTreeSet<usize>], from: usize) -> BTreeSet<usize> {

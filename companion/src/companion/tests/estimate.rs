@@ -22,7 +22,7 @@ fn the_pace_follows_the_estimate() {
             Kind::Px4 => Bench::new(config()),
             Kind::ArduPilot => Bench::ardupilot(config()),
         };
-        bench.companion.parameters.set(3, 0.26).unwrap();
+        bench.companion.services.set(3, 0.26).unwrap();
         bench.companion.tune();
         bench.until(State::Ready, 60.0);
         bench.start();

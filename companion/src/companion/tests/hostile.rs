@@ -196,7 +196,7 @@ proptest::proptest! {
         }
         let mut flash = crate::testing::fake_flash::Flash::new(9);
         bench.companion.mount(crate::testing::fake_flash::started(&mut flash));
-        let (state, parameters) = (bench.state(), bench.companion.parameters().to_bytes());
+        let (state, parameters) = (bench.state(), bench.companion.services.parameters().to_bytes());
         let config = bench.companion.config.clone();
         bench.events.clear();
         for (i, (kind, seed, who, wired)) in frames.into_iter().enumerate() {
@@ -212,7 +212,7 @@ proptest::proptest! {
         }
         proptest::prop_assert!(!bench.events.contains(&Event::RestartRequested));
         proptest::prop_assert_eq!(bench.companion.obstacles.count(), 0);
-        proptest::prop_assert!(bench.companion.parameters().to_bytes() == parameters && bench.companion.config == config);
+        proptest::prop_assert!(bench.companion.services.parameters().to_bytes() == parameters && bench.companion.config == config);
         // The radio gives the ground station all it requests within as long as its budget needs.
         bench.swarm.clear();
         bench.acks.clear();

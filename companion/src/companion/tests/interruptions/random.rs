@@ -64,7 +64,7 @@ impl Watch {
         }
         self.commands = b.commands.len();
         // What the companion can know: the armed bit, or the ack.
-        let acked = b.companion.handshake.is_armed_unseen(b.now + Duration::from_secs(9));
+        let acked = b.companion.requests.handshake().is_armed_unseen(b.now + Duration::from_secs(9));
         self.armed_once |= b.companion.telemetry.armed || (acked && state == State::Arming);
         let flies_on = matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
         assert!(!self.landing || !flies_on, "an accepted landing is forgotten in {state:?}: {:#?}", self.log);

@@ -1,0 +1,279 @@
+//! What is requested of the autopilot until it is so: streams, EKF origin, limits, mode, arming, take-off, landing.
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::SYS_STATUS_DATA;
+
+use crate::autopilot::Kind;
+use crate::autopilot::handshake::Handshake;
+use crate::autopilot::limits::AutopilotLimits;
+use crate::autopilot::telemetry::{Ack, Telemetry};
+use crate::events::Link;
+use crate::link::Links;
+use crate::link::frame::Frame;
+use crate::link::outbox::Outgoing;
+use crate::mission::State;
+use crate::time::{Duration, Instant};
+use crate::timers::{Timer, Timers};
+
+/// While another EKF origin is in doubt the autopilot is asked this often.
+pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
+/// Disarming is requested this long after the state was entered, and again.
+pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
+/// Before a landing is requested the safety filter has looked down: two steps.
+const LOOKS_DOWN: Duration = Duration::from_millis(100);
+const RETRY_EVERY: Duration = Duration::from_millis(1000);
+/// Longer than ArduCopter takes to spin up and lift off (2.3 s).
+const TAKE_OFF_AFTER: Duration = Duration::from_millis(4000);
+/// Positions missing this long while HEARTBEAT is heard: it has rebooted, and forgotten the streams.
+const STREAMS_LOST: Duration = Duration::from_millis(1500);
+/// Streams are asked for again no sooner than this.
+const STREAMS_EVERY: Duration = Duration::from_millis(2000);
+/// HEARTBEAT comes at 1 Hz: one late is not yet silence.
+const HEARD: Duration = Duration::from_millis(1500);
+/// Streams asked for at each step while connecting.
+const SETUP_BURST: usize = 5;
+const GPS_GLOBAL_ORIGIN: u16 = 49;
+/// Requests for limits, all together, and the time from one to the next.
+const LIMIT_TRIES: u8 = 80;
+const LIMIT_EVERY: Duration = Duration::from_millis(150);
+/// `MAV_PARAM_TYPE_REAL32`.
+const REAL32: u8 = 9;
+/// A stream that is this old is requested again: SYS_STATUS comes each second.
+const STREAM_LOST: Duration = Duration::from_millis(4000);
+/// No vehicle takes off with a charge that is older.
+const BATTERY_LOST: Duration = Duration::from_millis(5000);
+
+/// What requests follow from.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Situation {
+    pub(crate) now: Instant,
+    pub(crate) state: State,
+    /// Since the state was entered.
+    pub(crate) in_state: Duration,
+    /// Height of the climb, metres.
+    pub(crate) climb_m: f32,
+    /// How long Guided keeps the last velocity, seconds.
+    pub(crate) guided_timeout_s: f32,
+    /// Whether a landing may be requested now.
+    pub(crate) may_land: bool,
+}
+
+/// How far the requests have come.
+#[derive(Clone, Debug)]
+pub(crate) struct Requests {
+    handshake: Handshake,
+    /// What the autopilot's parameters allow.
+    limits: AutopilotLimits,
+    /// Which of them were read, by bits, and how often they may still be requested.
+    read: u16,
+    tries: u8,
+    /// Next of the streams to be requested.
+    stream: usize,
+}
+
+impl Default for Requests {
+    fn default() -> Self {
+        let limits = Kind::default().default_limits();
+        Self { handshake: Handshake::default(), limits, read: 0, tries: 0, stream: usize::MAX }
+    }
+}
+
+impl Requests {
+    /// How far arming has come.
+    pub(crate) fn handshake(&self) -> &Handshake {
+        &self.handshake
+    }
+
+    /// What the autopilot's parameters allow, as far as they were read.
+    pub(crate) fn limits(&self) -> &AutopilotLimits {
+        &self.limits
+    }
+
+    /// Forgets what belongs to the state left.
+    pub(crate) fn state_changed(&mut self, from: State, to: State) {
+        self.handshake.state_changed(from, to);
+    }
+
+    /// Looks at the mode and at the landing detector.
+    pub(crate) fn watch(&mut self, state: State, telemetry: &Telemetry) {
+        self.handshake.watch(state, telemetry);
+    }
+
+    /// Starts requesting the streams from the first, and on the ground the limits. Returns whether those are others now.
+    pub(crate) fn begin(
+        &mut self,
+        telemetry: &Telemetry,
+        s: &Situation,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) -> bool {
+        self.stream = 0;
+        // In flight the limits stay as they are.
+        let reads = !s.state.streams_setpoints() && !telemetry.armed;
+        if reads {
+            self.limits = telemetry.kind().default_limits();
+            (self.read, self.tries) = (0, LIMIT_TRIES);
+            timers.set(Timer::Limit, s.now);
+        }
+        timers.set(Timer::Streams, s.now + STREAMS_EVERY);
+        if telemetry.kind() == Kind::ArduPilot {
+            links.push(Link::Autopilot, Outgoing::Parameter("GUID_TIMEOUT", s.guided_timeout_s));
+        }
+        reads
+    }
+
+    /// Requests the next limit that was not read.
+    fn repeat_limits(&mut self, kind: Kind, now: Instant, timers: &mut Timers, links: &mut Links) {
+        if self.tries == 0 || !timers.is_due(Timer::Limit, now) {
+            return;
+        }
+        let all = kind.limits();
+        let from = usize::from(self.tries);
+        // In turn, so that one that does not exist holds back none.
+        let missing = (from..from + all.len()).map(|i| i % all.len()).find(|i| self.read & 1 << i == 0);
+        let Some(limit) = missing.and_then(|i| all.get(i)) else {
+            self.tries = 0;
+            return;
+        };
+        self.tries -= 1;
+        timers.set(Timer::Limit, now + LIMIT_EVERY);
+        links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
+    }
+
+    /// PARAM_VALUE of the autopilot; whether a limit changed. Read by field: a type newer than the crate's must not hide the
+    /// value.
+    pub(crate) fn handle_limit(&mut self, telemetry: &Telemetry, frame: &Frame) -> bool {
+        const ID: core::ops::Range<usize> = 8..24;
+        let p = frame.padded();
+        let value = f32::from_le_bytes([p[0], p[1], p[2], p[3]]);
+        let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
+        let mut changed = false;
+        for (i, limit) in telemetry.kind().limits().iter().enumerate() {
+            if limit.name.as_bytes() == name && p[24] == REAL32 && !telemetry.armed {
+                self.read |= 1 << i;
+                changed |= self.limits.set(limit, value);
+            }
+        }
+        changed
+    }
+
+    /// Requests whatever is due. Returns whether the limits are others now.
+    pub(crate) fn poll(
+        &mut self,
+        telemetry: &Telemetry,
+        s: &Situation,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) -> bool {
+        let (now, kind) = (s.now, telemetry.kind());
+        let heard = telemetry.heartbeat_at.is_some();
+        let silent = telemetry.heartbeat_age(now) > HEARD;
+        if heard {
+            self.repeat_limits(kind, now, timers, links);
+        }
+        let lost = !silent && telemetry.position_age(now) > STREAMS_LOST;
+        let tunes = lost && timers.is_due(Timer::Streams, now) && self.begin(telemetry, s, timers, links);
+        let doubts = telemetry.doubts_origin();
+        if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now) {
+            timers.set(Timer::Origin, now + if doubts { ORIGIN_AGAIN } else { RETRY_EVERY });
+            links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
+        }
+        for _ in 0..SETUP_BURST {
+            if let Some(&(id, interval_us)) = kind.streams().get(self.stream) {
+                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+                self.stream += 1;
+            }
+        }
+        if heard && !silent && timers.is_due(Timer::Streams, now) {
+            self.request_lost_streams(telemetry, now, timers, links);
+        }
+        if s.state == State::Arming {
+            if silent {
+                self.handshake.note_gap();
+            }
+            if self.handshake.asks_to_arm(now, telemetry.armed) {
+                links.push(Link::Autopilot, Outgoing::Arm(true));
+            }
+        } else {
+            self.repeat_state(telemetry, s, timers, links);
+        }
+        tunes
+    }
+
+    /// Requests what the state waits for.
+    fn repeat_state(&self, telemetry: &Telemetry, s: &Situation, timers: &mut Timers, links: &mut Links) {
+        let looks = s.state == State::Land && !s.may_land;
+        if looks || !timers.take(Timer::Request, s.now, RETRY_EVERY) {
+            return;
+        }
+        let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
+        let change_to = |custom_mode| {
+            let (main, sub) = kind.mode_params(custom_mode);
+            Outgoing::Mode(main, sub)
+        };
+        let mut push = |request| links.push(Link::Autopilot, request);
+        match s.state {
+            State::Engaging => push(change_to(kind.setpoint_mode())),
+            // HEARTBEAT may not show the mode yet in which a landing was requested.
+            State::LandingHeld if s.in_state < HEARD || mode != kind.setpoint_mode() => {
+                push(change_to(kind.setpoint_mode()));
+            }
+            State::CancelStart => push(Outgoing::Arm(false)),
+            State::TakeOff => {
+                timers.set(Timer::Request, s.now + TAKE_OFF_AFTER);
+                push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
+            }
+            State::Land if mode != kind.land_mode() => push(change_to(kind.land_mode())),
+            State::Disarm => {
+                timers.set(Timer::Request, s.now + DISARM_AFTER);
+                push(Outgoing::Arm(false));
+                if mode != kind.land_mode() {
+                    push(change_to(kind.land_mode()));
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// Requests streams again that are old, or never came, while the autopilot is heard.
+    fn request_lost_streams(
+        &self,
+        telemetry: &Telemetry,
+        now: Instant,
+        timers: &mut Timers,
+        links: &mut Links,
+    ) {
+        let streams = telemetry.kind().streams();
+        if self.stream < streams.len() {
+            return;
+        }
+        for &(id, interval_us) in streams.iter().filter(|(_, interval_us)| *interval_us > 0.0) {
+            if telemetry.stream_age(u32::from(id), now) > STREAM_LOST {
+                timers.set(Timer::Streams, now + STREAMS_EVERY);
+                links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
+            }
+        }
+    }
+
+    /// Takes the autopilot's answer to a request, and reports what it refused; `own` is this vehicle's system id.
+    pub(crate) fn handle_ack(&mut self, ack: &Ack, own: u8, state: State, now: Instant, links: &mut Links) {
+        if ack.to != (0, 0) && ack.to != (own, crate::COMPONENT) {
+            return;
+        }
+        if let Some((text, numbers)) = self.handshake.take(state, ack, now) {
+            links.say_count(true, text, numbers);
+        }
+    }
+}
+
+impl Situation {
+    /// Whether a landing may be requested: once the safety filter has looked down and the column is clear, or whatever is below.
+    pub(crate) fn may_land(in_state: Duration, column_clear: bool, must_land: bool) -> bool {
+        must_land || (in_state >= LOOKS_DOWN && column_clear)
+    }
+}
+
+/// Whether the battery's charge was reported lately, or does not count (`low_percent` not above zero).
+pub(crate) fn battery_reported(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
+    low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= BATTERY_LOST
+}

@@ -1,0 +1,71 @@
+//! The shell's flash, and the commands that concern the board.
+
+use super::Companion;
+use crate::events::Event;
+use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use crate::mission::State;
+use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
+use crate::time::{Duration, Instant};
+
+/// Without an autopilot this long after the start, there is none that could be armed.
+const ALONE_AFTER: Duration = Duration::from_secs(10);
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
+    /// forgotten.
+    pub fn mount(&mut self, store: Store) {
+        self.services.mount(store);
+        self.tune();
+    }
+
+    /// Puts the parameters to use.
+    pub(crate) fn tune(&mut self) {
+        self.services.tune(&mut self.config);
+        self.guidance.tune(&self.config, self.requests.limits());
+    }
+
+    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
+    /// other `poll_*`, but it may take long: nothing else waits for it.
+    pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
+        let erasing = self.erasing();
+        self.services.poll_flash(self.now, erasing, &mut self.links)
+    }
+
+    /// Takes in how the flash did what [`Self::poll_flash`] asked for: the bytes read, none for an erasure or a program.
+    pub fn handle_flash(&mut self, now: Instant, outcome: Result<&[u8], Fault>) {
+        self.now = now;
+        self.services.handle_flash(outcome);
+    }
+
+    /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
+    pub(crate) fn erasing(&self) -> Erasing {
+        let idle = matches!(
+            self.state,
+            State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
+        );
+        let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
+        match self.state {
+            _ if self.telemetry.armed => Erasing::Forbidden,
+            _ if idle && known => Erasing::Allowed,
+            _ if idle => Erasing::NotYet,
+            State::Planning => Erasing::NotYet,
+            _ => Erasing::Forbidden,
+        }
+    }
+
+    /// PREFLIGHT_REBOOT_SHUTDOWN: this companion restarts, unless the vehicle is armed.
+    pub(crate) fn restart(&mut self, command: &Command) -> u8 {
+        let asked = command.param2 == 1.0 || (command.to_component && command.param1 == 1.0);
+        if !asked {
+            return DENIED;
+        }
+        if self.telemetry.armed {
+            return TEMPORARILY_REJECTED;
+        }
+        // Full only if the shell does not drain: then it is asked again.
+        match self.events.push_back(Event::RestartRequested) {
+            Ok(()) => ACCEPTED,
+            Err(_) => TEMPORARILY_REJECTED,
+        }
+    }
+}

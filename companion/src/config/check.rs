@@ -1,0 +1,54 @@
+//! Whether settings can be flown.
+
+use planner_core::Point;
+
+use super::{Config, ConfigError, RosterEntry, holds};
+use crate::autopilot::Kind;
+use crate::guidance::limits::Settings;
+
+impl<const V: usize> Config<V> {
+    /// Whether it can be flown.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        if self.system_id == 0 || self.own().is_none() {
+            return Err(ConfigError::NotInRoster);
+        }
+        if self.roster.iter().any(|e| e.system_id == 0)
+            || self.roster.windows(2).any(|pair| pair[0].system_id >= pair[1].system_id)
+        {
+            return Err(ConfigError::RosterOrder);
+        }
+        let positive = [
+            self.cruise_mps,
+            self.climb_mps,
+            self.accel_mps2,
+            self.radius_m,
+            self.required_clearance_m,
+            self.safety_distance_m,
+            self.start_tolerance_m,
+            self.estimate_m,
+        ];
+        let starts = self.roster.iter().flat_map(|e| e.start.iter());
+        let bad = positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || self.swarm_hz == 0;
+        if bad || starts.into_iter().any(|c| !c.is_finite()) {
+            return Err(ConfigError::NotPositive);
+        }
+        if !self.origin.is_valid() {
+            return Err(ConfigError::Origin);
+        }
+        let sound = |(low, high): (Point, Point)| {
+            (0..3).all(|a| low[a].is_finite() && high[a].is_finite() && low[a] <= high[a])
+        };
+        if !self.geofence.is_none_or(sound) {
+            return Err(ConfigError::Geofence);
+        }
+        let inside = |entry: &&RosterEntry| self.geofence.is_none_or(|fence| holds(&fence, &entry.start));
+        if let Some(outside) = self.roster.iter().find(|entry| !inside(entry)) {
+            return Err(ConfigError::StartOutside(outside.system_id));
+        }
+        for kind in [Kind::Px4, Kind::ArduPilot] {
+            let settings = Settings::new(self, &kind.default_limits());
+            settings.check().map_err(|error| ConfigError::Setting(error.0))?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,216 @@
+//! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
+
+use planner_core::Point;
+use planner_core::path::Path;
+use planner_core::schedule::VehiclePlan;
+
+use crate::config::PlanFailure;
+use crate::link::commands::{self, Command, Pending};
+use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
+use crate::time::{Duration, Instant};
+
+/// A path begins this near to where the vehicle is, metres.
+const BEGINS_M: f32 = 0.1;
+
+/// One vehicle's mission: at most `W` waypoints and `G` gates.
+#[derive(Clone, Debug)]
+pub(crate) struct Mission<const W: usize, const G: usize> {
+    state: State,
+    entered_at: Instant,
+    /// When MISSION_START was taken: the schedule counts from it.
+    started_at: Instant,
+    /// When the pilot took the vehicle.
+    pilot_since: Instant,
+    interrupted: Interrupted,
+    pending: Pending,
+    /// The autopilot's mode at the start.
+    mode_before: u32,
+    /// First point of the path, above the pad.
+    start: Point,
+    plan: Option<VehiclePlan<W, G>>,
+    failure: Option<PlanFailure>,
+    /// Since when the estimate is worse than the margin leaves at a crawl.
+    vague_since: Option<Instant>,
+}
+
+impl<const W: usize, const G: usize> Mission<W, G> {
+    /// Before the autopilot was heard; the path is to begin at `start`.
+    pub(crate) fn new(start: Point) -> Self {
+        Self {
+            state: State::WaitAutopilot,
+            entered_at: Instant::ZERO,
+            started_at: Instant::ZERO,
+            pilot_since: Instant::ZERO,
+            interrupted: Interrupted::default(),
+            pending: Pending::default(),
+            mode_before: 0,
+            start,
+            plan: None,
+            failure: None,
+            vague_since: None,
+        }
+    }
+
+    /// Where it is.
+    pub(crate) fn state(&self) -> State {
+        self.state
+    }
+
+    /// Since when.
+    pub(crate) fn entered_at(&self) -> Instant {
+        self.entered_at
+    }
+
+    /// For how long.
+    pub(crate) fn in_state(&self, now: Instant) -> Duration {
+        now - self.entered_at
+    }
+
+    /// When the mission was started.
+    pub(crate) fn started_at(&self) -> Instant {
+        self.started_at
+    }
+
+    /// For how long the pilot has the vehicle.
+    pub(crate) fn with_pilot(&self, now: Instant) -> Duration {
+        now - self.pilot_since
+    }
+
+    /// The state of the flight itself, beneath pause and loss.
+    pub(crate) fn beneath(&self) -> State {
+        self.interrupted.beneath(self.state)
+    }
+
+    /// What was commanded and is not done yet.
+    pub(crate) fn pending(&self) -> &Pending {
+        &self.pending
+    }
+
+    /// The autopilot's mode at the start.
+    pub(crate) fn mode_before(&self) -> u32 {
+        self.mode_before
+    }
+
+    /// First point of the path, above the pad.
+    pub(crate) fn start(&self) -> Point {
+        self.start
+    }
+
+    /// The place of the vehicle on the ground before it starts.
+    pub(crate) fn pad(&self) -> Point {
+        self.start - Point::new(0.0, 0.0, self.climb_m())
+    }
+
+    /// The plan.
+    pub(crate) fn plan(&self) -> Option<&VehiclePlan<W, G>> {
+        self.plan.as_ref()
+    }
+
+    /// Height of its climb, metres.
+    pub(crate) fn climb_m(&self) -> f32 {
+        self.plan.as_ref().map_or(0.0, |plan| plan.climb_m)
+    }
+
+    /// Why the plan requested last did not come.
+    pub(crate) fn failure(&self) -> Option<PlanFailure> {
+        self.failure
+    }
+
+    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
+    pub(crate) fn departure_due(&self, now: Instant) -> bool {
+        let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
+        (now - self.started_at).secs_f32() >= depart_s
+    }
+
+    /// For how long the estimate has been worse than the margin leaves.
+    pub(crate) fn vague_for(&self, now: Instant) -> Duration {
+        self.vague_since.map_or(Duration::default(), |since| now - since)
+    }
+
+    /// Notes whether it is.
+    pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
+        self.vague_since = if usable { None } else { self.vague_since.or(Some(now)) };
+    }
+
+    /// Takes a command in and says the result; `None` for one that is not the mission's.
+    pub(crate) fn handle_command(&mut self, inputs: &Inputs, command: &Command) -> Option<u8> {
+        commands::apply(&mut self.pending, self.state, inputs, command)
+    }
+
+    /// Changes the state as a row of the table says. Returns it before and after.
+    pub(crate) fn enter(&mut self, row: &Row, custom_mode: u32, now: Instant) -> (State, State) {
+        let from = self.state;
+        let to = match row.to {
+            To::State(to) => to,
+            To::Interrupted => self.interrupted.target(from),
+        };
+        self.interrupted.note(from, to);
+        (self.state, self.entered_at) = (to, now);
+        if row.guard == Guard::StartCommanded {
+            (self.started_at, self.mode_before) = (now, custom_mode);
+        }
+        if to == State::PilotControl && from != State::PilotReturned {
+            self.pilot_since = now;
+        }
+        let ends = matches!(to, State::Aborted | State::Done)
+            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
+        self.pending.state_changed(row.guard, to, ends);
+        (from, to)
+    }
+
+    /// What a person reads on a change of state that interrupts another.
+    pub(crate) fn interruption(&self, from: State, to: State) -> Option<&'static str> {
+        self.interrupted.text(from, to)
+    }
+
+    /// A plan is requested: there is none, and no failure.
+    pub(crate) fn forget_plan(&mut self) {
+        (self.plan, self.failure) = (None, None);
+    }
+
+    /// A way around is requested: the plan stays until it comes.
+    pub(crate) fn forget_failure(&mut self) {
+        self.failure = None;
+    }
+
+    /// Takes the plan requested.
+    pub(crate) fn take_plan(&mut self, plan: &VehiclePlan<W, G>) {
+        match self.begins_at(plan, &self.start) {
+            true => self.plan = Some(plan.clone()),
+            false => self.failure = Some(PlanFailure::Invalid),
+        }
+    }
+
+    /// What was requested did not come.
+    pub(crate) fn fail(&mut self, failure: PlanFailure) {
+        self.failure = Some(failure);
+    }
+
+    /// Flies along another path, beside the shared plan.
+    pub(crate) fn leave_plan(&mut self, path: &Path<W>) {
+        if let Some(plan) = &mut self.plan {
+            plan.path = path.clone();
+            plan.gates.clear();
+            plan.depart_s = 0.0;
+        }
+    }
+
+    /// Flies back, as `turn` makes the path. Off the shared plan: neighbours keep clear of it as of a stranger.
+    pub(crate) fn turn_back(&mut self, turn: impl FnOnce(&mut Path<W>)) {
+        if let Some(plan) = &mut self.plan {
+            turn(&mut plan.path);
+            plan.gates.clear();
+            core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
+        }
+    }
+
+    /// Finite, from `place`, and a path wherever there is a goal.
+    pub(crate) fn begins_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
+        let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
+        let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
+            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
+        let first = plan.path.waypoints().first();
+        let begins = first.is_some_and(|w| (w.position - place).norm() < BEGINS_M);
+        finite && (begins || plan.goal.is_none())
+    }
+}
