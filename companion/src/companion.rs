@@ -7,7 +7,6 @@ mod steps;
 mod transmit;
 
 use heapless::Deque;
-use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::Kind;
@@ -16,11 +15,11 @@ use crate::autopilot::telemetry::Telemetry;
 use crate::config::{Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link};
 use crate::guidance::{Guidance, Scene, Stats};
-use crate::link::commands::Pending;
 use crate::link::frame::Counters;
 use crate::link::{Fresh, Links};
+use crate::mission::State;
+use crate::mission::course::Mission;
 use crate::mission::waits::Waits;
-use crate::mission::{Interrupted, State};
 use crate::services::Services;
 use crate::swarm::detour::{Around, Obstacles};
 use crate::swarm::neighbours::Neighbours;
@@ -47,32 +46,18 @@ const EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
-    /// Since when the estimate is worse than the margin leaves at a crawl.
-    pub(crate) vague_since: Option<Instant>,
     pub(crate) rank: u16,
-    pub(crate) start: Point,
     pub(crate) now: Instant,
     pub(crate) timers: Timers,
     pub(crate) links: Links,
     pub(crate) telemetry: Telemetry,
     pub(crate) neighbours: Neighbours<V>,
-    pub(crate) plan: Option<VehiclePlan<W, G>>,
-    pub(crate) plan_failure: Option<PlanFailure>,
     pub(crate) around: Around,
     pub(crate) obstacles: Obstacles,
-    pub(crate) state: State,
-    pub(crate) entered_at: Instant,
-    /// When MISSION_START was taken: the schedule counts from it.
-    started_at: Instant,
-    /// When the pilot took the vehicle.
-    pub(crate) pilot_since: Instant,
-    pub(crate) interrupted: Interrupted,
-    pub(crate) pending: Pending,
     pub(crate) requests: Requests,
-    pub(crate) waits: Waits,
+    pub(crate) mission: Mission<W, G>,
+    waits: Waits,
     pub(crate) guidance: Guidance,
-    pub(crate) mode_before: u32,
-    stepped_at: Instant,
     pub(crate) services: Services,
     pub(crate) events: Deque<Event, EVENTS>,
 }
@@ -85,9 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
         let start = own.start;
         Ok(Self {
-            vague_since: None,
             rank,
-            start,
             now: Instant::ZERO,
             timers: Timers::default(),
             links: Links::default(),
@@ -97,21 +80,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 config.system_id,
                 config.cruise_mps.max(config.climb_mps),
             ),
-            plan: None,
-            plan_failure: None,
             around: Around::default(),
             obstacles: Obstacles::default(),
-            state: State::WaitAutopilot,
-            entered_at: Instant::ZERO,
-            started_at: Instant::ZERO,
-            pilot_since: Instant::ZERO,
-            interrupted: Interrupted::default(),
-            pending: Pending::default(),
             requests: Requests::default(),
+            mission: Mission::new(start),
             waits: Waits::default(),
             guidance: Guidance::new(&config, &Kind::default().default_limits()),
-            mode_before: 0,
-            stepped_at: Instant::ZERO,
             services: Services::new(&config),
             events: Deque::new(),
             config,
@@ -120,12 +94,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Where the mission is.
     pub fn state(&self) -> State {
-        self.state
+        self.mission.state()
     }
 
     /// Whether setpoints are to go out, one each 50 ms.
     pub fn streams(&self) -> bool {
-        self.state.streams_setpoints()
+        self.mission.state().streams_setpoints()
     }
 
     /// The autopilot as last heard.
@@ -155,12 +129,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// changes by it; its cost is counted so.
     pub fn ask_filter(&mut self, now: Instant) -> u8 {
         let scene = Scene::new(
-            self.plan.as_ref(),
+            self.mission.plan(),
             &self.telemetry,
             (self.rank, self.config.system_id),
             self.around.flying,
         );
-        self.guidance.ask_filter(self.state, &scene, &self.neighbours, now)
+        self.guidance.ask_filter(self.mission.state(), &scene, &self.neighbours, now)
     }
 
     /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
@@ -172,7 +146,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub fn progress_m(&self) -> f32 {
         // What is flown around comes on top of where the plan was left.
         let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
-        self.guidance.progress_m(self.state, &self.scene()) + left_at_m.max(0.0)
+        self.guidance.progress_m(self.mission.state(), &self.scene()) + left_at_m.max(0.0)
     }
 
     /// What the setpoints came to since the start.
@@ -229,13 +203,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// was asked for.
     pub fn handle_plan(&mut self, now: Instant, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
         self.now = now;
-        match (self.state, outcome) {
-            (State::Planning, Ok(plan)) if self.begins_at(plan, &self.start) => {
-                self.plan = Some(plan.clone());
-            }
+        match (self.mission.state(), outcome) {
+            (State::Planning, Ok(plan)) => self.mission.take_plan(plan),
+            (State::Planning, Err(failure)) => self.mission.fail(failure),
             (State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
-            (State::Planning, Ok(_)) => self.plan_failure = Some(PlanFailure::Invalid),
-            (State::Planning, Err(failure)) => self.plan_failure = Some(failure),
             (State::Replanning | State::PadReplanning, Err(failure)) => self.miss_detour(failure),
             _ => return,
         }
@@ -254,7 +225,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     pub(crate) fn scene(&self) -> Scene<'_, W, G> {
         Scene::new(
-            self.plan.as_ref(),
+            self.mission.plan(),
             &self.telemetry,
             (self.rank, self.config.system_id),
             self.around.flying,
@@ -263,15 +234,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// What requests to the autopilot follow from.
     fn situation(&self) -> Situation {
-        let in_state = self.now - self.entered_at;
+        let in_state = self.mission.in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
         let timeout_s = (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_S.0, GUID_TIMEOUT_S.1);
         let column_clear = self.guidance.filter.column_clear();
         Situation {
             now: self.now,
-            state: self.state,
+            state: self.mission.state(),
             in_state,
-            climb_m: self.plan.as_ref().map_or(0.0, |plan| plan.climb_m),
+            climb_m: self.mission.climb_m(),
             guided_timeout_s: timeout_s,
             may_land: Situation::may_land(in_state, column_clear, self.must_land()),
         }
@@ -283,27 +254,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.requests.begin(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
             self.guidance.tune(&self.config, self.requests.limits());
         }
-    }
-
-    /// When the mission was started.
-    pub(crate) fn started_at(&self) -> Instant {
-        self.started_at
-    }
-
-    /// Whether the schedule lets it take off: it waits on the pad rather than at its first gate in the air.
-    pub(crate) fn departure_due(&self) -> bool {
-        let depart_s = self.plan.as_ref().map_or(0.0, |plan| plan.depart_s);
-        (self.now - self.started_at).secs_f32() >= depart_s
-    }
-
-    /// Finite, from `place`, and a path wherever there is a goal.
-    pub(crate) fn begins_at(&self, plan: &VehiclePlan<W, G>, place: &Point) -> bool {
-        let numbers = [plan.climb_m, plan.descent_m, plan.depart_s];
-        let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
-            && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
-        let first = plan.path.waypoints().first();
-        let begins = first.is_some_and(|w| (w.position - place).norm() < 0.1);
-        finite && (begins || plan.goal.is_none())
     }
 }
 

@@ -4,6 +4,7 @@
 //! held for the row's limit. Order is rank: the pilot and the failsafe come first. `docs/table.md` prints the same table, and
 //! a test compares the two.
 
+pub(crate) mod course;
 mod guard;
 mod state;
 pub mod table;

@@ -36,6 +36,7 @@ const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timers {
     due_at: [Instant; TIMERS],
+    stepped_at: Instant,
 }
 
 impl Timers {
@@ -68,6 +69,11 @@ impl Timers {
     pub(crate) fn repeat(&mut self, timer: Timer, now: Instant, every: Duration) {
         let due = self.due_at[timer as usize] + every;
         self.set(timer, if due > now { due } else { now + every });
+    }
+
+    /// Time since the step before, seconds; this is the next.
+    pub(crate) fn step_s(&mut self, now: Instant) -> f32 {
+        (now - core::mem::replace(&mut self.stepped_at, now)).secs_f32()
     }
 
     /// When the shell is to call again.

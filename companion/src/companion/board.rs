@@ -40,11 +40,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Sectors are erased only on the ground, disarmed, and not while the roadmap is planned on.
     pub(crate) fn erasing(&self) -> Erasing {
         let idle = matches!(
-            self.state,
+            self.mission.state(),
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
         );
         let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
-        match self.state {
+        match self.mission.state() {
             _ if self.telemetry.armed => Erasing::Forbidden,
             _ if idle && known => Erasing::Allowed,
             _ if idle => Erasing::NotYet,

@@ -56,16 +56,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
                     let changed = self.requests.handle_limit(&self.telemetry, frame);
-                    if changed && !self.state.streams_setpoints() {
+                    if changed && !self.mission.state().streams_setpoints() {
                         self.guidance.tune(&self.config, self.requests.limits());
                     }
                     return false;
                 }
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
                 if let Some(ack) = self.telemetry.ack.take() {
-                    self.requests.handle_ack(&ack, own, self.state, self.now, &mut self.links);
+                    self.requests.handle_ack(&ack, own, self.mission.state(), self.now, &mut self.links);
                 }
-                self.requests.watch(self.state, &self.telemetry);
+                self.requests.watch(self.mission.state(), &self.telemetry);
                 if change == Change::OriginDoubted {
                     self.timers.hasten(Timer::Origin, self.now + ORIGIN_AGAIN);
                     return self.telemetry.origin_moved;
@@ -102,7 +102,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         // Its sequence number counts only if the frame decodes.
         if frame.message_id == TUNNEL_DATA::ID {
             if let Some(relay) = Relay::decode(frame.padded(), id) {
-                let ours = self.plan.as_ref().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
+                let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
                 if ours && relay.mission_crc == self.config.mission_crc {
                     self.neighbours.handle_relay(self.now, id, &relay);
                 }
@@ -122,7 +122,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 late.take(delay_s);
             }
             if self.neighbours.accept(id, frame.sequence, self.now) {
-                let plan_crc = self.plan.as_ref().map(|plan| plan.plan_crc);
+                let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
                 self.neighbours.handle_intent(
                     self.now,
                     self.rank,
@@ -148,9 +148,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
     pub(super) fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
-        let (before, known) = (self.pending, self.obstacles.count());
+        let (before, known) = (*self.mission.pending(), self.obstacles.count());
         let inputs = self.inputs();
-        let result = match commands::apply(&mut self.pending, self.state, &inputs, command) {
+        let result = match self.mission.handle_command(&inputs, command) {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
             None if command.command == commands::EXCLUDE => self.exclude(command),
@@ -164,7 +164,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             None => UNSUPPORTED,
         };
         let restarts = command.command == commands::RESTART && result == ACCEPTED;
-        if restarts || self.pending != before || self.obstacles.count() != known {
+        if restarts || *self.mission.pending() != before || self.obstacles.count() != known {
             self.links.log_command(self.now, sender, command);
         }
         command.to_us.then_some(result)

@@ -25,9 +25,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (t, now, scene) = (&self.telemetry, self.now, self.scene());
         let (kind, handshake) = (self.kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
-        let mode_foreign = match self.state {
+        let mode_foreign = match self.mission.state() {
             State::Scheduled | State::PadReplanning | State::Streaming | State::Engaging => {
-                !offboard && t.custom_mode != self.mode_before
+                !offboard && t.custom_mode != self.mission.mode_before()
             }
             // Disarming after a landing the autopilot chooses a mode of its own.
             State::Land | State::LandingHeld | State::Disarm => {
@@ -35,22 +35,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             _ => !offboard,
         };
-        let climb_m = self.plan.as_ref().map_or(0.0, |plan| plan.climb_m);
-        let away = t.position - (self.start - Point::new(0.0, 0.0, climb_m));
+        let climb_m = self.mission.climb_m();
+        let away = t.position - (self.mission.start() - Point::new(0.0, 0.0, climb_m));
         let height_tolerance_m = self.config.start_tolerance_m.min(START_HEIGHT_M);
-        let beneath = self.interrupted.beneath(self.state);
-        let follow = self.state == State::Follow;
+        let beneath = self.mission.beneath();
+        let follow = self.mission.state() == State::Follow;
         let fence = self.config.geofence;
         let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
         Inputs {
-            in_state: now - self.entered_at,
+            in_state: self.mission.in_state(now),
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
-            stalled: if follow || self.state == State::Blocked {
+            stalled: if follow || self.mission.state() == State::Blocked {
                 now - self.guidance.progress_at()
             } else {
                 Duration::default()
@@ -59,22 +59,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // being heard.
             neighbour_age: match self.guidance.returning || self.around.lands {
                 true => Duration::default(),
-                false => self.neighbours.silence(now, self.entered_at),
+                false => self.neighbours.silence(now, self.mission.entered_at()),
             },
             neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
-            plan_ready: self.plan.is_some(),
-            plan_failed: self.plan_failure.is_some(),
-            roadmap_bad: self.plan_failure == Some(PlanFailure::NoRoadmap),
-            has_goal: self.plan.as_ref().is_some_and(|plan| plan.goal.is_some()),
+            plan_ready: self.mission.plan().is_some(),
+            plan_failed: self.mission.failure().is_some(),
+            roadmap_bad: self.mission.failure() == Some(PlanFailure::NoRoadmap),
+            has_goal: self.mission.plan().is_some_and(|plan| plan.goal.is_some()),
             at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
-            imprecise: self.state == State::Ready && self.guidance.pace < 1.0,
-            vague: self.vague_since.map_or(Duration::default(), |since| now - since),
+            imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
+            vague: self.mission.vague_for(now),
             origin_moved: t.origin_moved,
-            start: self.pending.start,
-            pause: self.pending.pause,
-            resume: self.pending.resume,
-            land: self.pending.land,
-            turn_back: self.pending.turn_back && !self.guidance.returning,
+            start: self.mission.pending().start,
+            pause: self.mission.pending().pause,
+            resume: self.mission.pending().resume,
+            land: self.mission.pending().land,
+            turn_back: self.mission.pending().turn_back && !self.guidance.returning,
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
             armed_unseen: handshake.is_armed_unseen(now),
@@ -92,16 +92,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05
                 && self.guidance.filter.column_clear()
-                && self.departure_due()
-                && !self.pending.pause
+                && self.mission.departure_due(now)
+                && !self.mission.pending().pause
                 && battery_reported(t, self.config.battery_low_percent, now)
                 && !self.around.blocked
-                && self.neighbours.is_clear_since(self.entered_at)
+                && self.neighbours.is_clear_since(self.mission.entered_at())
                 && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
-            climb_done: self.state == State::Climb && self.guidance.climb_done(&scene),
+            climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(&scene),
             path_done: follow && self.guidance.path_done(&scene),
             at_goal: self.guidance.at_goal(&scene),
-            near_path: match (beneath, self.state) {
+            near_path: match (beneath, self.mission.state()) {
                 // Those refer to no place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
                 (_, State::PilotReturned) => self.guidance.near_path(&scene, REJOIN_WINDOW_M),

@@ -7,7 +7,7 @@ use crate::events::{Event, Link};
 use crate::guidance::Scene;
 use crate::link::Fresh;
 use crate::margins;
-use crate::mission::{self, Action, Guard, Row, State, To};
+use crate::mission::{self, Action, Row, State};
 use crate::storage::store::Erasing;
 use crate::swarm::detour::{Aim, Around};
 use crate::timers::Timer;
@@ -20,15 +20,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.tune();
         }
         self.watch_estimate();
-        let dt_s = (now - self.stepped_at).secs_f32().clamp(0.0, 0.2);
-        self.stepped_at = now;
+        let dt_s = self.timers.step_s(now).clamp(0.0, 0.2);
         let scene = Scene::new(
-            self.plan.as_ref(),
+            self.mission.plan(),
             &self.telemetry,
             (self.rank, self.config.system_id),
             self.around.flying,
         );
-        if !self.guidance.step(self.state, &scene, &mut self.neighbours, now, dt_s)
+        if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
             && self.timers.take(Timer::HeldReport, now, REPORT_EVERY)
         {
             self.links.say(true, "Setpoint out of limits: holding");
@@ -43,10 +42,22 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.requests.poll(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
             self.guidance.tune(&self.config, self.requests.limits());
         }
-        let flows = self.state.streams_setpoints();
+        let flows = self.mission.state().streams_setpoints();
         self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
         let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
         self.timers.repeat(Timer::Step, now, every);
+    }
+
+    /// Names a vehicle that never starts while this one waits for it.
+    fn name_who_never_starts(&mut self) {
+        let flies = matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
+        let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
+        let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
+        if self.waits.watch(id, self.now) {
+            self.links.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
+            // Full only if the shell does not drain.
+            let _ = self.events.push_back(Event::WaitsForStart { id });
+        }
     }
 
     /// Compares the estimate's bound with what the margin leaves, and sets the pace.
@@ -59,9 +70,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
         };
         let before = core::mem::replace(&mut self.guidance.pace, pace);
-        self.vague_since = if pace > 0.0 { None } else { self.vague_since.or(Some(now)) };
+        self.mission.note_estimate(pace > 0.0, now);
         let kind = |pace: f32| if pace >= 1.0 { 2 } else { u8::from(pace > 0.0) };
-        if kind(before) == kind(pace) || !self.state.streams_setpoints() {
+        if kind(before) == kind(pace) || !self.mission.state().streams_setpoints() {
             return;
         }
         // Whole centimetres, rounded up; more than a hundred metres is not known.
@@ -80,36 +91,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn run_table(&mut self) {
         for _ in 0..ROWS_AT_ONCE {
             let inputs = self.inputs();
-            let Some(row) = mission::update(self.state, &inputs) else { return };
+            let Some(row) = mission::update(self.mission.state(), &inputs) else { return };
             self.take(row);
         }
     }
 
     pub(super) fn take(&mut self, row: &'static Row) {
-        let (from, now) = (self.state, self.now);
-        let to = match row.to {
-            To::State(to) => to,
-            To::Interrupted => self.interrupted.target(from),
-        };
-        self.interrupted.note(from, to);
-        self.state = to;
-        self.entered_at = now;
-        if row.guard == Guard::StartCommanded {
-            self.started_at = now;
-            self.mode_before = self.telemetry.custom_mode;
-        }
-        if to == State::PilotControl && from != State::PilotReturned {
-            self.pilot_since = now;
-        }
-        let ends = matches!(to, State::Aborted | State::Done)
-            || matches!(row.action, Action::ForgetStart | Action::CancelStart);
-        self.pending.state_changed(row.guard, to, ends);
+        let now = self.now;
+        let (from, to) = self.mission.enter(row, self.telemetry.custom_mode, now);
         self.requests.state_changed(from, to);
         self.act(from, to, row);
         if !row.text.is_empty() {
             self.links.say(row.warning, row.text);
         }
-        if let Some(text) = self.interrupted.text(from, to) {
+        if let Some(text) = self.mission.interruption(from, to) {
             self.links.say(false, text);
         }
         // Full only if the shell does not drain: then the newest is lost.
@@ -129,8 +124,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::None | Action::ForgetStart => {}
             Action::Connect => self.connect(),
             Action::RequestPlan => {
-                self.plan = None;
-                self.plan_failure = None;
+                self.mission.forget_plan();
                 self.around = Around { left: self.around.left, ..Around::default() };
                 self.obstacles.avoided = 0;
                 self.neighbours.forget_plan();
@@ -162,12 +156,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
-                if let Some(plan) = &mut self.plan {
-                    self.guidance.turn_back(&mut plan.path, now);
-                    // Off the shared plan: neighbours keep clear of us as of a stranger.
-                    plan.gates.clear();
-                    core::mem::swap(&mut plan.climb_m, &mut plan.descent_m);
-                }
+                let guidance = &mut self.guidance;
+                self.mission.turn_back(|path| guidance.turn_back(path, now));
             }
         }
     }
@@ -192,8 +182,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             State::TakeOff => self.timers.set(Timer::Request, now),
             State::Land => self.ask_land(from),
             _ => {
-                let climbs = matches!(self.interrupted.beneath(to), State::TakeOff | State::Climb);
-                if let Some(plan) = &self.plan {
+                let climbs = matches!(self.mission.beneath(), State::TakeOff | State::Climb);
+                if let Some(plan) = self.mission.plan() {
                     self.guidance.go_on(plan, climbs, &position, now);
                 }
                 if to == State::Blocked {

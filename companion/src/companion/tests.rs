@@ -15,6 +15,7 @@ use planner_core::deconflict::Method;
 use super::*;
 use crate::autopilot::px4;
 use crate::testing::fake_autopilot::*;
+use planner_core::Point;
 
 /// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
 pub(super) fn assert_no_gap(bench: &Bench) {

@@ -62,7 +62,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !self.links.radio_half_full() || !self.links.take_due(Link::Swarm, Fresh::Relay) {
             return 0;
         }
-        let plan_crc = self.plan.as_ref().map_or(0, |plan| plan.plan_crc);
+        let plan_crc = self.mission.plan().map_or(0, |plan| plan.plan_crc);
         let crc = self.config.mission_crc;
         let relay = self.neighbours.relay(self.now, crc, plan_crc);
         if relay.is_empty() {
@@ -104,17 +104,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let still = Point::zeros();
         let kind = self.kind();
         let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, kind.stop_mask());
-        let (position, velocity, acceleration, mask) = match self.guidance.setpoint(self.state, &self.scene())
-        {
-            Setpoint::None => return None,
-            Setpoint::Stop(velocity) => stop(&velocity),
-            Setpoint::Move(position, velocity, acceleration) => {
-                self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
-                    let velocity = frames::swap_enu_ned(&velocity);
-                    (ned, velocity, frames::swap_enu_ned(&acceleration), kind.move_mask())
-                })
-            }
-        };
+        let (position, velocity, acceleration, mask) =
+            match self.guidance.setpoint(self.mission.state(), &self.scene()) {
+                Setpoint::None => return None,
+                Setpoint::Stop(velocity) => stop(&velocity),
+                Setpoint::Move(position, velocity, acceleration) => {
+                    self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
+                        let velocity = frames::swap_enu_ned(&velocity);
+                        (ned, velocity, frames::swap_enu_ned(&acceleration), kind.move_mask())
+                    })
+                }
+            };
         Some(SET_POSITION_TARGET_LOCAL_NED_DATA {
             time_boot_ms: self.now.boot_ms(),
             x: position.x,
@@ -135,14 +135,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn heartbeat(&self) -> HEARTBEAT_DATA {
-        let system_status = match self.state {
+        let system_status = match self.mission.state() {
             State::WaitAutopilot | State::WaitPosition => MavState::MAV_STATE_BOOT,
             State::Planning | State::Ready | State::Done | State::Aborted => MavState::MAV_STATE_STANDBY,
             State::AutopilotSilent | State::PositionLost | State::Failsafe => MavState::MAV_STATE_CRITICAL,
             _ => MavState::MAV_STATE_ACTIVE,
         };
         HEARTBEAT_DATA {
-            custom_mode: self.state as u32,
+            custom_mode: self.mission.state() as u32,
             mavtype: MavType::MAV_TYPE_ONBOARD_CONTROLLER,
             autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
             base_mode: MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED,
@@ -171,13 +171,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     fn intent(&self) -> Intent {
         use State::*;
-        let grounded = match self.state {
+        let grounded = match self.mission.state() {
             Done | Disarm => true,
             _ => !self.telemetry.armed || self.telemetry.on_ground == Some(true),
         };
         let on_plan = !self.guidance.returning
             && matches!(
-                self.state,
+                self.mission.state(),
                 Ready
                     | Scheduled
                     | PadReplanning
@@ -191,19 +191,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Replanning
                     | Paused
             )
-            || matches!(self.state, Land | LandingHeld | Disarm | Done)
+            || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.at_goal(&self.scene());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
         let out = self.is_out();
         let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
-            | flag(intent::LANDED, self.state == Done)
-            | flag(intent::ON_PLAN, on_plan && self.plan.is_some())
+            | flag(intent::LANDED, self.mission.state() == Done)
+            | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT, out)
             | flag(intent::WAITING, self.waits())
             | flag(intent::BLOCKED, self.around.blocked)
             | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
-        let plan = self.plan.as_ref();
-        let along_m = self.guidance.progress_m(self.state, &self.scene());
+        let plan = self.mission.plan();
+        let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
         let (points, column) = self.way_ahead();
         Intent {
             system_id: self.config.system_id,
@@ -213,7 +213,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             progress_m: if self.around.flying { self.around.left_at_m } else { along_m },
             heard: self.neighbours.heard_bits(self.now),
             speed_mps: self.telemetry.velocity.norm(),
-            floor_m: plan.map_or(self.start.z, |plan| self.guidance.ground_m(plan)),
+            floor_m: plan.map_or(self.mission.start().z, |plan| self.guidance.ground_m(plan)),
             column,
             echo: self.neighbours.echo(self.links.intents_sent(), self.now),
             points,
@@ -225,7 +225,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let mut points = heapless::Vec::new();
         let here = self.telemetry.position;
-        let setpoint = match self.guidance.setpoint(self.state, &self.scene()) {
+        let setpoint = match self.guidance.setpoint(self.mission.state(), &self.scene()) {
             Setpoint::Move(place, ..) => place,
             _ => here,
         };
@@ -233,11 +233,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // Full after eight: the rest is further than it can fly before it is heard again.
             let _ = points.push(point);
         };
-        let Some(plan) = &self.plan else { return (points, true) };
+        let Some(plan) = self.mission.plan() else { return (points, true) };
         let path = &plan.path;
         let (first, last) = (path.point_at(0.0), path.point_at(path.length_m()));
         let mut column = true;
-        match self.state {
+        match self.mission.state() {
             // On the pad too: it may lift off before it is heard again.
             Scheduled | PadReplanning | Streaming | Engaging | Arming | TakeOff | Climb => {
                 add(setpoint);

@@ -1,8 +1,8 @@
 //! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
 
 use planner_core::Point;
-use planner_core::path::Path;
-use planner_core::schedule::VehiclePlan;
+use planner_core::flight::Path;
+use planner_core::flight::VehiclePlan;
 
 use crate::config::PlanFailure;
 use crate::link::commands::{self, Command, Pending};

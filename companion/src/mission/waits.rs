@@ -1,10 +1,7 @@
 //! A vehicle of the mission that never starts is named while this one waits for it: nobody else may see why the swarm stands.
 //!
-//! Constant work, but for one look through the roster.
+//! Constant work.
 
-use crate::companion::Companion;
-use crate::events::Event;
-use crate::mission::State;
 use crate::time::{Duration, Instant};
 
 /// So long a vehicle waits for one that has not started before it says so, and again.
@@ -17,18 +14,16 @@ pub(crate) struct Waits {
     since: Instant,
 }
 
-impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// After the guidance's step.
-    pub(crate) fn name_who_never_starts(&mut self) {
-        let flies = matches!(self.state, State::Scheduled | State::Follow | State::Blocked);
-        let id = if flies { self.guidance.advice.waiting_for } else { 0 };
-        if id != self.waits.id || id == 0 || !self.neighbours.is_not_started(id) {
-            self.waits = Waits { id, since: self.now };
-        } else if self.now - self.waits.since >= NAMED_AFTER {
-            self.waits.since = self.now;
-            self.links.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
-            // Full only if the shell does not drain.
-            let _ = self.events.push_back(Event::WaitsForStart { id });
+impl Waits {
+    /// After each step: it waits for the vehicle `id` that has not started, or for none (0). Returns whether that is to be named.
+    pub(crate) fn watch(&mut self, id: u8, now: Instant) -> bool {
+        if id != self.id || id == 0 {
+            *self = Self { id, since: now };
         }
+        let named = id != 0 && now - self.since >= NAMED_AFTER;
+        if named {
+            self.since = now;
+        }
+        named
     }
 }

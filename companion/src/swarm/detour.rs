@@ -165,11 +165,11 @@ pub(crate) struct Told {
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether it has left the plan for good, and rests or is a pilot's.
     pub(crate) fn is_out(&self) -> bool {
-        let lasted = self.now - self.entered_at;
-        match self.state {
+        let lasted = self.mission.in_state(self.now);
+        match self.mission.state() {
             State::Done => !self.guidance.at_goal(&self.scene()) || self.around.left,
             State::Aborted => self.telemetry.on_ground == Some(true) || lasted >= SETTLED,
-            State::PilotControl | State::PilotReturned => self.now - self.pilot_since >= KEPT,
+            State::PilotControl | State::PilotReturned => self.mission.with_pilot(self.now) >= KEPT,
             _ => false,
         }
     }
@@ -183,11 +183,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let now = self.now;
         let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
         let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
-        match self.state {
+        match self.mission.state() {
             State::Scheduled | State::PadReplanning => {
                 self.around.blocked
                     || !self.guidance.filter.column_clear()
-                    || self.neighbours.silence(now, self.started_at()) >= UNHEARD
+                    || self.neighbours.silence(now, self.mission.started_at()) >= UNHEARD
                     || (held && self.guidance.advice.stop_within_m <= 0.05)
             }
             State::Follow => held && stands,
@@ -212,7 +212,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(crate) fn mark_place(&mut self, to: State) {
         match to {
             State::PositionLost if self.around.lost_at.is_none() && self.telemetry.is_settling(self.now) => {
-                let path = self.plan.as_ref().map(|plan| &plan.path);
+                let path = self.mission.plan().map(|plan| &plan.path);
                 let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
                 self.around.lost_at = Some((on_path.unwrap_or(self.telemetry.position), self.now));
             }
@@ -224,10 +224,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Looks for what blocks the path, and whether the others stand.
     pub(crate) fn look_around(&mut self) {
         let now = self.now;
-        self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.plan.is_some();
-        let on_ground = matches!(self.state, State::Scheduled | State::PadReplanning);
-        let stopped = matches!(self.state, State::Blocked | State::Replanning);
-        if !on_ground && !stopped && self.state != State::Follow {
+        self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.mission.plan().is_some();
+        let on_ground = matches!(self.mission.state(), State::Scheduled | State::PadReplanning);
+        let stopped = matches!(self.mission.state(), State::Blocked | State::Replanning);
+        if !on_ground && !stopped && self.mission.state() != State::Follow {
             (self.around.blocked, self.around.in_the_way) = (false, false);
             (self.around.quiet_since, self.around.claimed_since) = (None, None);
             self.around.sweep.restart();
@@ -259,8 +259,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// What follows from what is known: whether it is blocked, for how long all have stood, and whether it claims its turn.
     fn weigh(&mut self) {
         let now = self.now;
-        let stuck =
-            self.around.flying && self.state != State::Scheduled && now - self.guidance.progress_at() > STUCK;
+        let stuck = self.around.flying
+            && self.mission.state() != State::Scheduled
+            && now - self.guidance.progress_at() > STUCK;
         let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
         let astray = self.around.left && (!self.around.flying || aside) && !self.around.lands;
         let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
@@ -279,8 +280,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether anything is; `None` while the look goes on.
     fn is_in_the_way(&mut self, on_ground: bool) -> Option<bool> {
-        let Some(plan) = &self.plan else { return Some(false) };
-        let here = if on_ground { self.pad() } else { self.telemetry.position };
+        let Some(plan) = self.mission.plan() else { return Some(false) };
+        let here = if on_ground { self.mission.pad() } else { self.telemetry.position };
         let along_m = self.guidance.along_m();
         let cost = detour::stretches_ahead(&plan.path, along_m) + THING_COST;
         let apart_m = self.config.safety_distance_m + STRAY_M;
@@ -327,10 +328,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    fn pad(&self) -> Point {
-        self.start - Point::new(0.0, 0.0, self.plan.as_ref().map_or(0.0, |plan| plan.climb_m))
-    }
-
     /// Whether it may claim its turn to fly around.
     fn is_due(&self) -> bool {
         let wait_s = QUIET_S
@@ -354,7 +351,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.around.lands = aim == Aim::Landing;
         self.obstacles.requested = self.obstacles.known.len();
         self.guidance.trapped_since = None;
-        self.plan_failure = None;
+        self.mission.forget_failure();
         self.around.ready = false;
         // Full only if the shell does not drain; then the way around is late.
         let _ = self.events.push_back(Event::PlanRequested);
@@ -363,10 +360,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
     /// `tell` is given all that is to be kept off.
     pub fn detour(&self, mut tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
-        if !matches!(self.state, State::Replanning | State::PadReplanning) {
+        if !matches!(self.mission.state(), State::Replanning | State::PadReplanning) {
             return None;
         }
-        let plan = self.plan.as_ref()?;
+        let plan = self.mission.plan()?;
         let points = plan.path.waypoints();
         let along_m = self.guidance.along_m();
         let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
@@ -395,19 +392,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Takes the way around.
     pub(crate) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
-        let here = self.plan.as_ref().and_then(|plan| plan.path.point_at(along_m));
-        if !here.is_some_and(|here| self.begins_at(detour, &here)) {
+        let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+        if !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
             self.miss_detour(PlanFailure::Invalid);
             return;
         }
         if !self.around.flying {
-            self.around.left_at_m = self.guidance.progress_m(self.state, &self.scene());
+            self.around.left_at_m = self.guidance.progress_m(self.mission.state(), &self.scene());
         }
-        if let Some(plan) = &mut self.plan {
-            plan.path = detour.path.clone();
-            plan.gates.clear();
-            plan.depart_s = 0.0;
-        }
+        self.mission.leave_plan(&detour.path);
         let stuck = self.around.flying && self.now - self.guidance.progress_at() > STUCK;
         let fruitless = if stuck { self.around.fruitless.saturating_add(1) } else { 0 };
         let Around { aside, lands, left_at_m, .. } = self.around;
@@ -418,7 +411,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {
-        self.plan_failure = Some(failure);
+        self.mission.fail(failure);
         // Where no way aside is found there may yet be one around.
         if self.around.aside {
             self.around.no_way_aside_at = Some(self.now);
@@ -442,7 +435,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
     pub(crate) fn can_land_aside(&self) -> bool {
         let retries = |at: Instant| self.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
-        self.plan.as_ref().is_some_and(|plan| plan.goal.is_some())
+        self.mission.plan().is_some_and(|plan| plan.goal.is_some())
             && (!self.neighbours.is_deaf(self.now)
                 || self.neighbours.all_rest()
                 || self.guidance.filter.column_blocked_for(self.now) >= DEAF_ASIDE)

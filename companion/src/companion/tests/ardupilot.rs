@@ -8,6 +8,7 @@ use mavlink::dialects::ardupilotmega::{MavCmd, TIMESYNC_DATA};
 use super::super::*;
 use crate::autopilot::ardupilot;
 use crate::testing::fake_autopilot::*;
+use planner_core::Point;
 
 /// A bench in the middle of its path.
 fn following() -> Bench {

@@ -5,6 +5,7 @@ extern crate std;
 use super::super::*;
 use crate::autopilot::Kind;
 use crate::testing::fake_autopilot::*;
+use planner_core::Point;
 
 /// An estimate that is worse than the margin leaves: no start; in flight slower, then a stop, and on again.
 #[test]

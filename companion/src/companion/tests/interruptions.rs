@@ -12,6 +12,7 @@ use crate::autopilot::{ardupilot, px4};
 use crate::link::commands::{ACCEPTED, TEMPORARILY_REJECTED};
 use crate::link::intent::{GROUNDED, ON_PLAN, OUT};
 use crate::testing::fake_autopilot::*;
+use planner_core::Point;
 
 mod random;
 

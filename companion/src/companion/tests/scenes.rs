@@ -12,6 +12,7 @@ use crate::autopilot::px4;
 use crate::link::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
 use crate::testing::fake_autopilot::*;
 use crate::{Config, RosterEntry};
+use planner_core::Point;
 
 mod autopilot;
 mod detours;

@@ -69,7 +69,7 @@ impl Watch {
         let flies_on = matches!(state, State::TakeOff | State::Climb | State::Follow | State::Arming);
         assert!(!self.landing || !flies_on, "an accepted landing is forgotten in {state:?}: {:#?}", self.log);
         assert!(
-            !b.companion.pending.pause || !matches!(state, State::Climb | State::Follow),
+            !b.companion.mission.pending().pause || !matches!(state, State::Climb | State::Follow),
             "a pause is forgotten in {state:?}: {:#?}",
             self.log
         );
