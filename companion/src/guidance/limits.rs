@@ -2,8 +2,8 @@
 
 use libm::{fmaxf, fminf};
 use planner_core::deconflict::DeconflictConfig;
-use planner_core::track::TrackConfig;
 use planner_core::safety::{Bounds, Braking};
+use planner_core::track::TrackConfig;
 use planner_core::{ConfigError, Point};
 
 use crate::autopilot::limits::{AutopilotLimits, Limit};
