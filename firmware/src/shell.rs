@@ -18,7 +18,7 @@ use embassy_time::{Duration, Instant, Timer, with_timeout};
 use embedded_io_async::{Read, Write};
 use heapless::Vec;
 
-use crate::boards::{HoldsExecutors, overslept_us};
+use crate::boards::HoldsExecutors;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::planner::Planner;
 
@@ -160,11 +160,6 @@ fn now_ms() -> u32 {
     Instant::now().as_millis() as u32
 }
 
-/// The same without what an emulated board's host overslept, which is none of the firmware's doing.
-fn awake_ms() -> u32 {
-    (Instant::now().as_micros().saturating_sub(overslept_us().into()) / 1000) as u32
-}
-
 impl Shell {
     /// Without a companion.
     pub const fn new() -> Self {
@@ -207,7 +202,7 @@ impl Shell {
                     Event::PlanRequested => self.wants_plan.signal(()),
                     Event::RestartRequested => self.ask_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
-                        if let Some(told) = self.setpoints.take(awake_ms()) {
+                        if let Some(told) = self.setpoints.take(now_ms()) {
                             companion.say_count(false, "Setpoints: #, at most # ms apart", told);
                         }
                     }
@@ -216,9 +211,9 @@ impl Shell {
                 }
             }
             if companion.streams() {
-                self.setpoints.begin(awake_ms());
+                self.setpoints.begin(now_ms());
             } else {
-                self.setpoints.end(awake_ms());
+                self.setpoints.end(now_ms());
             }
             result
         });
@@ -284,7 +279,7 @@ impl Shell {
                 let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
-                    self.setpoints.note(awake_ms());
+                    self.setpoints.note(now_ms());
                 }
                 // What waited for room to be said may go on.
                 self.works.signal(());
@@ -369,16 +364,16 @@ impl Shell {
     /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
     /// watchdog is left to bite.
     pub fn is_alive(&self) -> bool {
-        self.is_alive_at(now_ms(), awake_ms())
+        self.is_alive_at(now_ms())
     }
 
-    fn is_alive_at(&self, now_ms: u32, awake_ms: u32) -> bool {
+    fn is_alive_at(&self, now_ms: u32) -> bool {
         if !self.started.load(Ordering::Relaxed) {
-            return awake_ms < STARTS_WITHIN_MS;
+            return now_ms < STARTS_WITHIN_MS;
         }
         let limit = 4 * ALIVE_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
-            && self.setpoints.since(awake_ms).is_none_or(|passed| passed < limit)
+            && self.setpoints.since(now_ms).is_none_or(|passed| passed < limit)
     }
 }
 
@@ -438,9 +433,9 @@ impl Setpoints {
     }
 }
 
-/// What passed since the last, if there was one. The time less what was overslept may step back by a little.
+/// What passed since the last, if there was one.
 fn passed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
-    (last_ms != 0).then(|| (now_ms.wrapping_sub(last_ms) as i32).max(0) as u32)
+    (last_ms != 0).then(|| now_ms.wrapping_sub(last_ms))
 }
 
 /// SET_POSITION_TARGET_LOCAL_NED, by the message id of a MAVLink 2 frame.
@@ -458,11 +453,11 @@ mod tests {
         assert_eq!(setpoints.since(1000), None);
         setpoints.note(1000);
         setpoints.note(1050);
-        assert_eq!((setpoints.since(1049), setpoints.since(1500)), (Some(0), Some(450)));
+        assert_eq!((setpoints.since(1050), setpoints.since(1500)), (Some(0), Some(450)));
         setpoints.end(1500);
         assert_eq!(setpoints.since(9000), None);
         setpoints.begin(9000);
-        setpoints.note(8999);
+        setpoints.note(9000);
         assert_eq!(setpoints.take(9000), Some([3, 450]));
         assert_eq!(setpoints.take(9000), None);
     }
@@ -470,19 +465,19 @@ mod tests {
     #[test]
     fn the_watchdog_is_fed_only_while_tasks_come_by_and_setpoints_flow() {
         let shell = Shell::new();
-        assert!(shell.is_alive_at(19_999, 19_999) && !shell.is_alive_at(20_000, 20_000), "it starts");
+        assert!(shell.is_alive_at(19_999) && !shell.is_alive_at(20_000), "it starts");
         shell.started.store(true, Ordering::Relaxed);
         let come_by = |ms| shell.seen_ms.iter().for_each(|seen| seen.store(ms, Ordering::Relaxed));
         come_by(1000);
-        assert!(shell.is_alive_at(1399, 1399) && !shell.is_alive_at(1400, 1400));
+        assert!(shell.is_alive_at(1399) && !shell.is_alive_at(1400));
         come_by(5000);
         shell.setpoints.begin(5000);
-        assert!(shell.is_alive_at(5399, 5399));
+        assert!(shell.is_alive_at(5399));
         come_by(5300);
-        assert!(!shell.is_alive_at(5400, 5400), "the first setpoint is late");
+        assert!(!shell.is_alive_at(5400), "the first setpoint is late");
         shell.setpoints.note(5400);
-        assert!(shell.is_alive_at(5400, 5400));
+        assert!(shell.is_alive_at(5400));
         shell.seen_ms[TIME].store(4000, Ordering::Relaxed);
-        assert!(!shell.is_alive_at(5400, 5400), "one task hangs");
+        assert!(!shell.is_alive_at(5400), "one task hangs");
     }
 }

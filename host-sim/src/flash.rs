@@ -68,6 +68,11 @@ impl DeskFlash {
         Ok(&[])
     }
 
+    /// What it holds.
+    pub fn into_bytes(self) -> Vec<u8> {
+        self.bytes
+    }
+
     fn change(&mut self, at: u32, len: usize, change: impl FnOnce(&mut [u8])) -> Result<(), Fault> {
         let start = at as usize;
         let part = self.bytes.get_mut(start..start + len).ok_or(Fault)?;

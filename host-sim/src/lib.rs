@@ -3,6 +3,7 @@
 
 pub mod area;
 pub mod autopilot;
+pub mod boards;
 pub mod capacity;
 pub mod commands;
 pub mod coverage;

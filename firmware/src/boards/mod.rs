@@ -35,16 +35,6 @@ pub use lock::HoldsExecutors;
 #[cfg(not(all(target_os = "none", feature = "board")))]
 pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 
-/// What an emulated board's host overslept since the start, microseconds.
-#[cfg(all(target_os = "none", feature = "qemu"))]
-pub use qemu::clock::overslept_us;
-
-/// What an emulated board's host overslept: a chip has none.
-#[cfg(not(all(target_os = "none", feature = "qemu")))]
-pub fn overslept_us() -> u32 {
-    0
-}
-
 /// The watchdog resets the board so long after it was last fed, microseconds.
 #[cfg(all(target_os = "none", feature = "board"))]
 pub(crate) const BITES_AFTER_US: u32 = 1_000_000;

@@ -47,6 +47,13 @@ pub struct FlyArgs {
     /// others hear each other only where its own radio joins them, and do not start where they are to
     #[arg(long, value_name = "URL", requires = "companion")]
     radio: Vec<LinkUrl>,
+    /// Boards in QEMU decide, in lock step with the simulation: the firmware that `cargo xtask build --board qemu` makes. Each has
+    /// roadmap and mission in its flash and logs to board-N.defmt in the directory
+    #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
+    emulate: Option<PathBuf>,
+    /// How many of the scenario's first vehicles have such a board, if not all
+    #[arg(long, value_name = "N", requires = "emulate")]
+    boards: Option<usize>,
 }
 
 /// Arguments of `host-sim demo`.
@@ -64,6 +71,9 @@ pub struct DemoArgs {
 pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     let mut scenario = load(&args.scenario, args.seed)?;
     put_on_boards(&mut scenario, &args.companion, &args.radio)?;
+    if let Some(program) = &args.emulate {
+        emulate(&mut scenario, program, args.boards, &args.out)?;
+    }
     plan_and_fly(scenario, "fly", &args.out, args.realtime, args.qgc.as_ref())
 }
 
@@ -78,6 +88,18 @@ fn put_on_boards(scenario: &mut Scenario, companions: &[LinkUrl], radios: &[Link
     );
     for (i, (vehicle, autopilot)) in scenario.vehicles.iter_mut().zip(companions).enumerate() {
         vehicle.companion = Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
+    }
+    Ok(())
+}
+
+/// The first vehicles have boards in QEMU.
+fn emulate(scenario: &mut Scenario, program: &Path, boards: Option<usize>, out: &Path) -> anyhow::Result<()> {
+    let vehicles = scenario.vehicles.len();
+    let boards = boards.unwrap_or(vehicles);
+    ensure!(boards <= vehicles, "too many --boards: {boards}: {} has {vehicles} vehicles", scenario.path);
+    for vehicle in &mut scenario.vehicles[..boards] {
+        let log = out.join(format!("board-{}.defmt", vehicle.id));
+        vehicle.companion = Companion::Emulated { program: program.to_owned(), log };
     }
     Ok(())
 }

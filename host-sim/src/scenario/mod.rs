@@ -216,6 +216,13 @@ pub enum Companion {
         /// Its port for the radio; none where that is joined to others by something else, or to nothing.
         radio: Option<LinkUrl>,
     },
+    /// On a board in QEMU, in lock step with the simulation; no scenario's file says so.
+    Emulated {
+        /// The firmware for the board `qemu`.
+        program: PathBuf,
+        /// What the board logs.
+        log: PathBuf,
+    },
 }
 
 /// `[deconfliction]`

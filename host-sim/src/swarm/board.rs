@@ -2,37 +2,88 @@
 //!
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
 //! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
+//!
+//! A board in QEMU is in lock step with the simulation ([`boards`](crate::boards)): it runs through a step while the desk computes
+//! the others', and its bytes are taken at the step's end.
+
+use std::path::Path;
 
 use companion::link::frame::{Frame, Framer, MAX_SENT};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Instant, State};
+use companion::{COMPONENT, Instant, Link as Port, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, STATUSTEXT_DATA, TUNNEL_DATA};
+use planner_core::Point;
 
+use super::member::STEP_US;
+use super::radio::Radio;
+use super::serial::SerialLink;
+use crate::boards::{self, Emulated, Piece};
 use crate::link::{Link, LinkUrl};
 
 /// One board.
 pub struct Board {
-    autopilot: Box<dyn Link>,
-    radio: Option<Box<dyn Link>>,
+    ends: Ends,
     framer: Framer,
     state: State,
     progress_m: Option<f32>,
 }
 
+/// What a board is joined to.
+pub struct Lines<'a> {
+    /// From its autopilot.
+    pub up: &'a mut SerialLink,
+    /// To its autopilot.
+    pub down: &'a mut SerialLink,
+    /// Its radio.
+    pub radio: &'a mut Radio,
+    /// Its place among the radio's stations.
+    pub station: usize,
+    /// Where the stations are.
+    pub places: &'a [Point],
+    /// Takes its words.
+    pub said: &'a mut dyn FnMut(&str),
+}
+
+/// What joins us to it.
+enum Ends {
+    /// Links, at the speed of the clock.
+    Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
+    /// Grants of time.
+    LockStep(LockStep),
+}
+
+/// A board in lock step.
+struct LockStep {
+    board: Emulated,
+    /// When it started, microseconds of the simulation's time.
+    started_us: u64,
+    /// Whether it runs.
+    runs: bool,
+}
+
 impl Board {
+    /// Switches on a board in QEMU whose flash holds these files.
+    ///
+    /// # Errors
+    /// QEMU or the program does not start; the board does not hold the files.
+    pub fn emulate(program: &Path, log: &Path, roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Self> {
+        let mut board = Emulated::start(program, log)?;
+        board.load(&boards::bank(roadmap, mission)?)?;
+        Ok(Self::new(Ends::LockStep(LockStep { board, started_us: 0, runs: false })))
+    }
+
+    fn new(ends: Ends) -> Self {
+        Self { ends, framer: Framer::new(), state: State::default(), progress_m: None }
+    }
+
     /// Connects to the board's port for the autopilot and, if its radio is ours, the one for the radio.
     ///
     /// # Errors
     /// A link cannot be opened.
     pub fn open(autopilot: &LinkUrl, radio: Option<&LinkUrl>) -> anyhow::Result<Self> {
-        Ok(Self {
-            autopilot: autopilot.open()?,
-            radio: radio.map(LinkUrl::open).transpose()?,
-            framer: Framer::new(),
-            state: State::default(),
-            progress_m: None,
-        })
+        let radio = radio.map(LinkUrl::open).transpose()?;
+        Ok(Self::new(Ends::Links { autopilot: autopilot.open()?, radio }))
     }
 
     /// Its state as last told.
@@ -47,74 +98,98 @@ impl Board {
 
     /// Whether its radio is ours.
     pub fn has_radio(&self) -> bool {
-        self.radio.is_some()
+        !matches!(self.ends, Ends::Links { radio: None, .. })
     }
 
-    /// Gives it bytes of its autopilot.
+    /// Bytes of the stack that were used since its start; of boards in lock step alone.
     ///
     /// # Errors
-    /// The link is gone for good.
-    pub fn tell_autopilot(&mut self, bytes: &[u8]) -> std::io::Result<()> {
-        self.autopilot.send(bytes)
+    /// The board is gone.
+    pub fn stack_used(&mut self) -> anyhow::Result<Option<usize>> {
+        let Ends::LockStep(LockStep { board, runs, .. }) = &mut self.ends else { return Ok(None) };
+        if core::mem::take(runs) {
+            board.finish()?;
+        }
+        board.stack_used().map(Some)
     }
 
-    /// Gives it a packet that its radio heard.
+    /// Carries bytes between the board, its autopilot and the radio, up to the end of a step; one in lock step is granted
+    /// the next one.
     ///
     /// # Errors
-    /// The link is gone for good.
-    pub fn tell_radio(&mut self, packet: &[u8]) -> std::io::Result<()> {
-        self.radio.as_mut().map_or(Ok(()), |radio| radio.send(packet))
-    }
-
-    /// Bytes for its autopilot; 0 if there are none. Its words go to `said` if its radio is not ours.
-    ///
-    /// # Errors
-    /// The link is gone for good.
-    pub fn hear_autopilot(
-        &mut self,
-        now: Instant,
-        out: &mut [u8],
-        mut said: impl FnMut(&str),
-    ) -> std::io::Result<usize> {
-        let length = self.autopilot.receive(out)?;
-        if self.radio.is_none() {
-            let mut input = &out[..length];
-            while let Some(frame) = self.framer.next(now, &mut input) {
-                self.note(&frame, &mut said);
+    /// A board in lock step hangs or is gone.
+    pub fn step(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
+        match &mut self.ends {
+            Ends::Links { .. } => {
+                // A board that is gone is silent, as one without power.
+                let _: anyhow::Result<()> = self.exchange(now_us, lines);
+                Ok(())
+            }
+            Ends::LockStep(lock_step) => {
+                let sent = lock_step.end(now_us)?;
+                let started_us = lock_step.started_us;
+                for Piece { port, at_us, bytes } in sent {
+                    match port {
+                        Port::Autopilot => lines.down.write(started_us + at_us, &bytes),
+                        Port::Swarm => self.sent(now_us, &bytes, lines),
+                    }
+                }
+                let Ends::LockStep(lock_step) = &mut self.ends else { return Ok(()) };
+                lock_step.begin(now_us, lines)
             }
         }
-        Ok(length)
     }
 
-    /// Moves what its radio sends out as whole packets to `sent`, and its words to `said`.
-    ///
-    /// # Errors
-    /// The link is gone for good.
-    pub fn hear_radio(
-        &mut self,
-        now: Instant,
-        mut sent: impl FnMut(&[u8]),
-        mut said: impl FnMut(&str),
-    ) -> std::io::Result<()> {
-        let mut buffer = [0; 2048];
-        while let Some(radio) = &mut self.radio {
-            let length = radio.receive(&mut buffer)?;
-            let mut input = &buffer[..length];
-            while let Some(frame) = self.framer.next(now, &mut input) {
-                let mut packet = [0; MAX_SENT];
-                let length = frame.encode(&mut packet);
-                sent(&packet[..length]);
-                self.note(&frame, &mut said);
+    /// What has come by now, of links.
+    fn exchange(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
+        let Ends::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
+        while let Some((_, bytes)) = lines.up.next_by(now_us) {
+            autopilot.send(&bytes)?;
+        }
+        while let Some(packet) = lines.radio.receive(now_us, lines.station) {
+            if let Some(radio) = radio {
+                radio.send(&packet)?;
             }
-            if length == 0 {
-                break;
+        }
+        let drain = |link: &mut Box<dyn Link>| -> anyhow::Result<Vec<u8>> {
+            let (mut heard, mut buffer) = (Vec::new(), [0; 2048]);
+            loop {
+                match link.receive(&mut buffer)? {
+                    0 => return Ok(heard),
+                    length => heard.extend(&buffer[..length]),
+                }
+            }
+        };
+        let from_autopilot = drain(autopilot)?;
+        let from_radio = radio.as_mut().map(drain).transpose()?;
+        if !from_autopilot.is_empty() {
+            lines.down.write(now_us, &from_autopilot);
+        }
+        match from_radio {
+            Some(bytes) => self.sent(now_us, &bytes, lines),
+            None => {
+                let mut input = &from_autopilot[..];
+                while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
+                    self.note(&frame, &mut lines.said);
+                }
             }
         }
         Ok(())
     }
 
+    /// The board's radio sends bytes: its frames go out as whole packets.
+    fn sent(&mut self, now_us: u64, bytes: &[u8], lines: &mut Lines<'_>) {
+        let mut input = bytes;
+        while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
+            let mut packet = [0; MAX_SENT];
+            let length = frame.encode(&mut packet);
+            lines.radio.broadcast(now_us, Some(lines.station), lines.places, &packet[..length]);
+            self.note(&frame, &mut lines.said);
+        }
+    }
+
     /// Keeps what the board tells of itself.
-    fn note(&mut self, frame: &Frame, said: &mut impl FnMut(&str)) {
+    fn note(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
         if frame.component != COMPONENT {
             return;
         }
@@ -131,6 +206,35 @@ impl Board {
             }
             _ => {}
         }
+    }
+}
+
+impl LockStep {
+    /// What it sent in the step that ends now.
+    fn end(&mut self, now_us: u64) -> anyhow::Result<Vec<Piece>> {
+        if !core::mem::take(&mut self.runs) {
+            return Ok(Vec::new());
+        }
+        let answer = self.board.finish()?;
+        if answer.restarted {
+            self.started_us = now_us;
+        }
+        Ok(answer.sent)
+    }
+
+    /// Grants it the next step, and what it receives meanwhile.
+    fn begin(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
+        let until_us = now_us + STEP_US;
+        let board_us = |us: u64| us.max(now_us) - self.started_us;
+        let mut pieces = Vec::new();
+        while let Some(packet) = lines.radio.receive(now_us, lines.station) {
+            pieces.push(Piece { port: Port::Swarm, at_us: board_us(now_us), bytes: packet.to_vec() });
+        }
+        while let Some((arrives_us, bytes)) = lines.up.next_by(until_us) {
+            pieces.push(Piece { port: Port::Autopilot, at_us: board_us(arrives_us), bytes });
+        }
+        self.runs = true;
+        self.board.begin(board_us(until_us), &pieces)
     }
 }
 

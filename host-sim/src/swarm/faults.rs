@@ -49,7 +49,8 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
         for vehicle in scenario.vehicles.iter().filter(|vehicle| fault.strikes(vehicle)) {
             let in_vain = match (&vehicle.companion, fault.kind) {
                 (Companion::InProcess, _) => false,
-                (Companion::Url { .. }, "companion-reset" | "late-plan" | "bad-roadmap") => true,
+                (_, "companion-reset" | "late-plan" | "bad-roadmap") => true,
+                (Companion::Emulated { .. }, _) => false,
                 (Companion::Url { radio, .. }, kind) => kind == "radio-cut" && radio.is_none(),
             };
             anyhow::ensure!(

@@ -1,14 +1,16 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
+use anyhow::Context;
 use companion::{Companion, Config, Event, Instant, Link, State};
 use planner_core::Point;
 
-use super::board::Board;
+use super::board::{Board, Lines};
 use super::monitor::{Observation, Phase};
 use super::new_companion;
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use crate::autopilot::{self, Autopilot};
+use crate::boards::STACK_LEN;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
@@ -103,6 +105,18 @@ impl Member {
         self.board = Some(board);
     }
 
+    /// Says how much of its stack its board used, if it has one in lock step.
+    ///
+    /// # Errors
+    /// The board is gone.
+    pub fn say_stack(&mut self) -> anyhow::Result<()> {
+        let (id, board) = (self.system_id(), self.board.as_mut());
+        if let Some(used) = board.map(Board::stack_used).transpose()?.flatten() {
+            say!("board {id}: stack: {used} of {STACK_LEN} bytes used");
+        }
+        Ok(())
+    }
+
     /// Where its mission is.
     pub fn state(&self) -> State {
         self.board.as_ref().map_or_else(|| self.companion.state(), Board::state)
@@ -170,6 +184,9 @@ impl Member {
     }
 
     /// One physics step of the autopilot and all bytes that arrive by its end; what the companion reports goes to `log`.
+    ///
+    /// # Errors
+    /// Its board hangs or is gone.
     pub fn step(
         &mut self,
         step: u64,
@@ -178,14 +195,14 @@ impl Member {
         radio: &mut Radio,
         places: &[Point],
         log: &mut Vec<report::Event>,
-    ) {
+    ) -> anyhow::Result<()> {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_STEPS == station as u64 % GROUND_STEPS {
             self.ground_m = map.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
         if self.killed {
-            return;
+            return Ok(());
         }
         let booting = now_us < self.boots_until_us;
         let mut buffer = [0; 512];
@@ -198,10 +215,10 @@ impl Member {
                 self.up.write(now_us, &buffer[..length]);
             }
         }
-        self.up.read(now_us, &mut self.bytes);
         if self.board.is_some() {
-            self.step_board(now_us, station, radio, places, log);
+            self.step_board(now_us, station, radio, places, log)?;
         } else {
+            self.up.read(now_us, &mut self.bytes);
             self.step_companion(now_us, station, radio, places, log);
         }
         self.down.read(now_us, &mut self.bytes);
@@ -215,6 +232,7 @@ impl Member {
         if self.took_off_s.is_some() && truth.touching && !truth.armed {
             self.landed_s.get_or_insert(t_s);
         }
+        Ok(())
     }
 
     /// Carries bytes between the board, its autopilot and the radio.
@@ -225,31 +243,18 @@ impl Member {
         radio: &mut Radio,
         places: &[Point],
         log: &mut Vec<report::Event>,
-    ) {
-        let (now, id) = (self.companion_now(now_us), self.system_id());
-        let Some(board) = &mut self.board else { return };
-        let mut buffer = [0; 512];
+    ) -> anyhow::Result<()> {
+        let id = self.system_id();
+        let Some(board) = &mut self.board else { return Ok(()) };
         let mut said = |text: &str| {
             say!("board {id}: {text}");
             let t_s = (now_us as f64 * 1e-6) as f32;
             log.push(report::Event { t_s, vehicle: Some(id), level: Level::Info, text: text.to_owned() });
         };
-        let mut exchange = || {
-            board.tell_autopilot(&self.bytes)?;
-            while let Some(packet) = radio.receive(now_us, station) {
-                board.tell_radio(&packet)?;
-            }
-            loop {
-                let length = board.hear_autopilot(now, &mut buffer, &mut said)?;
-                if length == 0 {
-                    break;
-                }
-                self.down.write(now_us, &buffer[..length]);
-            }
-            board.hear_radio(now, |packet| radio.broadcast(now_us, Some(station), places, packet), &mut said)
-        };
-        // A board that is gone is silent, as one without power.
-        let _: std::io::Result<()> = exchange();
+        let (up, down) = (&mut self.up, &mut self.down);
+        board
+            .step(now_us, &mut Lines { up, down, radio, station, places, said: &mut said })
+            .with_context(|| format!("the board of vehicle {id}"))
     }
 
     /// Lets the companion in this process have what has come by now.

@@ -36,7 +36,7 @@ use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
-use crate::scenario;
+use crate::scenario::Companion;
 use crate::shortage;
 
 /// A vehicle within this distance of its goal has reached it, metres.
@@ -123,8 +123,8 @@ fn simulate(
     let mut log = Vec::new();
     let mut nearest_goal_m = vec![f32::INFINITY; members.len()];
     let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
-    // A board's time is the clock's.
-    let has_boards = scenario.vehicles.iter().any(|v| v.companion != scenario::Companion::InProcess);
+    // The time of a board behind links is the clock's.
+    let by_clock = scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.steps("flight", settings.time_limit_s as u64);
     let began = Clock::now();
@@ -143,7 +143,7 @@ fn simulate(
         };
         script.step(now_us, &mut world, &mut log)?;
         for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, &mission.map, &mut radio, &places, &mut log);
+            member.step(step, i, &mission.map, &mut radio, &places, &mut log)?;
             if member.wants_plan && member.planner != Planner::Late {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
@@ -182,13 +182,14 @@ fn simulate(
         if t_s >= ends_at_s {
             break;
         }
-        if realtime || has_boards {
+        if realtime || by_clock {
             let due = Duration::from_micros(now_us) + put_off;
             put_off += began.elapsed().saturating_sub(due + LATEST);
             std::thread::sleep(due.saturating_sub(began.elapsed()));
         }
     }
     let took_s = began.elapsed().as_secs_f64();
+    members.iter_mut().try_for_each(Member::say_stack)?;
     let vehicles: Vec<_> = (0..members.len())
         .map(|i| {
             // As far as the estimate is wrong, the vehicle cannot know.
@@ -342,8 +343,15 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             let mut member =
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
-            if let scenario::Companion::Url { autopilot, radio } = &vehicle.companion {
-                member.put_on(Board::open(autopilot, radio.as_ref())?);
+            match &vehicle.companion {
+                Companion::InProcess => {}
+                Companion::Url { autopilot, radio } => {
+                    member.put_on(Board::open(autopilot, radio.as_ref())?);
+                }
+                Companion::Emulated { program, log } => {
+                    let (roadmap, file) = (&mission.roadmap_file, &mission.mission_file);
+                    member.put_on(Board::emulate(program, log, roadmap, file)?);
+                }
             }
             Ok(member)
         })

@@ -3,7 +3,6 @@
 //! A byte takes ten bit times (8N1). What does not fit the transmit buffer is lost, as on a UART without flow control.
 
 use std::collections::VecDeque;
-use std::io::Read;
 
 use rand_core::Rng;
 use rand_pcg::Pcg32;
@@ -120,18 +119,19 @@ impl SerialLink {
     /// Moves what has arrived by now into `out` (cleared first).
     pub fn read(&mut self, now_us: u64, out: &mut Vec<u8>) {
         out.clear();
-        if now_us < self.stalled_until_us {
-            return;
+        while let Some((_, bytes)) = self.next_by(now_us) {
+            out.extend(bytes);
         }
-        while let Some(&(arrives_us, length)) = self.writes.front() {
-            if arrives_us > now_us {
-                break;
-            }
-            self.writes.pop_front();
-            let start = out.len();
-            out.resize(start + length, 0);
-            self.bytes.read_exact(&mut out[start..]).expect("a write is as long as its bytes");
+    }
+
+    /// The next write that arrives by `until_us`, and when; the time may lie ahead.
+    pub fn next_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
+        let &(arrives_us, length) = self.writes.front()?;
+        if arrives_us > until_us || until_us < self.stalled_until_us {
+            return None;
         }
+        self.writes.pop_front();
+        Some((arrives_us.max(self.stalled_until_us), self.bytes.drain(..length).collect()))
     }
 
     /// Changes the share of bytes that arrive changed.

@@ -1,12 +1,9 @@
 //! Time: CMSDK timer 0 counts, timer 1 wakes.
 //!
 //! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts instructions in forties.
-//!
-//! While the processor sleeps QEMU waits for the host's clock, and what the host oversleeps on a loaded machine passes for the board
-//! too: no chip knows that. It shows as an alarm that comes late to a sleeping processor, and is counted ([`overslept_us`]).
+//! In lock step ([`grants`](super::grants)) it is two nanoseconds.
 
 use core::cell::{Cell, RefCell};
-use core::sync::atomic::{AtomicU32, Ordering};
 use core::task::Waker;
 
 use critical_section::{CriticalSection, Mutex};
@@ -17,7 +14,7 @@ use super::interrupts::{self, Irq};
 use super::registers::Register;
 
 /// Counts in a microsecond.
-const COUNTS_US: u64 = 25;
+pub(super) const COUNTS_US: u64 = 25;
 /// Instructions of `-icount shift=0` in a count.
 const INSTRUCTIONS: u64 = 40;
 const TIMER0: usize = 0x4000_0000;
@@ -33,20 +30,11 @@ struct Clock {
     /// How often timer 0 has gone round.
     rounds: Mutex<Cell<u32>>,
     queue: Mutex<RefCell<Queue>>,
-    /// When timer 1 runs down.
-    due: Mutex<Cell<u64>>,
 }
-
-static OVERSLEPT_US: AtomicU32 = AtomicU32::new(0);
-/// Interrupt control and state.
-const ICSR: usize = 0xE000_ED04;
-/// No other handler is under way, so it was the sleeping thread that was interrupted.
-const RETTOBASE: u32 = 1 << 11;
 
 embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock {
     rounds: Mutex::new(Cell::new(0)),
     queue: Mutex::new(RefCell::new(Queue::new())),
-    due: Mutex::new(Cell::new(u64::MAX)),
 });
 
 /// Starts both timers.
@@ -69,16 +57,12 @@ pub fn on_timer0() {
 pub fn on_timer1() {
     critical_section::with(|cs| {
         Register::new(TIMER1, INTSTATUS).write(1);
-        let late = CLOCK_NOW(cs).saturating_sub(CLOCK.due.borrow(cs).replace(u64::MAX));
-        if Register::new(ICSR, 0).read() & RETTOBASE != 0 {
-            OVERSLEPT_US.fetch_add((late / COUNTS_US) as u32, Ordering::Relaxed);
-        }
         CLOCK.arm(cs);
     });
 }
 
 /// Counts since the start. Notes a round that has not been noted yet.
-const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
+pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     let rounds = CLOCK.rounds.borrow(cs);
     let before = Register::new(TIMER0, VALUE).read();
     let ended = Register::new(TIMER0, INTSTATUS).read() != 0;
@@ -91,11 +75,6 @@ const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     }
     u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)
 };
-
-/// What the host overslept since the start, microseconds.
-pub fn overslept_us() -> u32 {
-    OVERSLEPT_US.load(Ordering::Relaxed)
-}
 
 /// Instructions since the start, under `-icount shift=0`, to the next forty.
 pub fn instructions() -> u64 {
@@ -117,7 +96,6 @@ impl Clock {
                 // Far alarms are looked at again when the timer has run down.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
                 Register::new(TIMER1, VALUE).write(wait);
-                self.due.borrow(cs).set(now + u64::from(wait));
                 return;
             }
         }

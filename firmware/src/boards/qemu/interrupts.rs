@@ -5,9 +5,11 @@ use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
 use embassy_executor::SendSpawner;
 
-use super::{clock, uart};
+use super::{clock, grants, uart};
 use crate::boards::parts;
 
+/// Priority of the desk's grants, above all.
+pub const GRANTS: u8 = 0x20;
 /// Priority of devices.
 pub const DEVICES: u8 = 0x40;
 /// Priority of links and setpoints, below devices.
@@ -31,6 +33,8 @@ pub enum Irq {
     Timer0 = 8,
     /// An alarm is due.
     Timer1 = 9,
+    /// What is due in lock step.
+    DualTimer = 10,
     /// No device has it: it runs the executor of plans and flash.
     Plans = 30,
     /// No device has it: it runs the executor of links and setpoints.
@@ -57,6 +61,7 @@ static __INTERRUPTS: [Handler; 32] = {
     table[Irq::Uart1Tx as usize] = Some(uart1);
     table[Irq::Timer0 as usize] = Some(timer0);
     table[Irq::Timer1 as usize] = Some(timer1);
+    table[Irq::DualTimer as usize] = Some(dual_timer);
     table[Irq::Plans as usize] = Some(plans);
     table[Irq::Links as usize] = Some(links);
     table
@@ -76,6 +81,10 @@ unsafe extern "C" fn timer0() {
 
 unsafe extern "C" fn timer1() {
     clock::on_timer1();
+}
+
+unsafe extern "C" fn dual_timer() {
+    grants::on_alarm();
 }
 
 unsafe extern "C" fn links() {

@@ -4,6 +4,7 @@ use defmt_semihosting as _;
 
 pub mod clock;
 pub mod flash;
+mod grants;
 pub mod interrupts;
 pub mod memory;
 mod registers;
@@ -37,7 +38,7 @@ pub fn start() -> Parts {
     clock::start();
     let mut watchdog = Watchdog(());
     watchdog.wake();
-    Parts {
+    let parts = Parts {
         links: interrupts::start_links(),
         plans: interrupts::start_plans(),
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
@@ -45,5 +46,7 @@ pub fn start() -> Parts {
         flash: Flash::new(),
         watchdog,
         warnings: Vec::new(),
-    }
+    };
+    grants::start();
+    parts
 }

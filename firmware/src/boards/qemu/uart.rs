@@ -5,6 +5,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
 use embassy_sync::pipe::Pipe;
 
+use super::grants;
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
@@ -36,6 +37,8 @@ pub struct Counters {
 /// One UART.
 pub struct Uart {
     base: usize,
+    /// As the desk counts them.
+    port: u8,
     transmits: Irq,
     received: Pipe<CriticalSectionRawMutex, RECEIVED>,
     sent: Pipe<CriticalSectionRawMutex, SENT>,
@@ -44,14 +47,14 @@ pub struct Uart {
 }
 
 /// UART 0, to the autopilot.
-pub static AUTOPILOT: Uart = Uart::new(0x4000_4000, Irq::Uart0Tx);
+pub static AUTOPILOT: Uart = Uart::new(0x4000_4000, 0, Irq::Uart0Tx);
 /// UART 1, to the swarm's radio.
-pub static SWARM: Uart = Uart::new(0x4000_5000, Irq::Uart1Tx);
+pub static SWARM: Uart = Uart::new(0x4000_5000, 1, Irq::Uart1Tx);
 
 impl Uart {
-    const fn new(base: usize, transmits: Irq) -> Self {
+    const fn new(base: usize, port: u8, transmits: Irq) -> Self {
         let counters = Counters { overruns: AtomicU32::new(0), dropped: AtomicU32::new(0) };
-        Self { base, transmits, received: Pipe::new(), sent: Pipe::new(), counters }
+        Self { base, port, transmits, received: Pipe::new(), sent: Pipe::new(), counters }
     }
 
     fn register(&self, offset: usize) -> Register {
@@ -65,6 +68,17 @@ impl Uart {
         interrupts::enable(receives, interrupts::DEVICES);
         interrupts::enable(self.transmits, interrupts::DEVICES);
         (Receiver { uart: self, told: 0 }, Transmitter(self))
+    }
+
+    /// Takes bytes that a line in lock step brings: all that there is room for.
+    pub(super) fn take(&self, mut bytes: &[u8]) {
+        while !bytes.is_empty() {
+            let Ok(taken) = self.received.try_write(bytes) else {
+                self.counters.dropped.fetch_add(bytes.len() as u32, Ordering::Relaxed);
+                return;
+            };
+            bytes = &bytes[taken..];
+        }
     }
 
     /// Takes the byte that has come and gives the next one to send.
@@ -138,6 +152,9 @@ impl embedded_io_async::ErrorType for Transmitter {
 
 impl embedded_io_async::Write for Transmitter {
     async fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
+        if grants::send(self.0.port, bytes) {
+            return Ok(bytes.len());
+        }
         let length = self.0.sent.write(bytes).await;
         interrupts::pend(self.0.transmits);
         Ok(length)

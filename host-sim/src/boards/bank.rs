@@ -1,0 +1,51 @@
+//! What lies in an emulated board's flash.
+
+use anyhow::ensure;
+use companion::services::ftp::DATA;
+use companion::storage::store::window::Taken;
+use companion::storage::store::{Erasing, File, READ, Store, UploadState};
+
+use crate::flash::{DeskFlash, LAYOUT};
+
+/// Where bank 2 of the emulated flash lies.
+pub const BANK2: u32 = 0x6000_0000;
+/// Where a byte for each of its words tells what happened to that last: nothing since it was erased, or it was programmed, or
+/// it is being programmed or erased.
+pub const MARKS: u32 = 0x6020_0000;
+pub const ERASED: u8 = 0;
+pub const WHOLE: u8 = 1;
+pub const TORN: u8 = 2;
+/// Where it is noted that the bank holds something.
+pub const MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
+
+/// What a bank of flash holds after these files were uploaded to an empty one, its other slot erased.
+///
+/// # Errors
+/// A file is refused.
+pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
+    let mut flash = DeskFlash::open(None)?;
+    let mut store = Store::mount(LAYOUT, &mut flash);
+    let mut settle = |store: &mut Store| {
+        let mut read = [0; READ];
+        while let Some(request) = store.poll(Erasing::Allowed) {
+            let outcome = flash.obey(request, &mut read);
+            store.handle(outcome);
+        }
+    };
+    settle(&mut store);
+    for (file, bytes) in [(File::Roadmap, roadmap), (File::Mission, mission)] {
+        let opened = store.open(file, Erasing::Allowed);
+        ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());
+        settle(&mut store);
+        for (i, piece) in bytes.chunks(DATA).enumerate() {
+            let taken = store.take((i * DATA) as u32, piece);
+            ensure!(taken == Taken::Yes, "a board's store refuses {}: {taken:?}", file.name());
+            settle(&mut store);
+        }
+        store.close();
+        settle(&mut store);
+        let ended = store.upload();
+        ensure!(ended == Some(UploadState::Ended(Ok(()))), "a board refuses {}: {ended:?}", file.name());
+    }
+    Ok(flash.into_bytes())
+}

@@ -1,0 +1,90 @@
+//! The debug probe of a board in lock step: memory, and what is called in it while it stands still.
+
+use std::time::Duration;
+
+use anyhow::ensure;
+use lock_step::ToBoard;
+
+use super::bank::{BANK2, ERASED, MADE, MARKS, TORN, WHOLE};
+use super::{Answer, Emulated};
+use crate::flash::LAYOUT;
+use companion::storage::store::WORD;
+
+/// Bytes of memory in a message.
+const CHUNK: usize = 32 << 10;
+/// Where the stack lies, as in the board's memory map.
+const STACK: u32 = 0x2008_A000;
+/// Its length, bytes.
+pub const STACK_LEN: usize = 88 << 10;
+/// What no stack has touched since the start.
+const PAINT: u8 = 0xcc;
+
+impl Emulated {
+    /// Its memory from an address on.
+    ///
+    /// # Errors
+    /// The board is gone.
+    pub fn peek(&mut self, address: u32, length: usize) -> anyhow::Result<Vec<u8>> {
+        let mut memory = Vec::new();
+        while memory.len() < length {
+            let len = (length - memory.len()).min(CHUNK) as u16;
+            self.send(&ToBoard::Peek { address: address + memory.len() as u32, len }.to_bytes())?;
+            memory.extend(self.finish()?.memory);
+        }
+        Ok(memory)
+    }
+
+    /// Changes its memory.
+    ///
+    /// # Errors
+    /// The board is gone.
+    pub fn poke(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
+        for (i, bytes) in bytes.chunks(CHUNK).enumerate() {
+            let head = ToBoard::Poke { address: address + (i * CHUNK) as u32, len: bytes.len() as u16 };
+            self.send(&[&head.to_bytes(), bytes].concat())?;
+            self.finish()?;
+        }
+        Ok(())
+    }
+
+    /// Calls a function, above every task and at this moment of the board's time; what came of it is that the board waits
+    /// again, or that it starts again.
+    ///
+    /// # Errors
+    /// The board is gone, or hangs for longer than `patience`.
+    pub fn call(&mut self, address: u32, argument: u32, patience: Duration) -> anyhow::Result<Answer> {
+        self.send(&ToBoard::Call { address, argument }.to_bytes())?;
+        self.finish_within(patience)
+    }
+
+    /// Puts what a bank of flash holds into the board's.
+    ///
+    /// # Errors
+    /// The board is gone, or the bank is none of its flash.
+    pub fn load(&mut self, bank: &[u8]) -> anyhow::Result<()> {
+        ensure!(bank.len() == LAYOUT.len() as usize, "a bank has {} bytes", LAYOUT.len());
+        let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
+        let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
+        self.poke(BANK2, bank)?;
+        self.poke(MARKS, &marks)?;
+        self.poke(MADE.0, &MADE.1.to_le_bytes())
+    }
+
+    /// Words of its flash that are being programmed or erased, in its order.
+    ///
+    /// # Errors
+    /// The board is gone.
+    pub fn torn(&mut self) -> anyhow::Result<Vec<usize>> {
+        let marks = self.peek(MARKS, LAYOUT.len() as usize / WORD)?;
+        Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
+    }
+
+    /// Bytes of the stack that were used since the start.
+    ///
+    /// # Errors
+    /// The board is gone.
+    pub fn stack_used(&mut self) -> anyhow::Result<usize> {
+        let stack = self.peek(STACK, STACK_LEN)?;
+        Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == PAINT).count())
+    }
+}

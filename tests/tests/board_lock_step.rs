@@ -1,0 +1,68 @@
+//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine does.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::thread::{available_parallelism, scope};
+
+use flockmate_tests::board;
+use flockmate_tests::vehicle::mission;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario::Companion;
+use host_sim::swarm::{self, Flight};
+
+/// Three vehicles in the lobby of the built-in building; two of them cross.
+const THREE: &str = r#"
+[map]
+file = "builtin:building"
+[roadmap]
+nodes = 400
+edge_max_m = 12.0
+[mission]
+goals = [[16.0, 6.0, 3.5], [16.0, 2.0, 3.5], [22.0, 4.0, 3.5]]
+[[vehicles]]
+id = 1
+start = [10.0, 2.0, 3.5]
+[[vehicles]]
+id = 2
+start = [10.0, 6.0, 3.5]
+personality = "ardupilot"
+[[vehicles]]
+id = 3
+start = [13.0, 4.0, 3.5]
+"#;
+
+/// A flight of three boards.
+fn fly(mission: &mut Mission) -> Flight {
+    let plan = mission.plan().expect("there is a plan");
+    swarm::fly(mission, &plan, "fly", false, &Progress::on_terminal()).expect("the boards answer")
+}
+
+/// All of a flight that anybody can see.
+fn record(flight: &Flight) -> String {
+    let result = serde_json::to_string(&flight.result).expect("a result");
+    let log: Vec<_> = flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();
+    format!("{result}\n{log:?}\n{:?}", flight.tracks)
+}
+
+#[test]
+fn a_flight_of_boards_is_the_same_twice_on_any_load() {
+    let Some(program) = board::program("flockmate") else { return };
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let mut mission = mission(THREE);
+    for vehicle in &mut mission.scenario.vehicles {
+        let log = folder.path().join(format!("board-{}.defmt", vehicle.id));
+        vehicle.companion = Companion::Emulated { program: program.clone(), log };
+    }
+    let first = fly(&mut mission);
+    assert!(first.result.complete, "{:?}", first.log.iter().map(|event| &event.text).collect::<Vec<_>>());
+    let over = AtomicBool::new(false);
+    let second = scope(|scope| {
+        let busy = || while !over.load(Ordering::Relaxed) {};
+        (0..available_parallelism().map_or(2, usize::from)).for_each(|_| _ = scope.spawn(busy));
+        let second = fly(&mut mission);
+        over.store(true, Ordering::Relaxed);
+        second
+    });
+    println!("{:.0} s in {:.1} s, beside a load {:.1} s", first.simulated_s, first.took_s, second.took_s);
+    assert!(record(&first) == record(&second), "{:?}\n{:?}", first.result, second.result);
+}
