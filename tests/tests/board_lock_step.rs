@@ -57,7 +57,11 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
     assert!(first.result.complete, "{:?}", first.log.iter().map(|event| &event.text).collect::<Vec<_>>());
     let over = AtomicBool::new(false);
     let second = scope(|scope| {
-        let busy = || while !over.load(Ordering::Relaxed) {};
+        let busy = || {
+            while !over.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
+        };
         (0..available_parallelism().map_or(2, usize::from)).for_each(|_| _ = scope.spawn(busy));
         let second = fly(&mut mission);
         over.store(true, Ordering::Relaxed);
