@@ -1,5 +1,6 @@
 //! Helpers shared by the cross-crate tests.
 
+pub mod areas;
 pub mod board;
 pub mod bounds;
 pub mod debugger;

@@ -101,6 +101,7 @@ fn report() -> ReportData {
             plot("Speed", None, vec![curve("UAV 1", Some(1)), curve("UAV 7", Some(7))]),
         ],
         vehicles,
+        outlines: Vec::new(),
         obstacles: vec![],
         result: json!({
             "complete": true,

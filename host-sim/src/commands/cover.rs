@@ -8,8 +8,7 @@ use planner_core::coverage::pack::Route;
 use serde::Serialize;
 
 use crate::coverage::check::{self, Findings, Flown};
-use crate::coverage::flight::{Stop, stops, times_s};
-use crate::coverage::{Planned, export, page};
+use crate::coverage::{Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
 use crate::report;
@@ -89,16 +88,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let names: Vec<&str> = output::NAMES.into_iter().chain(files.iter().map(String::as_str)).collect();
     let mut results = Results::open(&args.out, &names)?;
     let planned = Planned::new(&scenario, args.method.unwrap_or(scenario.area.method))?;
-    let flights: Vec<(Route, Vec<Stop>, Vec<f32>)> = planned
-        .plan
-        .routes
-        .iter()
-        .map(|route| {
-            let stops = stops(&planned, route);
-            let times = times_s(&planned, route, &stops);
-            (*route, stops, times)
-        })
-        .collect();
+    let flights = planned.flights();
     let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
     let findings = check::check(&planned, &flown);
     let result = described(&planned, &findings);
@@ -127,11 +117,7 @@ fn files(scenario: &Coverage) -> Vec<String> {
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
 }
 
-fn add_flights(
-    planned: &Planned<'_>,
-    flights: &[(Route, Vec<Stop>, Vec<f32>)],
-    results: &mut Results,
-) -> anyhow::Result<()> {
+fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results) -> anyhow::Result<()> {
     for (route, stops, _) in flights {
         let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
         let items = export::items(planned, route, stops);
@@ -244,6 +230,9 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
         coverage.lanes,
         coverage.angle_deg
     );
+    if let Some([x, y]) = findings.missing {
+        say!("left out   the first cell is at [{x:.1}, {y:.1}]");
+    }
     if findings.forbidden > 0 {
         say!("no-fly     {} legs enter a no-fly zone", findings.forbidden);
     }

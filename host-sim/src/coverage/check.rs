@@ -3,7 +3,8 @@
 //!
 //! It looks at the flights as they are written, in f64, and shares no code with the planner. Cells are a tenth of the lane
 //! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
-//! all its corners, or, where overlaps are less than a cell, if pictures show each of them.
+//! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
+//! area.
 
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
@@ -21,6 +22,8 @@ pub struct Findings {
     pub covered_share: f64,
     /// Cells that count.
     pub cells: u64,
+    /// The middle of a cell that is left out, metres east and north.
+    pub missing: Option<[f64; 2]>,
     /// Side of a cell, metres.
     pub cell_m: f64,
     /// Pictures taken.
@@ -50,6 +53,13 @@ pub struct Flown<'a> {
     pub stops: &'a [Stop],
     /// Seconds.
     pub times_s: &'a [f32],
+}
+
+/// Checks what a plan flies.
+pub fn check_plan(planned: &Planned<'_>) -> Findings {
+    let flights: Vec<_> = planned.flights();
+    let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
+    check(planned, &flown)
 }
 
 /// Checks flights against the area.
@@ -147,27 +157,30 @@ impl Cells {
         [x * self.along[0] + y * self.along[1], y * self.along[0] - x * self.along[1]]
     }
 
-    /// Whether each cell counts, row by row.
-    fn counted(&self, planned: &Planned<'_>) -> Vec<bool> {
+    /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their corners, half a cell
+    /// before them and one more each way.
+    fn held(&self, planned: &Planned<'_>, [columns, rows]: [usize; 2], offset: f64) -> Vec<bool> {
         let area = &planned.scenario.area;
         let rings = |kind| {
             let turned = |ring: &[Flat]| ring.iter().map(|v| self.rotated(v)).collect::<Vec<_>>();
             area.rings_of(kind).map(turned).collect::<Vec<_>>()
         };
         let wanted: Vec<_> = rings(RingKind::Outer).into_iter().chain(rings(RingKind::Hole)).collect();
-        let mut counted = vec![false; self.size[0] * self.size[1]];
-        for (row, line) in counted.chunks_mut(self.size[0]).enumerate() {
-            let v = self.low[1] + (row as f64 + 0.5) * self.side;
-            self.fill(line, &wanted, v, |cell| *cell = !*cell);
-            for zone in rings(RingKind::NoFly) {
-                self.fill(line, &[zone], v, |cell| *cell = false);
+        let zones = rings(RingKind::NoFly);
+        let mut held = vec![false; columns * rows];
+        for (row, line) in held.chunks_mut(columns).enumerate() {
+            let at = [self.low[0] + offset * self.side, self.low[1] + (row as f64 + offset) * self.side];
+            self.fill(line, &wanted, at, |place| *place = true);
+            for zone in &zones {
+                self.fill(line, std::slice::from_ref(zone), at, |place| *place = false);
             }
         }
-        counted
+        held
     }
 
-    /// Does something to the cells of a row whose middles are inside rings.
-    fn fill(&self, row: &mut [bool], rings: &[Vec<[f64; 2]>], v: f64, mut to: impl FnMut(&mut bool)) {
+    /// Does something to the places of a row, which begins at `at`, that are inside rings.
+    fn fill(&self, row: &mut [bool], rings: &[Vec<[f64; 2]>], at: [f64; 2], mut to: impl FnMut(&mut bool)) {
+        let v = at[1];
         let mut crossings = Vec::new();
         for ring in rings {
             for (a, b) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -178,7 +191,7 @@ impl Cells {
         }
         crossings.sort_by(f64::total_cmp);
         for pair in crossings.chunks_exact(2) {
-            let index = |u: f64| ((u - self.low[0]) / self.side - 0.5).ceil().max(0.0) as usize;
+            let index = |u: f64| ((u - at[0]) / self.side).ceil().max(0.0) as usize;
             let (from, end) = (index(pair[0]), index(pair[1]).min(row.len()));
             row.get_mut(from..end).into_iter().flatten().for_each(&mut to);
         }
@@ -186,7 +199,7 @@ impl Cells {
 
     fn judge(&self, planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
         let spacing = planned.scenario.area.spacing;
-        let counted = self.counted(planned);
+        let counted = self.held(planned, self.size, 0.5);
         // Where pictures overlap by a cell, one of them must show all its corners.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
@@ -202,7 +215,12 @@ impl Cells {
         photos.sort_by(|a, b| a.0.total_cmp(&b.0));
         let half = [f64::from(spacing.footprint.along_m) / 2.0, f64::from(spacing.footprint.across_m) / 2.0];
         let [columns, rows] = self.size;
-        let mut corners = vec![false; (columns + 1) * (rows + 1)];
+        // Elsewhere each corner that is in the area must be in a picture, and the middle.
+        let mut corners: Vec<bool> = match whole {
+            true => vec![false; (columns + 1) * (rows + 1)],
+            false => self.held(planned, [columns + 1, rows + 1], 0.0).iter().map(|held| !held).collect(),
+        };
+        let mut middles = vec![whole; counted.len()];
         let mut shown = vec![false; counted.len()];
         for (time, place) in photos {
             // Corners in the picture; a rounding beyond it is in it.
@@ -218,16 +236,22 @@ impl Cells {
                     corners[row as usize * (columns + 1) + column as usize] = true;
                 }
             }
+            let middle_shown = |axis: usize, index: i64| {
+                let middle = self.low[axis] + (index as f64 + 0.5) * self.side;
+                (middle - place[axis]).abs() <= half[axis]
+            };
             // Cells of which a corner is new: one more each way where other pictures show the rest.
             let more = i64::from(!whole);
             let mut new = 0;
             for row in (r0 - more).max(0)..(r1 + more).min(rows as i64) {
                 for column in (c0 - more).max(0)..(c1 + more).min(columns as i64) {
+                    let middle = middle_shown(0, column) && middle_shown(1, row);
                     let (row, column) = (row as usize, column as usize);
                     let corner = |r: usize, c: usize| corners[(row + r) * (columns + 1) + column + c];
                     let all = corner(0, 0) && corner(0, 1) && corner(1, 0) && corner(1, 1);
                     let cell = row * columns + column;
-                    if all && counted[cell] && !shown[cell] {
+                    middles[cell] |= middle;
+                    if all && middles[cell] && counted[cell] && !shown[cell] {
                         shown[cell] = true;
                         new += 1;
                     }
@@ -237,6 +261,12 @@ impl Cells {
         }
         findings.cell_m = self.side;
         findings.cells = counted.iter().filter(|counted| **counted).count() as u64;
+        let missing = counted.iter().zip(&shown).position(|(counted, shown)| *counted && !shown);
+        findings.missing = missing.map(|cell| {
+            let at = |axis: usize, index: usize| self.low[axis] + (index as f64 + 0.5) * self.side;
+            let (u, v) = (at(0, cell % columns), at(1, cell / columns));
+            [u * self.along[0] - v * self.along[1], u * self.along[1] + v * self.along[0]]
+        });
         let good = counted.iter().zip(&shown).filter(|(counted, shown)| **counted && **shown).count();
         findings.covered_share = if findings.cells == 0 { 1.0 } else { good as f64 / findings.cells as f64 };
     }

@@ -7,11 +7,11 @@
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 use planner_core::coverage::pack::Route;
-use planner_core::frames::{Geodetic, enu_to_geodetic};
+use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
-use super::Planned;
 use super::flight::{Act, Stop, heading_deg};
+use super::{Flight, Planned};
 use crate::scenario::Personality;
 use crate::scenario::coverage::{Heading, Trigger};
 
@@ -48,7 +48,7 @@ impl Item {
 /// The place where a vehicle stands.
 fn home(planned: &Planned<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
-    enu_to_geodetic(&planned.scenario.area.origin, &start)
+    Geodetic { alt_m: planned.scenario.area.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
 }
 
 /// Which lane is flown at a stop and which way a vehicle looks there, degrees from north.
@@ -75,8 +75,7 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
     let home = home(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
     let place = |position: &Point| {
-        let place = enu_to_geodetic(&scenario.area.origin, position);
-        // The height is about the tangent plane, as the plan is; over the area that is flat to centimetres.
+        let place = planned.geodetic(position);
         [round(place.lat_deg, 1e9), round(place.lon_deg, 1e9), round(f64::from(position.z - start.z), 1e3)]
     };
     let waypoint = |index: usize| Item {
@@ -203,7 +202,7 @@ pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String
 }
 
 /// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames.
-pub fn csv(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> String {
+pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
     let mut text = "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m\n".to_owned();
     for (route, stops, times) in flights {
         let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
@@ -215,7 +214,7 @@ pub fn csv(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> S
                 Act::Photo(number) => ("photo", number.to_string()),
             };
             let p = stop.position;
-            let place = enu_to_geodetic(&planned.scenario.area.origin, &p);
+            let place = planned.geodetic(&p);
             text += &format!(
                 "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3}\n",
                 place.lat_deg, place.lon_deg, p.x, p.y, p.z
@@ -226,9 +225,9 @@ pub fn csv(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> S
 }
 
 /// The area, its zones and every vehicle's lanes, for maps.
-pub fn geojson(planned: &Planned<'_>, flights: &[(Route, Vec<Stop>, Vec<f32>)]) -> Value {
+pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
     let place = |x: f32, y: f32| {
-        let place = enu_to_geodetic(&planned.scenario.area.origin, &Point::new(x, y, 0.0));
+        let place = planned.geodetic(&Point::new(x, y, 0.0));
         json!([round(place.lon_deg, 1e9), round(place.lat_deg, 1e9)])
     };
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];

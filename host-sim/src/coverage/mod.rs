@@ -11,12 +11,14 @@ pub mod page;
 use std::time::Instant;
 
 use anyhow::bail;
+use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::bound::lower_bound_s;
-use planner_core::coverage::pack::{PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::pack::{PackWorkspace, Plan, Route, Unit, Vehicle, Work, binpat};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
+use planner_core::frames::{Geodetic, enu_to_geodetic};
 
 use crate::area::MOST_VERTICES;
 use crate::scenario::coverage::{Coverage, Method};
@@ -33,6 +35,9 @@ pub const LOOKS: u32 = 20_000_000;
 const CLIMB_MPS: f32 = 3.0;
 /// V_d likewise.
 const DESCEND_MPS: f32 = 1.0;
+
+/// A route, its stops, and when each is passed, seconds.
+pub type Flight = (Route, Vec<flight::Stop>, Vec<f32>);
 
 /// A planned coverage mission.
 pub struct Planned<'a> {
@@ -105,6 +110,29 @@ impl<'a> Planned<'a> {
             Self { scenario, area, method, vehicles, tracks, transit, plan, lower_bound_s, seconds };
         planned.check_endurance()?;
         Ok(planned)
+    }
+
+    /// Latitude and longitude of a place of the plan. Heights are above the ground there, not above the plane that touches
+    /// the earth at the origin: 100 km away that plane is 780 m up.
+    pub fn geodetic(&self, place: &Point) -> Geodetic {
+        let origin = &self.scenario.area.origin;
+        let mut up_m = 0.0;
+        let mut found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
+        for _ in 0..3 {
+            up_m -= (found.alt_m - origin.alt_m) as f32;
+            found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
+        }
+        found
+    }
+
+    /// Each route with its stops, and when they are passed.
+    pub fn flights(&self) -> Vec<Flight> {
+        let flight = |route: &Route| {
+            let stops = flight::stops(self, route);
+            let times_s = flight::times_s(self, route, &stops);
+            (*route, stops, times_s)
+        };
+        self.plan.routes.iter().map(flight).collect()
     }
 
     /// Nobody is sent out for longer than its battery lasts.

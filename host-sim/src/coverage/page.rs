@@ -2,17 +2,16 @@
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
-use planner_core::coverage::pack::Route;
 
-use super::Planned;
 use super::check::Findings;
 use super::flight::Stop;
+use super::{Flight, Planned};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// What the page shows.
 pub fn page(
     planned: &Planned<'_>,
-    flights: &[(Route, Vec<Stop>, Vec<f32>)],
+    flights: &[Flight],
     findings: &Findings,
     result: serde_json::Value,
 ) -> ReportData {

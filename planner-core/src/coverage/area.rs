@@ -8,8 +8,8 @@ use libm::{fabs, sqrt};
 
 use super::Flat;
 
-/// Furthest coordinate, metres: at 20 km f32 still steps by 2 mm.
-pub const MAX_COORDINATE_M: f32 = 20_000.0;
+/// Furthest coordinate, metres: at 100 km f32 steps by 8 mm.
+pub const MAX_COORDINATE_M: f32 = 150_000.0;
 /// Vertices nearer than this are one, metres.
 pub const SAME_M: f32 = 1e-3;
 /// Edges cross if each reaches so far beyond the other, metres: neighbouring fields share borders, and coordinates are
@@ -112,8 +112,9 @@ impl<'a> Area<'a> {
     pub fn new(vertices: &'a [Flat], rings: &'a [Ring]) -> Result<Self, AreaError> {
         let area = Self { vertices, rings };
         area.check_shape()?;
-        area.check_rings()?;
+        area.check_duplicates()?;
         area.check_crossings()?;
+        area.check_sizes()?;
         area.check_nesting()?;
         Ok(area)
     }
@@ -196,22 +197,25 @@ impl<'a> Area<'a> {
         Ok(())
     }
 
-    fn check_rings(&self) -> Result<(), AreaError> {
+    fn check_duplicates(&self) -> Result<(), AreaError> {
         let mut start = 0;
-        for (i, (_, ring)) in self.each().enumerate() {
-            for (k, (a, b)) in edges_of(ring).enumerate() {
-                if (b - a).amax() < SAME_M {
-                    return Err(AreaError::Duplicate { vertex: (start + (k + 1) % ring.len()) as u16 });
-                }
-            }
-            let (area, around) = (signed_area(ring), perimeter(ring));
-            // A strip as long as half its border and a millimetre wide.
-            if fabs(area) < around * f64::from(SAME_M) / 2.0 {
-                return Err(AreaError::NoArea { ring: i as u16 });
+        for (_, ring) in self.each() {
+            if let Some(k) = edges_of(ring).position(|(a, b)| (b - a).amax() < SAME_M) {
+                return Err(AreaError::Duplicate { vertex: (start + (k + 1) % ring.len()) as u16 });
             }
             start += ring.len();
         }
         Ok(())
+    }
+
+    fn check_sizes(&self) -> Result<(), AreaError> {
+        // A strip as long as half its border and a millimetre wide.
+        let is_flat =
+            |(_, ring): (_, &[Flat])| fabs(signed_area(ring)) < perimeter(ring) * f64::from(SAME_M) / 2.0;
+        match self.each().position(is_flat) {
+            Some(ring) => Err(AreaError::NoArea { ring: ring as u16 }),
+            None => Ok(()),
+        }
     }
 
     fn check_crossings(&self) -> Result<(), AreaError> {

@@ -9,7 +9,7 @@
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
 use super::CoverageError;
-use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_layers};
+use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_costs};
 
 /// Most vehicles.
 pub const MOST_VEHICLES: usize = 10;
@@ -178,6 +178,6 @@ impl<const L: usize, const N: usize> Table<'_, '_, '_, L, N> {
             }
         }
         out.routes.reverse();
-        set_layers(self.work, out);
+        set_costs(self.work, out);
     }
 }

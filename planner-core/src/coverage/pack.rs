@@ -387,10 +387,18 @@ pub(super) fn set_layers<const L: usize, const N: usize, const K: usize>(
         });
         plan.routes[i].layer = longer.count() as u8 + 1;
     }
+    set_costs(work, plan);
+}
+
+/// Sets the costs of routes that have their layers.
+pub(super) fn set_costs<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    plan: &mut Plan<K>,
+) {
     for route in &mut plan.routes {
         let vehicle = &work.vehicles[usize::from(route.vehicle)];
         let top_m = work.heights.mission_m + f32::from(route.layer) * work.heights.layer_m;
         route.cost_m = route.ground_m + 2.0 * top_m;
-        route.cost_s = seconds(route) + work.altitude_delay_s(vehicle, route.layer);
+        route.cost_s = route.ground_m / vehicle.cruise_mps + work.altitude_delay_s(vehicle, route.layer);
     }
 }

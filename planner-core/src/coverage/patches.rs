@@ -1,8 +1,9 @@
 //! More lanes where a no-fly zone covers the middle of a strip and not all of it.
 //!
 //! A strip that a zone reaches into is halved three times. Of each part, what no lane shows yet gets a lane along the
-//! part's own middle, as far as that is free. A place beside a zone lies at most a sixteenth of a lane from such a
-//! middle, and a footprint reaches half a lane to both sides. O(strips at zones · 14 · (vertices + lanes)).
+//! part's own middle, as far as that is free. What then is left of an eighth, because its middle is not free, gets a lane
+//! beside it, else single pictures: a footprint reaches at least half a lane to both sides. O(strips at zones · 14 · (vertices + lanes)), and
+//! 16 lines more for each eighth that has something left.
 
 use libm::{fmaxf, fminf};
 
@@ -14,6 +15,8 @@ use super::transit::CLEARANCE_M;
 
 /// How often a strip is halved.
 const HALVINGS: u32 = 3;
+/// Parts in the end.
+const EIGHTHS: u32 = 1 << HALVINGS;
 
 /// Lays the lanes that are missing.
 pub(super) fn lay<const L: usize, const V: usize>(
@@ -33,8 +36,72 @@ pub(super) fn lay<const L: usize, const V: usize>(
                 strips.lay(strip as u16, strips.middle(span), ws, out)?;
             }
         }
+        let wide = (high - low) / EIGHTHS as f32;
+        for part in 0..EIGHTHS {
+            let from = low + part as f32 * wide;
+            lay_beside(strips, strip as u16, [from, from + wide], ws, out)?;
+            lay_pictures(strips, strip as u16, [from, from + wide], ws, out)?;
+        }
     }
     Ok(())
+}
+
+/// Lays lanes on both sides of an eighth, the nearest first, until nothing is left of it.
+fn lay_beside<const L: usize, const V: usize>(
+    strips: &Strips<'_>,
+    strip: u16,
+    span: Span,
+    ws: &mut Workspace<V>,
+    out: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
+    let half = (span[1] - span[0]) / 2.0;
+    for step in 1..=EIGHTHS {
+        for side in [-1.0, 1.0] {
+            strips.need(span, ws)?;
+            without_shown(strips, span, out, ws)?;
+            if ws.need.spans().is_empty() {
+                return Ok(());
+            }
+            let v = strips.middle(span) + side * half * step as f32;
+            if !reaches(strips, v, span) {
+                return Ok(());
+            }
+            strips.lay(strip, v, ws, out)?;
+        }
+    }
+    Ok(())
+}
+
+/// Takes single pictures of what no line through it or beside it reaches: a wedge between two zones.
+fn lay_pictures<const L: usize, const V: usize>(
+    strips: &Strips<'_>,
+    strip: u16,
+    span: Span,
+    ws: &mut Workspace<V>,
+    out: &mut Tracks<L>,
+) -> Result<(), CoverageError> {
+    let half = (span[1] - span[0]) / 2.0;
+    for step in 0..=EIGHTHS {
+        for side in [-1.0, 1.0] {
+            strips.need(span, ws)?;
+            without_shown(strips, span, out, ws)?;
+            let v = strips.middle(span) + side * half * step as f32;
+            let Some(&need) = ws.need.spans().first().filter(|_| reaches(strips, v, span)) else {
+                return Ok(());
+            };
+            strips.lay_picture(strip, v, need, ws, out)?;
+        }
+    }
+    Ok(())
+}
+
+/// Whether pictures along the line `v` show all between two other `v`, and a little more.
+fn reaches(strips: &Strips<'_>, v: f32, [low, high]: Span) -> bool {
+    let spacing = strips.pattern.spacing;
+    let across = spacing.footprint.across_m;
+    let spare = fmaxf(across - strips.wide, 0.0) / 2.0;
+    let reach = across / 2.0 - fminf(spacing.lane_m / 19.0, spare * 0.99);
+    v - low <= reach && high - v <= reach
 }
 
 /// Whether a no-fly zone comes between two `v`.
@@ -47,20 +114,18 @@ fn meets_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     })
 }
 
-/// Takes from `ws.need` what lanes already show of the strip's part between two `v`.
+/// Takes from `ws.need` what lanes already show of the strip's part between two `v`, and what zones hold of it.
 fn without_shown<const L: usize, const V: usize>(
     strips: &Strips<'_>,
-    [low, high]: Span,
+    span: Span,
     tracks: &Tracks<L>,
     ws: &mut Workspace<V>,
 ) -> Result<(), CoverageError> {
-    let footprint = strips.pattern.spacing.footprint;
-    // A rounding less than what is shown.
-    let (along, across) = (footprint.along_m * 0.499, footprint.across_m * 0.499);
+    strips.without_zones(span, ws)?;
+    let along = strips.reach();
     for lane in tracks.lanes() {
         let ((from, v), (to, _)) = (strips.rotated(&lane.from), strips.rotated(&lane.to));
-        let reaches = v - low <= across && high - v <= across;
-        if reaches {
+        if reaches(strips, v, span) {
             ws.need.remove([fminf(from, to) - along, fmaxf(from, to) + along])?;
         }
     }

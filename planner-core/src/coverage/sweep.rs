@@ -76,6 +76,11 @@ fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Resu
     let mut side = 0;
     for step in 0..2 * count {
         let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
+        // What lies above the line between both ends is no corner of the lower side, and the other way round.
+        let above = (sorted[count - 1] - sorted[0]).perp(&(place - sorted[0]));
+        if (step < count && above > 0.0) || (step > count && step + 1 < 2 * count && above <= 0.0) {
+            continue;
+        }
         if step == count {
             side = hull.len().saturating_sub(1);
         }
@@ -86,12 +91,10 @@ fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Resu
             }
             hull.pop();
         }
-        if hull.last() != Some(&place) {
+        let closes = step > count && hull.first() == Some(&place);
+        if hull.last() != Some(&place) && !closes {
             hull.push(place).map_err(|_| AreaError::AreaFull)?;
         }
-    }
-    if hull.len() > 1 && hull.first() == hull.last() {
-        hull.pop();
     }
     Ok(())
 }

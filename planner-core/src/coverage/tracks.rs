@@ -204,9 +204,6 @@ pub fn build<const L: usize, const V: usize, const N: usize>(
         None => least_width(area, &mut ws.hull)?,
     };
     let strips = Strips::new(area, pattern, direction)?;
-    if strips.count > L {
-        return Err(CoverageError::LanesFull);
-    }
     out.lanes.clear();
     out.along = direction.along;
     for strip in 0..strips.count {
@@ -308,18 +305,8 @@ impl<'a> Strips<'a> {
                 out.add([pair[0] - grown, pair[1] + grown])?;
             }
         }
-        for (a, b) in edges {
-            let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
-            if a.1 > b.1 {
-                core::mem::swap(&mut a, &mut b);
-            }
-            if a.1 > high || b.1 < low {
-                continue;
-            }
-            let at = |v: f32| a.0 + (v - a.1) * (b.0 - a.0) / (b.1 - a.1);
-            let from = if a.1 < low { at(low) } else { a.0 };
-            let to = if b.1 > high { at(high) } else { b.0 };
-            out.add([fminf(from, to) - grown, fmaxf(from, to) + grown])?;
+        for [from, to] in edges.filter_map(|edge| self.between(edge, [low, high])) {
+            out.add([from - grown, to + grown])?;
         }
         Ok(())
     }
@@ -335,6 +322,53 @@ impl<'a> Strips<'a> {
         let inset = self.wide * 1e-4;
         let span = [span[0] + inset, span[1] - inset];
         self.shadow(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
+    }
+
+    /// Takes from `ws.need` every `u` at which one no-fly zone holds all between two `v`: those inside it on both border
+    /// lines, without those of its edges between them.
+    pub(super) fn without_zones<const V: usize>(
+        &self,
+        span: Span,
+        ws: &mut Workspace<V>,
+    ) -> Result<(), CoverageError> {
+        for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            ws.line.clear();
+            self.crossings(edges_of(ring), span[0], &mut ws.crossings)?;
+            for pair in ws.crossings.chunks_exact(2) {
+                ws.line.add([pair[0], pair[1]])?;
+            }
+            self.crossings(edges_of(ring), span[1], &mut ws.crossings)?;
+            let mut outside = f32::NEG_INFINITY;
+            for pair in ws.crossings.chunks_exact(2) {
+                ws.line.remove([outside, pair[0]])?;
+                outside = pair[1];
+            }
+            ws.line.remove([outside, f32::INFINITY])?;
+            for edge in edges_of(ring) {
+                if let Some(edge) = self.between(edge, span) {
+                    ws.line.remove(edge)?;
+                }
+            }
+            for span in ws.line.spans() {
+                ws.need.remove(*span)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// From where to where an edge runs between two `v`, if it does.
+    fn between(&self, (a, b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
+        let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
+        if a.1 > b.1 {
+            core::mem::swap(&mut a, &mut b);
+        }
+        if a.1 > high || b.1 < low {
+            return None;
+        }
+        let at = |v: f32| a.0 + (v - a.1) * (b.0 - a.0) / (b.1 - a.1);
+        let from = if a.1 < low { at(low) } else { a.0 };
+        let to = if b.1 > high { at(high) } else { b.0 };
+        Some([fminf(from, to), fmaxf(from, to)])
     }
 
     /// Takes from `ws.free` every `u` at which the line `v` comes nearer than the clearance to a no-fly zone.
@@ -370,28 +404,56 @@ impl<'a> Strips<'a> {
         if self.area.has_no_fly() {
             self.unblock(v, ws)?;
         }
-        for &[from, to] in ws.free.spans() {
-            let lane = Lane {
-                from: self.place(from, v),
-                to: self.place(to, v),
-                first: 0,
-                count: 0,
-                start_m: 0.0,
-                strip,
-            };
-            out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)?;
+        ws.free.spans().iter().try_for_each(|span| self.push(strip, v, *span, out))
+    }
+
+    /// Lays a lane of one waypoint on the line `v`, as near as can be to the middle of `need`, if it shows all of it.
+    pub(super) fn lay_picture<const L: usize, const V: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        need: Span,
+        ws: &mut Workspace<V>,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        let (middle, room) = ((need[0] + need[1]) / 2.0, self.reach() - (need[1] - need[0]) / 2.0);
+        if room <= 0.0 {
+            return Ok(());
         }
-        Ok(())
+        ws.free.clear();
+        ws.free.add([middle - room, middle + room])?;
+        self.unblock(v, ws)?;
+        let near = ws.free.spans().iter().map(|[from, to]| middle.clamp(*from, *to));
+        let far = |u: &f32| libm::fabsf(u - middle);
+        let nearest = near.min_by(|a, b| far(a).total_cmp(&far(b)));
+        nearest.map_or(Ok(()), |u| self.push(strip, v, [u, u], out))
+    }
+
+    fn push<const L: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        [from, to]: Span,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        let (from, to) = (self.place(from, v), self.place(to, v));
+        let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
+        out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
     }
 
     /// From where to where a lane runs for an area that reaches over `need` in its strip and over `line` along it: from
     /// border to border, further where the first or last picture would else leave something out.
     fn extent(&self, need: Span, line: Span) -> Span {
-        let half = self.pattern.spacing.footprint.along_m / 2.0;
-        let reach = half - fminf(self.wide / 10.0, half / 2.0);
+        let reach = self.reach();
         let (from, to) = (fminf(line[0], need[0] + reach), fmaxf(line[1], need[1] - reach));
         let middle = (need[0] + need[1]) / 2.0;
         let [from, to] = if from <= to { [from, to] } else { [middle, middle] };
         [from - self.pattern.margin_m, to + self.pattern.margin_m]
+    }
+
+    /// How far beyond its middle a picture shows the lane: a little less than half its side.
+    pub(super) fn reach(&self) -> f32 {
+        let half = self.pattern.spacing.footprint.along_m / 2.0;
+        half - fminf(self.wide / 10.0, half / 2.0)
     }
 }

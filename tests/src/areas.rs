@@ -1,0 +1,105 @@
+//! Random coverage scenarios, as text: what a user would write.
+
+use rand_core::Rng;
+
+/// A corner, metres.
+type Corner = [f64; 2];
+
+/// What random areas have.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Convex, without holes and zones.
+    Convex,
+    /// Concave, with up to three holes and up to three no-fly zones that may cut the border and each other.
+    Any,
+}
+
+/// A number from 0 to below 1.
+pub fn unit(random: &mut impl Rng) -> f64 {
+    f64::from(random.next_u32()) / (f64::from(u32::MAX) + 1.0)
+}
+
+fn between(random: &mut impl Rng, low: f64, high: f64) -> f64 {
+    low + (high - low) * unit(random)
+}
+
+/// A polygon that is seen whole from its middle.
+fn star(random: &mut impl Rng, middle: Corner, radius: f64, corners: usize) -> Vec<Corner> {
+    let mut angles: Vec<f64> = (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
+    angles.sort_by(f64::total_cmp);
+    let least = between(random, 0.15, 0.9);
+    let corner = |angle: f64| {
+        let far = radius * between(random, least, 1.0);
+        [middle[0] + far * angle.cos(), middle[1] + far * angle.sin()]
+    };
+    angles.into_iter().map(corner).collect()
+}
+
+/// The convex hull of random places.
+fn convex(random: &mut impl Rng, size: Corner, corners: usize) -> Vec<Corner> {
+    let mut angles: Vec<f64> = (0..corners).map(|_| between(random, 0.0, std::f64::consts::TAU)).collect();
+    angles.sort_by(f64::total_cmp);
+    let turn = between(random, 0.0, std::f64::consts::TAU);
+    let corner = |angle: f64| {
+        let (u, v) = (size[0] * angle.cos(), size[1] * angle.sin());
+        [u * turn.cos() - v * turn.sin(), u * turn.sin() + v * turn.cos()]
+    };
+    angles.into_iter().map(corner).collect()
+}
+
+fn list(rings: &[Vec<Corner>]) -> String {
+    let ring = |ring: &Vec<Corner>| {
+        let corners: Vec<String> = ring.iter().map(|[x, y]| format!("[{x:.3}, {y:.3}]")).collect();
+        format!("[{}]", corners.join(", "))
+    };
+    rings.iter().map(ring).collect::<Vec<_>>().join(", ")
+}
+
+/// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a hole outside.
+pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let radius = between(random, 40.0, 250.0);
+    let count = 3 + (random.next_u32() % 20) as usize;
+    let outer = match shape {
+        Shape::Convex => {
+            let flat = between(random, 0.2, 1.0);
+            convex(random, [radius, radius * flat], count.min(9))
+        }
+        Shape::Any => star(random, [0.0, 0.0], radius, count),
+    };
+    let mut text = format!("[area]\npolygon = {}\n", list(&[outer]));
+    if shape == Shape::Any {
+        for (key, most, size) in [("holes", 4, 0.15), ("no_fly", 4, 0.35)] {
+            let rings = (0..random.next_u32() % most).map(|_| {
+                let middle = [0, 1].map(|_| between(random, -0.6, 0.6) * radius);
+                let size = size * radius * between(random, 0.2, 1.0);
+                let corners = 3 + (random.next_u32() % 7) as usize;
+                star(random, middle, size, corners)
+            });
+            let rings: Vec<_> = rings.collect();
+            text += &format!("{key} = [{}]\n", list(&rings));
+        }
+        if random.next_u32().is_multiple_of(3) {
+            text += &format!("angle_deg = {:.1}\n", between(random, 0.0, 180.0));
+        }
+        if random.next_u32().is_multiple_of(4) {
+            text += &format!("margin_m = {:.1}\n", between(random, 0.0, 10.0));
+        }
+    }
+    let height = between(random, 15.0, 60.0);
+    let (front, side) = (between(random, 0.1, 0.8), between(random, 0.1, 0.7));
+    text += &format!("camera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = {height:.1}\n");
+    text += &format!("overlap_front = {front:.2}\noverlap_side = {side:.2}\n[mission]\ncruise_mps = 5.0\n");
+    let base = [0, 1].map(|_| between(random, -1.2, 1.2) * radius);
+    let scattered = random.next_u32().is_multiple_of(2);
+    for id in 1..=vehicles {
+        let place = match scattered {
+            true => [0, 1].map(|_| between(random, -1.3, 1.3) * radius),
+            false => [base[0] + 3.0 * id as f64, base[1]],
+        };
+        text += &format!(
+            "[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{:.2}, {:.2}, 0.0]\n",
+            place[0], place[1]
+        );
+    }
+    text
+}

@@ -1,0 +1,279 @@
+//! Coverage plans, judged by the one checker: everything photographed, every waypoint once, no leg in a no-fly zone.
+
+use flockmate_tests::areas::{self, Shape};
+use flockmate_tests::shared_data;
+use host_sim::coverage::Planned;
+use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::scenario::coverage::{Coverage, Method};
+use host_sim::scenario::parse_coverage;
+use planner_core::coverage::Flat;
+use rand_core::SeedableRng as _;
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+/// How many random areas: more with `FLOCKMATE_AREAS=N`.
+fn areas() -> u64 {
+    std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
+}
+
+fn findings(scenario: &Coverage, method: Method) -> Result<Findings, String> {
+    let planned = Planned::new(scenario, method).map_err(|error| format!("{error:#}"))?;
+    Ok(check_plan(&planned))
+}
+
+#[test]
+fn random_areas_are_covered() {
+    const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+    let outcome = |seed: u64| -> Result<bool, String> {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let text = areas::scenario(&mut random, Shape::Any, 1 + (seed % 10) as usize);
+        let Ok(scenario) = parse_coverage(&text, "random") else { return Ok(false) };
+        let findings = match findings(&scenario, METHODS[(seed % 3) as usize]) {
+            Ok(findings) => findings,
+            Err(error) if error.contains("no-fly zone") => return Ok(false),
+            Err(error) => return Err(format!("seed {seed}: {error}\n{text}")),
+        };
+        if findings.is_clean() {
+            Ok(true)
+        } else {
+            Err(format!("seed {seed}: {:?}\n{text}", Findings { over_time: Vec::new(), ..findings }))
+        }
+    };
+    // Areas that are none, or that zones close, are followed by others.
+    let all: Vec<_> = (0..areas() * 2).into_par_iter().map(outcome).collect();
+    let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
+    for wrong in wrong.iter().take(60) {
+        println!("{}\n", wrong.chars().take(2500).collect::<String>());
+    }
+    let planned = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count() as u64;
+    println!("{planned} of {} areas planned, {} wrong", all.len(), wrong.len());
+    assert!(wrong.is_empty() && planned >= areas(), "{planned} planned, {} wrong", wrong.len());
+}
+
+/// Costs of the methods on one random convex area.
+fn costs(seed: u64) -> Option<[f32; 4]> {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
+    let scenario = parse_coverage(&text, "random").ok()?;
+    let cost = |method| Planned::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
+    let bound_s = Planned::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
+    let costs = [
+        cost(Method::SimpleBinpat)?,
+        cost(Method::Binpat)?,
+        cost(Method::PowellBinpat)?,
+        cost(Method::Exact)?,
+    ];
+    assert!(costs.iter().all(|cost| *cost >= bound_s * 0.9999), "seed {seed}: {costs:?} below {bound_s}");
+    Some(costs)
+}
+
+/// `FLOCKMATE_AREAS=1000` takes minutes in a debug build: `exact` looks at 2²⁰ states for ten vehicles.
+#[test]
+fn powell_is_no_worse_than_binpat_and_exact_is_the_best() {
+    let count = std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(60);
+    let mut all: Vec<[f32; 4]> = (0..count).into_par_iter().filter_map(costs).collect();
+    assert!(all.len() as u64 > count / 2, "{}", all.len());
+    let over = |costs: &[f32; 4], a: usize, b: usize| costs[a] > costs[b] * 1.0001;
+    assert!(!all.iter().any(|costs| over(costs, 2, 1)), "POWELL is worse than BINPAT");
+    let best = (0..3).all(|method| !all.iter().any(|costs| over(costs, 3, method)));
+    assert!(best, "`exact` is not the best");
+    let beaten = all.iter().filter(|costs| over(costs, 2, 0)).count();
+    let mut median = |method: usize| {
+        all.sort_by(|a, b| (a[method] / a[3]).total_cmp(&(b[method] / b[3])));
+        100.0 * (all[all.len() / 2][method] / all[all.len() / 2][3] - 1.0)
+    };
+    let gaps = [median(0), median(1), median(2)];
+    println!(
+        "{} areas; median gap to exact: simple {:.1} %, binpat {:.1} %, powell {:.1} %",
+        all.len(),
+        gaps[0],
+        gaps[1],
+        gaps[2]
+    );
+    println!("POWELL is worse than SIMPLE in {beaten}");
+    assert!(beaten * 20 <= all.len() && gaps[2] <= 8.0, "{beaten}, {gaps:?}");
+}
+
+/// The least largest cost of waypoints `from` on for these vehicles and layers, by trying everything.
+fn brute_force(planned: &Planned<'_>, from: u32, vehicles: &[usize], layers: &[u8]) -> f64 {
+    let count = planned.tracks.waypoint_count();
+    if from == count {
+        return 0.0;
+    }
+    let distance = |a: &Flat, b: &Flat| f64::from(a.x - b.x).hypot(f64::from(a.y - b.y));
+    let place = |number: u32| planned.tracks.waypoint(number).expect("a waypoint");
+    let heights = planned.scenario.area.heights;
+    let mut best = f64::INFINITY;
+    for (i, &v) in vehicles.iter().enumerate() {
+        for (j, &layer) in layers.iter().enumerate() {
+            let vehicle = &planned.vehicles[v];
+            let top_m = f64::from(heights.mission_m) + f64::from(layer) * f64::from(heights.layer_m);
+            let delay_s = top_m / f64::from(vehicle.climb_mps) + top_m / f64::from(vehicle.descend_mps);
+            let mut inside_m = 0.0;
+            for end in from + 1..=count {
+                if end > from + 1 {
+                    inside_m += distance(&place(end - 2), &place(end - 1));
+                }
+                let transit_m =
+                    distance(&vehicle.place, &place(from)) + distance(&place(end - 1), &vehicle.home);
+                let own_s = (inside_m + transit_m) / f64::from(vehicle.cruise_mps) + delay_s;
+                let others = [&vehicles[..i], &vehicles[i + 1..]].concat();
+                let above = [&layers[..j], &layers[j + 1..]].concat();
+                best = best.min(own_s.max(brute_force(planned, end, &others, &above)));
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn exact_is_what_trying_everything_finds() {
+    let mut tried = 0;
+    for seed in 0..400 {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let vehicles = 1 + (seed % 3) as usize;
+        let mut text = areas::scenario(&mut random, Shape::Convex, vehicles);
+        // Pictures so large that there are few.
+        text = text.replace("height_m = ", "height_m = 1");
+        for id in 1..=vehicles {
+            let speeds = [areas::unit(&mut random), areas::unit(&mut random)].map(|unit| 0.5 + 4.0 * unit);
+            let extra = format!("id = {id}\nclimb_mps = {:.2}\ndescend_mps = {:.2}\n", speeds[0], speeds[1]);
+            text = text.replace(&format!("id = {id}\n"), &extra);
+        }
+        let Ok(scenario) = parse_coverage(&text, "random") else { continue };
+        let Ok(planned) = Planned::new(&scenario, Method::Exact) else { continue };
+        if !(2..=12).contains(&planned.tracks.waypoint_count()) {
+            continue;
+        }
+        let all: Vec<usize> = (0..vehicles).collect();
+        let layers: Vec<u8> = (1..=vehicles as u8).collect();
+        let best = brute_force(&planned, 0, &all, &layers);
+        let found = f64::from(planned.plan.max_cost_s());
+        assert!((found - best).abs() <= best * 1e-4, "seed {seed}: {found} instead of {best}\n{text}");
+        tried += 1;
+    }
+    println!("{tried} areas tried");
+    assert!(tried >= 50, "{tried}");
+}
+
+/// `[area]` for a real file: one picture shows about 15 by 10 lanes' units.
+fn real(file: &std::path::Path, area: &str) -> String {
+    format!("[area]\nfile = '{}'\n{area}\n[mission]\ncruise_mps = 5.0\n", file.display())
+}
+
+#[test]
+fn real_areas_are_covered() {
+    let wide = "camera = { fov_deg = 73.7, aspect = 1.5 }\nheight_m = 35.0";
+    let narrow = "coordinates = \"metres\"\nlane_m = 1.0\nwaypoint_m = 1.0";
+    let files = [
+        ("coverage/12.json", narrow),
+        ("coverage/13.json", narrow),
+        ("coverage/fiboa-example.json", wide),
+        ("coverage/fields2cover_test.json", wide),
+        ("coverage/fields2cover_test_2_cell.json", wide),
+        ("plans/qgroundcontrol_sample_with_survey.plan", "lane_m = 10.0\nwaypoint_m = 5.0"),
+    ];
+    for (name, area) in files {
+        let Some(path) = shared_data(name) else { return };
+        let mut text = real(&path, area);
+        for id in 1..=3 {
+            text +=
+                &format!("[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{}, 0.0, 0.0]\n", 3 * id);
+        }
+        let scenario = parse_coverage(&text, name).unwrap_or_else(|error| panic!("{error}"));
+        for method in [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat, Method::Exact] {
+            let planned = Planned::new(&scenario, method).unwrap_or_else(|error| panic!("{name}: {error:#}"));
+            let found = check_plan(&planned);
+            println!(
+                "{name} {}: {} lanes, {} waypoints, {} cells, {:.1} s, bound {:.1} s",
+                method.name(),
+                planned.tracks.lanes().len(),
+                found.photos,
+                found.cells,
+                planned.plan.max_cost_s(),
+                planned.lower_bound_s
+            );
+            assert!(found.is_clean(), "{name}: {:?}", Findings { over_time: Vec::new(), ..found });
+        }
+    }
+}
+
+#[test]
+fn files_without_an_area_are_refused_by_name() {
+    for (name, why) in [
+        ("coverage/darp_inputVariables.json", "is not GeoJSON"),
+        ("plans/qgroundcontrol_sample.plan", "holds no polygon"),
+        ("plans/qgroundcontrol_sample_with_structured_scan.plan", "holds no polygon"),
+        ("plans/qgroundcontrol_sample_wrong_overall_version.plan", "is not a plan of QGroundControl"),
+    ] {
+        let Some(path) = shared_data(name) else { return };
+        let text = real(&path, "lane_m = 10.0") + "[[vehicles]]\nid = 1\nstart = [0, 0, 0]\n";
+        let error = parse_coverage(&text, name).expect_err(name);
+        assert!(error.why.contains(why), "{name}: {error}");
+    }
+}
+
+/// What is no area, or hardly one: the error says why, or the plan is right.
+#[test]
+fn bad_areas_are_refused_by_name_or_covered() {
+    let many: Vec<String> = (0..10_000)
+        .map(|i| {
+            let angle = f64::from(i) / 10_000.0 * std::f64::consts::TAU;
+            format!("[{:.4}, {:.4}]", 900.0 * angle.cos(), 700.0 * angle.sin())
+        })
+        .collect();
+    let many = format!("[{}]", many.join(","));
+    let degrees = "[{ lat_deg = -17.0, lon_deg = 179.999 }, { lat_deg = -17.0, lon_deg = -179.999 }, \
+                   { lat_deg = -16.999, lon_deg = -179.999 }, { lat_deg = -16.999, lon_deg = 179.999 }]";
+    let square = "[[0, 0], [100, 0], [100, 80], [0, 80]]";
+    let cases = [
+        ("[[0, 0], [100, 100], [100, 0], [0, 100]]", "", "crosses another one"),
+        ("[[0, 0], [50, 50], [100, 100]]", "", "encloses nothing"),
+        ("[[0, 0], [100, 0], [0, 0], [100, 0]]", "", "encloses nothing"),
+        ("[[0, 0], [100, 0]]", "", "at least three places"),
+        ("[[0, 0], [0, 0], [0, 0]]", "", "at least three places"),
+        ("[]", "", "at least three places"),
+        ("[[0, 0], [100, 0], [nan, 80]]", "", "must be a number"),
+        ("[[0, 0], [100, 0], [inf, 80]]", "", "must be a number"),
+        ("[[0, 0], [100, 0], [100, 80], [1e6, 5]]", "", "km from the origin"),
+        ("[[0, 0], [0.004, 0], [0.004, 0.003]]", "", "area is 0.004"),
+        (square, "holes = [[[200, 0], [210, 0], [210, 10]]]", "lies outside every polygon"),
+        (square, "holes = [[[90, 10], [120, 10], [120, 20]]]", "cross"),
+        (square, "holes = [[[10, 10], [20, 20], [20, 10], [10, 20]]]", "crosses another one"),
+        (square, "no_fly = [[[-10, -10], [-10, 90], [110, 90], [110, -10]]]", "hold the whole area"),
+        (
+            square,
+            "coordinates = \"wgs84\"\norigin = { lat_deg = 0, lon_deg = 0, alt_m = 0 }",
+            "km from the origin",
+        ),
+        ("[[0, 0], [100, 0], [100, 99], [0, 99]]", "coordinates = \"wgs84\"", "no place on earth"),
+        (square, "", ""),
+        ("[[0, 0], [0, 0], [100, 0], [100, 0], [100, 80], [0, 80], [0, 0]]", "", ""),
+        ("[[0, 0], [50, 0], [100, 0], [100, 80], [0, 80]]", "", ""),
+        ("[[0, 0], [100, 0], [100, 3], [0, 3]]", "", ""),
+        ("[[0, 0], [3, 0], [3, 2], [0, 2]]", "", ""),
+        (square, "holes = [[[0, 10], [20, 10], [20, 20]]]", ""),
+        (square, "no_fly = [[[-10, 10], [120, 10], [120, 20], [-10, 20]]]", ""),
+        (degrees, "", ""),
+        (&many, "", ""),
+    ];
+    for (polygon, more, why) in cases {
+        let shown = &polygon[..polygon.len().min(80)];
+        let text = format!(
+            "[area]\npolygon = {polygon}\n{more}\nlane_m = 10.0\nwaypoint_m = 8.0\ncamera = {{ fov_deg = 73.7 }}\n\
+             height_m = 15.0\n[[vehicles]]\nid = 1\nstart = [-30, -30, 0]\n[[vehicles]]\nid = 2\nstart = [-30, -40, 0]\n"
+        );
+        let planned = parse_coverage(&text, "bad").map_err(anyhow::Error::new);
+        let found = match &planned {
+            Ok(scenario) => findings(scenario, Method::PowellBinpat),
+            Err(error) => Err(error.to_string()),
+        };
+        match found {
+            Ok(found) if why.is_empty() => {
+                assert!(found.is_clean(), "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
+            }
+            Err(error) if !why.is_empty() => assert!(error.contains(why), "{shown} {more}: {error}"),
+            other => panic!("{shown} {more}: {other:?}, expected {why:?}"),
+        }
+    }
+}
