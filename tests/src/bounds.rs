@@ -1,6 +1,7 @@
 //! What bounds the work of every public call of planner-core and companion, and what an emulated board counted.
 
 use std::collections::HashMap;
+use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result};
@@ -10,6 +11,9 @@ use host_sim::progress::Progress;
 use host_sim::scenario;
 
 use crate::{board, workspace};
+
+/// Where the table of worst cases is, seen from the checkout.
+pub const PAGE: &str = "docs/worst-case.md";
 
 /// What the board's program `calls` calls each call, and what bounds its work: n nodes, h half-edges, w = 64 waypoints, g = 128 gates,
 /// v = 32 vehicles, p = 2048 pieces of flights, d metres of segment, c cells of a map.
@@ -131,6 +135,31 @@ fn seen(line: &str) -> Result<(String, Seen)> {
     let mut word = || words.next().context("a line of `calls` is cut");
     let (instructions, bytes) = (word()?.parse()?, word()?.parse()?);
     Ok((word()?.to_owned(), Seen { instructions, bytes }))
+}
+
+/// The page before its table, the table, and what is behind it.
+///
+/// # Errors
+/// The page has lost the lines around the table.
+pub fn parts(page: &str) -> Result<[&str; 3]> {
+    const BEFORE: &str = "<!-- written by `cargo xtask bench --only worst-case` -->\n";
+    const BEHIND: &str = "<!-- end -->";
+    let from = page.find(BEFORE).context("no line where the table begins")? + BEFORE.len();
+    let len = page[from..].find(BEHIND).context("no line where the table ends")?;
+    Ok([&page[..from], &page[from..from + len], &page[from + len..]])
+}
+
+/// The table of what was counted.
+///
+/// # Errors
+/// A call of [`BOUNDS`] was not counted.
+pub fn table(calls: &HashMap<String, Seen>) -> Result<String> {
+    let mut table = "| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|\n".to_owned();
+    for (name, bound) in BOUNDS {
+        let call = calls.get(*name).with_context(|| format!("{name} was not counted"))?;
+        writeln!(table, "| `{name}` | {bound} | {} | {} |", rounded(call.instructions), call.bytes)?;
+    }
+    Ok(table)
 }
 
 /// A count as the table prints it: two digits, rounded up.

@@ -1,5 +1,5 @@
-//! The table of worst cases in ARCHITECTURE.md: every public call of planner-core and companion is in it, and an emulated board
-//! needs no more than it says.
+//! The page docs/worst-case.md: every public call of planner-core and companion is on it, and an emulated board needs no more
+//! than its table says.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use flockmate_tests::{board, workspace};
 const SLACK: f64 = 1.25;
 /// Instructions of a control step among 32 neighbours, whatever they do.
 const STEP: u64 = 75_000;
-/// The safety filter's, in the worst case seen. It should take 12 000: ARCHITECTURE.md says what the rest goes to.
+/// The safety filter's, in the worst case seen. It should take 12 000: the page says what the rest goes to.
 const FILTER: u64 = 27_000;
 /// Modules of companion that are its own, where no call is public, and doubles of its tests.
 const PRIVATE: [&str; 14] = [
@@ -31,11 +31,8 @@ const PRIVATE: [&str; 14] = [
     "fake_flash",
 ];
 
-fn table() -> String {
-    let text = fs::read_to_string(workspace().join("ARCHITECTURE.md")).expect("it is there");
-    let from = text.find("## Worst cases").expect("the section");
-    let to = text[from + 1..].find("\n## ").map_or(text.len(), |len| from + 1 + len);
-    text[from..to].to_owned()
+fn page() -> String {
+    fs::read_to_string(workspace().join(bounds::PAGE)).expect("it is there")
 }
 
 /// Names of the public functions in a folder's sources.
@@ -59,24 +56,26 @@ fn public_calls(folder: &Path, names: &mut Vec<String>) {
 }
 
 #[test]
-fn every_public_call_is_in_the_table() {
-    let table = table();
+fn every_public_call_is_on_the_page() {
+    let page = page();
     let mut names = Vec::new();
     public_calls(&workspace().join("planner-core/src"), &mut names);
     public_calls(&workspace().join("companion/src"), &mut names);
     assert!(names.len() > 100, "{}", names.len());
-    let words: Vec<&str> = table.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
+    let words: Vec<&str> = page.split(|c: char| !(c.is_alphanumeric() || c == '_')).collect();
     names.retain(|name| !words.contains(&name.as_str()));
     names.sort();
     names.dedup();
-    assert!(names.is_empty(), "not in ARCHITECTURE.md, Worst cases: {names:?}");
+    assert!(names.is_empty(), "not in {}: {names:?}", bounds::PAGE);
 }
 
 #[test]
 fn the_board_needs_no_more_than_the_table_says() {
     let Some(program) = board::program("calls") else { return };
     let calls = bounds::counted(&program).expect("`calls` runs");
-    let table = table();
+    let page = page();
+    let table = bounds::parts(&page).expect("the page has a table")[1];
+    assert_eq!(table.lines().count(), BOUNDS.len() + 2, "a row for each call");
     for (name, bound) in BOUNDS {
         let start = format!("| `{name}` | {bound} | ");
         let line =

@@ -1,11 +1,12 @@
 //! Every public call of planner-core and companion: its work bound, the most instructions seen on the emulated board, and the
-//! bytes it is lent. Printed as the table that ARCHITECTURE.md keeps.
+//! bytes it is lent. Written as the table of docs/worst-case.md.
 //!
 //! The program `calls` counts, in QEMU with `-icount shift=0`; the bounds are in [`flockmate_tests::bounds`].
 
+use std::fs;
+
 use anyhow::{Context, Result};
-use flockmate_tests::board;
-use flockmate_tests::bounds::{self, BOUNDS};
+use flockmate_tests::{board, bounds, workspace};
 
 use crate::Row;
 
@@ -19,15 +20,17 @@ const LIMITS: [(&str, &str, f64); 6] = [
     ("board control step, else", "Companion::handle_timeout, else", 75.0),
 ];
 
-/// Prints the table; rows for what has a limit.
+/// Writes the table; rows for what has a limit.
 pub fn rows() -> Result<Vec<Row>> {
     let Some(program) = board::program("calls") else { return Ok(Vec::new()) };
     let calls = bounds::counted(&program)?;
-    println!("| call | bound | instructions seen | bytes lent |\n|---|---|---:|---:|");
-    for (name, bound) in BOUNDS {
-        let call = calls.get(*name).with_context(|| format!("{name} was not counted"))?;
-        println!("| `{name}` | {bound} | {} | {} |", bounds::rounded(call.instructions), call.bytes);
-    }
+    let path = workspace().join(bounds::PAGE);
+    let page = fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    let [before, _, behind] = bounds::parts(&page)?;
+    let table = bounds::table(&calls)?;
+    fs::write(&path, [before, &table, behind].concat())
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    print!("{table}");
     LIMITS
         .iter()
         .map(|&(name, call, limit)| {
