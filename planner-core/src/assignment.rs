@@ -13,40 +13,15 @@
 //! Costs are f32 in any unit (metres, seconds), sums and dual prices f64.
 
 mod augment;
+mod costs;
 mod reduce;
+mod state;
 
-use augment::Paths;
 use libm::fmaxf;
 
-/// "Not assigned", as an index.
-const NONE: u16 = u16::MAX;
-
-/// Why an assignment was refused.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum AssignmentError {
-    /// There are no rows or no columns.
-    Empty,
-    /// The costs are not `rows · cols` long.
-    Shape,
-    /// The output is not `rows` long.
-    OutputLength,
-    /// Rows or columns exceed the workspace.
-    WorkspaceTooSmall,
-    /// This cost is NaN.
-    NotANumber {
-        /// Row of the cost.
-        row: u16,
-        /// Column of the cost.
-        col: u16,
-    },
-    /// This cost is minus infinity.
-    MinusInfinity {
-        /// Row of the cost.
-        row: u16,
-        /// Column of the cost.
-        col: u16,
-    },
-}
+pub use self::costs::AssignmentError;
+use self::costs::Costs;
+use self::state::{NONE, Paths, State};
 
 /// What an assignment amounts to.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -114,89 +89,6 @@ impl<const N: usize> AssignmentWorkspace<N> {
 impl<const N: usize> Default for AssignmentWorkspace<N> {
     fn default() -> Self {
         Self::new()
-    }
-}
-
-/// Dual prices and the matching so far, sides swapped so that there are never more rows than columns.
-struct State<'w> {
-    price: &'w mut [f64],
-    row_of: &'w mut [u16],
-    col_of: &'w mut [u16],
-    /// Room for one row of a transposed matrix.
-    row: &'w mut [f32],
-    /// Rows without a column, in the order they are to be served.
-    free: &'w mut [u16],
-}
-
-impl State<'_> {
-    fn reset(&mut self) {
-        self.price.fill(0.0);
-        self.row_of.fill(NONE);
-        self.col_of.fill(NONE);
-    }
-
-    fn join(&mut self, row: u16, col: u16) {
-        self.row_of[usize::from(col)] = row;
-        self.col_of[usize::from(row)] = col;
-    }
-}
-
-/// A checked cost matrix, seen so that `rows <= cols`. Costs above `limit` count as infinite.
-struct Costs<'a> {
-    data: &'a [f32],
-    rows: usize,
-    cols: usize,
-    transposed: bool,
-    limit: f32,
-}
-
-impl<'a> Costs<'a> {
-    fn new(data: &'a [f32], rows: usize, cols: usize) -> Result<Self, AssignmentError> {
-        if rows == 0 || cols == 0 {
-            return Err(AssignmentError::Empty);
-        }
-        if rows.checked_mul(cols) != Some(data.len()) {
-            return Err(AssignmentError::Shape);
-        }
-        // One pass that vectorises; which cost it was is only asked when there is one.
-        let sound =
-            data.chunks(64).all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
-        if !sound && let Some(at) = data.iter().position(|c| c.is_nan() || *c == f32::NEG_INFINITY) {
-            let (row, col) = ((at / cols) as u16, (at % cols) as u16);
-            return Err(match data[at].is_nan() {
-                true => AssignmentError::NotANumber { row, col },
-                false => AssignmentError::MinusInfinity { row, col },
-            });
-        }
-        let transposed = rows > cols;
-        let (rows, cols) = if transposed { (cols, rows) } else { (rows, cols) };
-        Ok(Self { data, rows, cols, transposed, limit: f32::INFINITY })
-    }
-
-    #[inline]
-    fn at(&self, row: u16, col: u16) -> f32 {
-        let (row, col) = (usize::from(row), usize::from(col));
-        let cost = self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
-        if cost <= self.limit { cost } else { f32::INFINITY }
-    }
-
-    /// One row, in place where it lies so in memory, else copied into `buffer`.
-    #[inline]
-    fn row<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
-        let row = usize::from(row);
-        if !self.transposed && self.limit == f32::INFINITY {
-            return &self.data[row * self.cols..][..self.cols];
-        }
-        self.copy_row(row, buffer)
-    }
-
-    #[cold]
-    fn copy_row<'b>(&self, row: usize, buffer: &'b mut [f32]) -> &'b [f32] {
-        let (first, stride) = if self.transposed { (row, self.rows) } else { (row * self.cols, 1) };
-        for (copy, &cost) in buffer.iter_mut().zip(self.data[first..].iter().step_by(stride)) {
-            *copy = if cost <= self.limit { cost } else { f32::INFINITY };
-        }
-        buffer
     }
 }
 

@@ -10,172 +10,19 @@
 
 mod departures;
 mod order;
+mod request;
+mod workspace;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 
-use crate::ConfigError;
-use crate::assignment::{self, AssignmentError, AssignmentWorkspace};
-use crate::flight::{Flight, Path, PathError, VehiclePlan};
+pub use self::request::{Mode, Objective, PlanError, PlanRequest, VehicleTask};
+pub use self::workspace::{PlanWorkspace, SwarmPlan};
+use crate::assignment;
+use crate::flight::{Flight, Path, VehiclePlan};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::sipp::SippWorkspace;
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
-use crate::search::{self, SearchError, SearchWorkspace};
-
-/// What an assignment makes small.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Objective {
-    /// The sum of all path lengths.
-    TotalDistance,
-    /// The longest path.
-    Makespan,
-}
-
-/// How goals are given out.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Every vehicle has its goal.
-    Labelled,
-    /// Any vehicle may take any goal.
-    Unlabelled(Objective),
-}
-
-/// One vehicle of the request; vehicle `i` starts at node `i` of the roadmap.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct VehicleTask {
-    /// Id of the vehicle, unique in the swarm.
-    pub id: u8,
-    /// Radius + safety margin, metres: edges must have more clearance.
-    pub required_clearance_m: f32,
-    /// Height of the start above its pad, metres.
-    pub climb_m: f32,
-    /// Labelled: index of its goal.
-    pub goal: Option<u16>,
-}
-
-/// A swarm's task.
-#[derive(Clone, Copy, Debug)]
-pub struct PlanRequest<'a> {
-    /// The vehicles, in the order of the roadmap's starts.
-    pub vehicles: &'a [VehicleTask],
-    /// Height of each goal above the ground below it, metres; as many as the roadmap has goals.
-    pub descents_m: &'a [f32],
-    /// How goals are given out.
-    pub mode: Mode,
-    /// Separation and nominal speeds.
-    pub schedule: ScheduleConfig,
-    /// Most gates of one vehicle: the least `G` that [`vehicle_plan`] is to be called with.
-    pub gates_most: usize,
-}
-
-impl PlanRequest<'_> {
-    /// Whether every number is one that can be planned with, every id is one vehicle's and, labelled, every goal as well.
-    pub fn check(&self) -> Result<(), PlanError> {
-        self.schedule.check().map_err(PlanError::Config)?;
-        let good = |number: f32| number >= 0.0 && number.is_finite();
-        for (i, vehicle) in self.vehicles.iter().enumerate() {
-            let before = &self.vehicles[..i];
-            if !good(vehicle.required_clearance_m) || !good(vehicle.climb_m) {
-                return Err(PlanError::BadTask(vehicle.id));
-            }
-            if before.iter().any(|other| other.id == vehicle.id) {
-                return Err(PlanError::SameId(vehicle.id));
-            }
-            let labelled = self.mode == Mode::Labelled && vehicle.goal.is_some();
-            if labelled && before.iter().any(|other| other.goal == vehicle.goal) {
-                return Err(PlanError::SameGoal(vehicle.id));
-            }
-        }
-        match self.descents_m.iter().position(|&height_m| !good(height_m)) {
-            Some(goal) => Err(PlanError::BadDescent(goal as u16)),
-            None => Ok(()),
-        }
-    }
-}
-
-/// Why there is no plan.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PlanError {
-    /// The roadmap has other numbers of starts or goals than the request.
-    Terminals,
-    /// More vehicles or goals than `V`.
-    SwarmFull,
-    /// A setting of the schedule.
-    Config(ConfigError),
-    /// Height or clearance of the vehicle with this id is negative, NaN or infinite.
-    BadTask(u8),
-    /// The height of the goal with this index over its ground is.
-    BadDescent(u16),
-    /// Two vehicles have this id.
-    SameId(u8),
-    /// The vehicle with this id has a goal that is another one's too.
-    SameGoal(u8),
-    /// A labelled goal that is not in the roadmap, for the vehicle with this id.
-    BadGoal(u8),
-    /// A search failed for a reason other than "no path", for the vehicle with this id.
-    Search(u8, SearchError),
-    /// The costs could not be assigned.
-    Assignment(AssignmentError),
-    /// The path of the vehicle with this id was refused.
-    Path(u8, PathError),
-    /// The vehicle with this id cannot be scheduled among the others.
-    Schedule(u8, ScheduleError),
-}
-
-/// The plan of a whole swarm: flight `i` is vehicle `i` of the request. A vehicle without a goal stays on its pad.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct SwarmPlan<const V: usize, const W: usize> {
-    /// One flight per vehicle.
-    pub flights: Vec<Flight<W>, V>,
-    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times, and departures.
-    pub crc: u32,
-}
-
-impl<const V: usize, const W: usize> SwarmPlan<V, W> {
-    /// Without vehicles.
-    pub const fn new() -> Self {
-        Self { flights: Vec::new(), crc: 0 }
-    }
-
-    /// Sum of the lengths of all paths, metres.
-    pub fn total_m(&self) -> f64 {
-        self.flights.iter().map(|f| f64::from(f.path.length_m())).sum()
-    }
-}
-
-/// Scratch of [`plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
-/// which one steps aside.
-pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
-    /// Scratch of searches, also for [`crate::detour`].
-    pub search: SearchWorkspace<N>,
-    /// Scratch of [`schedule::sipp`].
-    pub sipp: SippWorkspace<N, P>,
-    /// Scratch of [`assignment`].
-    pub assignment: AssignmentWorkspace<V>,
-    /// Starts × goals, packed from the front.
-    costs: [[f32; V]; V],
-    /// Scratch of the schedule, also for [`vehicle_plan`].
-    pub schedule: ScheduleWorkspace,
-}
-
-impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
-    /// All zeros.
-    pub const fn new() -> Self {
-        Self {
-            search: SearchWorkspace::new(),
-            sipp: SippWorkspace::new(),
-            assignment: AssignmentWorkspace::new(),
-            costs: [[0.0; V]; V],
-            schedule: ScheduleWorkspace::new(),
-        }
-    }
-}
-
-impl<const N: usize, const V: usize, const P: usize> Default for PlanWorkspace<N, V, P> {
-    fn default() -> Self {
-        Self::new()
-    }
-}
+use crate::search;
 
 /// Plans the whole swarm: [`costs`], then [`assign`], then [`schedule()`]. Vehicles and goals that cannot be served are
 /// left out, the rest is served as well as can be.

@@ -13,6 +13,7 @@
 //! Cost: O(nodes · neighbours); 2300 nodes make some 80 000 pairs in range. Memory: 14 bytes a node, 2 a cube.
 //! Metres, mission frame, f32.
 
+mod config;
 mod free_box;
 mod neighbours;
 #[cfg(test)]
@@ -23,117 +24,13 @@ use core::ops::Range;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+use self::config::LengthRange;
+pub use self::config::{Config, Edge, PrmError, Sampling, TRIES_PER_NODE, squared_length};
+use self::free_box::Sight;
+pub use self::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{point_clearance, segment_clearance, segment_is_clear};
 use crate::voxel::VoxelGrid;
-use free_box::Sight;
-pub use neighbours::Workspace;
-
-/// Draws a free node may take before the map counts as full. A map with one free cell in a thousand still yields
-/// a node with a probability of 1 − e⁻¹⁰.
-pub const TRIES_PER_NODE: usize = 10_000;
-
-/// How nodes are spread.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sampling {
-    /// Independent and uniform, as in the paper.
-    Uniform,
-    /// The Halton sequence in bases 2, 3 and 5, shifted by the seed (Cranley and Patterson 1976): more even.
-    Halton,
-}
-
-/// What to build.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Config {
-    /// Random nodes, beside the terminals.
-    pub nodes: usize,
-    /// Shortest edge, metres (Dmin).
-    pub edge_min_m: f32,
-    /// Longest edge, metres (Dmax).
-    pub edge_max_m: f32,
-    /// Distance every edge keeps to obstacles, strictly: radius and safety margin, metres.
-    pub clearance_m: f32,
-    /// Seed of the nodes.
-    pub seed: u64,
-    /// How nodes are spread.
-    pub sampling: Sampling,
-}
-
-/// Why a roadmap could not be built.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PrmError {
-    /// The named field is NaN, infinite, negative, or makes an empty range.
-    Config(&'static str),
-    /// This terminal is not finite, not in the map or inside an obstacle.
-    TerminalBlocked(usize),
-    /// More nodes than the caller's memory holds.
-    TooManyNodes,
-    /// So many nodes were found and then none in [`TRIES_PER_NODE`] draws: hardly any space is free.
-    NoFreeSpace(usize),
-    /// This node is not finite.
-    NotFinite(usize),
-    /// More edges than the caller's memory holds.
-    RoadmapFull,
-}
-
-/// An edge between two nodes, `a < b`.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Edge {
-    /// The lower index.
-    pub a: u16,
-    /// The higher index.
-    pub b: u16,
-}
-
-impl Config {
-    /// Checks every number.
-    pub fn check(&self) -> Result<(), PrmError> {
-        let good = |x: f32| x >= 0.0 && x.is_finite();
-        if !(good(self.edge_min_m)) {
-            return Err(PrmError::Config("edge_min_m"));
-        }
-        // Beyond 1e6 m squares of lengths lose their meaning next to other f32 coordinates.
-        if !(good(self.edge_max_m) && self.edge_max_m > 0.0 && self.edge_max_m <= 1e6)
-            || self.edge_max_m < self.edge_min_m
-        {
-            return Err(PrmError::Config("edge_max_m"));
-        }
-        if !good(self.clearance_m) {
-            return Err(PrmError::Config("clearance_m"));
-        }
-        if self.nodes > usize::from(u16::MAX) {
-            return Err(PrmError::Config("nodes"));
-        }
-        Ok(())
-    }
-}
-
-/// Squared length of the segment from `a` to `b`, m²; the one place where it is computed, so that every builder
-/// rounds alike.
-#[inline(always)]
-pub fn squared_length(a: [f32; 3], b: [f32; 3]) -> f32 {
-    let (x, y, z) = (b[0] - a[0], b[1] - a[1], b[2] - a[2]);
-    x * x + y * y + z * z
-}
-
-/// The squared lengths an edge may have. Two nodes in one place are never joined.
-#[derive(Clone, Copy)]
-struct LengthRange {
-    min: f32,
-    max: f32,
-}
-
-impl LengthRange {
-    fn new(config: &Config) -> Self {
-        let min = config.edge_min_m * config.edge_min_m;
-        Self { min: min.max(f32::MIN_POSITIVE), max: config.edge_max_m * config.edge_max_m }
-    }
-
-    #[inline(always)]
-    fn holds(self, square: f32) -> bool {
-        square >= self.min && square <= self.max
-    }
-}
 
 /// Writes the terminals and then `config.nodes` random free points into `nodes`; returns how many in all.
 ///

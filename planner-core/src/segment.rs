@@ -2,7 +2,7 @@
 //!
 //! The question of every roadmap edge (P3D §3.2, Algorithm 1): may a vehicle that needs `clearance_m` fly straight from
 //! `a` to `b`? A segment is clear iff its Euclidean distance to every occupied closed cell, and to the outside where
-//! that is [`Outside::Blocked`], is strictly greater than the clearance: touching a face, an edge or a corner is blocked.
+//! that is [`Outside::Blocked`](crate::voxel::Outside::Blocked), is strictly greater than the clearance: touching a face, an edge or a corner is blocked.
 //!
 //! # What makes clearance 0 exact
 //!
@@ -23,53 +23,27 @@
 //! the words whose cells lie in the bounding boxes of the swept volume, and a distance for each obstacle in them.
 
 mod distance;
+mod lanes;
+mod lattice;
 #[cfg(test)]
 mod tests;
+mod walk;
 
-pub(crate) use distance::is_farther_than;
-pub use distance::{point_clearance, segment_clearance};
-
+pub(crate) use self::distance::is_farther_than;
+pub use self::distance::{point_clearance, segment_clearance};
+pub(crate) use self::lanes::lane_mask;
+pub use self::lattice::{FRACTION_BITS, MAX_SNAPPED, Snapped, snap, snap_error_cells};
+pub(crate) use self::walk::snapped_rest_touches;
+pub use self::walk::snapped_segment_touches;
 use crate::Point;
-use crate::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
-
-/// Bits after the point of a snapped coordinate, in cells.
-pub const FRACTION_BITS: u32 = 14;
-const ONE: i32 = 1 << FRACTION_BITS;
+use crate::voxel::VoxelGrid;
 
 /// A clearance as wide as this, in cells, is not kept by what is touched, whatever the rounding.
 pub(crate) const WIDE_CELLS: f32 = 0.25;
 
-/// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
-pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
-
-/// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
-pub type Snapped = [i32; 3];
-
-/// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells beyond the grid.
-#[inline]
-pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
-    const REACH: f32 = MAX_DIM as f32;
-    let mut out = [0; 3];
-    for axis in 0..3 {
-        let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
-        if !(-REACH..=2.0 * REACH).contains(&u) {
-            return None;
-        }
-        let v = u * ONE as f32;
-        out[axis] = (if v < 0.0 { v - 0.5 } else { v + 0.5 }) as i32;
-    }
-    Some(out)
-}
-
-/// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of the grid's minimum
-/// corner: half a lattice step, and half an ulp for each of the subtraction and the division.
-pub fn snap_error_cells(cells: f32) -> f32 {
-    0.5 / ONE as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
-}
-
 /// Whether the segment from `a` to `b` stays strictly farther than `clearance_m` from every obstacle.
 ///
-/// An end that is not finite or more than [`MAX_DIM`] cells beyond the grid counts as blocked, as does a clearance that is
+/// An end that is not finite or more than [`MAX_DIM`](crate::voxel::MAX_DIM) cells beyond the grid counts as blocked, as does a clearance that is
 /// NaN, infinite or negative: the safe answer. `a` may equal `b`.
 pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m: f32) -> bool {
     let (Some(from), Some(to)) = (snap(grid.shape(), a), snap(grid.shape(), b)) else {
@@ -84,234 +58,5 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
     if clearance_m < WIDE_CELLS * grid.shape().resolution_m && snapped_segment_touches(grid, &from, &to) {
         return false;
     }
-    distance::is_farther_than(grid, a, b, 0.0, clearance_m)
-}
-
-/// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact; an end beyond
-/// [`MAX_SNAPPED`] counts as touching.
-pub fn snapped_segment_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped) -> bool {
-    snapped_rest_touches(grid, a, b, 0.0)
-}
-
-/// As [`snapped_segment_touches`] for a segment whose first part, the share `known` of it from `a`, is known to touch nothing.
-#[inline]
-pub(crate) fn snapped_rest_touches(grid: &VoxelGrid<'_>, a: &Snapped, b: &Snapped, known: f32) -> bool {
-    let dims = grid.shape().dims;
-    if grid.outside() == Outside::Blocked {
-        let inside =
-            |p: &Snapped| (0..3).all(|axis| p[axis] > 0 && p[axis] < (dims[axis] as i32) << FRACTION_BITS);
-        if !inside(a) || !inside(b) {
-            return true;
-        }
-    } else if a.iter().chain(b).any(|c| c.unsigned_abs() > MAX_SNAPPED as u32) {
-        return true;
-    }
-    let size = [0, 1, 2].map(|axis| (b[axis] - a[axis]).unsigned_abs());
-    if size[0] >= size[1] && size[0] >= size[2] {
-        Walk::<0, 1, 2>::new(grid, a, b, known).touches()
-    } else if size[1] >= size[2] {
-        Walk::<1, 0, 2>::new(grid, a, b, known).touches()
-    } else {
-        Walk::<2, 0, 1>::new(grid, a, b, known).touches()
-    }
-}
-
-/// The walk along the longest axis `U`; `V` and `W` are the other two.
-struct Walk<'g, const U: usize, const V: usize, const W: usize> {
-    words: &'g [u64],
-    a: Snapped,
-    b: Snapped,
-    /// Where along `U` the walk begins and ends.
-    start: i32,
-    end: i32,
-    /// Cells along each axis.
-    dims: [i32; 3],
-    /// Words from one brick to the next along each axis.
-    strides: [i32; 3],
-    /// Change of each coordinate over one lattice unit of `U`, times 2³⁰.
-    slopes: [i64; 3],
-    /// What a coordinate at a place along `U` may err by, in lattice units.
-    slack: i32,
-}
-
-/// The cells of one axis that a stretch of the segment may touch, clipped to the grid; empty if `first > last`.
-#[derive(Clone, Copy)]
-struct Span {
-    first: i32,
-    last: i32,
-}
-
-impl Span {
-    #[inline(always)]
-    fn new(from: i32, to: i32, slack: i32, dim: i32) -> Self {
-        let (low, high) = if from < to { (from, to) } else { (to, from) };
-        Self {
-            first: ((low - slack) >> FRACTION_BITS).max(0),
-            last: ((high + slack) >> FRACTION_BITS).min(dim - 1),
-        }
-    }
-
-    /// The cells of this span in brick `brick`, as a mask of its four lanes. They must meet.
-    #[inline(always)]
-    fn lanes(self, brick: i32) -> u32 {
-        let first = (self.first - brick * 4).max(0) as u32;
-        let last = (self.last - brick * 4).min(3) as u32;
-        (0b1111 << first) & (0b1111 >> (3 - last))
-    }
-
-    /// As [`Self::lanes`], none if they do not meet.
-    #[inline(always)]
-    fn lanes_if_met(self, brick: i32) -> u32 {
-        let first = (self.first - brick * 4).clamp(0, 4) as u32;
-        let last = (self.last - brick * 4).clamp(-1, 3);
-        (0b1111 << first) & (0b1111 >> (3 - last) as u32)
-    }
-}
-
-/// The cells of a brick whose lane along `axis` is among `lanes`.
-#[inline(always)]
-pub(crate) fn lane_mask(axis: usize, lanes: u32) -> u64 {
-    const SPREAD: [[u64; 16]; 3] = lane_masks();
-    SPREAD[axis][(lanes & 15) as usize]
-}
-
-const fn lane_masks() -> [[u64; 16]; 3] {
-    let mut out = [[0; 16]; 3];
-    let mut lanes = 0;
-    while lanes < 16 {
-        let mut bit = 0;
-        while bit < 64 {
-            let lane = [bit % 4, bit / 4 % 4, bit / 16];
-            let mut axis = 0;
-            while axis < 3 {
-                if lanes >> lane[axis] & 1 == 1 {
-                    out[axis][lanes] |= 1 << bit;
-                }
-                axis += 1;
-            }
-            bit += 1;
-        }
-        lanes += 1;
-    }
-    out
-}
-
-impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
-    #[inline(always)]
-    fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
-        let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
-        // A thousandth and a cell less than known, against the rounding of `known` and of this product.
-        let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE).max(0);
-        // Along U upwards, so that the walk has one direction.
-        let ((a, b), (start, end)) =
-            if d[U] < 0 { ((*b, *a), (b[U], a[U] - skip)) } else { ((*a, *b), (a[U] + skip, b[U])) };
-        let [bx, by, _] = grid.shape().bricks().map(|n| n as i32);
-        // |slope| ≤ 1. The quotient of two f32 errs by 2⁻²³ at most, so a coordinate by 2⁻²² of the length, and two units.
-        let per_u = if d[U] == 0 { 0.0 } else { (1 << 30) as f32 / d[U] as f32 };
-        Self {
-            words: grid.words(),
-            a,
-            b,
-            start,
-            end,
-            dims: grid.shape().dims.map(|n| n as i32),
-            strides: [1, bx, bx * by],
-            slopes: d.map(|d| (d as f32 * per_u) as i64),
-            slack: (d[U].unsigned_abs() >> 21) as i32 + 3,
-        }
-    }
-
-    /// The coordinate on `axis` where the segment is at `u`, within `slack`.
-    #[inline(always)]
-    fn at(&self, axis: usize, u: i32) -> i32 {
-        let run = i64::from(u - self.a[U]);
-        self.a[axis] + ((run * self.slopes[axis]) >> 30) as i32
-    }
-
-    #[inline(always)]
-    fn touches(&self) -> bool {
-        // A cell is closed: an end on its face touches the one before too.
-        let whole = Span::new(self.start, self.end, 1, self.dims[U]);
-        if whole.first > whole.last {
-            return false;
-        }
-        let first = (whole.first * ONE).clamp(self.start, self.end);
-        let (mut v, mut w) = (self.at(V, first), self.at(W, first));
-        for brick in whole.first >> 2..=whole.last >> 2 {
-            let u = ((brick + 1) * (4 * ONE)).clamp(self.start, self.end);
-            let (next_v, next_w) = (self.at(V, u), self.at(W, u));
-            let span_v = Span::new(v, next_v, self.slack, self.dims[V]);
-            let span_w = Span::new(w, next_w, self.slack, self.dims[W]);
-            (v, w) = (next_v, next_w);
-            let row = brick * self.strides[U];
-            for brick_w in span_w.first >> 2..=span_w.last >> 2 {
-                for brick_v in span_v.first >> 2..=span_v.last >> 2 {
-                    let word =
-                        self.words[(row + brick_v * self.strides[V] + brick_w * self.strides[W]) as usize];
-                    if word == 0 {
-                        continue;
-                    }
-                    let near =
-                        word & lane_mask(V, span_v.lanes(brick_v)) & lane_mask(W, span_w.lanes(brick_w));
-                    if near != 0 && self.brick_touches(near, brick, brick_v, brick_w) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    }
-
-    /// Looks at the occupied cells `near` of a brick, one layer along `U` at a time.
-    #[inline(always)]
-    fn brick_touches(&self, near: u64, brick_u: i32, brick_v: i32, brick_w: i32) -> bool {
-        let floor = brick_u * (4 * ONE);
-        let from = floor.clamp(self.start, self.end);
-        let (mut v, mut w) = (self.at(V, from), self.at(W, from));
-        for layer in 0..4 {
-            let to = (floor + (layer + 1) * ONE).clamp(self.start, self.end);
-            let (next_v, next_w) = (self.at(V, to), self.at(W, to));
-            let (last_v, last_w) = (v, w);
-            (v, w) = (next_v, next_w);
-            let mut cells = near & lane_mask(U, 1 << layer);
-            if cells == 0 {
-                continue;
-            }
-            cells &= lane_mask(V, Span::new(last_v, v, self.slack, self.dims[V]).lanes_if_met(brick_v));
-            cells &= lane_mask(W, Span::new(last_w, w, self.slack, self.dims[W]).lanes_if_met(brick_w));
-            while cells != 0 {
-                let bit = cells.trailing_zeros() as i32;
-                cells &= cells - 1;
-                let lane = [bit & 3, bit >> 2 & 3, bit >> 4];
-                let mut cell = [0; 3];
-                cell[U] = brick_u * 4 + lane[U];
-                cell[V] = brick_v * 4 + lane[V];
-                cell[W] = brick_w * 4 + lane[W];
-                if cell_is_touched(&self.a, &self.b, cell) {
-                    return true;
-                }
-            }
-        }
-        false
-    }
-}
-
-/// Whether a segment meets a closed cell: the six separating axes, in integers. Coordinates stay below 1.5 · 2³⁰, so the
-/// two products and their difference below 2⁶³.
-#[inline(always)]
-fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
-    const HALF: i64 = (ONE / 2) as i64;
-    let mut d = [0_i64; 3];
-    let mut to_center = [0_i64; 3];
-    for axis in 0..3 {
-        let low = cell[axis] * ONE;
-        if a[axis].max(b[axis]) < low || a[axis].min(b[axis]) > low + ONE {
-            return false;
-        }
-        d[axis] = i64::from(b[axis] - a[axis]);
-        to_center[axis] = i64::from(low - a[axis]) + HALF;
-    }
-    [(0, 1), (1, 2), (2, 0)]
-        .into_iter()
-        .all(|(p, q)| (d[p] * to_center[q] - d[q] * to_center[p]).abs() <= (d[p].abs() + d[q].abs()) * HALF)
+    is_farther_than(grid, a, b, 0.0, clearance_m)
 }

@@ -145,6 +145,56 @@ fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
 }
 
+/// What lies ahead of the reference.
+struct Ahead<'a> {
+    points: &'a [Waypoint],
+    /// Index of the next waypoint.
+    next: usize,
+    along_m: f32,
+    /// Distance within which to stop, metres.
+    stop_m: f32,
+    /// Of the leg at hand.
+    direction: Point,
+    /// Of the leg at hand, m/s².
+    accel: f32,
+}
+
+impl Ahead<'_> {
+    /// Squares of what can be braked from, summed up leg by leg: each has its acceleration.
+    fn braking_sq(&self, cfg: &TrackConfig) -> f32 {
+        let mut before = self.direction;
+        let mut braking_sq = f32::INFINITY;
+        let (mut room, mut from_m, mut leg_accel) = (0.0, self.along_m, self.accel);
+        let enough = 4.0 * (cfg.cruise_mps * cfg.cruise_mps + self.accel * self.accel);
+        for (i, waypoint) in self.points.iter().enumerate().skip(self.next) {
+            let stops_at = self.along_m + self.stop_m;
+            if stops_at <= waypoint.along_m {
+                braking_sq = fminf(braking_sq, room + 2.0 * leg_accel * (stops_at - from_m));
+                break;
+            }
+            room += 2.0 * leg_accel * (waypoint.along_m - from_m);
+            if room >= enough {
+                // From here on there is room to stop before any corner.
+                break;
+            }
+            let corner_sq = match self.points.get(i + 1) {
+                Some(end) => {
+                    let after = direction(waypoint, end);
+                    let clearance_m = fminf(waypoint.clearance_m, end.clearance_m);
+                    let (fastest, after_accel) = limits_along(cfg, &after);
+                    let corner_sq = corner_speed_sq(cfg, clearance_m, &before, &after);
+                    (before, leg_accel) = (after, after_accel);
+                    fminf(corner_sq, fastest * fastest)
+                }
+                None => 0.0,
+            };
+            braking_sq = fminf(braking_sq, corner_sq + room);
+            from_m = waypoint.along_m;
+        }
+        braking_sq
+    }
+}
+
 /// Moves the reference by one step of `dt_s` (expected 0.01…0.2 s) and returns it; `None` on an empty path.
 ///
 /// `advice` is what the neighbours leave. The speed changes by no more than the acceleration of the leg: a stop that is
@@ -166,40 +216,13 @@ pub fn advance<const W: usize>(
         (Some(from), Some(to)) => direction(from, to),
         _ => Point::zeros(),
     };
-    let mut before = along_leg(leg);
+    let before = along_leg(leg);
     let (top_mps, accel) = limits_along(cfg, &before);
     // NaN stops.
     let top_mps = if advice.speed_scale > 0.0 { top_mps * fminf(advice.speed_scale, 1.0) } else { 0.0 };
-    // Squares of what can be braked from, summed up leg by leg: each has its acceleration.
     let stop_m = if advice.stop_within_m > 0.0 { advice.stop_within_m } else { 0.0 };
-    let mut braking_sq = f32::INFINITY;
-    let (mut room, mut from_m, mut leg_accel) = (0.0, tracker.along_m, accel);
-    let enough = 4.0 * (cfg.cruise_mps * cfg.cruise_mps + accel * accel);
-    for (i, waypoint) in points.iter().enumerate().skip(next) {
-        let stops_at = tracker.along_m + stop_m;
-        if stops_at <= waypoint.along_m {
-            braking_sq = fminf(braking_sq, room + 2.0 * leg_accel * (stops_at - from_m));
-            break;
-        }
-        room += 2.0 * leg_accel * (waypoint.along_m - from_m);
-        if room >= enough {
-            // From here on there is room to stop before any corner.
-            break;
-        }
-        let corner_sq = match points.get(i + 1) {
-            Some(end) => {
-                let after = direction(waypoint, end);
-                let clearance_m = fminf(waypoint.clearance_m, end.clearance_m);
-                let (fastest, after_accel) = limits_along(cfg, &after);
-                let corner_sq = corner_speed_sq(cfg, clearance_m, &before, &after);
-                (before, leg_accel) = (after, after_accel);
-                fminf(corner_sq, fastest * fastest)
-            }
-            None => 0.0,
-        };
-        braking_sq = fminf(braking_sq, corner_sq + room);
-        from_m = waypoint.along_m;
-    }
+    let ahead = Ahead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
+    let braking_sq = ahead.braking_sq(cfg);
     let speed_before = tracker.speed_mps;
     // Such that braking within the leg's acceleration is enough from the next step on.
     let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));

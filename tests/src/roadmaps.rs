@@ -119,7 +119,7 @@ impl Forger {
         if starts == 0 || goals == 0 {
             return;
         }
-        let route = Route { from: 0, to: starts, not_before_s: 0.0, parked: &[] };
+        let route = Route { cfg: &SCHEDULE, from: 0, to: starts, not_before_s: 0.0, parked: &[] };
         let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
         let mut flight = Flight::<NODES> {
             id: 1,
@@ -135,7 +135,7 @@ impl Forger {
             asked.set(asked.get() + 1);
             true
         };
-        let found = sipp::route(&SCHEDULE, view, &route, any, [].iter(), &mut self.sipp, &mut flight);
+        let found = sipp::route(view, &route, any, [].iter(), &mut self.sipp, &mut flight);
         assert!(asked.get() <= view.half_edge_count(), "{} half-edges asked about", asked.get());
         match found {
             Ok(()) => near(f64::from(flight.path.length_m()), way),

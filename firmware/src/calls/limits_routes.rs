@@ -197,10 +197,15 @@ fn schedules(
                 let told = schedule::gates(&cfg, &pair, 1, &mut ws.schedule, &mut own.gates);
                 to.is(told.is_ok());
                 let mut found = flight.clone();
-                let route =
-                    Route { from: 0, to: 2, not_before_s: hard, parked: &[Point::new(hard, 0.0, 0.0)] };
+                let route = Route {
+                    cfg: &cfg,
+                    from: 0,
+                    to: 2,
+                    not_before_s: hard,
+                    parked: &[Point::new(hard, 0.0, 0.0)],
+                };
                 let told = to.call("sipp::route", || {
-                    sipp::route(&cfg, view, &route, any, flights[1..].iter(), &mut ws.sipp, &mut found)
+                    sipp::route(view, &route, any, flights[1..].iter(), &mut ws.sipp, &mut found)
                 });
                 to.is(told.is_ok());
             }
@@ -208,11 +213,10 @@ fn schedules(
     }
     for i in 0..INDICES.len() * INDICES.len() {
         let (from, to_node) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
-        let route = Route { from, to: to_node, not_before_s: 0.0, parked: &[] };
+        let route = Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[] };
         let mut flight = plan.flights[0].clone();
-        let told = to.call("sipp::route", || {
-            sipp::route(&SCHEDULE, view, &route, any, [].iter(), &mut ws.sipp, &mut flight)
-        });
+        let told =
+            to.call("sipp::route", || sipp::route(view, &route, any, [].iter(), &mut ws.sipp, &mut flight));
         let there = usize::from(from.max(to_node)) < view.node_count();
         assert!(there || told == Err(ScheduleError::BadIndex));
         to.is(told.is_ok());

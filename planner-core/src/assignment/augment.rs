@@ -3,20 +3,8 @@
 //! A settled column is taken out of the running by moving its price to minus infinity and its distance to infinity, so
 //! the inner loop has no test for it: its reduced costs come out infinite. Both are kept aside and put back at the end.
 
-use super::{Costs, NONE, State};
-
-/// Columns handled together; enough for the widest vectors, small enough to stay in registers.
-pub(super) const LANES: usize = 8;
-
-/// Scratch of one search, a slot for each column.
-pub(super) struct Paths<'w> {
-    pub(super) distance: &'w mut [f64],
-    pub(super) previous: &'w mut [u16],
-    /// Columns settled, in order, with their price and distance.
-    pub(super) settled: &'w mut [u16],
-    pub(super) settled_price: &'w mut [f64],
-    pub(super) settled_distance: &'w mut [f64],
-}
+use super::costs::Costs;
+use super::state::{LANES, NONE, Paths, State};
 
 /// Serves the free row number `k`. False if no path leads to a free column.
 pub(super) fn from_one(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, k: usize) -> bool {

@@ -1,7 +1,7 @@
 //! The cheap first phases of Jonker–Volgenant: most rows find their column here.
 
-use super::augment::{LANES, Paths};
-use super::{Costs, NONE, State};
+use super::costs::Costs;
+use super::state::{LANES, NONE, Paths, State};
 
 /// Columns of a large matrix that are reduced together: four cache lines of each row.
 const WIDE: usize = 64;

@@ -12,7 +12,8 @@ use libm::fmaxf;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
+use super::request::{PlanError, PlanRequest};
+use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::flight::Flight;
 use crate::schedule::{self, ScheduleError};
 

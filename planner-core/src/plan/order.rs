@@ -7,7 +7,8 @@
 use heapless::Vec;
 use libm::fmaxf;
 
-use super::{PlanError, PlanRequest, PlanWorkspace, SwarmPlan};
+use super::request::{PlanError, PlanRequest, VehicleTask};
+use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::Point;
 use crate::flight::{Flight, Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
@@ -29,7 +30,8 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         let length = match flight.goal {
             Some(goal) => {
                 let parked = Parked::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
-                find_path(view, request, i, goal, &parked, &mut ws.search, &mut nodes)?
+                let ends = Ends::new(request, i, goal);
+                find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?
             }
             None => f32::INFINITY,
         };
@@ -106,6 +108,18 @@ struct Rush {
     head_start_s: f32,
 }
 
+/// One vehicle's turn among the others.
+struct Turn<'a> {
+    /// Its place in the request.
+    index: usize,
+    /// Those scheduled already.
+    before: &'a [u16],
+    /// Those still to come.
+    waiting: &'a [u16],
+    /// It takes off no earlier, seconds.
+    not_before_s: f32,
+}
+
 fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -121,10 +135,11 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
         let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
-        let waits = wait_on_pad(view, request, index, before, waiting, not_before_s, ws, out);
+        let turn = Turn { index, before, waiting, not_before_s };
+        let waits = wait_on_pad(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
-            None => step_aside(view, request, index, before, waiting, not_before_s, ws, out)
+            None => step_aside(view, request, &turn, ws, out)
                 .map_err(|error| (place, PlanError::Schedule(out.flights[index].id, error)))?,
         };
         out.flights[index] = flight;
@@ -133,23 +148,21 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 }
 
 /// The flight along a shortest path, after a wait on the pad; `None` if no wait is long enough.
-#[expect(clippy::too_many_arguments, reason = "the state of one round")]
 fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    index: usize,
-    before: &[u16],
-    waiting: &[u16],
-    not_before_s: f32,
+    turn: &Turn<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Option<Flight<W>>, PlanError> {
+    let &Turn { index, before, waiting, not_before_s } = turn;
     let flight = &out.flights[index];
     let Some(goal) = flight.goal else { return Ok(None) };
+    let ends = Ends::new(request, index, goal);
     for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
         let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
         let mut nodes: Vec<u16, W> = Vec::new();
-        if find_path(view, request, index, goal, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
+        if find_path(view, request, &ends, &parked, &mut ws.search, &mut nodes)?.is_infinite() {
             continue;
         }
         let mut path = path_of(view, &nodes).map_err(|e| PlanError::Path(flight.id, e))?;
@@ -169,35 +182,26 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
 
 /// The flight that waits and steps aside on its way. The earliest to arrive may leave its pad only to wait for long among the
 /// others; then a later departure is tried, as often as that helps.
-#[expect(clippy::too_many_arguments, reason = "the state of one round")]
 fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    index: usize,
-    before: &[u16],
-    waiting: &[u16],
-    not_before_s: f32,
+    turn: &Turn<'_>,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Flight<W>, ScheduleError> {
+    let &Turn { index, before, waiting, not_before_s } = turn;
     let mut flight = out.flights[index].clone();
     let Some(goal) = flight.goal else { return Ok(flight) };
-    let required_m = request.vehicles[index].required_clearance_m;
-    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, required_m);
+    let Ends { from, to, vehicle } = Ends::new(request, index, goal);
+    let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
         let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
-        let mut route = Route {
-            from: index as u16,
-            to: request.vehicles.len() as u16 + goal,
-            not_before_s,
-            parked: &parked.pads,
-        };
+        let mut route = Route { cfg: &request.schedule, from, to, not_before_s, parked: &parked.pads };
         let mut best: Option<Flight<W>> = None;
         flight.piece_m = PIECE_M;
         for _ in 0..DEPARTURES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
-            match sipp::route(&request.schedule, view, &route, passable, scheduled, &mut ws.sipp, &mut flight)
-            {
+            match sipp::route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
                 // Looked for again with the longer segments that it is cut into.
                 Ok(()) if flight.pieces() > PIECES => {
                     flight.fit_pieces();
@@ -284,26 +288,37 @@ impl<const V: usize> Parked<V> {
     }
 }
 
-/// The shortest path from start `index` to `goal` for that vehicle, clear of `parked`; infinite without one.
+/// The vehicle that a path is for, and the nodes of its start and of its goal.
+struct Ends<'a> {
+    vehicle: &'a VehicleTask,
+    from: u16,
+    to: u16,
+}
+
+impl<'a> Ends<'a> {
+    fn new(request: &PlanRequest<'a>, index: usize, goal: u16) -> Self {
+        let vehicles = request.vehicles;
+        Self { vehicle: &vehicles[index], from: index as u16, to: vehicles.len() as u16 + goal }
+    }
+}
+
+/// The shortest path between the ends for their vehicle, clear of `parked`; infinite without one.
 fn find_path<const N: usize, const V: usize, const W: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    index: usize,
-    goal: u16,
+    ends: &Ends<'_>,
     parked: &Parked<V>,
     search: &mut SearchWorkspace<N>,
     nodes: &mut Vec<u16, W>,
 ) -> Result<f32, PlanError> {
-    let vehicle = &request.vehicles[index];
     let passable = |from: u16, edge: &HalfEdge| {
-        view.clears(edge, vehicle.required_clearance_m)
+        view.clears(edge, ends.vehicle.required_clearance_m)
             && parked.clears(&view.node(from), &view.node(edge.target), request.schedule.parked_separation_m)
     };
-    let target = request.vehicles.len() as u16 + goal;
-    match search::astar(view, index as u16, target, passable, search, nodes) {
+    match search::astar(view, ends.from, ends.to, passable, search, nodes) {
         Ok(length_m) => Ok(length_m),
         Err(SearchError::NoPath) => Ok(f32::INFINITY),
-        Err(error) => Err(PlanError::Search(vehicle.id, error)),
+        Err(error) => Err(PlanError::Search(ends.vehicle.id, error)),
     }
 }
 

@@ -5,7 +5,8 @@
 //! answers are given only where no rounding can turn them: ends at least [`GUARD`] cells inside, and a point of the ray
 //! at least [`GUARD`] cells inside an occupied cell. All other rays go to the exact check.
 
-use super::{Config, Workspace};
+use super::config::Config;
+use super::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{
     Snapped, WIDE_CELLS, is_farther_than, lane_mask, segment_is_clear, snap, snapped_rest_touches,

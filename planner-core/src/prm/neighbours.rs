@@ -3,7 +3,7 @@
 //! A counting sort over a box of cubes around the nodes, half the longest edge a side (more where that would be too many
 //! cubes), x fastest: the nodes of neighbouring cubes in a row lie side by side, and a node's neighbours are a few runs.
 
-use super::{Config, LengthRange, PrmError, squared_length};
+use super::config::{Config, LengthRange, PrmError, squared_length};
 use crate::Point;
 
 /// Candidates measured at once.

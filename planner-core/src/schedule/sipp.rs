@@ -80,6 +80,8 @@ impl<const N: usize, const P: usize> Default for SippWorkspace<N, P> {
 /// What to route.
 #[derive(Clone, Copy, Debug)]
 pub struct Route<'a> {
+    /// Separation and nominal speeds.
+    pub cfg: &'a ScheduleConfig,
     /// Node above the pad.
     pub from: u16,
     /// Node of the goal.
@@ -97,6 +99,23 @@ struct Climb {
     leave_by_s: f32,
 }
 
+/// The descent.
+struct Landing {
+    down: Leg,
+    /// The landing place is held until then, seconds.
+    after_s: f32,
+}
+
+/// A flight from one state to a node.
+struct Hop {
+    node: u16,
+    /// The state flown from; none from the pad.
+    parent: Option<u16>,
+    /// The first and the last departure, seconds.
+    leave_s: (f32, f32),
+    duration_s: f32,
+}
+
 /// A leg of the path, flown from time 0.
 fn leg(from: Point, to: Point, duration_s: f32) -> Leg {
     let length_m = (to - from).norm();
@@ -104,16 +123,71 @@ fn leg(from: Point, to: Point, duration_s: f32) -> Leg {
 }
 
 /// Finds the earliest way for `flight` (its climb, descent and length of timed segments are taken, its path and departure are
-/// written) that keeps
-/// clear of `scheduled`.
+/// written) that keeps clear of `scheduled`.
 pub fn route<'a, const N: usize, const P: usize, const W: usize>(
-    cfg: &ScheduleConfig,
     view: &RoadmapView<'_>,
     route: &Route<'_>,
     passable: impl Fn(u16, &HalfEdge) -> bool,
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut SippWorkspace<N, P>,
     flight: &mut Flight<W>,
+) -> Result<(), ScheduleError> {
+    let cfg = route.cfg;
+    check::<N, W>(view, route, flight)?;
+    load(cfg, route.parked, scheduled, ws)?;
+    ws.first[..view.node_count()].fill(0);
+    ws.heap.clear(N);
+    ws.len = 0;
+
+    let start = view.node(route.from);
+    let pad = start - Point::new(0.0, 0.0, flight.climb_m);
+    let goal = view.node(route.to);
+    let up = Leg::climb(pad, start, flight.climb_m / cfg.vertical_mps);
+    let climb = Climb { up, leave_by_s: ws.leave_pad_by_s(cfg, pad, &up, flight.piece_m) };
+    let landing = ws.landing(cfg, goal, flight.descent_m)?;
+    let piece_m = flight.piece_m;
+    // At most so early, seconds from a place to the goal.
+    let left_s = |there: &Point| (goal - there).norm() / cfg.cruise_mps;
+
+    ws.add_states(cfg, view, route.from);
+    ws.forbid_departures(cfg, &up, piece_m, (route.not_before_s, climb.leave_by_s));
+    let leave_s = (route.not_before_s, climb.leave_by_s);
+    let hop = Hop { node: route.from, parent: None, leave_s, duration_s: up.to_s };
+    ws.relax(&hop, left_s(&start));
+    while let Some(state) = ws.heap.pop() {
+        let reached = ws.states[usize::from(state)];
+        let leave_s = (reached.arrive_s, reached.until_s);
+        if reached.node == route.to {
+            ws.forbid_departures(cfg, &landing.down, piece_m, leave_s);
+            let from_s = fmaxf(reached.arrive_s, landing.after_s);
+            let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
+            if let Some(land_s) = land_s {
+                return write(route, view, &climb, ws, (state, land_s), flight);
+            }
+        }
+        let here = view.node(reached.node);
+        for edge in view.half_edges(reached.node) {
+            if !passable(reached.node, &edge) {
+                continue;
+            }
+            let there = view.node(edge.target);
+            let duration_s = (there - here).norm() / cfg.cruise_mps;
+            ws.add_states(cfg, view, edge.target);
+            let hop = Hop { node: edge.target, parent: Some(state), leave_s, duration_s };
+            if ws.may_improve(&hop) {
+                ws.forbid_departures(cfg, &leg(here, there, duration_s), piece_m, leave_s);
+                ws.relax(&hop, left_s(&there));
+            }
+        }
+    }
+    Err(ScheduleError::Blocked)
+}
+
+/// Whether the memory is enough for the roadmap and the flight, and the ends are nodes.
+fn check<const N: usize, const W: usize>(
+    view: &RoadmapView<'_>,
+    route: &Route<'_>,
+    flight: &Flight<W>,
 ) -> Result<(), ScheduleError> {
     if view.node_count() > N {
         return Err(ScheduleError::PiecesFull);
@@ -127,61 +201,7 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
     if !whole || vertical[0].max(vertical[1]) > PIECES {
         return Err(ScheduleError::PiecesFull);
     }
-    load(cfg, route.parked, scheduled, ws)?;
-    ws.first[..view.node_count()].fill(0);
-    ws.heap.clear(N);
-    ws.len = 0;
-
-    let start = view.node(route.from);
-    let pad = start - Point::new(0.0, 0.0, flight.climb_m);
-    let goal = view.node(route.to);
-    let ground = goal - Point::new(0.0, 0.0, flight.descent_m);
-    let descent_s = flight.descent_m / cfg.vertical_mps;
-    // Held from −∞, so that it is no conflict with another pad.
-    let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
-    let up = Leg::climb(pad, start, flight.climb_m / cfg.vertical_mps);
-    let down = Leg::climb(goal, ground, descent_s);
-    // The pad is held until the first part of the climb is behind the vehicle.
-    let off_pad_s = fmaxf(up.first_part(flight.piece_m).1, OFF_PAD_S);
-    let needed_s = ws.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
-    let climb = Climb { up, leave_by_s: needed_s - off_pad_s };
-    // The landing place is held from the beginning of the descent.
-    let land_after_s = ws.near(cfg, &standing(ground, true)).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
-    if land_after_s == f32::INFINITY {
-        return Err(ScheduleError::Blocked);
-    }
-    let piece_m = flight.piece_m;
-
-    ws.add_states(cfg, view, route.from);
-    ws.forbid_departures(cfg, &up, piece_m, (route.not_before_s, climb.leave_by_s));
-    ws.relax(route.from, None, route.not_before_s, climb.leave_by_s, up.to_s, &goal, &start, cfg);
-    while let Some(state) = ws.heap.pop() {
-        let reached = ws.states[usize::from(state)];
-        if reached.node == route.to {
-            ws.forbid_departures(cfg, &down, piece_m, (reached.arrive_s, reached.until_s));
-            let from_s = fmaxf(reached.arrive_s, land_after_s);
-            let land_s = first_allowed(&ws.forbidden, from_s).filter(|&t| t <= reached.until_s);
-            if let Some(land_s) = land_s {
-                return write(cfg, view, &climb, ws, state, land_s, flight);
-            }
-        }
-        let here = view.node(reached.node);
-        for edge in view.half_edges(reached.node) {
-            if !passable(reached.node, &edge) {
-                continue;
-            }
-            let there = view.node(edge.target);
-            let duration_s = (there - here).norm() / cfg.cruise_mps;
-            ws.add_states(cfg, view, edge.target);
-            let (from_s, until_s) = (reached.arrive_s, reached.until_s);
-            if !ws.may_improve(edge.target, from_s, until_s, duration_s) {
-                continue;
-            }
-            ws.forbid_departures(cfg, &leg(here, there, duration_s), piece_m, (from_s, until_s));
-            ws.relax(edge.target, Some(state), from_s, until_s, duration_s, &goal, &there, cfg);
-        }
-    }
-    Err(ScheduleError::Blocked)
+    Ok(())
 }
 
 /// Cuts all scheduled flights into pieces with absolute times.
@@ -255,8 +275,31 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Whether some interval of `node` would be reached earlier if nobody were in the way.
-    fn may_improve(&self, node: u16, from_s: f32, until_s: f32, duration_s: f32) -> bool {
+    /// The latest take-off before another vehicle needs the pad's place, seconds.
+    fn leave_pad_by_s(&self, cfg: &ScheduleConfig, pad: Point, up: &Leg, piece_m: f32) -> f32 {
+        // Held from −∞, so that it is no conflict with another pad.
+        let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
+        // The pad is held until the first part of the climb is behind the vehicle.
+        let off_pad_s = fmaxf(up.first_part(piece_m).1, OFF_PAD_S);
+        let needed_s = self.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
+        needed_s - off_pad_s
+    }
+
+    /// The descent below a goal; an error where another vehicle stands there for ever.
+    fn landing(&self, cfg: &ScheduleConfig, goal: Point, descent_m: f32) -> Result<Landing, ScheduleError> {
+        let ground = goal - Point::new(0.0, 0.0, descent_m);
+        // The landing place is held from the beginning of the descent.
+        let standing = standing(ground, true);
+        let after_s = self.near(cfg, &standing).map(|q| q.to_s).fold(f32::NEG_INFINITY, fmaxf);
+        if after_s == f32::INFINITY {
+            return Err(ScheduleError::Blocked);
+        }
+        Ok(Landing { down: Leg::climb(goal, ground, descent_m / cfg.vertical_mps), after_s })
+    }
+
+    /// Whether some interval of the hop's node would be reached earlier if nobody were in the way.
+    fn may_improve(&self, hop: &Hop) -> bool {
+        let &Hop { node, leave_s: (from_s, until_s), duration_s, .. } = hop;
         let mut at = self.first[usize::from(node)];
         while at != 0 {
             let index = at - 1;
@@ -298,19 +341,9 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         }
     }
 
-    /// Reaches every interval of `node` as early as it can be, leaving between `from_s` and `until_s`.
-    #[expect(clippy::too_many_arguments, reason = "one call site for edges, one for the climb")]
-    fn relax(
-        &mut self,
-        node: u16,
-        parent: Option<u16>,
-        from_s: f32,
-        until_s: f32,
-        duration_s: f32,
-        goal: &Point,
-        there: &Point,
-        cfg: &ScheduleConfig,
-    ) {
+    /// Reaches every interval of the hop's node as early as it can be; from there the goal is at least `left_s` away.
+    fn relax(&mut self, hop: &Hop, left_s: f32) {
+        let &Hop { node, parent, leave_s: (from_s, until_s), duration_s } = hop;
         let mut at = self.first[usize::from(node)];
         while at != 0 {
             let index = at - 1;
@@ -328,25 +361,25 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
                 let reached = &mut self.states[usize::from(index)];
                 reached.parent = parent.unwrap_or(index);
                 (reached.left_parent_s, reached.arrive_s) = (leave_s, arrive_s);
-                self.heap.push(index, arrive_s + (goal - there).norm() / cfg.cruise_mps);
+                self.heap.push(index, arrive_s + left_s);
             }
         }
     }
 }
 
-/// Writes the way that ends in `state`, left at `land_s`, labelled with seconds after take-off. Every wait is moved as near to
+/// Writes the way that ends in a state, left for the descent at a time (`end`), labelled with seconds after take-off. Every wait is moved as near to
 /// the pad as the safe intervals allow: who waits in the air is in the way, and its battery drains.
 fn write<const N: usize, const P: usize, const W: usize>(
-    cfg: &ScheduleConfig,
+    route: &Route<'_>,
     view: &RoadmapView<'_>,
     climb: &Climb,
     ws: &mut SippWorkspace<N, P>,
-    state: u16,
-    land_s: f32,
+    end: (u16, f32),
     flight: &mut Flight<W>,
 ) -> Result<(), ScheduleError> {
     let mut way: Vec<(u16, f32, f32), W> = Vec::new();
-    let (mut at, mut leave_s) = (state, land_s);
+    let cfg = route.cfg;
+    let (mut at, mut leave_s) = end;
     loop {
         let reached = ws.states[usize::from(at)];
         let first = reached.parent == at;

@@ -9,7 +9,9 @@
 
 use core::ops::ControlFlow;
 
-use super::lane_mask;
+use super::lanes::lane_mask;
+use super::lattice::snap;
+use super::walk::snapped_segment_touches;
 use crate::Point;
 use crate::voxel::{Outside, VoxelGrid};
 
@@ -182,7 +184,7 @@ fn corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
 }
 
 /// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive and finite. The
-/// caller has checked that the ends are finite and near the grid, and where the clearance is less than [`super::WIDE_CELLS`]
+/// caller has checked that the ends are finite and near the grid, and where the clearance is less than `WIDE_CELLS`
 /// that nothing is touched. Of the share `known` of the segment from `a` the answer is known already, by far more than rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,
@@ -220,10 +222,10 @@ pub(crate) fn is_farther_than(
 /// the cube of what is returned, not of `max_m`.
 pub fn segment_clearance(grid: &VoxelGrid<'_>, a: &Point, b: &Point, max_m: f32) -> f32 {
     let shape = grid.shape();
-    let (Some(from), Some(to)) = (super::snap(shape, a), super::snap(shape, b)) else {
+    let (Some(from), Some(to)) = (snap(shape, a), snap(shape, b)) else {
         return 0.0;
     };
-    if max_m.is_nan() || max_m <= 0.0 || super::snapped_segment_touches(grid, &from, &to) {
+    if max_m.is_nan() || max_m <= 0.0 || snapped_segment_touches(grid, &from, &to) {
         return 0.0;
     }
     let segment = Segment::new(grid, a, b);

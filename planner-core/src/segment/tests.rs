@@ -8,6 +8,7 @@ use std::vec;
 use std::vec::Vec;
 
 use super::*;
+use crate::voxel::{GridShape, Outside};
 
 const DIMS: [u32; 3] = [13, 10, 9];
 

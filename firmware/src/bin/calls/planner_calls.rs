@@ -180,14 +180,14 @@ fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
     let bytes = size_of::<SippWorkspace<ROADMAP_NODES, PIECES>>();
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.goal else { continue };
-        let route =
-            Route { from: index as u16, to: view.header().starts + goal, not_before_s: 0.0, parked: &[] };
+        let (from, to) = (index as u16, view.header().starts + goal);
+        let route = Route { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[] };
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
         // That there is no way is an answer too.
         let _ = meter.call("schedule::sipp::route, past 9", bytes, || {
-            sipp::route(&cases::SCHEDULE, view, &route, passable, others, &mut ws.sipp, &mut own)
+            sipp::route(view, &route, passable, others, &mut ws.sipp, &mut own)
         });
     }
 }

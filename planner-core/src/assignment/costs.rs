@@ -1,0 +1,87 @@
+//! The cost matrix, checked.
+
+/// Why an assignment was refused.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AssignmentError {
+    /// There are no rows or no columns.
+    Empty,
+    /// The costs are not `rows · cols` long.
+    Shape,
+    /// The output is not `rows` long.
+    OutputLength,
+    /// Rows or columns exceed the workspace.
+    WorkspaceTooSmall,
+    /// This cost is NaN.
+    NotANumber {
+        /// Row of the cost.
+        row: u16,
+        /// Column of the cost.
+        col: u16,
+    },
+    /// This cost is minus infinity.
+    MinusInfinity {
+        /// Row of the cost.
+        row: u16,
+        /// Column of the cost.
+        col: u16,
+    },
+}
+
+/// A checked cost matrix, seen so that `rows <= cols`. Costs above `limit` count as infinite.
+pub(super) struct Costs<'a> {
+    pub(super) data: &'a [f32],
+    pub(super) rows: usize,
+    pub(super) cols: usize,
+    pub(super) transposed: bool,
+    pub(super) limit: f32,
+}
+
+impl<'a> Costs<'a> {
+    pub(super) fn new(data: &'a [f32], rows: usize, cols: usize) -> Result<Self, AssignmentError> {
+        if rows == 0 || cols == 0 {
+            return Err(AssignmentError::Empty);
+        }
+        if rows.checked_mul(cols) != Some(data.len()) {
+            return Err(AssignmentError::Shape);
+        }
+        // One pass that vectorises; which cost it was is only asked when there is one.
+        let sound =
+            data.chunks(64).all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
+        if !sound && let Some(at) = data.iter().position(|c| c.is_nan() || *c == f32::NEG_INFINITY) {
+            let (row, col) = ((at / cols) as u16, (at % cols) as u16);
+            return Err(match data[at].is_nan() {
+                true => AssignmentError::NotANumber { row, col },
+                false => AssignmentError::MinusInfinity { row, col },
+            });
+        }
+        let transposed = rows > cols;
+        let (rows, cols) = if transposed { (cols, rows) } else { (rows, cols) };
+        Ok(Self { data, rows, cols, transposed, limit: f32::INFINITY })
+    }
+
+    #[inline]
+    pub(super) fn at(&self, row: u16, col: u16) -> f32 {
+        let (row, col) = (usize::from(row), usize::from(col));
+        let cost = self.data[if self.transposed { col * self.rows + row } else { row * self.cols + col }];
+        if cost <= self.limit { cost } else { f32::INFINITY }
+    }
+
+    /// One row, in place where it lies so in memory, else copied into `buffer`.
+    #[inline]
+    pub(super) fn row<'b>(&'b self, row: u16, buffer: &'b mut [f32]) -> &'b [f32] {
+        let row = usize::from(row);
+        if !self.transposed && self.limit == f32::INFINITY {
+            return &self.data[row * self.cols..][..self.cols];
+        }
+        self.copy_row(row, buffer)
+    }
+
+    #[cold]
+    fn copy_row<'b>(&self, row: usize, buffer: &'b mut [f32]) -> &'b [f32] {
+        let (first, stride) = if self.transposed { (row, self.rows) } else { (row * self.cols, 1) };
+        for (copy, &cost) in buffer.iter_mut().zip(self.data[first..].iter().step_by(stride)) {
+            *copy = if cost <= self.limit { cost } else { f32::INFINITY };
+        }
+        buffer
+    }
+}

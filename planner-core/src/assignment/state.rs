@@ -1,0 +1,40 @@
+//! The matching so far, and the memory of one search.
+
+/// "Not assigned", as an index.
+pub(super) const NONE: u16 = u16::MAX;
+/// Columns handled together; enough for the widest vectors, small enough to stay in registers.
+pub(super) const LANES: usize = 8;
+
+/// Dual prices and the matching so far, sides swapped so that there are never more rows than columns.
+pub(super) struct State<'w> {
+    pub(super) price: &'w mut [f64],
+    pub(super) row_of: &'w mut [u16],
+    pub(super) col_of: &'w mut [u16],
+    /// Room for one row of a transposed matrix.
+    pub(super) row: &'w mut [f32],
+    /// Rows without a column, in the order they are to be served.
+    pub(super) free: &'w mut [u16],
+}
+
+impl State<'_> {
+    pub(super) fn reset(&mut self) {
+        self.price.fill(0.0);
+        self.row_of.fill(NONE);
+        self.col_of.fill(NONE);
+    }
+
+    pub(super) fn join(&mut self, row: u16, col: u16) {
+        self.row_of[usize::from(col)] = row;
+        self.col_of[usize::from(row)] = col;
+    }
+}
+
+/// Scratch of one search, a slot for each column.
+pub(super) struct Paths<'w> {
+    pub(super) distance: &'w mut [f64],
+    pub(super) previous: &'w mut [u16],
+    /// Columns settled, in order, with their price and distance.
+    pub(super) settled: &'w mut [u16],
+    pub(super) settled_price: &'w mut [f64],
+    pub(super) settled_distance: &'w mut [f64],
+}

@@ -1,0 +1,64 @@
+//! The plan of a swarm, and the memory to make it in.
+
+use heapless::Vec;
+
+use crate::assignment::AssignmentWorkspace;
+use crate::flight::Flight;
+use crate::schedule::ScheduleWorkspace;
+use crate::schedule::sipp::SippWorkspace;
+use crate::search::SearchWorkspace;
+
+/// The plan of a whole swarm: flight `i` is vehicle `i` of the request. A vehicle without a goal stays on its pad.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct SwarmPlan<const V: usize, const W: usize> {
+    /// One flight per vehicle.
+    pub flights: Vec<Flight<W>, V>,
+    /// CRC-32 over separation and speeds, ids, goals, climbs, descents, waypoints with their times, and departures.
+    pub crc: u32,
+}
+
+impl<const V: usize, const W: usize> SwarmPlan<V, W> {
+    /// Without vehicles.
+    pub const fn new() -> Self {
+        Self { flights: Vec::new(), crc: 0 }
+    }
+
+    /// Sum of the lengths of all paths, metres.
+    pub fn total_m(&self) -> f64 {
+        self.flights.iter().map(|f| f64::from(f.path.length_m())).sum()
+    }
+}
+
+/// Scratch of [`super::plan_swarm`] and its steps, for roadmaps of `N` nodes, swarms of `V` vehicles and goals, and `P` pieces of flights among
+/// which one steps aside.
+pub struct PlanWorkspace<const N: usize, const V: usize, const P: usize> {
+    /// Scratch of searches, also for [`crate::detour`].
+    pub search: SearchWorkspace<N>,
+    /// Scratch of [`crate::schedule::sipp`].
+    pub sipp: SippWorkspace<N, P>,
+    /// Scratch of [`crate::assignment`].
+    pub assignment: AssignmentWorkspace<V>,
+    /// Starts × goals, packed from the front.
+    pub(super) costs: [[f32; V]; V],
+    /// Scratch of the schedule, also for [`super::vehicle_plan`].
+    pub schedule: ScheduleWorkspace,
+}
+
+impl<const N: usize, const V: usize, const P: usize> PlanWorkspace<N, V, P> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self {
+            search: SearchWorkspace::new(),
+            sipp: SippWorkspace::new(),
+            assignment: AssignmentWorkspace::new(),
+            costs: [[0.0; V]; V],
+            schedule: ScheduleWorkspace::new(),
+        }
+    }
+}
+
+impl<const N: usize, const V: usize, const P: usize> Default for PlanWorkspace<N, V, P> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,36 @@
+//! The lattice that ends of a segment are snapped to, so that what follows is integer arithmetic.
+
+use crate::Point;
+use crate::voxel::{GridShape, MAX_DIM};
+
+/// Bits after the point of a snapped coordinate, in cells.
+pub const FRACTION_BITS: u32 = 14;
+pub(super) const ONE: i32 = 1 << FRACTION_BITS;
+
+/// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
+pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
+
+/// A point in units of 2⁻¹⁴ cell from the grid's minimum corner.
+pub type Snapped = [i32; 3];
+
+/// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells beyond the grid.
+#[inline]
+pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
+    const REACH: f32 = MAX_DIM as f32;
+    let mut out = [0; 3];
+    for axis in 0..3 {
+        let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
+        if !(-REACH..=2.0 * REACH).contains(&u) {
+            return None;
+        }
+        let v = u * ONE as f32;
+        out[axis] = (if v < 0.0 { v - 0.5 } else { v + 0.5 }) as i32;
+    }
+    Some(out)
+}
+
+/// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of the grid's minimum
+/// corner: half a lattice step, and half an ulp for each of the subtraction and the division.
+pub fn snap_error_cells(cells: f32) -> f32 {
+    0.5 / ONE as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
+}
