@@ -9,6 +9,7 @@ pub mod commands;
 pub mod coverage;
 pub mod files;
 pub mod flash;
+pub mod kinds;
 pub mod link;
 pub mod map;
 pub mod margins;

@@ -7,11 +7,11 @@ use super::command::{ACCEPTED, Command, message_id};
 use super::config::Config;
 use super::estimator::Errors;
 use super::geodesy::LocalFrame;
-use super::inbox::Sender;
 use super::mission::Missions;
 use super::noise::{self, Disturbance};
-use super::port::{Ack, Port};
+use super::port::{Ack, Port, Sender};
 use super::vehicle::{Demand, Vehicle};
+use super::wire::Fields;
 
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
@@ -202,6 +202,11 @@ impl Body {
     /// Sends STATUSTEXT through every port.
     pub(super) fn say(&mut self, severity: u8, text: &str) {
         self.ports.iter_mut().for_each(|port| port.send_text(severity, text));
+    }
+
+    /// Takes a message of the mission protocol.
+    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &Fields<'_>) {
+        self.missions.handle(self.time_us, &mut self.ports[from.port], from, id, fields);
     }
 
     pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {

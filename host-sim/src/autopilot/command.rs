@@ -12,6 +12,7 @@ pub const FAILED: u8 = 4;
 pub const FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
+pub const DO_SET_MODE: u16 = 176;
 pub const AUTOPILOT_VERSION: u32 = 148;
 pub const PROTOCOL_VERSION: u32 = 300;
 
@@ -50,6 +51,11 @@ impl Command {
 
 fn first_four(fields: &Fields<'_>) -> [f32; 4] {
     [fields.f32(0), fields.f32(4), fields.f32(8), fields.f32(12)]
+}
+
+/// The result of what was done, or cannot be done now.
+pub fn accept(done: bool) -> u8 {
+    if done { ACCEPTED } else { TEMPORARILY_REJECTED }
 }
 
 /// A message id that came in a float.

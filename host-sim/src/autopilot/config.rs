@@ -3,18 +3,9 @@
 use planner_core::Point;
 use planner_core::frames::{Geodetic, Projection};
 
-use super::estimator::{Errors, Estimator};
+use super::estimator::Errors;
 use super::vehicle::VehicleLimits;
-
-/// Which autopilot is simulated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Personality {
-    /// PX4 1.17, Offboard.
-    #[default]
-    Px4,
-    /// ArduCopter 4.6, Guided.
-    Ardupilot,
-}
+use crate::kinds::{Estimator, Personality};
 
 impl Personality {
     /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its recorded flights.

@@ -16,20 +16,8 @@
 
 use planner_core::Point;
 
-use super::config::Personality;
 use super::noise::{Gaussian, SLOT_S};
-
-/// How good an estimate is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Estimator {
-    /// The truth.
-    #[default]
-    Perfect,
-    /// A receiver with fixed RTK: at most 0.1 m across and 0.15 m in height.
-    Rtk,
-    /// As the recorded flights' were.
-    Recorded,
-}
+use crate::kinds::{Estimator, Personality};
 
 impl Estimator {
     /// What ESTIMATOR_STATUS reports, across and in height, metres: recorded PX4s reported 0.02 to 0.29 across

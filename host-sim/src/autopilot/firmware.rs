@@ -3,13 +3,15 @@
 use super::ardupilot::{self, Copter};
 use super::body::{Body, Order, Sense};
 use super::command::Command;
-use super::config::{Config, Personality};
-use super::inbox::Sender;
+use super::config::Config;
 use super::params::Params;
+use super::port::Sender;
 use super::px4::{self, Px4};
+use super::status::Status;
 use super::telemetry;
 use super::vehicle::Gains;
 use super::wire::Fields;
+use crate::kinds::Personality;
 
 /// The firmware of one vehicle.
 #[derive(Clone, Debug)]
@@ -18,33 +20,6 @@ pub enum Firmware {
     Px4(Box<Px4>),
     /// ArduCopter 4.6.
     Copter(Box<Copter>),
-}
-
-/// What telemetry tells of the firmware's state.
-#[derive(Clone, Copy, Debug)]
-pub struct Status {
-    /// Which firmware it is.
-    pub personality: Personality,
-    /// `custom_mode` of HEARTBEAT.
-    pub custom_mode: u32,
-    /// The mode that was asked for, whatever a failsafe flies.
-    pub intended_mode: u32,
-    /// MAV_MODE_FLAG.
-    pub flags: u8,
-    /// MAV_STATE.
-    pub system_status: u8,
-    /// The arming checks pass.
-    pub armable: bool,
-    /// MAV_LANDED_STATE.
-    pub landed_state: u8,
-    /// Follows setpoints.
-    pub guided: bool,
-    /// ArduPilot's flags of EKF_STATUS_REPORT.
-    pub ekf_flags: u16,
-    /// The estimator has an origin.
-    pub origin_known: bool,
-    /// The estimator has a position.
-    pub position_known: bool,
 }
 
 impl Firmware {

@@ -3,28 +3,14 @@
 //! Read by field ([`Fields`]): offsets are those of the wire order. What is for another system or component, or of an id
 //! not listed here, changes nothing and is not answered, as on PX4 and ArduPilot.
 
-use companion::link::frame::Frame;
 use mavlink::dialects::ardupilotmega as dialect;
 
 use super::command::Command;
+use super::frame::Frame;
 use super::params::Encoding;
-use super::port::AUTOPILOT_COMPONENT;
+use super::port::{AUTOPILOT_COMPONENT, Sender};
 use super::wire::Fields;
 use super::{Autopilot, telemetry};
-
-/// Who sent a frame, and through which port.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Sender {
-    pub(crate) port: usize,
-    pub(crate) system: u8,
-    pub(crate) component: u8,
-}
-
-impl Sender {
-    pub(crate) fn id(self) -> (u8, u8) {
-        (self.system, self.component)
-    }
-}
 
 impl Autopilot {
     pub(super) fn handle_frame(&mut self, port: usize, frame: &Frame) {

@@ -4,7 +4,7 @@ use mavlink::dialects::ardupilotmega as dialect;
 use planner_core::frames::Geodetic;
 
 use super::port::Port;
-use super::telemetry::Snapshot;
+use super::snapshot::Snapshot;
 use super::vehicle::GRAVITY;
 
 /// What PX4 1.17 announced, without FTP (32), which is not simulated.

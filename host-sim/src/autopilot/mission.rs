@@ -3,9 +3,7 @@
 //! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK. Download: REQUEST_LIST →
 //! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
 
-use super::body::Body;
-use super::inbox::Sender;
-use super::port::Port;
+use super::port::{Port, Sender};
 use super::wire::Fields;
 
 const MISSION_ITEM: u32 = 39;
@@ -79,30 +77,35 @@ impl Upload {
     }
 }
 
-impl Body {
-    /// Takes a message of the mission protocol.
-    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &Fields<'_>) {
-        let now_us = self.time_us;
+impl Missions {
+    /// Takes a message of the mission protocol that came by `port`, from a sender there.
+    pub(super) fn handle(
+        &mut self,
+        now_us: u64,
+        port: &mut Port,
+        from: Sender,
+        id: u32,
+        fields: &Fields<'_>,
+    ) {
         let kind_at = match id {
             REQUEST_LIST | CLEAR_ALL => 2,
             COUNT | REQUEST | REQUEST_INT => 4,
             MISSION_ITEM | MISSION_ITEM_INT => 37,
-            SET_CURRENT => return self.set_current(from, fields.u16(0)),
+            SET_CURRENT => return self.set_current(port, from, fields.u16(0)),
             // An ACK ends a download.
             _ => return,
         };
         let kind = fields.u8(kind_at);
         let slot = usize::from(kind);
         if slot >= KINDS && !(id == CLEAR_ALL && kind == u8::MAX) {
-            return self.answer_mission(from, UNSUPPORTED, kind);
+            return answer(port, from, UNSUPPORTED, kind);
         }
-        let port = &mut self.ports[from.port];
         match id {
             REQUEST_LIST => {
-                let [low, high] = (self.missions.stored[slot].len() as u16).to_le_bytes();
+                let [low, high] = (self.stored[slot].len() as u16).to_le_bytes();
                 port.send_raw(COUNT, &[low, high, from.system, from.component, kind]);
             }
-            REQUEST | REQUEST_INT => match self.missions.stored[slot].get(usize::from(fields.u16(0))) {
+            REQUEST | REQUEST_INT => match self.stored[slot].get(usize::from(fields.u16(0))) {
                 Some(item) => {
                     let mut payload = [0; 38];
                     payload[..37].copy_from_slice(item);
@@ -110,38 +113,46 @@ impl Body {
                     payload[37] = kind;
                     port.send_raw(MISSION_ITEM_INT, &payload);
                 }
-                None => self.answer_mission(from, INVALID_SEQUENCE, kind),
+                None => answer(port, from, INVALID_SEQUENCE, kind),
             },
-            COUNT if fields.u16(0) > MOST => self.answer_mission(from, NO_SPACE, kind),
+            COUNT if fields.u16(0) > MOST => answer(port, from, NO_SPACE, kind),
             COUNT if fields.u16(0) == 0 => {
-                self.missions.stored[slot].clear();
-                self.answer_mission(from, ACCEPTED, kind);
+                self.stored[slot].clear();
+                answer(port, from, ACCEPTED, kind);
             }
             COUNT => {
                 let mut upload =
                     Upload { from, kind, count: fields.u16(0), items: Vec::new(), asked_us: 0, retries: 0 };
                 upload.ask(now_us, port);
-                self.missions.upload = Some(upload);
+                self.upload = Some(upload);
             }
             CLEAR_ALL => {
                 let all = kind == u8::MAX;
-                for (k, stored) in self.missions.stored.iter_mut().enumerate() {
+                for (k, stored) in self.stored.iter_mut().enumerate() {
                     if all || k == slot {
                         stored.clear();
                     }
                 }
-                self.answer_mission(from, ACCEPTED, kind);
+                answer(port, from, ACCEPTED, kind);
             }
-            _ => self.take_item(from, id, kind, fields),
+            _ => self.take_item(now_us, port, from, id, kind, fields),
         }
     }
 
-    fn take_item(&mut self, from: Sender, id: u32, kind: u8, fields: &Fields<'_>) {
-        let Some(upload) = &mut self.missions.upload else {
-            return self.answer_mission(from, INVALID_SEQUENCE, kind);
+    fn take_item(
+        &mut self,
+        now_us: u64,
+        port: &mut Port,
+        from: Sender,
+        id: u32,
+        kind: u8,
+        fields: &Fields<'_>,
+    ) {
+        let Some(upload) = &mut self.upload else {
+            return answer(port, from, INVALID_SEQUENCE, kind);
         };
         if upload.from.id() != from.id() || upload.kind != kind {
-            return self.answer_mission(from, INVALID_SEQUENCE, kind);
+            return answer(port, from, INVALID_SEQUENCE, kind);
         }
         let sequence = usize::from(fields.u16(28));
         if sequence < upload.items.len() {
@@ -149,35 +160,34 @@ impl Body {
             return;
         }
         let Some(item) = read_item(id, fields) else {
-            self.missions.upload = None;
-            return self.answer_mission(from, INVALID, kind);
+            self.upload = None;
+            return answer(port, from, INVALID, kind);
         };
-        let port = &mut self.ports[from.port];
         if sequence == upload.items.len() {
             upload.items.push(item);
             upload.retries = 0;
         }
         if upload.items.len() < usize::from(upload.count) {
-            upload.ask(self.time_us, port);
-        } else if let Some(done) = self.missions.upload.take() {
-            self.missions.stored[usize::from(kind)] = done.items;
-            self.missions.current = 0;
-            self.answer_mission(from, ACCEPTED, kind);
+            upload.ask(now_us, port);
+        } else if let Some(done) = self.upload.take() {
+            self.stored[usize::from(kind)] = done.items;
+            self.current = 0;
+            answer(port, from, ACCEPTED, kind);
         }
     }
 
-    fn set_current(&mut self, from: Sender, sequence: u16) {
-        if usize::from(sequence) < self.missions.stored[0].len() {
-            self.missions.current = sequence;
-            self.ports[from.port].send_raw(CURRENT, &sequence.to_le_bytes());
+    fn set_current(&mut self, port: &mut Port, from: Sender, sequence: u16) {
+        if usize::from(sequence) < self.stored[0].len() {
+            self.current = sequence;
+            port.send_raw(CURRENT, &sequence.to_le_bytes());
         } else {
-            self.answer_mission(from, INVALID_SEQUENCE, 0);
+            answer(port, from, INVALID_SEQUENCE, 0);
         }
     }
+}
 
-    fn answer_mission(&mut self, from: Sender, result: u8, kind: u8) {
-        self.ports[from.port].send_raw(ACK, &[from.system, from.component, result, kind]);
-    }
+fn answer(port: &mut Port, from: Sender, result: u8, kind: u8) {
+    port.send_raw(ACK, &[from.system, from.component, result, kind]);
 }
 
 /// An item of either kind as MISSION_ITEM_INT; `None` if a number in it is infinite, or a place is none on earth.

@@ -32,6 +32,7 @@ mod command;
 mod config;
 pub mod estimator;
 mod firmware;
+pub mod frame;
 pub mod geodesy;
 mod inbox;
 mod messages;
@@ -43,6 +44,8 @@ pub mod px4;
 mod routing;
 pub mod server;
 mod shaping;
+mod snapshot;
+mod status;
 pub mod telemetry;
 pub mod vehicle;
 pub mod wire;
@@ -54,13 +57,13 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use self::body::{Body, Integral};
-pub use self::config::{Config, ConfigError, Personality};
-pub use self::estimator::Estimator;
+pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
 use self::port::Port;
 pub use self::px4::Mode;
-use self::telemetry::Snapshot;
+use self::snapshot::Snapshot;
 pub use self::vehicle::{State, VehicleLimits};
+pub use crate::kinds::{Estimator, Personality};
 
 /// One simulated vehicle with its autopilot.
 #[derive(Clone, Debug)]
@@ -115,11 +118,6 @@ impl Autopilot {
     /// Wind at the vehicle now, ENU m/s.
     pub fn wind(&self) -> &Point {
         &self.body.disturbance.wind
-    }
-
-    /// Framing counters of a port.
-    pub fn counters(&self, port: usize) -> companion::link::frame::Counters {
-        self.body.ports.get(port).map(Port::counters).unwrap_or_default()
     }
 
     /// Takes bytes that arrived at port 0.

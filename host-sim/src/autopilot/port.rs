@@ -1,8 +1,8 @@
 //! One MAVLink port of the simulated autopilot: framing, its own sequence numbers, stream settings and send queue.
 
-use companion::link::frame::{self, Frame, Framer, Header};
-use companion::time::Instant;
 use mavlink::MessageData;
+
+use super::frame::{self, FRAME_MAX, Frame, Framer};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
@@ -49,6 +49,20 @@ pub struct Ack {
     pub to: (u8, u8),
 }
 
+/// Who sent a frame, and through which port.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Sender {
+    pub(crate) port: usize,
+    pub(crate) system: u8,
+    pub(crate) component: u8,
+}
+
+impl Sender {
+    pub(crate) fn id(self) -> (u8, u8) {
+        (self.system, self.component)
+    }
+}
+
 /// A port. Frames in both directions; the transport around it is someone else's.
 #[derive(Clone, Debug)]
 pub struct Port {
@@ -88,7 +102,7 @@ impl Port {
             })
             .collect();
         Self {
-            framer: Framer::new(),
+            framer: Framer::default(),
             system_id,
             sequence: 0,
             queue: Vec::new(),
@@ -111,34 +125,26 @@ impl Port {
         Self::new(system_id, &streams)
     }
 
-    /// Frames that came in so far, good and bad.
-    pub fn counters(&self) -> frame::Counters {
-        self.framer.counters()
-    }
-
     /// The next whole frame of `input`, from which it takes bytes.
     pub fn next_frame(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
-        self.framer.next(Instant::from_micros(now_us), input)
+        self.framer.next(now_us, input)
     }
 
-    fn header(&mut self) -> Header {
+    fn sender(&mut self) -> (u8, u8, u8) {
         let sequence = self.sequence;
         self.sequence = sequence.wrapping_add(1);
-        Header { system: self.system_id, component: AUTOPILOT_COMPONENT, sequence }
+        (self.system_id, AUTOPILOT_COMPONENT, sequence)
     }
 
-    fn reserve(&mut self) -> Option<usize> {
+    /// Whether there is room for one more frame; what there is none for counts as dropped.
+    fn has_room(&mut self) -> bool {
         if self.sent == self.queue.len() {
             self.queue.clear();
             self.sent = 0;
         }
-        let start = self.queue.len();
-        if start - self.sent > QUEUE - frame::MAX_SENT {
-            self.dropped += 1;
-            return None;
-        }
-        self.queue.resize(start + frame::MAX_SENT, 0);
-        Some(start)
+        let room = self.queue.len() - self.sent <= QUEUE - FRAME_MAX;
+        self.dropped += u64::from(!room);
+        room
     }
 
     /// Remembers that a component is reached here.
@@ -156,34 +162,31 @@ impl Port {
 
     /// Queues a frame of somebody else's as it came.
     pub fn pass(&mut self, frame: &Frame) {
-        if let Some(start) = self.reserve() {
-            let len = frame.encode(&mut self.queue[start..]);
-            self.queue.truncate(start + len);
+        if self.has_room() {
+            frame.write(&mut self.queue);
         }
     }
 
     /// Queues a message.
     pub fn send<M: MessageData>(&mut self, message: &M) {
-        if let Some(start) = self.reserve() {
-            let header = self.header();
-            let len = frame::encode(header, message, &mut self.queue[start..]);
-            self.queue.truncate(start + len);
+        if self.has_room() {
+            let sender = self.sender();
+            frame::write(sender, message, &mut self.queue);
         }
     }
 
     /// Queues a message whose payload the caller laid out, for what the crate's types cannot hold.
     pub fn send_raw(&mut self, id: u32, payload: &[u8]) {
-        if let Some(extra) = frame::extra_crc(id) {
-            self.send_seeded(id, extra, payload);
+        if let Some(seed) = frame::seed(id) {
+            self.send_seeded(id, seed, payload);
         }
     }
 
     /// The same for a message the crate does not know, with its CRC seed.
-    pub fn send_seeded(&mut self, id: u32, extra: u8, payload: &[u8]) {
-        if let Some(start) = self.reserve() {
-            let header = self.header();
-            let len = frame::encode_raw(header, id, extra, payload, &mut self.queue[start..]);
-            self.queue.truncate(start + len);
+    pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
+        if self.has_room() {
+            let sender = self.sender();
+            frame::write_raw(sender, id, seed, payload, &mut self.queue);
         }
     }
 

@@ -4,8 +4,7 @@
 //! A port leads to every component that was heard on it. A message to one goes to the ports that lead there, a message to nobody
 //! in particular to all other ports on which somebody was heard; what is for this autopilot alone goes no further.
 
-use companion::link::frame::Frame;
-
+use super::frame::Frame;
 use super::port::{AUTOPILOT_COMPONENT, Port};
 
 /// Where a message names its target system, the component after it: in its payload. Others are for everybody.

@@ -3,17 +3,12 @@
 //!
 //! A message is put together only when it is due, from a [`Snapshot`] taken once for all that are due in the same step.
 
-use core::cell::OnceCell;
-
 use mavlink::dialects::ardupilotmega as dialect;
-use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
 
 use super::command::{AUTOPILOT_VERSION, PROTOCOL_VERSION};
-use super::config::Personality;
-use super::firmware::Status;
 use super::messages::{self, scaled};
 use super::port::Port;
+use super::snapshot::Snapshot;
 
 /// Message id and interval in microseconds of each stream; 0 is off until asked for.
 pub const STREAMS: [(u32, u32); 32] = [
@@ -51,102 +46,17 @@ pub const STREAMS: [(u32, u32); 32] = [
     (49, 0),          // GPS_GLOBAL_ORIGIN: when it changes
 ];
 
-/// Everything telemetry is made of, at one instant.
-#[derive(Clone, Debug)]
-pub struct Snapshot {
-    /// Microseconds since boot.
-    pub time_us: u64,
-    /// Microseconds of UTC.
-    pub unix_us: u64,
-    /// System id.
-    pub system_id: u8,
-    /// The firmware's state.
-    pub status: Status,
-    /// Armed.
-    pub armed: bool,
-    /// Estimated NED about the EKF origin, metres.
-    pub ned: Vector3<f64>,
-    /// Estimated NED velocity, m/s.
-    pub velocity: Vector3<f64>,
-    /// Estimated position.
-    pub geodetic: Geodetic,
-    /// GPS receiver: position error north and east in metres beyond the estimate's, and whether it has a fix.
-    pub gps: (f32, f32, bool),
-    /// Home, and in NED about the EKF origin.
-    pub home: (Geodetic, Vector3<f64>),
-    /// EKF origin.
-    pub ekf_origin: Geodetic,
-    /// Thrust over mass, NED, m/s²; points up.
-    pub specific_force: Vector3<f32>,
-    /// Heading and its change, radians.
-    pub heading: (f32, f32),
-    /// Position, velocity and acceleration the controller flies, NED.
-    pub target: [Vector3<f64>; 3],
-    /// Height over ground, metres.
-    pub height: f32,
-    /// Accuracy that the estimator reports, across and in height, metres.
-    pub accuracy: [f32; 2],
-    /// Charge left, 0 to 1.
-    pub battery: f32,
-    /// Filled by the first message that needs it.
-    pub attitude: OnceCell<Attitude>,
-}
-
-/// Attitude as angles and as a quaternion (w, x, y, z), NED to body.
-#[derive(Clone, Copy, Debug)]
-pub struct Attitude {
-    /// Roll, pitch, yaw, radians.
-    pub euler: [f32; 3],
-    /// Rotation from the body to NED.
-    pub quaternion: [f32; 4],
-}
-
-/// The attitude whose thrust axis lies along a specific force (NED, pointing up) at a heading.
-pub fn attitude(force: &Vector3<f32>, heading: f32) -> Attitude {
-    let norm = force.norm().max(0.1);
-    let (sin, cos) = libm::sincosf(heading);
-    // The body's z axis, down, in a frame turned by the heading: (cos φ sin θ, −sin φ, cos φ cos θ).
-    let (ahead, right) = (cos * force.x + sin * force.y, cos * force.y - sin * force.x);
-    let axis = [-ahead / norm, -right / norm, -force.z / norm];
-    let roll = libm::asinf((-axis[1]).clamp(-1.0, 1.0));
-    let pitch = libm::atan2f(axis[0], axis[2]);
-    let (sr, cr) = libm::sincosf(0.5 * roll);
-    let (sp, cp) = libm::sincosf(0.5 * pitch);
-    let (sy, cy) = libm::sincosf(0.5 * heading);
-    let quaternion = [
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    ];
-    Attitude { euler: [roll, pitch, heading], quaternion }
-}
-
 impl Snapshot {
-    pub(super) fn attitude(&self) -> &Attitude {
-        self.attitude.get_or_init(|| attitude(&self.specific_force, self.heading.0))
-    }
-
-    pub(super) fn is_px4(&self) -> bool {
-        self.status.personality == Personality::Px4
-    }
-
-    pub(super) fn boot_ms(&self) -> u32 {
-        (self.time_us / 1000) as u32
-    }
-
-    pub(super) fn volts(&self) -> f32 {
-        // Four cells between BAT1_V_EMPTY and BAT1_V_CHARGED.
-        4.0 * (3.6 + 0.45 * self.battery)
-    }
-
-    pub(super) fn heading_deg(&self) -> f32 {
-        let degrees = self.heading.0.to_degrees();
-        if degrees < 0.0 { degrees + 360.0 } else { degrees }
-    }
-
     /// Sends one message; false where there is no such message.
     pub fn send(&self, id: u32, port: &mut Port) -> bool {
+        self.send_state(id, port)
+            || self.send_attitude(id, port)
+            || self.send_position(id, port)
+            || self.send_sensor(id, port)
+    }
+
+    /// What it is and what state it is in.
+    fn send_state(&self, id: u32, port: &mut Port) -> bool {
         match id {
             0 => self.send_heartbeat(port),
             1 => self.send_sys_status(port),
@@ -160,13 +70,36 @@ impl Snapshot {
                 port.send_raw(4, &ping(self.time_us, seq, 0, 0));
             }
             8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
-            24 => self.send_gps(port),
-            29 => port.send(&dialect::SCALED_PRESSURE_DATA {
-                time_boot_ms: self.boot_ms(),
-                press_abs: self.pressure(),
-                press_diff: 0.0,
-                temperature: 1500,
-            }),
+            42 => port.send(&dialect::MISSION_CURRENT_DATA { seq: 0 }),
+            111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
+            AUTOPILOT_VERSION => self.send_version(port),
+            245 => {
+                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the landed state.
+                let vtol = if self.is_px4() { 0 } else { 3 };
+                port.send_raw(245, &[vtol, self.status.landed_state]);
+            }
+            PROTOCOL_VERSION => {
+                // Version 2.00, 1.00 at least, 2.00 at most; no hashes.
+                let mut payload = [0; 22];
+                for (at, version) in [(0, 200_u16), (2, 100), (4, 200)] {
+                    payload[at..at + 2].copy_from_slice(&version.to_le_bytes());
+                }
+                port.send_raw(PROTOCOL_VERSION, &payload);
+            }
+            436 => {
+                let mut payload = [0; 9];
+                payload[..4].copy_from_slice(&self.status.custom_mode.to_le_bytes());
+                payload[4..8].copy_from_slice(&self.status.intended_mode.to_le_bytes());
+                port.send_raw(436, &payload);
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    /// How it is turned.
+    fn send_attitude(&self, id: u32, port: &mut Port) -> bool {
+        match id {
             30 => {
                 let [roll, pitch, yaw] = self.attitude().euler;
                 port.send(&dialect::ATTITUDE_DATA {
@@ -192,6 +125,23 @@ impl Snapshot {
                     yawspeed: self.heading.1,
                 });
             }
+            83 => port.send(&dialect::ATTITUDE_TARGET_DATA {
+                time_boot_ms: self.boot_ms(),
+                q: self.attitude().quaternion,
+                body_roll_rate: 0.0,
+                body_pitch_rate: 0.0,
+                body_yaw_rate: self.heading.1,
+                thrust: self.throttle(),
+                type_mask: dialect::AttitudeTargetTypemask::empty(),
+            }),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Where it is, how it moves and where it is to be.
+    fn send_position(&self, id: u32, port: &mut Port) -> bool {
+        match id {
             // PX4 sends it only while the estimate is valid.
             32 if !self.status.position_known => {}
             32 => {
@@ -207,8 +157,6 @@ impl Snapshot {
                 });
             }
             33 => self.send_global_position(port),
-            36 => self.send_servos(port),
-            42 => port.send(&dialect::MISSION_CURRENT_DATA { seq: 0 }),
             // Not before there is one.
             49 if !self.status.origin_known => {}
             49 => {
@@ -226,20 +174,8 @@ impl Snapshot {
                     throttle: (100.0 * self.throttle()) as u16,
                 });
             }
-            83 => port.send(&dialect::ATTITUDE_TARGET_DATA {
-                time_boot_ms: self.boot_ms(),
-                q: self.attitude().quaternion,
-                body_roll_rate: 0.0,
-                body_pitch_rate: 0.0,
-                body_yaw_rate: self.heading.1,
-                thrust: self.throttle(),
-                type_mask: dialect::AttitudeTargetTypemask::empty(),
-            }),
             85 if !self.status.guided => {}
             85 => self.send_target(port),
-            105 => self.send_imu(port),
-            111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
-            132 => self.send_distance(port),
             141 => port.send(&dialect::ALTITUDE_DATA {
                 time_usec: self.time_us,
                 altitude_monotonic: self.geodetic.alt_m as f32,
@@ -250,8 +186,27 @@ impl Snapshot {
                 bottom_clearance: self.height,
             }),
             62 => port.send(&dialect::NAV_CONTROLLER_OUTPUT_DATA::default()),
+            242 => self.send_home(port),
+            331 => self.send_odometry(port),
+            _ => return false,
+        }
+        true
+    }
+
+    /// Sensors, motors, battery and what the estimator thinks of itself.
+    fn send_sensor(&self, id: u32, port: &mut Port) -> bool {
+        match id {
+            24 => self.send_gps(port),
+            29 => port.send(&dialect::SCALED_PRESSURE_DATA {
+                time_boot_ms: self.boot_ms(),
+                press_abs: self.pressure(),
+                press_diff: 0.0,
+                temperature: 1500,
+            }),
+            36 => self.send_servos(port),
+            105 => self.send_imu(port),
+            132 => self.send_distance(port),
             147 => self.send_battery(port),
-            AUTOPILOT_VERSION => self.send_version(port),
             193 => self.send_ekf_status(port),
             230 => port.send(&dialect::ESTIMATOR_STATUS_DATA {
                 time_usec: self.time_us,
@@ -274,27 +229,6 @@ impl Snapshot {
                 clipping_1: 0,
                 clipping_2: 0,
             }),
-            242 => self.send_home(port),
-            245 => {
-                // Two bytes: vtol_state undefined or, as ArduCopter says, multicopter; and the landed state.
-                let vtol = if self.is_px4() { 0 } else { 3 };
-                port.send_raw(245, &[vtol, self.status.landed_state]);
-            }
-            PROTOCOL_VERSION => {
-                // Version 2.00, 1.00 at least, 2.00 at most; no hashes.
-                let mut payload = [0; 22];
-                for (at, version) in [(0, 200_u16), (2, 100), (4, 200)] {
-                    payload[at..at + 2].copy_from_slice(&version.to_le_bytes());
-                }
-                port.send_raw(PROTOCOL_VERSION, &payload);
-            }
-            331 => self.send_odometry(port),
-            436 => {
-                let mut payload = [0; 9];
-                payload[..4].copy_from_slice(&self.status.custom_mode.to_le_bytes());
-                payload[4..8].copy_from_slice(&self.status.intended_mode.to_le_bytes());
-                port.send_raw(436, &payload);
-            }
             _ => return false,
         }
         true

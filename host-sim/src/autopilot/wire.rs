@@ -4,7 +4,7 @@
 //! say), but such a command has to be answered UNSUPPORTED. So what comes in is read at the byte offsets of the wire
 //! order (fields sorted by size, extensions last); what V2 cut from the end reads as zero.
 
-use companion::link::frame::Frame;
+use super::frame::Frame;
 
 /// A payload with its cut zeros put back.
 pub struct Fields<'a>(&'a [u8; 255]);

@@ -18,8 +18,8 @@ use companion::config::GROUND_STATIONS;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-pub use crate::autopilot::{Estimator, Personality};
 use crate::files;
+pub use crate::kinds::{Estimator, Personality};
 use crate::link::LinkUrl;
 use crate::map::Unknown;
 use crate::quote::quoted_path;

@@ -6,7 +6,7 @@ use crate::autopilot::body::Body;
 use crate::autopilot::command::{
     ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, FAILED, FORCE, UNSUPPORTED, message_id,
 };
-use crate::autopilot::inbox::Sender;
+use crate::autopilot::port::Sender;
 use crate::autopilot::wire::Fields;
 
 const SET_MODE: u16 = 11;

@@ -2,7 +2,6 @@
 
 use planner_core::Point;
 
-use super::params::Tuning;
 use super::reference::Reference;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, micros};
@@ -10,7 +9,6 @@ use crate::autopilot::body::Sense;
 use crate::autopilot::shaping::approach;
 use crate::autopilot::vehicle::Demand;
 
-const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 /// The take-off is done this near its height, metres: landed_state 2 came 9.3 s after the command to 10 m.
 const TAKEN_OFF_M: f32 = 0.12;
 /// How it leaves the ground, as seen: seconds since it lifted, and the acceleration up until then, m/s². First the throttle
@@ -21,24 +19,6 @@ const LIFT_OFF: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
 const BRAKE_MPS2: f32 = 7.5;
 /// A leg of the return is at its end within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
-
-/// A demand for nothing.
-pub(super) fn nothing(tuning: &Tuning) -> Demand {
-    Demand {
-        position: NONE,
-        velocity: NONE,
-        acceleration: NONE,
-        heading: f32::NAN,
-        heading_rate: f32::NAN,
-        // The reference keeps the limits; the controller may correct beyond them.
-        speed_max: 1.5 * tuning.speed,
-        climb_max: 1.5 * tuning.speed_up,
-        descend_max: 1.5 * tuning.speed_down.max(tuning.stick_sink),
-        lift_off: f32::NAN,
-        thrust_min: 0.15,
-        height_rate_share: 0.0,
-    }
-}
 
 impl Copter {
     /// What the mode asks for now.
@@ -78,13 +58,13 @@ impl Copter {
             heading: goal.heading,
             heading_rate: goal.heading_rate,
             lift_off: self.lift_off(sense.now_us),
-            ..nothing(&tuning)
+            ..tuning.nothing()
         }
     }
 
     /// Acceleration up while it leaves the ground; NaN once it has.
     fn lift_off(&self, now_us: u64) -> f32 {
-        let since_s = now_us.saturating_sub(self.lifted_us) as f32 * 1e-6;
+        let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
         LIFT_OFF.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
     }
 

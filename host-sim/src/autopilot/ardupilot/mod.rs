@@ -28,12 +28,12 @@ use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
 use super::body::{Body, Integral, Order, Sense};
-use super::config::Personality;
-use super::firmware::Status;
-use super::inbox::Sender;
 use super::params::Params;
+use super::port::Sender;
+use super::status::Status;
 use super::vehicle::VehicleLimits;
 use super::wire::Fields;
+use crate::kinds::Personality;
 
 /// From arming until it lifts, where NAV_TAKEOFF comes at once: `MOT` arming delay 2 s, spool-up 0.5 s, and the throttle's
 /// slew to hover.
@@ -109,6 +109,16 @@ enum ReturnLeg {
     Land,
 }
 
+/// When each of these began last, microseconds since boot.
+#[derive(Clone, Copy, Debug, Default)]
+struct Since {
+    armed_us: u64,
+    lifted_us: u64,
+    idle_us: u64,
+    landed_us: u64,
+    touching_us: Option<u64>,
+}
+
 /// The firmware: state machine and parameters.
 #[derive(Clone, Debug)]
 pub struct Copter {
@@ -120,8 +130,7 @@ pub struct Copter {
     told: [bool; 2],
     runtime_us: u64,
     armed: bool,
-    armed_us: u64,
-    lifted_us: u64,
+    since: Since,
     /// The position controller starts in this step.
     starts: bool,
     landed: bool,
@@ -130,9 +139,6 @@ pub struct Copter {
     position_ok: bool,
     lost_us: Option<u64>,
     gcs_us: Option<u64>,
-    idle_us: u64,
-    landed_us: u64,
-    touching_us: Option<u64>,
     takeoff: Option<TakeOff>,
     goal: Goal,
     goal_us: u64,
@@ -152,8 +158,7 @@ impl Copter {
             told: [false; 2],
             runtime_us: 0,
             armed: false,
-            armed_us: 0,
-            lifted_us: 0,
+            since: Since::default(),
             starts: false,
             landed: true,
             mode: Mode::Stabilize,
@@ -161,9 +166,6 @@ impl Copter {
             position_ok: true,
             lost_us: None,
             gcs_us: None,
-            idle_us: 0,
-            landed_us: 0,
-            touching_us: None,
             takeoff: None,
             goal: Goal::STOP,
             goal_us: 0,
@@ -292,8 +294,8 @@ impl Copter {
             return false;
         }
         self.armed = true;
-        self.armed_us = sense.now_us;
-        self.idle_us = sense.now_us;
+        self.since.armed_us = sense.now_us;
+        self.since.idle_us = sense.now_us;
         self.goal = Goal::STOP;
         body.announce_origin();
         body.set_home_here();
@@ -368,11 +370,12 @@ impl Copter {
         }
         if self.landed
             && let Some(takeoff) = self.takeoff
-            && now_us >= (takeoff.since_us + micros(SPOOL_UP_S)).max(self.armed_us + micros(ARM_TO_LIFT_S))
+            && now_us
+                >= (takeoff.since_us + micros(SPOOL_UP_S)).max(self.since.armed_us + micros(ARM_TO_LIFT_S))
         {
             self.landed = false;
-            self.touching_us = None;
-            self.lifted_us = now_us;
+            self.since.touching_us = None;
+            self.since.lifted_us = now_us;
             self.reference = Reference::new(sense.position, Point::zeros());
         }
         if self.landed {
@@ -387,7 +390,7 @@ impl Copter {
 
     /// Motors off or idle.
     fn rest(&self) -> Order {
-        Order { lift: false, integral: Integral::Clear, demand: flight::nothing(&self.tuning) }
+        Order { lift: false, integral: Integral::Clear, demand: self.tuning.nothing() }
     }
 
     /// Origin and position, each once.
@@ -425,12 +428,12 @@ impl Copter {
     fn update_timers(&mut self, body: &mut Body, sense: &Sense) {
         let since = |start: u64| sense.now_us.saturating_sub(start);
         if !self.landed || self.takeoff.is_some() {
-            self.idle_us = sense.now_us;
+            self.since.idle_us = sense.now_us;
         } else {
             let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
             let landing = matches!(self.mode, Mode::Land | Mode::Rtl);
-            if landing && since(self.landed_us) >= micros(LAND_DISARM_S)
-                || delay > 0.0 && since(self.idle_us) >= micros(delay)
+            if landing && since(self.since.landed_us) >= micros(LAND_DISARM_S)
+                || delay > 0.0 && since(self.since.idle_us) >= micros(delay)
             {
                 self.disarm(body, false);
             }
@@ -442,14 +445,14 @@ impl Copter {
 
     fn detect_landing(&mut self, sense: &Sense, climbing: bool) {
         if !sense.touching || climbing {
-            self.touching_us = None;
+            self.since.touching_us = None;
             return;
         }
-        let since = *self.touching_us.get_or_insert(sense.now_us);
+        let since = *self.since.touching_us.get_or_insert(sense.now_us);
         if sense.now_us - since >= micros(LAND_DETECTOR_S) {
-            self.touching_us = None;
+            self.since.touching_us = None;
             self.landed = true;
-            self.landed_us = sense.now_us;
+            self.since.landed_us = sense.now_us;
             self.takeoff = None;
             self.goal = Goal::STOP;
         }

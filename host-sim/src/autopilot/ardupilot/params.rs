@@ -1,8 +1,10 @@
 //! The parameters of the simulated ArduCopter: names, types and defaults of 4.6, and the few that act.
 
+use planner_core::Point;
+
 use crate::autopilot::params::Value::{self, Int, Int8, Int16, Real};
 use crate::autopilot::params::{Encoding, Params};
-use crate::autopilot::vehicle::{Gains, VehicleLimits};
+use crate::autopilot::vehicle::{Demand, Gains, VehicleLimits};
 
 /// Sorted by name.
 const DEFAULTS: &[(&str, Value)] = &[
@@ -75,6 +77,8 @@ pub fn params(system_id: u8, limits: &VehicleLimits) -> Params {
     Params::new(DEFAULTS, Encoding::Cast, &own)
 }
 
+const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+
 /// The parameters that act, by what they do. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
@@ -106,6 +110,24 @@ pub struct Tuning {
 }
 
 impl Tuning {
+    /// A demand for nothing.
+    pub(super) fn nothing(&self) -> Demand {
+        Demand {
+            position: NONE,
+            velocity: NONE,
+            acceleration: NONE,
+            heading: f32::NAN,
+            heading_rate: f32::NAN,
+            // The reference keeps the limits; the controller may correct beyond them.
+            speed_max: 1.5 * self.speed,
+            climb_max: 1.5 * self.speed_up,
+            descend_max: 1.5 * self.speed_down.max(self.stick_sink),
+            lift_off: f32::NAN,
+            thrust_min: 0.15,
+            height_rate_share: 0.0,
+        }
+    }
+
     /// What acts, looked up once after each change.
     pub fn new(params: &Params) -> Self {
         let cm = |name| 0.01 * params.real(name);

@@ -5,14 +5,12 @@ use planner_core::frames::Geodetic;
 use super::{Mode, Px4};
 use crate::autopilot::body::Body;
 use crate::autopilot::command::{
-    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, FAILED, FORCE, PROTOCOL_VERSION,
-    TEMPORARILY_REJECTED, UNSUPPORTED, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_SET_MODE, FAILED, FORCE, PROTOCOL_VERSION,
+    TEMPORARILY_REJECTED, UNSUPPORTED, accept, message_id,
 };
-use crate::autopilot::inbox::Sender;
+use crate::autopilot::port::Sender;
 use crate::autopilot::telemetry;
 use crate::autopilot::wire::Fields;
-
-pub(super) const DO_SET_MODE: u16 = 176;
 
 impl Px4 {
     /// Takes a command and acknowledges it.
@@ -123,10 +121,6 @@ impl Px4 {
         self.commander.set_cruise(command.param[0]);
         accept(self.commander.reposition(&to, command.param[3], &sense, &self.tuning))
     }
-}
-
-pub(super) fn accept(done: bool) -> u8 {
-    if done { ACCEPTED } else { TEMPORARILY_REJECTED }
 }
 
 fn mode_of(base: u8, main: u8, sub: u8) -> Option<Mode> {

@@ -2,14 +2,15 @@
 
 use super::params::{self, Tuning};
 use super::setpoint;
-use super::{Commander, Mode, commands};
+use super::{Commander, Mode};
 use crate::autopilot::body::{Body, Order, Sense};
-use crate::autopilot::config::Personality;
-use crate::autopilot::firmware::Status;
-use crate::autopilot::inbox::Sender;
+use crate::autopilot::command::{DO_SET_MODE, accept};
 use crate::autopilot::params::Params;
+use crate::autopilot::port::Sender;
+use crate::autopilot::status::Status;
 use crate::autopilot::vehicle::VehicleLimits;
 use crate::autopilot::wire::Fields;
+use crate::kinds::Personality;
 
 const COMMAND_LONG: u32 = 76;
 /// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe began: takes control of the
@@ -44,7 +45,7 @@ impl Px4 {
     pub(in crate::autopilot) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
         if let Some((from, mode)) = self.asked.take() {
             let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
-            body.acknowledge(from, commands::DO_SET_MODE, commands::accept(changed));
+            body.acknowledge(from, DO_SET_MODE, accept(changed));
         }
         let failed = self.commander.in_failsafe();
         let order = self.commander.update(sense, &self.tuning);

@@ -23,26 +23,6 @@ const DISTANCE_LAG_S: f32 = 0.2;
 /// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
 const BRAKE_MPS2: f32 = 3.0;
 
-const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
-
-/// A demand for nothing, within the bounds of manual and Offboard flight.
-pub(super) fn nothing(tuning: &Tuning) -> Demand {
-    Demand {
-        position: NONE,
-        velocity: NONE,
-        acceleration: NONE,
-        heading: f32::NAN,
-        heading_rate: f32::NAN,
-        speed_max: tuning.speed_max,
-        climb_max: tuning.climb_max,
-        descend_max: tuning.descend_max,
-        lift_off: f32::NAN,
-        // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
-        thrust_min: 0.245,
-        height_rate_share: 0.0,
-    }
-}
-
 impl Commander {
     /// Fixes what the mode leans on: where it stops, which leg of the return is next.
     pub(super) fn enter(&mut self, mode: Mode, sense: &Sense) {
@@ -79,7 +59,7 @@ impl Commander {
             speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
             climb_max: tuning.auto_up.min(tuning.climb_max),
             descend_max: tuning.auto_down.min(tuning.descend_max),
-            ..nothing(tuning)
+            ..tuning.nothing()
         };
         match self.mode() {
             Mode::Offboard => match self.setpoint {
@@ -89,7 +69,7 @@ impl Commander {
                     acceleration: s.acceleration,
                     heading: s.heading,
                     heading_rate: s.heading_rate,
-                    ..nothing(tuning)
+                    ..tuning.nothing()
                 },
                 None => held,
             },

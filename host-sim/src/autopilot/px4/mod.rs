@@ -371,7 +371,7 @@ impl Commander {
                 self.landed = true;
                 self.landed_us = now;
             }
-            let demand = flight::nothing(tuning);
+            let demand = tuning.nothing();
             return Order { lift: false, integral: Integral::Clear, demand };
         }
         let mut demand = self.demand(sense, tuning);

@@ -1,9 +1,11 @@
 //! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few that act.
 
+use planner_core::Point;
+
 use crate::autopilot::params::Encoding;
 use crate::autopilot::params::Params;
 use crate::autopilot::params::Value::{self, Int, Real};
-use crate::autopilot::vehicle::{Gains, VehicleLimits};
+use crate::autopilot::vehicle::{Demand, Gains, VehicleLimits};
 
 /// Sorted by name, as PX4 lists them.
 const DEFAULTS: &[(&str, Value)] = &[
@@ -113,6 +115,8 @@ pub fn params(system_id: u8, limits: &VehicleLimits) -> Params {
     Params::new(DEFAULTS, Encoding::Bytewise, &own)
 }
 
+const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+
 /// The parameters that act, by what they do. Metres, seconds, m/s.
 #[derive(Clone, Copy, Debug)]
 #[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
@@ -149,6 +153,24 @@ pub struct Tuning {
 }
 
 impl Tuning {
+    /// A demand for nothing, within the bounds of manual and Offboard flight.
+    pub(super) fn nothing(&self) -> Demand {
+        Demand {
+            position: NONE,
+            velocity: NONE,
+            acceleration: NONE,
+            heading: f32::NAN,
+            heading_rate: f32::NAN,
+            speed_max: self.speed_max,
+            climb_max: self.climb_max,
+            descend_max: self.descend_max,
+            lift_off: f32::NAN,
+            // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
+            thrust_min: 0.245,
+            height_rate_share: 0.0,
+        }
+    }
+
     /// What acts, looked up once after each change.
     pub fn new(params: &Params) -> Self {
         Self {

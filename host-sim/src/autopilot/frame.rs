@@ -1,0 +1,178 @@
+//! MAVLink framing of the simulated autopilots. It shares no code with the companion's: a bug in one shall not hide in the other.
+//!
+//! Source: MAVLink guide, "Packet Serialization". The `mavlink` crate gives message types, CRC seeds and the checksum; its
+//! reader wants a stream that it may wait for, and bytes here come whenever the simulation has some.
+//!
+//! Of candidates that overlap, the first with the right checksum is the frame; a wrong one costs its start byte. A frame that
+//! is not complete [`PARTIAL_US`] after its first byte is given up.
+
+use mavlink::dialects::ardupilotmega::MavMessage;
+use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
+
+/// A frame not complete this long after its first byte is given up, microseconds.
+const PARTIAL_US: u64 = 100_000;
+/// The longest frame without a signature: 10 bytes of header, 255 of payload, 2 of CRC.
+pub const FRAME_MAX: usize = 267;
+
+const V1_START: u8 = 0xFE;
+const V2_START: u8 = 0xFD;
+const V1_HEADER: usize = 6;
+const V2_HEADER: usize = 10;
+/// Flag of a V2 frame that a signature follows; a frame with any other is none that we can read.
+const SIGNED: u8 = 1;
+/// COMPONENT_INFORMATION, the one message whose seed is 0: the crate answers 0 for unknown ids too.
+const SEED_ZERO: u32 = 395;
+
+/// A frame whose checksum is right.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Frame {
+    /// System id of the sender.
+    pub system: u8,
+    /// Component id of the sender.
+    pub component: u8,
+    /// Sequence number of the sender's link.
+    pub sequence: u8,
+    /// Message id.
+    pub message_id: u32,
+    /// Bytes of the payload that came.
+    len: usize,
+    payload: [u8; 255],
+}
+
+impl Frame {
+    /// The payload; what V2 cut from the end reads as zero.
+    pub fn padded(&self) -> &[u8; 255] {
+        &self.payload
+    }
+
+    /// Of a whole frame's bytes, signature left out.
+    fn read(bytes: &[u8]) -> Self {
+        let header = header_len(bytes);
+        // Sequence number, system and component stand before the id.
+        let at = if header == V1_HEADER { 2 } else { 4 };
+        let received = &bytes[header..bytes.len() - 2];
+        let mut payload = [0; 255];
+        payload[..received.len()].copy_from_slice(received);
+        Self {
+            sequence: bytes[at],
+            system: bytes[at + 1],
+            component: bytes[at + 2],
+            message_id: message_id(bytes),
+            len: received.len(),
+            payload,
+        }
+    }
+
+    /// Appends it to `out` as a V2 frame of the same sender.
+    pub fn write(&self, out: &mut Vec<u8>) {
+        if let Some(seed) = seed(self.message_id) {
+            let sender = (self.system, self.component, self.sequence);
+            write_raw(sender, self.message_id, seed, &self.payload[..self.len], out);
+        }
+    }
+}
+
+/// The CRC seed of a message id; `None` where the dialect does not know the id.
+pub fn seed(message_id: u32) -> Option<u8> {
+    let seed = MavMessage::extra_crc(message_id);
+    (seed != 0 || message_id == SEED_ZERO).then_some(seed)
+}
+
+/// Appends a message to `out` as a V2 frame; the sender is its system, component and sequence number.
+pub fn write<M: MessageData>(sender: (u8, u8, u8), message: &M, out: &mut Vec<u8>) {
+    let mut payload = [0; 255];
+    let len = message.ser(MavlinkVersion::V2, &mut payload);
+    write_raw(sender, M::ID, M::EXTRA_CRC, &payload[..len], out);
+}
+
+/// As [`write`], of a payload of at most 255 bytes that the caller laid out; zeros at its end are cut, but for one.
+pub fn write_raw(sender: (u8, u8, u8), message_id: u32, seed: u8, payload: &[u8], out: &mut Vec<u8>) {
+    let cut = payload.iter().rev().take_while(|&&byte| byte == 0).count();
+    let len = (payload.len() - cut).max(payload.len().min(1));
+    let (system, component, sequence) = sender;
+    let [a, b, c, _] = message_id.to_le_bytes();
+    let start = out.len();
+    out.extend([V2_START, len as u8, 0, 0, sequence, system, component, a, b, c]);
+    out.extend(&payload[..len]);
+    let crc = calculate_crc(&out[start + 1..], seed);
+    out.extend(crc.to_le_bytes());
+}
+
+/// What stands at the front of the bytes held.
+enum Front {
+    /// The beginning of what may be a frame.
+    Partial,
+    /// No frame.
+    Noise,
+    /// A frame of this many bytes, signature not counted.
+    Whole(usize),
+}
+
+/// The reader of one port.
+#[derive(Clone, Debug, Default)]
+pub struct Framer {
+    bytes: Vec<u8>,
+    /// When each of them came, microseconds.
+    came_us: Vec<u64>,
+}
+
+impl Framer {
+    /// The next whole frame of what came so far; takes all of `input` first, which came now.
+    pub fn next(&mut self, now_us: u64, input: &mut &[u8]) -> Option<Frame> {
+        self.bytes.extend_from_slice(input);
+        self.came_us.resize(self.bytes.len(), now_us);
+        *input = &[];
+        loop {
+            let noise = self.bytes.iter().position(|byte| matches!(*byte, V1_START | V2_START));
+            self.drop_first(noise.unwrap_or(self.bytes.len()));
+            let first_us = *self.came_us.first()?;
+            match front(&self.bytes) {
+                Front::Whole(total) => {
+                    let frame = Frame::read(&self.bytes[..total]);
+                    self.drop_first(total);
+                    return Some(frame);
+                }
+                Front::Partial if now_us <= first_us + PARTIAL_US => return None,
+                Front::Partial | Front::Noise => self.drop_first(1),
+            }
+        }
+    }
+
+    fn drop_first(&mut self, count: usize) {
+        self.bytes.drain(..count);
+        self.came_us.drain(..count);
+    }
+}
+
+fn front(bytes: &[u8]) -> Front {
+    let header = header_len(bytes);
+    if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !SIGNED != 0) {
+        return Front::Noise;
+    }
+    if bytes.len() < header {
+        return Front::Partial;
+    }
+    let Some(seed) = seed(message_id(bytes)) else { return Front::Noise };
+    let end = header + usize::from(bytes[1]);
+    let Some(&[low, high]) = bytes.get(end..end + 2) else { return Front::Partial };
+    if calculate_crc(&bytes[1..end], seed) == u16::from_le_bytes([low, high]) {
+        Front::Whole(end + 2)
+    } else {
+        Front::Noise
+    }
+}
+
+fn header_len(bytes: &[u8]) -> usize {
+    if bytes[0] == V1_START { V1_HEADER } else { V2_HEADER }
+}
+
+/// The message id of a whole header.
+fn message_id(bytes: &[u8]) -> u32 {
+    match header_len(bytes) {
+        V1_HEADER => u32::from(bytes[5]),
+        _ => u32::from_le_bytes([bytes[7], bytes[8], bytes[9], 0]),
+    }
+}
+
+#[cfg(test)]
+mod tests;
