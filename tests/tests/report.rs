@@ -103,7 +103,6 @@ fn report() -> ReportData {
         vehicles,
         outlines: Vec::new(),
         obstacles: vec![],
-        outlines: vec![],
         result: json!({
             "complete": true,
             "vehicles": [{ "id": 1, "goal": 0, "reached": true, "landed": true, "path_m": 14.1, "end": "landed" }],
