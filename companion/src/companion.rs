@@ -3,6 +3,7 @@
 mod board;
 mod frames;
 mod inputs;
+mod replanning;
 mod steps;
 mod transmit;
 
@@ -19,9 +20,8 @@ use crate::link::frame::Counters;
 use crate::link::{Fresh, Links};
 use crate::mission::State;
 use crate::mission::course::Mission;
-use crate::mission::waits::Waits;
 use crate::services::Services;
-use crate::swarm::detour::{Around, Obstacles};
+use crate::swarm::detour::Detours;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
@@ -32,8 +32,6 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 const REPORT_EVERY: Duration = Duration::from_secs(5);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
-/// A hovering vehicle sways more slowly, m/s.
-pub(crate) const STANDING_MPS: f32 = 0.3;
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// After so long without setpoints Guided stops, seconds: between these, the time in which cruise speed flies the margin.
 /// ArduCopter's own 3 s would fly the last velocity on through walls while a link stalls; the shortest are four setpoints.
@@ -46,17 +44,14 @@ const EVENTS: usize = 16;
 #[derive(Clone, Debug)]
 pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) config: Config<V>,
-    pub(crate) rank: u16,
     pub(crate) now: Instant,
     pub(crate) timers: Timers,
     pub(crate) links: Links,
     pub(crate) telemetry: Telemetry,
     pub(crate) neighbours: Neighbours<V>,
-    pub(crate) around: Around,
-    pub(crate) obstacles: Obstacles,
+    pub(crate) detours: Detours,
     pub(crate) requests: Requests,
     pub(crate) mission: Mission<W, G>,
-    waits: Waits,
     pub(crate) guidance: Guidance,
     pub(crate) services: Services,
     pub(crate) events: Deque<Event, EVENTS>,
@@ -67,10 +62,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
         config.check()?;
-        let (rank, own) = config.own().ok_or(ConfigError::NotInRoster)?;
+        let (_, own) = config.own().ok_or(ConfigError::NotInRoster)?;
         let start = own.start;
         Ok(Self {
-            rank,
             now: Instant::ZERO,
             timers: Timers::default(),
             links: Links::default(),
@@ -80,11 +74,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 config.system_id,
                 config.cruise_mps.max(config.climb_mps),
             ),
-            around: Around::default(),
-            obstacles: Obstacles::default(),
+            detours: Detours::default(),
             requests: Requests::default(),
             mission: Mission::new(start),
-            waits: Waits::default(),
             guidance: Guidance::new(&config, &Kind::default().default_limits()),
             services: Services::new(&config),
             events: Deque::new(),
@@ -131,8 +123,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let scene = Scene::new(
             self.mission.plan(),
             &self.telemetry,
-            (self.rank, self.config.system_id),
-            self.around.flying,
+            (self.neighbours.own_rank(), self.config.system_id),
+            self.detours.is_flying(),
         );
         self.guidance.ask_filter(self.mission.state(), &scene, &self.neighbours, now)
     }
@@ -145,7 +137,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Way made along the own path, metres.
     pub fn progress_m(&self) -> f32 {
         // What is flown around comes on top of where the plan was left.
-        let left_at_m = if self.around.flying { self.around.left_at_m } else { 0.0 };
+        let left_at_m = if self.detours.is_flying() { self.detours.left_at_m() } else { 0.0 };
         self.guidance.progress_m(self.mission.state(), &self.scene()) + left_at_m.max(0.0)
     }
 
@@ -227,8 +219,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         Scene::new(
             self.mission.plan(),
             &self.telemetry,
-            (self.rank, self.config.system_id),
-            self.around.flying,
+            (self.neighbours.own_rank(), self.config.system_id),
+            self.detours.is_flying(),
         )
     }
 

@@ -50,7 +50,7 @@ const ARRIVED_M: f32 = 0.35;
 /// (`PROGRESS_ERROR_M`), since it stops short of a gate by a little.
 const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
 /// Slower than this counts as standing at the end of the path, m/s.
-const STANDING_MPS: f32 = 0.5;
+const RESTS_MPS: f32 = 0.5;
 /// A setpoint slower than this stands, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// This near its top the climb is done, metres.
@@ -151,7 +151,7 @@ pub struct Guidance {
     /// No place along its path is better.
     nowhere: bool,
     /// Since when it waits under a vehicle that comes down, and its path leads nowhere better.
-    pub trapped_since: Option<Instant>,
+    trapped_since: Option<Instant>,
     /// Whether its path leads aside only: it does not land at its end.
     pub aside: bool,
     /// Height over the ground at which the autopilot lands by itself, metres.
@@ -471,6 +471,16 @@ impl Guidance {
     /// Whether it leads the vehicle down.
     pub(crate) fn descends(&self) -> bool {
         self.phase == Phase::Descent
+    }
+
+    /// Since when it has been below a vehicle that lands, with no way out.
+    pub(crate) fn trapped_since(&self) -> Option<Instant> {
+        self.trapped_since
+    }
+
+    /// That counts from now on.
+    pub(crate) fn forget_trap(&mut self) {
+        self.trapped_since = None;
     }
 
     /// Time since the reference last moved on.

@@ -2,4 +2,5 @@
 
 pub(crate) mod detour;
 pub mod neighbours;
+pub(crate) mod obstacles;
 pub(crate) mod sweep;

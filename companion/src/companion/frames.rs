@@ -116,7 +116,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 return;
             }
-            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.rank);
+            let echo = intent.echo.filter(|echo| u16::from(echo.rank) == self.neighbours.own_rank());
             let delay_s = echo.and_then(|echo| self.links.delay_s(&echo, self.now));
             if let (Some(delay_s), Some(late)) = (delay_s, self.neighbours.lateness(id)) {
                 late.take(delay_s);
@@ -125,7 +125,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let plan_crc = self.mission.plan().map(|plan| plan.plan_crc);
                 self.neighbours.handle_intent(
                     self.now,
-                    self.rank,
+                    self.neighbours.own_rank(),
                     &intent,
                     self.config.mission_crc,
                     plan_crc,
@@ -148,12 +148,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Returns the answer; none is due to a broadcast, nor to a command that is another component's.
     pub(super) fn handle_command(&mut self, link: Link, sender: Sender, command: &Command) -> Option<u8> {
-        let (before, known) = (*self.mission.pending(), self.obstacles.count());
+        let (before, known) = (*self.mission.pending(), self.detours.obstacles());
         let inputs = self.inputs();
         let result = match self.mission.handle_command(&inputs, command) {
             Some(result) => result,
             None if command.command == commands::REQUEST => self.request(link, sender, command.param1),
-            None if command.command == commands::EXCLUDE => self.exclude(command),
+            None if command.command == commands::EXCLUDE => {
+                self.detours.exclude(command, &self.config.origin, self.config.required_clearance_m)
+            }
             None if command.command == commands::RESTART
                 && (command.to_component || command.param2 == 1.0) =>
             {
@@ -164,7 +166,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             None => UNSUPPORTED,
         };
         let restarts = command.command == commands::RESTART && result == ACCEPTED;
-        if restarts || *self.mission.pending() != before || self.obstacles.count() != known {
+        if restarts || *self.mission.pending() != before || self.detours.obstacles() != known {
             self.links.log_command(self.now, sender, command);
         }
         command.to_us.then_some(result)

@@ -2,11 +2,12 @@
 
 use planner_core::Point;
 
-use super::{Companion, HEARTBEAT_EVERY, STANDING_MPS};
+use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::battery_reported;
 use crate::config::PlanFailure;
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};
+use crate::swarm::neighbours::STANDING_MPS;
 use crate::time::Duration;
 
 /// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
@@ -22,7 +23,8 @@ const RESTING_MPS: f32 = 0.5;
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
     pub(crate) fn inputs(&self) -> Inputs {
-        let (t, now, scene) = (&self.telemetry, self.now, self.scene());
+        let (t, now, view) = (&self.telemetry, self.now, self.view());
+        let scene = &view.scene;
         let (kind, handshake) = (self.kind(), self.requests.handshake());
         let offboard = t.custom_mode == kind.setpoint_mode();
         let mode_foreign = match self.mission.state() {
@@ -57,7 +59,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
-            neighbour_age: match self.guidance.returning || self.around.lands {
+            neighbour_age: match self.guidance.returning || self.detours.lands() {
                 true => Duration::default(),
                 false => self.neighbours.silence(now, self.mission.entered_at()),
             },
@@ -95,17 +97,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.mission.departure_due(now)
                 && !self.mission.pending().pause
                 && battery_reported(t, self.config.battery_low_percent, now)
-                && !self.around.blocked
+                && !self.detours.is_blocked()
                 && self.neighbours.is_clear_since(self.mission.entered_at())
                 && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
-            climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(&scene),
-            path_done: follow && self.guidance.path_done(&scene),
-            at_goal: self.guidance.at_goal(&scene),
+            climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
+            path_done: follow && self.guidance.path_done(scene),
+            at_goal: self.guidance.at_goal(scene),
             near_path: match (beneath, self.mission.state()) {
                 // Those refer to no place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
-                (_, State::PilotReturned) => self.guidance.near_path(&scene, REJOIN_WINDOW_M),
-                (_, State::PositionLost) => self.guidance.near_path(&scene, LOST_WINDOW_M),
+                (_, State::PilotReturned) => self.guidance.near_path(scene, REJOIN_WINDOW_M),
+                (_, State::PositionLost) => self.guidance.near_path(scene, LOST_WINDOW_M),
                 _ => false,
             },
             battery_low: t.charge_below(self.config.battery_low_percent),
@@ -121,23 +123,23 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),
             },
-            can_land_aside: self.can_land_aside(),
-            lands_aside: self.around.lands,
+            can_land_aside: self.detours.can_land_aside(&view),
+            lands_aside: self.detours.lands(),
             aside_reached: follow
-                && self.around.flying
-                && self.around.lands
-                && self.guidance.is_at_end(&scene)
+                && self.detours.is_flying()
+                && self.detours.lands()
+                && self.guidance.is_at_end(scene)
                 && standing,
             yielded: self.guidance.filter.yielded_for(now),
             hindered: self.guidance.filter.hindered_for(now),
             room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
             outside: self.guidance.stands_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
-            blocked: self.around.blocked,
-            our_turn: self.is_our_turn(),
-            detour_ready: self.around.ready,
-            no_way_around: self.gives_up(),
-            underneath: self.underneath(),
+            blocked: self.detours.is_blocked(),
+            our_turn: self.detours.is_our_turn(&view),
+            detour_ready: self.detours.is_ready(),
+            no_way_around: self.detours.gives_up(),
+            underneath: self.detours.underneath(&view),
             standing,
         }
     }

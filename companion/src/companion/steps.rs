@@ -9,7 +9,7 @@ use crate::link::Fresh;
 use crate::margins;
 use crate::mission::{self, Action, Row, State};
 use crate::storage::store::Erasing;
-use crate::swarm::detour::{Aim, Around};
+use crate::swarm::detour::Aim;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -24,8 +24,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let scene = Scene::new(
             self.mission.plan(),
             &self.telemetry,
-            (self.rank, self.config.system_id),
-            self.around.flying,
+            (self.neighbours.own_rank(), self.config.system_id),
+            self.detours.is_flying(),
         );
         if !self.guidance.step(self.mission.state(), &scene, &mut self.neighbours, now, dt_s)
             && self.timers.take(Timer::HeldReport, now, REPORT_EVERY)
@@ -53,7 +53,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let flies = matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
         let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
-        if self.waits.watch(id, self.now) {
+        if self.mission.names(id, self.now) {
             self.links.say_count(true, "Waiting for vehicle #: it has not started", [u32::from(id), 0]);
             // Full only if the shell does not drain.
             let _ = self.events.push_back(Event::WaitsForStart { id });
@@ -125,8 +125,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::Connect => self.connect(),
             Action::RequestPlan => {
                 self.mission.forget_plan();
-                self.around = Around { left: self.around.left, ..Around::default() };
-                self.obstacles.avoided = 0;
+                self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
                 let _ = self.events.push_back(Event::PlanRequested);
@@ -151,7 +150,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::MissDetour => self.miss_detour(PlanFailure::Late),
             Action::FlyDetour => {
                 self.guidance.begin_path(now);
-                self.guidance.aside = self.around.aside;
+                self.guidance.aside = self.detours.is_aside();
             }
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
@@ -188,7 +187,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if to == State::Blocked {
                     // Until it was looked at again.
-                    (self.around.blocked, self.around.in_the_way) = (true, true);
+                    self.detours.look_again();
                 }
                 if !matches!(to, State::Climb | State::Follow) {
                     self.guidance.brake();

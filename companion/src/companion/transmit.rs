@@ -152,7 +152,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
-        let told = self.told_place();
+        let told = self.detours.told_place(&self.telemetry, self.now);
         let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
         let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
@@ -194,14 +194,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
                 && self.guidance.at_goal(&self.scene());
         let flag = |flag: u8, holds: bool| if holds { flag } else { 0 };
-        let out = self.is_out();
+        let out = self.detours.is_out(&self.view());
         let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
             | flag(intent::LANDED, self.mission.state() == Done)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
             | flag(intent::OUT, out)
-            | flag(intent::WAITING, self.waits())
-            | flag(intent::BLOCKED, self.around.blocked)
-            | flag(intent::DETOURS, self.around.flying || self.around.left || self.guidance.retreating);
+            | flag(intent::WAITING, self.detours.waits(&self.view()))
+            | flag(intent::BLOCKED, self.detours.is_blocked())
+            | flag(
+                intent::DETOURS,
+                self.detours.is_flying() || self.detours.has_left() || self.guidance.retreating,
+            );
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
         let (points, column) = self.way_ahead();
@@ -210,7 +213,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             flags,
             mission_crc: self.config.mission_crc,
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
-            progress_m: if self.around.flying { self.around.left_at_m } else { along_m },
+            progress_m: if self.detours.is_flying() { self.detours.left_at_m() } else { along_m },
             heard: self.neighbours.heard_bits(self.now),
             speed_mps: self.telemetry.velocity.norm(),
             floor_m: plan.map_or(self.mission.start().z, |plan| self.guidance.ground_m(plan)),

@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
 
 use super::{
-    ARRIVED_M, AT_END_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, STANDING_MPS, Scene,
+    ARRIVED_M, AT_END_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene,
     WINDOW_EDGE_M,
 };
 use crate::mission::State;
@@ -99,7 +99,7 @@ impl Guidance {
     /// Whether the path and the guided descent are flown.
     pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
         if self.is_algorithm2() {
-            let stands = self.stands() && scene.telemetry.velocity.norm() < STANDING_MPS;
+            let stands = self.stands() && scene.telemetry.velocity.norm() < RESTS_MPS;
             return stands && self.on_path && self.waypoints.completed() && !self.aside;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
@@ -122,7 +122,7 @@ impl Guidance {
                 (end - scene.telemetry.position).norm() < ARRIVED_M
                     && (end - self.door.position()).norm() < ARRIVED_M
             })
-            && scene.telemetry.velocity.norm() < STANDING_MPS
+            && scene.telemetry.velocity.norm() < RESTS_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 

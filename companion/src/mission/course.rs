@@ -6,6 +6,7 @@ use planner_core::flight::VehiclePlan;
 
 use crate::config::PlanFailure;
 use crate::link::commands::{self, Command, Pending};
+use crate::mission::waits::Waits;
 use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
 use crate::time::{Duration, Instant};
 
@@ -31,6 +32,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
     vague_since: Option<Instant>,
+    waits: Waits,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
@@ -48,6 +50,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             plan: None,
             failure: None,
             vague_since: None,
+            waits: Waits::default(),
         }
     }
 
@@ -130,6 +133,11 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// Notes whether it is.
     pub(crate) fn note_estimate(&mut self, usable: bool, now: Instant) {
         self.vague_since = if usable { None } else { self.vague_since.or(Some(now)) };
+    }
+
+    /// It waits for the vehicle `id`, which has not started, or for none (0). Returns whether that is to be named.
+    pub(crate) fn names(&mut self, id: u8, now: Instant) -> bool {
+        self.waits.watch(id, now)
     }
 
     /// Takes a command in and says the result; `None` for one that is not the mission's.

@@ -15,18 +15,19 @@
 //!
 //! ENU metres.
 
-use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
-use planner_core::flight::VehiclePlan;
-use planner_core::frames::{self, Geodetic};
+use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::frames::Geodetic;
 
-use crate::companion::{Companion, STANDING_MPS};
-use crate::config::PlanFailure;
-use crate::events::Event;
+use crate::autopilot::telemetry::Telemetry;
+use crate::config::Config;
 use crate::guidance::retreat;
-use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+use crate::guidance::{Guidance, Scene};
+use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
+use crate::mission::course::Mission;
+use crate::swarm::neighbours::{Neighbours, STANDING_MPS};
+use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::Sweep;
 use crate::time::{Duration, Instant};
 
@@ -70,37 +71,6 @@ const STRAY_M: f32 = 0.25;
 /// Beyond the safety distance, so that what strays a little does not block the way again, metres.
 const MARGIN_M: f32 = 0.5;
 
-/// Obstacles that were not on the map.
-const OBSTACLES: usize = 16;
-/// The greatest radius of one, metres: a wrong digit must not close a whole building.
-const OBSTACLE_MAX_M: f32 = 20.0;
-/// Two nearer than this are one that was sent twice, metres; a revocation this near means it.
-const SAME_M: f32 = 0.1;
-
-/// Obstacles that were not on the map, and for how many of them a way around was planned.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Obstacles {
-    known: Vec<KeepOff, OBSTACLES>,
-    pub(crate) avoided: usize,
-    /// How many were known when a way around was last requested: those that came later it does not avoid.
-    requested: usize,
-}
-
-impl Obstacles {
-    pub(crate) fn count(&self) -> usize {
-        self.known.len()
-    }
-
-    /// Forgets the obstacle at this place.
-    fn revoke(&mut self, centre: &Point) {
-        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_M) {
-            self.known.remove(at);
-            self.avoided -= usize::from(at < self.avoided);
-            self.requested -= usize::from(at < self.requested);
-        }
-    }
-}
-
 /// What a way around is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aim {
@@ -112,46 +82,64 @@ pub(crate) enum Aim {
     Landing,
 }
 
-/// What is known of the way ahead.
+/// What is known of the way ahead, and of ways around.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Around {
+pub(crate) struct Detours {
+    obstacles: Obstacles,
     /// The path is blocked, or the plan was left.
-    pub(crate) blocked: bool,
+    blocked: bool,
     /// It was out once: the others do not count on it any more.
-    pub(crate) left: bool,
+    left: bool,
     /// The path is one around.
-    pub(crate) flying: bool,
+    flying: bool,
     /// That path, or the one asked for, leads aside only, out from under a vehicle that lands.
-    pub(crate) aside: bool,
+    aside: bool,
     /// And it lands at the end of that.
-    pub(crate) lands: bool,
+    lands: bool,
     /// Progress on the plan when it was left for a way around, metres.
-    pub(crate) left_at_m: f32,
+    left_at_m: f32,
     /// The way around asked for has come.
-    pub(crate) ready: bool,
+    ready: bool,
     /// Ways around not found since somebody moved.
-    pub(crate) failed: u8,
+    failed: u8,
     /// The last one was not found although all others lie or rest for good, or for a while from here, whoever moved.
-    pub(crate) hopeless: bool,
+    hopeless: bool,
     /// Ways around not found from here, whoever moved between; how far along the path that is, and since when.
-    pub(crate) failed_here: u8,
-    pub(crate) failed_at_m: f32,
-    pub(crate) failed_since: Instant,
+    failed_here: u8,
+    failed_at_m: f32,
+    failed_since: Instant,
     /// Ways around on which it did not move, in a row.
-    pub(crate) fruitless: u8,
+    fruitless: u8,
     /// When no way aside was found.
-    pub(crate) no_way_aside_at: Option<Instant>,
+    no_way_aside_at: Option<Instant>,
     /// Where and when it was before its position jumped.
-    pub(crate) lost_at: Option<(Point, Instant)>,
-    pub(crate) quiet_since: Option<Instant>,
+    lost_at: Option<(Point, Instant)>,
+    quiet_since: Option<Instant>,
     /// Since when it claims its turn.
-    pub(crate) claimed_since: Option<Instant>,
+    claimed_since: Option<Instant>,
     /// When a look was last due, and when the one that goes on began.
-    pub(crate) looked_at: Instant,
-    pub(crate) look_began: Option<Instant>,
+    looked_at: Instant,
+    look_began: Option<Instant>,
     /// How far that is, and what the last one found.
-    pub(crate) sweep: Sweep,
-    pub(crate) in_the_way: bool,
+    sweep: Sweep,
+    in_the_way: bool,
+}
+
+/// What decisions about ways around follow from.
+pub(crate) struct View<'a, const V: usize, const W: usize, const G: usize> {
+    pub(crate) now: Instant,
+    pub(crate) config: &'a Config<V>,
+    pub(crate) mission: &'a Mission<W, G>,
+    pub(crate) guidance: &'a Guidance,
+    pub(crate) telemetry: &'a Telemetry,
+    pub(crate) neighbours: &'a Neighbours<V>,
+    pub(crate) scene: Scene<'a, W, G>,
+}
+
+/// What a look along the path found.
+struct Looked {
+    /// When one that found nothing began.
+    clear_at: Option<Instant>,
 }
 
 /// What it reports to the others of where it is.
@@ -162,132 +150,216 @@ pub(crate) struct Told {
     pub(crate) at: Instant,
 }
 
-impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+impl Detours {
+    /// The way ahead is as the plan has it again.
+    pub(crate) fn forget_plan(&mut self) {
+        let obstacles = core::mem::take(&mut self.obstacles);
+        *self = Self { left: self.left, obstacles, ..Self::default() };
+        self.obstacles.forget_avoided();
+    }
+
+    /// It counts as blocked until it was looked at again.
+    pub(crate) fn look_again(&mut self) {
+        (self.blocked, self.in_the_way) = (true, true);
+    }
+
+    /// Takes an obstacle of a command.
+    pub(crate) fn exclude(&mut self, command: &Command, origin: &Geodetic, clearance_m: f32) -> u8 {
+        let result = self.obstacles.take(command, origin, clearance_m);
+        if command.param1 <= 0.0 && result == ACCEPTED {
+            // A look that is under way counts them by index.
+            self.sweep.restart();
+            self.look_began = None;
+        }
+        result
+    }
+
+    /// Obstacles that were reported.
+    pub(crate) fn obstacles(&self) -> usize {
+        self.obstacles.count()
+    }
+
+    /// Whether the path is blocked, or the plan was left.
+    pub(crate) fn is_blocked(&self) -> bool {
+        self.blocked
+    }
+
+    /// Whether it was out once: the others do not count on it any more.
+    pub(crate) fn has_left(&self) -> bool {
+        self.left
+    }
+
+    /// Whether the path is one around.
+    pub(crate) fn is_flying(&self) -> bool {
+        self.flying
+    }
+
+    /// Whether that path, or the one asked for, leads aside only.
+    pub(crate) fn is_aside(&self) -> bool {
+        self.aside
+    }
+
+    /// Whether it lands at the end of that.
+    pub(crate) fn lands(&self) -> bool {
+        self.lands
+    }
+
+    /// Whether the way around asked for has come.
+    pub(crate) fn is_ready(&self) -> bool {
+        self.ready
+    }
+
+    /// Progress on the plan when it was left for a way around, metres.
+    pub(crate) fn left_at_m(&self) -> f32 {
+        self.left_at_m
+    }
+
     /// Whether it has left the plan for good, and rests or is a pilot's.
-    pub(crate) fn is_out(&self) -> bool {
-        let lasted = self.mission.in_state(self.now);
-        match self.mission.state() {
-            State::Done => !self.guidance.at_goal(&self.scene()) || self.around.left,
-            State::Aborted => self.telemetry.on_ground == Some(true) || lasted >= SETTLED,
-            State::PilotControl | State::PilotReturned => self.mission.with_pilot(self.now) >= KEPT,
+    pub(crate) fn is_out<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        let lasted = view.mission.in_state(view.now);
+        match view.mission.state() {
+            State::Done => !view.guidance.at_goal(&view.scene) || self.left,
+            State::Aborted => view.telemetry.on_ground == Some(true) || lasted >= SETTLED,
+            State::PilotControl | State::PilotReturned => view.mission.with_pilot(view.now) >= KEPT,
             _ => false,
         }
     }
 
     /// Whether it stands until somebody else moves: it does not claim the turn to move itself.
-    pub(crate) fn waits(&self) -> bool {
-        self.is_held() && self.around.claimed_since.is_none()
+    pub(crate) fn waits<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        self.is_held(view) && self.claimed_since.is_none()
     }
 
-    fn is_held(&self) -> bool {
-        let now = self.now;
-        let held = self.guidance.advice.waiting_for != 0 || self.guidance.filter.is_stopped();
-        let stands = self.guidance.stands() && self.telemetry.velocity.norm() < STANDING_MPS;
-        match self.mission.state() {
+    fn is_held<const V: usize, const W: usize, const G: usize>(&self, view: &View<'_, V, W, G>) -> bool {
+        let now = view.now;
+        let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
+        let stands = view.guidance.stands() && view.telemetry.velocity.norm() < STANDING_MPS;
+        match view.mission.state() {
             State::Scheduled | State::PadReplanning => {
-                self.around.blocked
-                    || !self.guidance.filter.column_clear()
-                    || self.neighbours.silence(now, self.mission.started_at()) >= UNHEARD
-                    || (held && self.guidance.advice.stop_within_m <= 0.05)
+                self.blocked
+                    || !view.guidance.filter.column_clear()
+                    || view.neighbours.silence(now, view.mission.started_at()) >= UNHEARD
+                    || (held && view.guidance.advice.stop_within_m <= 0.05)
             }
             State::Follow => held && stands,
             State::Climb => {
-                self.guidance.filter.is_stopped() && self.telemetry.velocity.norm() < STANDING_MPS
+                view.guidance.filter.is_stopped() && view.telemetry.velocity.norm() < STANDING_MPS
             }
             State::Blocked => stands,
             // It goes on by itself only once its column is free.
-            State::LandingHeld => self.telemetry.velocity.norm() < STANDING_MPS,
+            State::LandingHeld => view.telemetry.velocity.norm() < STANDING_MPS,
             _ => false,
         }
     }
 
-    pub(crate) fn told_place(&self) -> Told {
-        let t = &self.telemetry;
-        let vague = self.around.lost_at.is_some() || t.position_age(self.now) > FRESH;
-        let (position, at) = self.around.lost_at.unwrap_or((t.position, t.position_at.unwrap_or_default()));
+    /// What it reports of where it is.
+    pub(crate) fn told_place(&self, telemetry: &Telemetry, now: Instant) -> Told {
+        let t = telemetry;
+        let vague = self.lost_at.is_some() || t.position_age(now) > FRESH;
+        let (position, at) = self.lost_at.unwrap_or((t.position, t.position_at.unwrap_or_default()));
         Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
     /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.
-    pub(crate) fn mark_place(&mut self, to: State) {
+    pub(crate) fn mark_place<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        to: State,
+        view: &View<'_, V, W, G>,
+    ) {
         match to {
-            State::PositionLost if self.around.lost_at.is_none() && self.telemetry.is_settling(self.now) => {
-                let path = self.mission.plan().map(|plan| &plan.path);
-                let on_path = path.and_then(|path| path.point_at(self.guidance.along_m()));
-                self.around.lost_at = Some((on_path.unwrap_or(self.telemetry.position), self.now));
+            State::PositionLost if self.lost_at.is_none() && view.telemetry.is_settling(view.now) => {
+                let path = view.mission.plan().map(|plan| &plan.path);
+                let on_path = path.and_then(|path| path.point_at(view.guidance.along_m()));
+                self.lost_at = Some((on_path.unwrap_or(view.telemetry.position), view.now));
             }
-            State::Follow | State::WaitPosition => self.around.lost_at = None,
+            State::Follow | State::WaitPosition => self.lost_at = None,
             _ => {}
         }
     }
 
     /// Looks for what blocks the path, and whether the others stand.
-    pub(crate) fn look_around(&mut self) {
-        let now = self.now;
-        self.around.left |= self.config.roster.len() > 1 && self.is_out() && self.mission.plan().is_some();
-        let on_ground = matches!(self.mission.state(), State::Scheduled | State::PadReplanning);
-        let stopped = matches!(self.mission.state(), State::Blocked | State::Replanning);
-        if !on_ground && !stopped && self.mission.state() != State::Follow {
-            (self.around.blocked, self.around.in_the_way) = (false, false);
-            (self.around.quiet_since, self.around.claimed_since) = (None, None);
-            self.around.sweep.restart();
-            self.around.look_began = None;
-            return;
+    pub(crate) fn look_around<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        view: &View<'_, V, W, G>,
+    ) -> Option<Instant> {
+        let now = view.now;
+        self.left |= view.config.roster.len() > 1 && self.is_out(view) && view.mission.plan().is_some();
+        let on_ground = matches!(view.mission.state(), State::Scheduled | State::PadReplanning);
+        let stopped = matches!(view.mission.state(), State::Blocked | State::Replanning);
+        if !on_ground && !stopped && view.mission.state() != State::Follow {
+            (self.blocked, self.in_the_way) = (false, false);
+            (self.quiet_since, self.claimed_since) = (None, None);
+            self.sweep.restart();
+            self.look_began = None;
+            return None;
         }
-        let due = now - self.around.looked_at >= LOOK_EVERY;
+        let due = now - self.looked_at >= LOOK_EVERY;
         if due {
-            self.around.looked_at = now;
-            self.around.look_began.get_or_insert(now);
+            self.looked_at = now;
+            self.look_began.get_or_insert(now);
         }
-        if self.go_on_looking(on_ground) || due {
-            self.weigh();
+        let looked = self.go_on_looking(on_ground, view);
+        if looked.is_some() || due {
+            self.weigh(view);
         }
+        looked.and_then(|looked| looked.clear_at)
     }
 
-    /// Returns whether a look has ended.
-    fn go_on_looking(&mut self, on_ground: bool) -> bool {
-        let Some(began) = self.around.look_began else { return false };
-        let Some(in_the_way) = self.is_in_the_way(on_ground) else { return false };
-        self.around.look_began = None;
-        self.around.in_the_way = in_the_way;
-        if !in_the_way {
-            self.neighbours.found_clear(began);
-        }
-        true
+    /// What a look that has ended found.
+    fn go_on_looking<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        on_ground: bool,
+        view: &View<'_, V, W, G>,
+    ) -> Option<Looked> {
+        let began = self.look_began?;
+        let in_the_way = self.is_in_the_way(on_ground, view)?;
+        self.look_began = None;
+        self.in_the_way = in_the_way;
+        Some(Looked { clear_at: (!in_the_way).then_some(began) })
     }
 
     /// What follows from what is known: whether it is blocked, for how long all have stood, and whether it claims its turn.
-    fn weigh(&mut self) {
-        let now = self.now;
-        let stuck = self.around.flying
-            && self.mission.state() != State::Scheduled
-            && now - self.guidance.progress_at() > STUCK;
-        let aside = self.around.aside && self.guidance.is_at_end(&self.scene());
-        let astray = self.around.left && (!self.around.flying || aside) && !self.around.lands;
-        let dead_end = self.is_held() && self.around.quiet_since.is_some_and(|at| now - at > DEAD_END);
-        let stopped = self.guidance.filter.blocked_for(now) > STUCK;
-        self.around.blocked =
-            !self.guidance.returning && (stuck || astray || dead_end || stopped || self.around.in_the_way);
-        if !self.neighbours.all_stand(now) {
+    fn weigh<const V: usize, const W: usize, const G: usize>(&mut self, view: &View<'_, V, W, G>) {
+        let now = view.now;
+        let stuck = self.flying
+            && view.mission.state() != State::Scheduled
+            && now - view.guidance.progress_at() > STUCK;
+        let aside = self.aside && view.guidance.is_at_end(&view.scene);
+        let astray = self.left && (!self.flying || aside) && !self.lands;
+        let dead_end = self.is_held(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END);
+        let stopped = view.guidance.filter.blocked_for(now) > STUCK;
+        self.blocked =
+            !view.guidance.returning && (stuck || astray || dead_end || stopped || self.in_the_way);
+        if !view.neighbours.all_stand(now) {
             // Somebody moved: what blocked the path may have gone.
-            (self.around.quiet_since, self.around.failed, self.around.hopeless) = (None, 0, false);
-        } else if self.around.quiet_since.is_none() {
-            self.around.quiet_since = Some(now);
+            (self.quiet_since, self.failed, self.hopeless) = (None, 0, false);
+        } else if self.quiet_since.is_none() {
+            self.quiet_since = Some(now);
         }
-        let claims = self.is_due() && !self.neighbours.claimed_before(self.config.system_id, now);
-        self.around.claimed_since = self.around.claimed_since.or(Some(now)).filter(|_| claims);
+        let claims = self.is_due(view) && !view.neighbours.claimed_before(view.config.system_id, now);
+        self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
     }
 
     /// Whether anything is; `None` while the look goes on.
-    fn is_in_the_way(&mut self, on_ground: bool) -> Option<bool> {
-        let Some(plan) = self.mission.plan() else { return Some(false) };
-        let here = if on_ground { self.mission.pad() } else { self.telemetry.position };
-        let along_m = self.guidance.along_m();
+    fn is_in_the_way<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        on_ground: bool,
+        view: &View<'_, V, W, G>,
+    ) -> Option<bool> {
+        let Some(plan) = view.mission.plan() else { return Some(false) };
+        let here = if on_ground { view.mission.pad() } else { view.telemetry.position };
+        let along_m = view.guidance.along_m();
         let cost = detour::stretches_ahead(&plan.path, along_m) + THING_COST;
-        let apart_m = self.config.safety_distance_m + STRAY_M;
-        let (now, neighbours) = (self.now, &self.neighbours);
-        let new = &self.obstacles.known[self.obstacles.avoided..];
-        self.around.sweep.go_on(
+        let apart_m = view.config.safety_distance_m + STRAY_M;
+        let (now, neighbours) = (view.now, view.neighbours);
+        let new = self.obstacles.new_ones();
+        self.sweep.go_on(
             new.len() + neighbours.len(),
             &mut (cost.max(STRETCHES) as u16),
             cost as u16,
@@ -299,159 +371,126 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         )
     }
 
-    /// Takes an obstacle that is not on the map: its centre, and its radius; a radius that is not above zero revokes the one at
-    /// that place. It stays until revoked, or until the companion starts again: a wall does not go away by itself.
-    pub(crate) fn exclude(&mut self, command: &Command) -> u8 {
-        let Some((lat, lon, alt_m)) = command.place else { return DENIED };
-        let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
-        let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
-        if !(place.is_valid() && command.param1 <= OBSTACLE_MAX_M) {
-            return DENIED;
-        }
-        let centre = frames::geodetic_to_enu(&self.config.origin, &place);
-        if command.param1 <= 0.0 {
-            self.obstacles.revoke(&centre);
-            // A look that is under way counts them by index.
-            self.around.sweep.restart();
-            self.around.look_began = None;
-            return ACCEPTED;
-        }
-        let radius_m = command.param1 + self.config.required_clearance_m;
-        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_M && o.radius_m >= radius_m;
-        if self.obstacles.known.iter().any(told) {
-            return ACCEPTED;
-        }
-        match self.obstacles.known.push(KeepOff { from: centre, to: centre, radius_m, nature: Nature::Solid })
-        {
-            Ok(()) => ACCEPTED,
-            Err(_) => TEMPORARILY_REJECTED,
-        }
-    }
-
     /// Whether it may claim its turn to fly around.
-    fn is_due(&self) -> bool {
+    fn is_due<const V: usize, const W: usize, const G: usize>(&self, view: &View<'_, V, W, G>) -> bool {
         let wait_s = QUIET_S
-            + TURN_S * self.neighbours.blocked_before(self.config.system_id)
-            + RETRY_S * u64::from(self.around.failed);
-        self.around.blocked
-            && self.neighbours.all_stand(self.now)
-            && self.around.quiet_since.is_some_and(|at| self.now - at >= Duration::from_secs(wait_s))
+            + TURN_S * view.neighbours.blocked_before(view.config.system_id)
+            + RETRY_S * u64::from(self.failed);
+        self.blocked
+            && view.neighbours.all_stand(view.now)
+            && self.quiet_since.is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
     }
 
     /// Whether it may fly around now.
-    pub(crate) fn is_our_turn(&self) -> bool {
-        self.is_due()
-            && self.around.claimed_since.is_some_and(|at| self.now - at >= CLAIM)
-            && self.neighbours.all_wait(self.now)
+    pub(crate) fn is_our_turn<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        self.is_due(view)
+            && self.claimed_since.is_some_and(|at| view.now - at >= CLAIM)
+            && view.neighbours.all_wait(view.now)
     }
 
-    /// Asks the shell for a way around, or just aside.
-    pub(crate) fn request_detour(&mut self, aim: Aim) {
-        self.around.aside = aim != Aim::Goal;
-        self.around.lands = aim == Aim::Landing;
-        self.obstacles.requested = self.obstacles.known.len();
-        self.guidance.trapped_since = None;
-        self.mission.forget_failure();
-        self.around.ready = false;
-        // Full only if the shell does not drain; then the way around is late.
-        let _ = self.events.push_back(Event::PlanRequested);
+    /// A way around, or just aside, is requested of the shell.
+    pub(crate) fn request(&mut self, aim: Aim) {
+        self.aside = aim != Aim::Goal;
+        self.lands = aim == Aim::Landing;
+        self.obstacles.request();
+        self.ready = false;
     }
 
-    /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
-    /// `tell` is given all that is to be kept off.
-    pub fn detour(&self, mut tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
-        if !matches!(self.mission.state(), State::Replanning | State::PadReplanning) {
-            return None;
-        }
-        let plan = self.mission.plan()?;
+    /// What is requested; `None` without a plan. `tell` is given all that is to be kept off.
+    pub(crate) fn requested<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+        mut tell: impl FnMut(KeepOff),
+    ) -> Option<DetourRequest> {
+        let plan = view.mission.plan()?;
         let points = plan.path.waypoints();
-        let along_m = self.guidance.along_m();
+        let along_m = view.guidance.along_m();
         let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
         let ahead = points.get(next)?;
         let behind = points.get(next.saturating_sub(1))?;
-        let apart_m = self.config.safety_distance_m;
-        self.obstacles.known.iter().for_each(|obstacle| tell(*obstacle));
-        self.neighbours.places(self.now, apart_m + MARGIN_M, &mut tell);
-        if self.around.aside {
-            self.neighbours.landing_columns(self.now, apart_m + retreat::BESIDE_M, &mut tell);
+        let apart_m = view.config.safety_distance_m;
+        self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
+        view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell);
+        if self.aside {
+            view.neighbours.landing_columns(view.now, apart_m + retreat::BESIDE_M, &mut tell);
         }
-        if self.around.lands {
-            self.neighbours.lands_on(apart_m + MARGIN_M, tell);
+        if self.lands {
+            view.neighbours.lands_on(apart_m + MARGIN_M, tell);
         }
         Some(DetourRequest {
-            aside: self.around.aside,
+            aside: self.aside,
             here: plan.path.point_at(along_m)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
             goal: plan.goal?,
             descent_m: plan.descent_m,
-            required_clearance_m: self.config.required_clearance_m,
+            required_clearance_m: view.config.required_clearance_m,
         })
     }
 
-    /// Takes the way around.
-    pub(crate) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
-        let along_m = self.guidance.along_m();
-        let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        if !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
-            self.miss_detour(PlanFailure::Invalid);
-            return;
+    /// The way around has come: it is flown from here on. `progress_m` is the progress on the plan.
+    pub(crate) fn take(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
+        if !self.flying {
+            self.left_at_m = progress_m;
         }
-        if !self.around.flying {
-            self.around.left_at_m = self.guidance.progress_m(self.mission.state(), &self.scene());
-        }
-        self.mission.leave_plan(&detour.path);
-        let stuck = self.around.flying && self.now - self.guidance.progress_at() > STUCK;
-        let fruitless = if stuck { self.around.fruitless.saturating_add(1) } else { 0 };
-        let Around { aside, lands, left_at_m, .. } = self.around;
-        let flying = Around { left: true, flying: true, ready: true, ..Around::default() };
-        self.around = Around { aside, lands, left_at_m, fruitless, ..flying };
-        self.neighbours.avoid(self.now);
-        self.obstacles.avoided = self.obstacles.requested;
+        let stuck = self.flying && now - progress_at > STUCK;
+        let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
+        self.obstacles.avoid_requested();
+        let Self { aside, lands, left_at_m, .. } = *self;
+        let obstacles = core::mem::take(&mut self.obstacles);
+        let flying = Self { left: true, flying: true, ready: true, obstacles, ..Self::default() };
+        *self = Self { aside, lands, left_at_m, fruitless, ..flying };
     }
 
-    pub(crate) fn miss_detour(&mut self, failure: PlanFailure) {
-        self.mission.fail(failure);
+    /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
+    pub(crate) fn miss(&mut self, along_m: f32, for_good: bool, now: Instant) {
         // Where no way aside is found there may yet be one around.
-        if self.around.aside {
-            self.around.no_way_aside_at = Some(self.now);
-        } else {
-            let along_m = self.guidance.along_m();
-            if (along_m - self.around.failed_at_m).abs() > HERE_M {
-                (self.around.failed_here, self.around.failed_at_m) = (0, along_m);
-            }
-            if self.around.failed_here == 0 {
-                self.around.failed_since = self.now;
-            }
-            self.around.failed = self.around.failed.saturating_add(1);
-            self.around.failed_here = self.around.failed_here.saturating_add(1);
-            let long = self.now - self.around.failed_since >= Duration::from_secs(GIVES_UP_S);
-            let often = long && self.around.failed_here >= DETOURS_TRIED - 1;
-            let for_good = failure != PlanFailure::Late && self.neighbours.all_down(self.now);
-            self.around.hopeless = often || for_good;
+        if self.aside {
+            self.no_way_aside_at = Some(now);
+            return;
         }
+        if (along_m - self.failed_at_m).abs() > HERE_M {
+            (self.failed_here, self.failed_at_m) = (0, along_m);
+        }
+        if self.failed_here == 0 {
+            self.failed_since = now;
+        }
+        self.failed = self.failed.saturating_add(1);
+        self.failed_here = self.failed_here.saturating_add(1);
+        let long = now - self.failed_since >= Duration::from_secs(GIVES_UP_S);
+        let often = long && self.failed_here >= DETOURS_TRIED - 1;
+        self.hopeless = often || for_good;
     }
 
     /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.
-    pub(crate) fn can_land_aside(&self) -> bool {
-        let retries = |at: Instant| self.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
-        self.mission.plan().is_some_and(|plan| plan.goal.is_some())
-            && (!self.neighbours.is_deaf(self.now)
-                || self.neighbours.all_rest()
-                || self.guidance.filter.column_blocked_for(self.now) >= DEAF_ASIDE)
-            && self.around.no_way_aside_at.is_none_or(retries)
+    pub(crate) fn can_land_aside<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
+        view.mission.plan().is_some_and(|plan| plan.goal.is_some())
+            && (!view.neighbours.is_deaf(view.now)
+                || view.neighbours.all_rest()
+                || view.guidance.filter.column_blocked_for(view.now) >= DEAF_ASIDE)
+            && self.no_way_aside_at.is_none_or(retries)
     }
 
     /// Whether enough ways around were not found, or led nowhere.
     pub(crate) fn gives_up(&self) -> bool {
-        self.around.hopeless || self.around.failed.saturating_add(self.around.fruitless) >= DETOURS_TRIED
+        self.hopeless || self.failed.saturating_add(self.fruitless) >= DETOURS_TRIED
     }
 
     /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
-    pub(crate) fn underneath(&self) -> Duration {
-        let retries = |at: Instant| self.now - at >= Duration::from_secs(RETRY_S);
-        let trapped = self.guidance.trapped_since.filter(|_| self.around.no_way_aside_at.is_none_or(retries));
-        trapped.map_or(Duration::default(), |at| self.now - at)
+    pub(crate) fn underneath<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> Duration {
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(RETRY_S);
+        let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
+        trapped.map_or(Duration::default(), |at| view.now - at)
     }
 }
 

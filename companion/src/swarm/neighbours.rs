@@ -4,6 +4,7 @@
 //! [`Neighbour::position`]; TUNNEL → [`Neighbours::handle_intent`] → [`Neighbour::progress_m`];
 //! [`Neighbours::at`] brings the ages up to date, and `planner_core::deconflict::advise` makes of them a speed scale.
 
+mod bounds;
 mod contact;
 mod met;
 mod places;
@@ -16,74 +17,15 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::frames::{self, Geodetic};
 
+pub(crate) use self::bounds::STANDING_MPS;
+use self::bounds::*;
 use self::contact::Contact;
 pub(crate) use self::met::{Met, Reach};
 use crate::autopilot::telemetry::SequenceFilter;
-use crate::companion::STANDING_MPS;
 use crate::config::RosterEntry;
 use crate::link::echo::{Echo, Lateness};
-use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, POINTS, WAITING};
+use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, WAITING};
 use crate::time::{Duration, Instant};
-
-/// A position older than the one held by less than this is late; by more, the sender was restarted.
-const RESTART_MS: u32 = 10_000;
-/// Heard within this time counts as heard: four positions and intents.
-const LATELY: Duration = Duration::from_millis(800);
-/// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
-/// 20 s later; this leaves it 20 s to come down.
-const DEAD: Duration = Duration::from_secs(45);
-/// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
-const DOWN: Duration = Duration::from_secs(75);
-/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
-const STRETCH_M: f32 = 6.0;
-/// And by so much for each second that messages are late, m/s.
-const STRETCH_MPS: f32 = 2.0;
-/// Spacing of the places on that stretch below which it may lie, metres.
-const STRETCH_STEP_M: f32 = 1.0;
-/// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
-/// ground.
-const COLUMN_M: f32 = 60.0;
-/// An airborne vehicle of which nothing is heard for this long may land before more is heard.
-const SILENT: Duration = Duration::from_secs(3);
-/// Further below a vehicle whose height is known there is time until it is nearer, metres.
-const BELOW_M: f32 = 15.0;
-/// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
-const LANDS_MPS: f32 = 2.0;
-/// A place older than this tells little of how low a vehicle is that lands, seconds.
-const OLD_S: f32 = 1.0;
-/// The same: what was heard within this time is no older.
-const FRESHLY: Duration = Duration::from_secs(1);
-/// A vehicle this little below may yet be above in a moment, metres.
-const LEVEL_M: f32 = 1.0;
-/// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
-const VAGUE_M: f32 = 0.5;
-/// What two vehicles in the air may stray together, one of which hovers, metres.
-const SWAY_M: f32 = 0.1;
-/// A position counts as the vehicle's of the roster if an intent of our mission was heard from it within this time: ten intents
-/// at the lowest rate.
-const BELONGS: Duration = Duration::from_secs(5);
-/// Most strangers that are kept; a full roster leaves room for one.
-const STRANGERS: usize = 4;
-/// A stranger that was not heard for this long is forgotten.
-const STRANGER_STAYS: Duration = Duration::from_secs(60);
-/// Rank of a stranger: behind everyone.
-const STRANGER: u16 = u16::MAX;
-/// A vehicle that stood for so long is not about to go on.
-const STANDS: Duration = Duration::from_secs(5);
-/// Progress is believed as if it were that of so much later, seconds: messages come up to a second late, and then at once.
-const LATE_S: f32 = 1.0;
-/// What progress may jump, metres: where a vehicle takes up its path again, its nearest point is new.
-const STRIDE_M: f32 = 1.0;
-/// For so long a vehicle that nobody hears may fly on at the top of its climb, seconds.
-const BEYOND_TOP_S: f32 = 1.2;
-/// A climb leads straight up, this little beside, metres.
-const CLIMB_BESIDE_M: f32 = 0.9;
-/// A top this little above is reached, metres.
-const TOP_M: f32 = 0.3;
-/// Further away than any vehicle.
-const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
-/// Nobody flies higher over another than this, metres.
-const SKY_M: f32 = 1000.0;
 
 /// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
 /// whatever else they send changes nothing. A few are kept, in what the roster leaves free, until they are silent for a minute.
@@ -100,6 +42,8 @@ pub struct Neighbours<const V: usize> {
     fastest_mps: f32,
     /// With the vehicle of this rank the next relay begins.
     relay_next: u16,
+    /// The own place in the roster.
+    own_rank: u16,
 }
 
 impl<const V: usize> Neighbours<V> {
@@ -114,15 +58,23 @@ impl<const V: usize> Neighbours<V> {
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
             relay_next: 0,
+            own_rank: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
-            if entry.system_id != own_id {
+            if entry.system_id == own_id {
+                table.own_rank = rank as u16;
+            } else {
                 // A roster of at most V entries fits.
                 let _ = table.add(entry.system_id, rank as u16);
             }
         }
         table.roster = table.contacts.len();
         table
+    }
+
+    /// The own place in the roster.
+    pub(crate) fn own_rank(&self) -> u16 {
+        self.own_rank
     }
 
     /// Vehicles that found no slot, by frames.

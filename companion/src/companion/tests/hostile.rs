@@ -211,7 +211,7 @@ proptest::proptest! {
             proptest::prop_assert!(bench.state() == state || (flies && landed), "{:?} {:?}", bench.state(), bench.texts);
         }
         proptest::prop_assert!(!bench.events.contains(&Event::RestartRequested));
-        proptest::prop_assert_eq!(bench.companion.obstacles.count(), 0);
+        proptest::prop_assert_eq!(bench.companion.detours.obstacles(), 0);
         proptest::prop_assert!(bench.companion.services.parameters().to_bytes() == parameters && bench.companion.config == config);
         // The radio gives the ground station all it requests within as long as its budget needs.
         bench.swarm.clear();

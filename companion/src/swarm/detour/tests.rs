@@ -2,56 +2,16 @@ extern crate std;
 use std::vec::Vec;
 
 use super::*;
-use crate::link::commands::EXCLUDE;
 use crate::link::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
+use crate::swarm::obstacles::OBSTACLES;
+use crate::swarm::obstacles::tests::sphere;
 use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
+use planner_core::detour::Nature;
 use planner_core::flight::Gate;
 
-fn sphere(at: Point, radius_m: f32) -> Command {
-    let place = frames::enu_to_geodetic(&ORIGIN, &at);
-    Command {
-        command: EXCLUDE,
-        param1: radius_m,
-        param2: 0.0,
-        place: Some((
-            (place.lat_deg * 1e7).round() as i32,
-            (place.lon_deg * 1e7).round() as i32,
-            place.alt_m as f32,
-        )),
-        from: (255, 190),
-        to_us: true,
-        to_component: true,
-    }
-}
-
-#[test]
-fn a_sphere_told_by_command_is_an_obstacle_with_the_clearance_around_it() {
-    let mut bench = Bench::new(config());
-    let at = Point::new(14.0, 12.0, 1.5);
-    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED);
-    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED, "told twice");
-    let known = bench.companion.obstacles.known.clone();
-    assert_eq!(known.len(), 1);
-    assert!((known[0].from - at).norm() < 0.05 && known[0].to == known[0].from, "{known:?}");
-    assert!((known[0].radius_m - 1.3).abs() < 1e-6, "radius and required clearance: {known:?}");
-}
-
-#[test]
-fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
-    let mut bench = Bench::new(config());
-    let at = |x: f32| Point::new(x, 30.0, 1.5);
-    for radius_m in [f32::NAN, f32::INFINITY, 20.1, 1000.0] {
-        assert_eq!(bench.companion.exclude(&sphere(at(0.0), radius_m)), DENIED, "{radius_m}");
-    }
-    let nowhere = Command { place: None, ..sphere(at(0.0), 1.0) };
-    assert_eq!(bench.companion.exclude(&nowhere), DENIED, "COMMAND_LONG has no place");
-    let no_earth = Command { place: Some((i32::MAX, 0, 700.0)), ..nowhere };
-    assert_eq!(bench.companion.exclude(&no_earth), DENIED);
-    for i in 0..OBSTACLES {
-        assert_eq!(bench.companion.exclude(&sphere(at(i as f32), 0.5)), ACCEPTED);
-    }
-    assert_eq!(bench.companion.exclude(&sphere(at(99.0), 0.5)), TEMPORARILY_REJECTED);
+fn exclude(bench: &mut Bench, command: &Command) -> u8 {
+    bench.companion.detours.exclude(command, &ORIGIN, bench.companion.config.required_clearance_m)
 }
 
 #[test]
@@ -59,61 +19,20 @@ fn a_revoked_obstacle_does_not_block_any_more() {
     let mut bench = Bench::accompanied(two_vehicles());
     bench.until(State::Follow, 20.0);
     let at = Point::new(14.0, 12.0, 1.5);
-    assert_eq!(bench.companion.exclude(&sphere(Point::new(90.0, 90.0, 1.5), 0.5)), ACCEPTED);
-    assert_eq!(bench.companion.exclude(&sphere(at, 0.5)), ACCEPTED);
+    assert_eq!(exclude(&mut bench, &sphere(Point::new(90.0, 90.0, 1.5), 0.5)), ACCEPTED);
+    assert_eq!(exclude(&mut bench, &sphere(at, 0.5)), ACCEPTED);
     bench.until(State::Blocked, 5.0);
-    assert_eq!(bench.companion.exclude(&sphere(at, -1.0)), ACCEPTED);
-    assert_eq!(bench.companion.obstacles.count(), 1);
+    assert_eq!(exclude(&mut bench, &sphere(at, -1.0)), ACCEPTED);
+    assert_eq!(bench.companion.detours.obstacles(), 1);
     bench.until(State::Follow, 3.0);
-    assert_eq!(bench.companion.exclude(&sphere(at, 0.0)), ACCEPTED, "nothing is there: so it is revoked");
-}
-
-proptest::proptest! {
-    /// Whatever is reported and revoked, those that a detour was planned for stay the first ones.
-    #[test]
-    fn obstacles_are_those_reported_and_not_revoked(
-        orders in proptest::collection::vec((0u8..24, -1.0f32..25.0, proptest::prelude::any::<bool>()), 0..200),
-    ) {
-        let mut bench = Bench::new(config());
-        let mut model: std::vec::Vec<(u8, bool)> = std::vec::Vec::new();
-        for (x, radius_m, plans) in orders {
-            let result = bench.companion.exclude(&sphere(Point::new(f32::from(x), 30.0, 1.5), radius_m));
-            let known = model.iter().any(|(at, _)| *at == x);
-            // A larger one at the same place is another; keep the model to one a place.
-            if radius_m <= 0.0 {
-                model.retain(|(at, _)| *at != x);
-                proptest::prop_assert_eq!(result, ACCEPTED);
-            } else if radius_m > OBSTACLE_MAX_M {
-                proptest::prop_assert_eq!(result, DENIED);
-            } else if result == ACCEPTED && !known {
-                model.push((x, false));
-            } else {
-                let full = bench.companion.obstacles.count() == OBSTACLES;
-                proptest::prop_assert!(known || (result == TEMPORARILY_REJECTED && full));
-            }
-            if plans {
-                bench.companion.obstacles.avoided = bench.companion.obstacles.count();
-                model.iter_mut().for_each(|(_, avoided)| *avoided = true);
-            }
-            let obstacles = &bench.companion.obstacles;
-            proptest::prop_assert!(obstacles.avoided <= obstacles.count() && obstacles.count() <= OBSTACLES);
-            let places: std::collections::BTreeSet<i32> =
-                obstacles.known.iter().map(|o| libm::roundf(o.from.x) as i32).collect();
-            let wanted: std::collections::BTreeSet<i32> = model.iter().map(|(x, _)| i32::from(*x)).collect();
-            proptest::prop_assert_eq!(places, wanted);
-            for (x, avoided) in &model {
-                let new = obstacles.known[obstacles.avoided..].iter().any(|o| libm::roundf(o.from.x) as i32 == i32::from(*x));
-                proptest::prop_assert!(*avoided || new, "{}", x);
-            }
-        }
-    }
+    assert_eq!(exclude(&mut bench, &sphere(at, 0.0)), ACCEPTED, "nothing is there: so it is revoked");
 }
 
 #[test]
 fn a_sphere_on_the_path_is_flown_around_and_one_beside_it_is_none() {
     for (y, blocks) in [(16.0, false), (12.0, true)] {
         let mut bench = Bench::following(config());
-        bench.companion.exclude(&sphere(Point::new(14.0, y, 1.5), 0.5));
+        exclude(&mut bench, &sphere(Point::new(14.0, y, 1.5), 0.5));
         bench.run(1.0);
         assert_eq!(bench.state() == State::Blocked, blocks, "{y}");
         bench.until(State::Done, 60.0);
@@ -125,18 +44,18 @@ fn a_sphere_on_the_path_is_flown_around_and_one_beside_it_is_none() {
 fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     let mut bench = Bench::accompanied(two_vehicles());
     bench.until(State::Follow, 20.0);
-    bench.companion.exclude(&sphere(Point::new(14.0, 12.0, 1.5), 0.5));
+    exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
     bench.neighbour = other(BLOCKED | WAITING);
     bench.until(State::Blocked, 3.0);
-    while bench.companion.around.claimed_since.is_none() {
+    while bench.companion.detours.claimed_since.is_none() {
         bench.run(0.05);
     }
     // It claims; the other began to claim at the same time.
     bench.neighbour = other(BLOCKED);
     bench.run(4.0);
     assert_eq!(bench.state(), State::Blocked, "two would begin at once");
-    assert!(!bench.companion.waits(), "the lower system id goes on claiming");
+    assert!(!bench.companion.detours.waits(&bench.companion.view()), "the lower system id goes on claiming");
     bench.neighbour = other(BLOCKED | WAITING);
     bench.until(State::Follow, 1.0);
 }
@@ -148,18 +67,21 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     config.roster.sort_unstable_by_key(|entry| entry.system_id);
     let mut bench = Bench::accompanied(config);
     bench.until(State::Follow, 20.0);
-    bench.companion.exclude(&sphere(Point::new(14.0, 12.0, 1.5), 0.5));
+    exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
     bench.neighbour = other(BLOCKED);
     bench.until(State::Blocked, 3.0);
     bench.run(8.0);
-    assert!(bench.companion.waits() && bench.state() == State::Blocked);
+    assert!(bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked);
     // It flies: what was quiet is not any more.
     bench.neighbour = other(DETOURS);
     bench.run(1.0);
     bench.neighbour = other(BLOCKED | WAITING);
     bench.run(4.0);
-    assert!(bench.companion.waits() && bench.state() == State::Blocked, "it waits anew");
+    assert!(
+        bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked,
+        "it waits anew"
+    );
     bench.until(State::Follow, 5.0);
 }
 
@@ -211,7 +133,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
         // So many things beside the path that the one in the way is looked at in a later step.
         for i in 0..OBSTACLES {
-            bench.companion.exclude(&sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
+            exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }
         bench.until(State::Ready, 8.0);
         bench.run(0.1 * tenth as f32);
@@ -220,7 +142,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
         assert_eq!(bench.state(), State::Scheduled, "{tenth}");
         bench.run(0.8);
         assert_eq!(bench.state(), State::Scheduled, "{tenth}");
-        assert!(bench.companion.around.blocked, "{tenth}");
+        assert!(bench.companion.detours.blocked, "{tenth}");
     }
 }
 
@@ -260,7 +182,7 @@ fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
     bench.until(State::Ready, 20.0);
     bench.start();
     bench.run(0.7);
-    assert!(bench.companion.around.in_the_way, "{:?}", bench.state());
+    assert!(bench.companion.detours.in_the_way, "{:?}", bench.state());
 }
 
 #[test]
@@ -268,20 +190,20 @@ fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
     let mut bench = Bench::following(config());
     // The first ones are far beside the path; each costs a share of a step.
     for i in 0..OBSTACLES - 1 {
-        bench.companion.exclude(&sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
+        exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
     }
     bench.run(1.0);
     let mut steps = 0;
-    while bench.companion.around.look_began.is_none() {
+    while bench.companion.detours.look_began.is_none() {
         bench.run(0.05);
     }
-    while bench.companion.around.look_began.is_some() {
+    while bench.companion.detours.look_began.is_some() {
         bench.run(0.05);
         steps += 1;
     }
     assert!((1..4).contains(&steps), "{steps}");
     assert_eq!(bench.state(), State::Follow);
-    bench.companion.exclude(&sphere(Point::new(15.9, 12.0, 1.5), 0.5));
+    exclude(&mut bench, &sphere(Point::new(15.9, 12.0, 1.5), 0.5));
     bench.run(1.0);
     assert_eq!(bench.state(), State::Blocked);
 }

@@ -5,7 +5,11 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOff, Nature};
 
-use super::*;
+use super::bounds::*;
+use crate::autopilot::telemetry::SequenceFilter;
+use crate::link::echo::Lateness;
+use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, LANDED, OUT, POINTS, WAITING};
+use crate::time::{Duration, Instant};
 
 #[derive(Clone, Debug)]
 pub(super) struct Contact {

@@ -1,0 +1,83 @@
+//! Ways around: what is requested of the shell, and what becomes of its answer.
+
+use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::flight::VehiclePlan;
+
+use super::Companion;
+use crate::config::PlanFailure;
+use crate::events::Event;
+use crate::guidance::Scene;
+use crate::mission::State;
+use crate::swarm::detour::{Aim, View};
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// What decisions about ways around follow from.
+    pub(crate) fn view(&self) -> View<'_, V, W, G> {
+        View {
+            now: self.now,
+            config: &self.config,
+            mission: &self.mission,
+            guidance: &self.guidance,
+            telemetry: &self.telemetry,
+            neighbours: &self.neighbours,
+            scene: self.scene(),
+        }
+    }
+
+    /// Remembers, on entering a state, where it was before its position jumped.
+    pub(super) fn mark_place(&mut self, to: State) {
+        let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
+        let own = (neighbours.own_rank(), config.system_id);
+        let scene = Scene::new(mission.plan(), telemetry, own, detours.is_flying());
+        let view = View { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        detours.mark_place(to, &view);
+    }
+
+    /// Looks for what blocks the path, and whether the others stand.
+    pub(super) fn look_around(&mut self) {
+        let Self { now, config, mission, guidance, telemetry, neighbours, detours, .. } = self;
+        let own = (neighbours.own_rank(), config.system_id);
+        let scene = Scene::new(mission.plan(), telemetry, own, detours.is_flying());
+        let view = View { now: *now, config, mission, guidance, telemetry, neighbours, scene };
+        if let Some(clear_at) = detours.look_around(&view) {
+            self.neighbours.found_clear(clear_at);
+        }
+    }
+
+    /// Asks the shell for a way around, or just aside.
+    pub(super) fn request_detour(&mut self, aim: Aim) {
+        self.detours.request(aim);
+        self.guidance.forget_trap();
+        self.mission.forget_failure();
+        // Full only if the shell does not drain; then the way around is late.
+        let _ = self.events.push_back(Event::PlanRequested);
+    }
+
+    /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
+    /// `tell` is given all that is to be kept off.
+    pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
+        let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
+        if replans { self.detours.requested(&self.view(), tell) } else { None }
+    }
+
+    /// Takes the way around.
+    pub(super) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
+        let along_m = self.guidance.along_m();
+        let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+        if !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
+            self.miss_detour(PlanFailure::Invalid);
+            return;
+        }
+        let progress_m = self.guidance.progress_m(self.mission.state(), &self.scene());
+        self.mission.leave_plan(&detour.path);
+        self.detours.take(progress_m, self.now, self.guidance.progress_at());
+        self.neighbours.avoid(self.now);
+    }
+
+    /// There is none.
+    pub(super) fn miss_detour(&mut self, failure: PlanFailure) {
+        self.mission.fail(failure);
+        let for_good = failure != PlanFailure::Late && self.neighbours.all_down(self.now);
+        self.detours.miss(self.guidance.along_m(), for_good, self.now);
+    }
+}

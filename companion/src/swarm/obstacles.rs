@@ -1,0 +1,94 @@
+//! Obstacles that were not on the map, reported by a ground station.
+
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::detour::{KeepOff, Nature};
+use planner_core::frames::{self, Geodetic};
+
+use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
+
+/// Obstacles that were not on the map.
+pub(crate) const OBSTACLES: usize = 16;
+/// The greatest radius of one, metres: a wrong digit must not close a whole building.
+pub(crate) const OBSTACLE_MAX_M: f32 = 20.0;
+/// Two nearer than this are one that was sent twice, metres; a revocation this near means it.
+const SAME_M: f32 = 0.1;
+
+/// Obstacles that were not on the map, and for how many of them a way around was planned.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Obstacles {
+    known: Vec<KeepOff, OBSTACLES>,
+    avoided: usize,
+    /// How many were known when a way around was last requested: those that came later it does not avoid.
+    requested: usize,
+}
+
+impl Obstacles {
+    /// How many.
+    pub(crate) fn count(&self) -> usize {
+        self.known.len()
+    }
+
+    /// Forgets the obstacle at this place.
+    fn revoke(&mut self, centre: &Point) {
+        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_M) {
+            self.known.remove(at);
+            self.avoided -= usize::from(at < self.avoided);
+            self.requested -= usize::from(at < self.requested);
+        }
+    }
+
+    /// Takes an obstacle that is not on the map, ENU about `origin`: its centre, and its radius, to which the required clearance is
+    /// added; a radius that is not above zero revokes the one at
+    /// that place. It stays until revoked, or until the companion starts again: a wall does not go away by itself.
+    pub(crate) fn take(&mut self, command: &Command, origin: &Geodetic, clearance_m: f32) -> u8 {
+        let Some((lat, lon, alt_m)) = command.place else { return DENIED };
+        let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
+        let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
+        if !(place.is_valid() && command.param1 <= OBSTACLE_MAX_M) {
+            return DENIED;
+        }
+        let centre = frames::geodetic_to_enu(origin, &place);
+        if command.param1 <= 0.0 {
+            self.revoke(&centre);
+            return ACCEPTED;
+        }
+        let radius_m = command.param1 + clearance_m;
+        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_M && o.radius_m >= radius_m;
+        if self.known.iter().any(told) {
+            return ACCEPTED;
+        }
+        match self.known.push(KeepOff { from: centre, to: centre, radius_m, nature: Nature::Solid }) {
+            Ok(()) => ACCEPTED,
+            Err(_) => TEMPORARILY_REJECTED,
+        }
+    }
+
+    /// All of them.
+    pub(crate) fn known(&self) -> &[KeepOff] {
+        &self.known
+    }
+
+    /// Those that no way around was planned for.
+    pub(crate) fn new_ones(&self) -> &[KeepOff] {
+        &self.known[self.avoided..]
+    }
+
+    /// None has been planned for.
+    pub(crate) fn forget_avoided(&mut self) {
+        self.avoided = 0;
+    }
+
+    /// A way around those known now is requested.
+    pub(crate) fn request(&mut self) {
+        self.requested = self.known.len();
+    }
+
+    /// It has come.
+    pub(crate) fn avoid_requested(&mut self) {
+        self.avoided = self.requested;
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests;
