@@ -17,10 +17,13 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case; or one of the
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case; or one of the
     /// suites: deconfliction, meetings, hostile, range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
+    /// A checkout of cvar-upm/multi_uav_planning_binpat, which the coverage rows are beside.
+    #[arg(long, value_name = "DIR")]
+    binpat: Option<PathBuf>,
     /// Seeds of each case of the deconfliction suite, or of each range.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
@@ -62,6 +65,9 @@ pub fn run_bench(args: &Args) -> Result<()> {
             bench.arg("--peer").arg(peer);
         }
         Err(why) => println!("roadmap rows: skipped, {why:#}"),
+    }
+    if let Some(binpat) = &args.binpat {
+        bench.arg("--binpat").arg(std::path::absolute(binpat)?);
     }
     if let Some(out) = &args.out {
         bench.arg("--out").arg(std::path::absolute(out)?);

@@ -4,6 +4,7 @@
 //! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.
 
 mod assignment;
+mod coverage;
 mod fidelity;
 mod roadmap;
 mod steps;
@@ -41,12 +42,16 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, swarm, steps, worst-case, fidelity.
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case,
+    /// fidelity.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
     #[arg(long, value_name = "PROGRAM")]
     peer: Option<PathBuf>,
+    /// A checkout of cvar-upm/multi_uav_planning_binpat for the coverage rows; without it most are skipped.
+    #[arg(long, value_name = "DIR")]
+    binpat: Option<PathBuf>,
     /// What the steps are counted under: only the work itself, with this many neighbours.
     #[arg(long, value_name = "N", hide = true)]
     steps_beside: Option<usize>,
@@ -67,6 +72,9 @@ fn main() -> Result<()> {
     }
     if "assignment".contains(&args.only) {
         rows.extend(assignment::rows());
+    }
+    if "coverage".contains(&args.only) {
+        rows.extend(coverage::rows(args.binpat.as_deref())?);
     }
     if "swarm".contains(&args.only) {
         rows.extend(swarm::rows()?);

@@ -1,0 +1,190 @@
+//! Coverage beside the public C++ BINPAT, on its kind of area: five vertices, 300 by 150 m, lanes of 10 m.
+//!
+//! `--binpat DIR` is a checkout of cvar-upm/multi_uav_planning_binpat; `tests/peers/binpat.cpp` times it. Both are run
+//! alternately. Ours is everything from the vertices to the routes. After the loss of the first vehicle, ours divides what
+//! each vehicle has not flown among the rest; theirs, which knows no progress, the whole path.
+
+use std::hint::black_box;
+use std::path::Path;
+use std::process::Command;
+use std::time::Instant;
+
+use anyhow::{Context, Result, ensure};
+use flockmate_tests::workspace;
+use planner_core::coverage::Flat;
+use planner_core::coverage::area::{Area, Ring, RingKind};
+use planner_core::coverage::divide::{self, Range};
+use planner_core::coverage::footprint::{Footprint, Spacing};
+use planner_core::coverage::pack::{Heights, PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::powell;
+use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::transit::Transit;
+
+use crate::Row;
+
+/// Runs of each round, of which the median counts.
+const RUNS: usize = 301;
+/// Rounds of ours and theirs in turn.
+const ROUNDS: usize = 5;
+const LANES: usize = 512;
+const VEHICLES: usize = 32;
+const VERTICES: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
+
+/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take.
+///
+/// # Errors
+/// Theirs cannot be built or run.
+pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
+    let mut rows = Vec::new();
+    let peer = checkout.map(build).transpose()?;
+    if peer.is_none() {
+        println!("coverage: no --binpat DIR, a checkout of cvar-upm/multi_uav_planning_binpat; only POWELL");
+    }
+    for n in [3, 10] {
+        let Some(peer) = &peer else { break };
+        let (mut ours, mut theirs) = (Vec::new(), Vec::new());
+        for _ in 0..ROUNDS {
+            ours.push(ours_us(n));
+            theirs.push(theirs_us(peer, n)?);
+        }
+        for (k, name) in ["coverage, plan", "coverage, after a loss"].into_iter().enumerate() {
+            let middle = |times: &[[f64; 2]]| {
+                let mut times: Vec<f64> = times.iter().map(|round| round[k]).collect();
+                times.sort_by(f64::total_cmp);
+                times[ROUNDS / 2]
+            };
+            let (ours, theirs) = (middle(&ours), middle(&theirs));
+            let name = name.to_owned();
+            rows.push(Row { name, ours, theirs, ratio: theirs / ours, required: 1.1, unit: "us", n });
+        }
+    }
+    let ours = powell_us();
+    let name = "coverage, POWELL".to_owned();
+    rows.push(Row { name, ours, theirs: 5000.0, ratio: 5000.0 / ours, required: 1.0, unit: "us", n: 3 });
+    Ok(rows)
+}
+
+/// Builds our driver around their headers.
+fn build(checkout: &Path) -> Result<tempfile::TempPath> {
+    let program = tempfile::NamedTempFile::new()?.into_temp_path();
+    let include = checkout.join("planning_binpat/include");
+    let built = Command::new("g++")
+        .args(["-O3", "-march=native", "-std=c++17", "-o"])
+        .arg(&program)
+        .arg("-I")
+        .arg(&include)
+        .arg("-I")
+        .arg(include.join("assignment/bare"))
+        .arg(workspace().join("tests/peers/binpat.cpp"))
+        .arg(checkout.join("planning_binpat/src/bare/lap.cpp"))
+        .status()
+        .context("cannot run g++")?;
+    ensure!(built.success(), "the C++ BINPAT in {} does not build", checkout.display());
+    Ok(program)
+}
+
+fn theirs_us(program: &Path, vehicles: usize) -> Result<[f64; 2]> {
+    let output = Command::new(program).args([vehicles.to_string(), RUNS.to_string()]).output()?;
+    let text = String::from_utf8_lossy(&output.stdout);
+    let times: Vec<f64> = text.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    times.try_into().map_err(|_| anyhow::anyhow!("the C++ BINPAT printed {text:?}"))
+}
+
+/// What plans are made from and into.
+struct Desk {
+    vertices: Vec<Flat>,
+    rings: [Ring; 1],
+    vehicles: Vec<Vehicle>,
+    tracks: Box<Tracks<LANES>>,
+    workspace: Box<tracks::Workspace<64>>,
+    pack: Box<PackWorkspace<VEHICLES>>,
+    plan: Plan<VEHICLES>,
+}
+
+impl Desk {
+    fn new(vehicles: usize) -> Self {
+        let vehicle = |i: usize| {
+            let place = Flat::new(5.0 * i as f32, -10.0);
+            let (cruise_mps, climb_mps, descend_mps) = (5.0, 3.0, 1.0);
+            Vehicle { place, home: place, cruise_mps, climb_mps, descend_mps, weight: 1.0 }
+        };
+        Self {
+            vertices: VERTICES.iter().map(|[x, y]| Flat::new(*x, *y)).collect(),
+            rings: [Ring { end: VERTICES.len() as u16, kind: RingKind::Outer }],
+            vehicles: (0..vehicles).map(vehicle).collect(),
+            tracks: Box::default(),
+            workspace: Box::default(),
+            pack: Box::default(),
+            plan: Plan::new(),
+        }
+    }
+
+    /// The whole plan: from the vertices to the routes.
+    fn plan(&mut self) {
+        let area = Area::new(black_box(&self.vertices), &self.rings).expect("an area");
+        let mut transit = Transit::<8>::empty();
+        transit.learn(area).expect("no zones");
+        let footprint = Footprint { along_m: 10.0, across_m: 10.0 };
+        let spacing = Spacing { footprint, lane_m: 10.0, waypoint_m: 10.0 };
+        let pattern = Pattern { spacing, angle_deg: None, margin_m: 0.0, looks: 10_000 };
+        tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks).expect("lanes");
+        let work = work(&self.tracks, &transit, &self.vehicles);
+        binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
+        black_box(&self.plan);
+    }
+}
+
+fn work<'a>(
+    tracks: &'a Tracks<LANES>,
+    transit: &'a Transit<'a, 8>,
+    vehicles: &'a [Vehicle],
+) -> Work<'a, LANES, 8> {
+    let heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+    Work { tracks, transit, vehicles, heights, unit: Unit::Waypoint }
+}
+
+fn ours_us(vehicles: usize) -> [f64; 2] {
+    let mut desk = Desk::new(vehicles);
+    let plan_us = median_us(|| desk.plan());
+    let transit = Transit::<8>::empty();
+    // Each of them has flown ten waypoints and stands at the tenth.
+    let mut done = Vec::new();
+    for route in &desk.plan.routes {
+        let flown = Range { first: route.first, end: (route.first + 10).min(route.end) };
+        desk.vehicles[usize::from(route.vehicle)].place =
+            desk.tracks.waypoint(flown.end - 1).expect("a waypoint");
+        done.push(flown);
+    }
+    let mut left: Box<Tracks<LANES>> = Box::default();
+    let update_us = median_us(|| {
+        divide::left(&desk.tracks, black_box(&done), &transit, &mut left).expect("something is left");
+        let rest = &desk.vehicles[1..];
+        binpat(&work(&left, &transit, rest), &mut desk.pack, &mut desk.plan).expect("routes");
+        black_box(&desk.plan);
+    });
+    let last = left.waypoint_count() - 1;
+    assert_eq!(divide::original(&done, last), desk.tracks.waypoint_count() - 1);
+    [plan_us, update_us]
+}
+
+fn powell_us() -> f64 {
+    let mut desk = Desk::new(3);
+    desk.plan();
+    let transit = Transit::<8>::empty();
+    let mut ws: Box<powell::Workspace<VEHICLES>> = Box::default();
+    let work = work(&desk.tracks, &transit, &desk.vehicles);
+    median_us(|| {
+        powell::powell(&work, &powell::Config::USUAL, &mut ws, &mut desk.plan).expect("routes");
+    })
+}
+
+fn median_us(mut run: impl FnMut()) -> f64 {
+    let mut time = || {
+        let began = Instant::now();
+        run();
+        began.elapsed().as_secs_f64() * 1e6
+    };
+    let mut times: Vec<f64> = (0..RUNS).map(|_| time()).collect();
+    times.sort_by(f64::total_cmp);
+    times[RUNS / 2]
+}
