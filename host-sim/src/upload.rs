@@ -6,7 +6,6 @@
 mod pace;
 
 use std::collections::BTreeMap;
-use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::{Context, bail};
@@ -26,7 +25,6 @@ const COMPONENT_ID: u8 = 190;
 /// The companion may have to erase its flash first: eight sectors of two seconds each.
 const PATIENCE: Duration = Duration::from_secs(30);
 const BEAT: Duration = Duration::from_secs(1);
-const NAP: Duration = Duration::from_millis(1);
 
 const TERMINATE: u8 = 1;
 const RESET: u8 = 2;
@@ -68,7 +66,7 @@ struct Answer {
 impl Client {
     /// A client that talks to the companion of one vehicle, or of the first it hears.
     pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
-        let now = Clock::now();
+        let now = link.now();
         // Not that of a client before us: a server knows repeated requests by it.
         let sequence = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
@@ -104,7 +102,7 @@ impl Client {
 
     /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
     fn hear(&mut self) -> anyhow::Result<Vec<Frame>> {
-        if Clock::now() >= self.beat_at {
+        if self.link.now() >= self.beat_at {
             self.beat_at += BEAT;
             let beat = HEARTBEAT_DATA {
                 mavtype: MavType::MAV_TYPE_GCS,
@@ -119,9 +117,9 @@ impl Client {
         let mut buffer = [0; 2048];
         let length = self.link.receive(&mut buffer).context("link lost")?;
         if length == 0 {
-            sleep(NAP);
+            self.link.rest();
         }
-        let now = Instant::from_micros(self.began.elapsed().as_micros() as u64);
+        let now = Instant::from_micros(self.link.now().duration_since(self.began).as_micros() as u64);
         let mut input = &buffer[..length];
         let mut frames = Vec::new();
         while let Some(frame) = self.framer.next(now, &mut input) {
@@ -136,8 +134,8 @@ impl Client {
     /// # Errors
     /// None is heard.
     pub fn find(&mut self) -> anyhow::Result<u8> {
-        let began = Clock::now();
-        while began.elapsed() < PATIENCE {
+        let began = self.link.now();
+        while self.link.now().duration_since(began) < PATIENCE {
             if let Some(frame) = self.hear()?.first() {
                 self.system = Some(frame.system);
                 return Ok(frame.system);
@@ -189,13 +187,13 @@ impl Client {
     /// Asks until it is answered.
     fn done(&mut self, opcode: u8, data: &[u8]) -> anyhow::Result<Answer> {
         let request = self.request(opcode, 0, data);
-        let began = Clock::now();
+        let began = self.link.now();
         let mut asked_at = began;
         self.ask(&request)?;
-        while began.elapsed() < PATIENCE {
-            if self.pace.is_over(asked_at, Clock::now()) {
+        while self.link.now().duration_since(began) < PATIENCE {
+            if self.pace.is_over(asked_at, self.link.now()) {
                 self.ask(&request)?;
-                asked_at = Clock::now();
+                asked_at = self.link.now();
             }
             let sequence = self.sequence;
             let mine = |a: &Answer| a.sequence == sequence && a.answers == opcode;
@@ -217,17 +215,17 @@ impl Client {
         self.done(RESET, &[])?;
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
         // That it took long to erase its flash tells nothing of the link.
-        self.pace = Pace::new(Clock::now());
+        self.pace = Pace::new(self.link.now());
         let mut pieces = bytes.chunks(DATA).enumerate();
         let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
-        let (mut arrived, mut heard_at) = (0, Clock::now());
+        let (mut arrived, mut heard_at) = (0, self.link.now());
         loop {
             while under_way.len() < self.pace.window()
                 && let Some((i, piece)) = pieces.next()
             {
                 let request = self.request(WRITE, (i * DATA) as u32, piece);
                 self.ask(&request)?;
-                let piece = Piece { request, length: piece.len(), sent_at: Clock::now(), repeated: false };
+                let piece = Piece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
                 under_way.insert(self.sequence, piece);
             }
             if under_way.is_empty() {
@@ -242,21 +240,22 @@ impl Client {
                 }
                 if let Some(piece) = under_way.remove(&answer.sequence) {
                     arrived += piece.length;
-                    heard_at = Clock::now();
+                    heard_at = self.link.now();
                     // Of one that was sent twice nobody knows which was answered.
                     if !piece.repeated {
-                        self.pace.answered_after(piece.sent_at.elapsed());
+                        let took = self.link.now().duration_since(piece.sent_at);
+                        self.pace.answered_after(took);
                     }
                     progress(arrived as u64);
                 }
             }
-            if heard_at.elapsed() > PATIENCE {
+            if self.link.now().duration_since(heard_at) > PATIENCE {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
             for piece in under_way.values_mut() {
-                if self.pace.is_over(piece.sent_at, Clock::now()) {
+                if self.pace.is_over(piece.sent_at, self.link.now()) {
                     self.ask(&piece.request)?;
-                    (piece.sent_at, piece.repeated) = (Clock::now(), true);
+                    (piece.sent_at, piece.repeated) = (self.link.now(), true);
                 }
             }
         }

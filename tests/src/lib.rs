@@ -3,7 +3,7 @@
 pub mod areas;
 pub mod board;
 pub mod bounds;
-pub mod debugger;
+pub mod downfall;
 pub mod fidelity;
 pub mod hostile;
 pub mod logs;

@@ -1,13 +1,13 @@
-//! One vehicle in real time: a board in QEMU beside a simulated autopilot, and somebody who gives orders by its radio.
+//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and somebody who gives orders by its radio.
 
-use std::thread::sleep;
-use std::time::{Duration, Instant as Clock};
+use std::path::{self, PathBuf};
+use std::time::Duration;
 
 use companion::Link as Port;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{COMPONENT, Instant, State};
 use host_sim::autopilot::{Autopilot, Config};
-use host_sim::link::Link;
+use host_sim::boards::{self, Emulated, Piece};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -20,13 +20,13 @@ use planner_core::Point;
 use planner_core::flight::Path;
 use planner_core::frames::geodetic_to_enu;
 
-use crate::board::{Downfall, Emulated};
+use crate::downfall::{self, Downfall};
 
 const STEP: Duration = Duration::from_millis(4);
-/// Time that a machine which stood still does not make up for.
-const LATEST: Duration = Duration::from_millis(200);
-/// A machine may stand still for long; a megabyte of garbage takes 100 s of the board's time.
+/// A megabyte of garbage takes 100 s.
 const PATIENCE: Duration = Duration::from_secs(400);
+/// Between two commands to start.
+const AGAIN: Duration = Duration::from_secs(1);
 /// States of a mission that was not started, or still waits.
 const ON_PAD: [State; 6] = [
     State::WaitAutopilot,
@@ -46,6 +46,8 @@ pub struct Heard {
     pub texts: Vec<String>,
     /// Setpoints to the autopilot.
     pub setpoints: Vec<SET_POSITION_TARGET_LOCAL_NED_DATA>,
+    /// When the board sent each, microseconds of its time.
+    pub setpoints_us: Vec<u64>,
     /// Commands to the autopilot: number and first parameter.
     pub commands: Vec<(u32, f32)>,
     /// Its state as last told.
@@ -65,12 +67,17 @@ pub struct Vehicle {
     pub heard: Heard,
     /// What was heard from the board's radio, as it came, for others to read.
     pub radio: Vec<u8>,
-    /// The longest that this machine kept us from a step, since the last reset.
-    pub stood_still: Duration,
-    lines: [Option<Box<dyn Link>>; 2],
+    /// Steps so far.
+    pub time: Duration,
+    program: PathBuf,
+    folder: tempfile::TempDir,
+    /// When the board started.
+    started: Duration,
+    plugged: [bool; 2],
+    /// What it is about to receive.
+    pieces: Vec<Piece>,
     framers: [Framer; 2],
     ground_m: f32,
-    next: Clock,
     sequence: u8,
 }
 
@@ -94,9 +101,16 @@ pub fn ahead<const W: usize>(path: &Path<W>) -> Point {
 }
 
 impl Vehicle {
-    /// The first vehicle of a mission, on its pad, its autopilot just switched on.
-    pub fn new(board: Emulated, mission: &Mission, seed: u64) -> Self {
-        let lines = [Port::Autopilot, Port::Swarm].map(|port| Some(board.plug(port)));
+    /// The first vehicle of a mission, on its pad, its autopilot and its board just switched on; the board's flash holds the
+    /// files of `known`.
+    ///
+    /// # Panics
+    /// The board does not start.
+    pub fn new(program: &path::Path, mission: &Mission, known: &Mission, seed: u64) -> Self {
+        let folder = tempfile::tempdir().expect("a temporary directory");
+        let mut board = Emulated::start(program, &folder.path().join("log")).expect("a board");
+        let bank = boards::bank(&known.roadmap_file, &known.mission_file).expect("it holds them");
+        board.load(&bank).expect("a board");
         let mut config = config(mission);
         config.seed = seed;
         let mut autopilot = Autopilot::new(&config).expect("the scenario is good");
@@ -106,31 +120,60 @@ impl Vehicle {
             autopilot,
             heard: Heard::default(),
             radio: Vec::new(),
-            stood_still: Duration::ZERO,
-            lines,
+            time: Duration::ZERO,
+            program: program.to_owned(),
+            folder,
+            started: Duration::ZERO,
+            plugged: [true; 2],
+            pieces: Vec::new(),
             framers: [Framer::new(), Framer::new()],
             ground_m: config.start.z - config.vehicle.radius_m,
-            next: Clock::now(),
             sequence: 0,
         }
     }
 
+    /// What the board logged, in defmt's encoding.
+    pub fn log(&self) -> PathBuf {
+        self.folder.path().join("log")
+    }
+
     /// A line's cable is plugged in, or pulled out.
     pub fn plug(&mut self, port: Port, plugged: bool) {
-        self.lines[port as usize] = plugged.then(|| self.board.plug(port));
+        self.plugged[port as usize] = plugged;
         self.framers[port as usize] = Framer::new();
         self.heard.last[port as usize] = None;
     }
 
-    /// Brings the board down, now; what it sent before was heard before.
+    /// Brings the board down, now; it starts again by itself.
     pub fn bring_down(&mut self, how: Downfall) {
-        self.board.halt(true);
-        self.hear();
-        self.board.bring_down(how);
-        self.board.halt(false);
-        self.framers = [Framer::new(), Framer::new()];
+        how.befall(&mut self.board, &self.program);
+        self.starts();
+        // Meanwhile nothing is heard from it.
+        for _ in 0..how.lasts().as_micros() / STEP.as_micros() {
+            self.step_autopilot();
+            self.pieces.clear();
+            self.time += STEP;
+        }
+        self.started = self.time;
         self.heard = Heard::default();
-        self.stood_still = Duration::ZERO;
+    }
+
+    /// Has its planner fault whenever it plans, until the next start.
+    pub fn break_planner(&mut self) {
+        downfall::break_planner(&mut self.board, &self.program);
+    }
+
+    /// Has its planner take so much longer, until the next start.
+    pub fn slow_planner(&mut self, time: Duration) {
+        downfall::slow_planner(&mut self.board, &self.program, time);
+    }
+
+    /// The board's time begins again.
+    fn starts(&mut self) {
+        self.started = self.time;
+        self.pieces.clear();
+        self.framers = [Framer::new(), Framer::new()];
+        self.heard.last = [None; 2];
     }
 
     /// Sends the companion a command.
@@ -154,16 +197,28 @@ impl Vehicle {
         self.send(Port::Swarm, &out[..length]);
     }
 
-    /// Sends the board bytes, if the cable is in.
+    /// Sends the board bytes, if the cable is in: it receives them with the next step.
     pub fn send(&mut self, port: Port, bytes: &[u8]) {
-        if let Some(line) = &mut self.lines[port as usize] {
-            line.send(bytes).expect("the line is open");
+        if self.plugged[port as usize] {
+            let at_us = (self.time - self.started).as_micros() as u64;
+            self.pieces.push(Piece { port, at_us, bytes: bytes.to_owned() });
         }
     }
 
-    /// 4 ms, by the clock.
+    /// 4 ms.
     pub fn step(&mut self) {
-        self.hear();
+        self.step_autopilot();
+        self.time += STEP;
+        let until_us = (self.time - self.started).as_micros() as u64;
+        let pieces = core::mem::take(&mut self.pieces);
+        let answer = self.board.run(until_us, &pieces).expect("a board");
+        if answer.restarted {
+            self.starts();
+        }
+        answer.sent.iter().for_each(|piece| self.hear(piece));
+    }
+
+    fn step_autopilot(&mut self) {
         self.autopilot.step(STEP.as_secs_f32(), self.ground_m);
         let mut buffer = [0; 2048];
         loop {
@@ -173,11 +228,6 @@ impl Vehicle {
             }
             self.send(Port::Autopilot, &buffer[..length]);
         }
-        self.next += STEP;
-        let now = Clock::now();
-        self.stood_still = self.stood_still.max(now.saturating_duration_since(self.next));
-        self.next = self.next.max(now.checked_sub(LATEST).unwrap_or(now));
-        sleep(self.next.saturating_duration_since(now));
     }
 
     /// Steps for some time, by the vehicle's.
@@ -190,11 +240,11 @@ impl Vehicle {
     /// # Panics
     /// It does not in good time.
     pub fn until(&mut self, what: &str, mut holds: impl FnMut(&mut Self) -> bool) {
-        let began = Clock::now();
+        let began = self.time;
         while !holds(self) {
             let place = self.autopilot.truth().position;
             assert!(
-                began.elapsed() < PATIENCE,
+                self.time - began < PATIENCE,
                 "not {what}: {:?} at {place:?}, {:?}",
                 self.heard.state,
                 self.heard.texts
@@ -216,9 +266,9 @@ impl Vehicle {
     pub fn start(&mut self) {
         let mut last = None;
         self.until("started", |vehicle| {
-            let due = last.is_none_or(|last: Clock| last.elapsed() > Duration::from_secs(1));
+            let due = last.is_none_or(|last| vehicle.time - last > AGAIN);
             if vehicle.heard.state == State::Ready && due {
-                last = Some(Clock::now());
+                last = Some(vehicle.time);
                 vehicle.order(MavCmd::MAV_CMD_MISSION_START, 0.0);
             }
             !ON_PAD.contains(&vehicle.heard.state)
@@ -230,32 +280,26 @@ impl Vehicle {
         !self.autopilot.truth().touching
     }
 
-    fn hear(&mut self) {
-        for (index, line) in self.lines.iter_mut().enumerate() {
-            let mut buffer = [0; 2048];
-            while let Some(line) = line {
-                let length = line.receive(&mut buffer).expect("the line is open");
-                if length == 0 {
-                    break;
-                }
-                let bytes = &buffer[..length];
-                if index == Port::Autopilot as usize {
-                    self.autopilot.handle_bytes(bytes);
-                } else {
-                    self.radio.extend_from_slice(bytes);
-                }
-                // At no time, so that none expires in the middle because this machine stands still.
-                let mut input = bytes;
-                while let Some(frame) = self.framers[index].next(Instant::ZERO, &mut input) {
-                    self.heard.note(index, &frame);
-                }
-            }
+    /// What the board sent arrives, if the cable is in.
+    fn hear(&mut self, Piece { port, at_us, bytes }: &Piece) {
+        let line = *port as usize;
+        if !self.plugged[line] {
+            return;
+        }
+        if *port == Port::Autopilot {
+            self.autopilot.handle_bytes(bytes);
+        } else {
+            self.radio.extend_from_slice(bytes);
+        }
+        let mut input = &bytes[..];
+        while let Some(frame) = self.framers[line].next(Instant::from_micros(*at_us), &mut input) {
+            self.heard.note(line, &frame, *at_us);
         }
     }
 }
 
 impl Heard {
-    fn note(&mut self, line: usize, frame: &Frame) {
+    fn note(&mut self, line: usize, frame: &Frame, at_us: u64) {
         if let Some(last) = self.last[line].replace(frame.sequence) {
             self.missing[line] += u32::from(frame.sequence.wrapping_sub(last).wrapping_sub(1));
         }
@@ -266,7 +310,10 @@ impl Heard {
                 let text = frame.decode::<STATUSTEXT_DATA>().map(|data| data.text);
                 self.texts.extend(text.iter().map(|text| text.to_str().unwrap_or_default().to_owned()));
             }
-            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => self.setpoints.extend(frame.decode()),
+            SET_POSITION_TARGET_LOCAL_NED_DATA::ID => {
+                self.setpoints.extend(frame.decode());
+                self.setpoints_us.push(at_us);
+            }
             COMMAND_LONG_DATA::ID => {
                 let p = frame.padded();
                 let command = u32::from(u16::from_le_bytes([p[28], p[29]]));

@@ -1,7 +1,7 @@
 //! A roadmap on its way into an emulated board, cut anywhere: afterwards the board holds the old one or the new one, whole. An
 //! armed board erases nothing, nor one that does not know yet whether it is.
 //!
-//! The board is the firmware as it is flashed, in QEMU; its emulated flash keeps over a reset what was in it, torn words too. Each
+//! The board is the firmware as it is flashed, in QEMU and in lock step with its client; its emulated flash keeps over a reset what was in it, torn words too. Each
 //! cut is a reset: while a slot is erased, after a random byte of the upload, or a random moment after the last one, while it is
 //! checked and sealed. Every second cut is moved on, by instants, to one that leaves a torn word: of the data, or the seal. What
 //! the board holds then is asked of it by FTP.
@@ -12,13 +12,15 @@ use std::io::{Error, ErrorKind, Result};
 use std::net::SocketAddr;
 use std::path::Path;
 use std::sync::{Arc, Mutex};
-use std::thread::{scope, sleep};
-use std::time::{Duration, Instant as Clock};
+use std::thread::scope;
+use std::time::{Duration, Instant};
 
 use companion::Link as Port;
 use companion::link::frame::{self, Header};
 use companion::storage::store::File;
-use flockmate_tests::board::{self, Emulated};
+use flockmate_tests::board;
+use flockmate_tests::downfall::reset;
+use host_sim::boards::{Emulated, Piece};
 use host_sim::link::Link;
 use host_sim::upload::{Client, crc32};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavModeFlag, MavState, MavType};
@@ -28,11 +30,13 @@ use planner_core::roadmap::{self, Edge, RoadmapHeader};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// What works takes a tenth of it.
-const PATIENCE: Duration = Duration::from_secs(150);
+/// Between two looks at the board.
+const STEP_US: u64 = 4000;
+/// Between two heartbeats of the autopilot.
+const BEAT_US: u64 = 250_000;
 /// Cuts of a run that does not say how many.
 const CUTS: usize = 16;
-/// Boards at once: they mostly wait for their flash.
+/// Boards at once.
 const BOARDS: usize = 4;
 /// Erasing a slot takes a board three times 1.1 s.
 const ERASE_MS: u32 = 3400;
@@ -47,10 +51,12 @@ const SLOT: usize = (384 << 10) / 32;
 const SEAL: usize = 2;
 /// Where a slot's data begins, words.
 const DATA: usize = 8;
-/// A halted board runs on for less than this between two looks, microseconds.
+/// A board runs on for less than this between two looks, microseconds.
 const MOVE_US: u32 = 150;
 /// As `ALONE_AFTER` of the companion's services.
-const ALONE_AFTER: Duration = Duration::from_secs(10);
+const ALONE_AFTER_US: u64 = 10_000_000;
+/// Erasing begins within this time after it.
+const ERASES_WITHIN_US: u64 = 5_000_000;
 /// More torn words than a block has are a sector that is erased.
 const BLOCK: usize = 8;
 /// Looks for a torn word before a cut is made all the same.
@@ -61,25 +67,48 @@ const LOOKS: usize = 80;
 enum Cut {
     Never,
     AfterBytes(usize),
-    At(Clock),
+    /// Microseconds of the board's time.
+    At(u64),
 }
+
+/// A board that its clients share, one after the other.
+type Shared = Arc<Mutex<Emulated>>;
 
 /// What a client sees of its vehicle: the companion, and an autopilot that tells that it is there.
 struct Line {
-    link: Box<dyn Link>,
+    board: Shared,
+    began: Instant,
+    received: Vec<u8>,
+    sent: Vec<Piece>,
     /// Whether the autopilot is armed; none is there if there is nothing in it.
     armed: Option<bool>,
-    beat_at: Clock,
+    beat_at_us: u64,
     cut: Arc<Mutex<Cut>>,
 }
 
 impl Line {
-    fn new(board: &Emulated, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Box<Self> {
-        let link = board.plug(Port::Autopilot);
-        Box::new(Self { link, armed, beat_at: Clock::now(), cut: Arc::clone(cut) })
+    fn new(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Box<Self> {
+        Box::new(Self {
+            board: Arc::clone(board),
+            began: Instant::now(),
+            received: Vec::new(),
+            sent: Vec::new(),
+            armed,
+            beat_at_us: 0,
+            cut: Arc::clone(cut),
+        })
     }
 
-    fn beat(&mut self, armed: bool) -> Result<()> {
+    fn now_us(&self) -> u64 {
+        self.board.lock().unwrap().now_us()
+    }
+
+    fn put(&mut self, bytes: &[u8]) {
+        let at_us = self.now_us();
+        self.sent.push(Piece { port: Port::Autopilot, at_us, bytes: bytes.to_owned() });
+    }
+
+    fn beat(&mut self, armed: bool) {
         let flags = MavModeFlag::MAV_MODE_FLAG_CUSTOM_MODE_ENABLED;
         let beat = HEARTBEAT_DATA {
             mavtype: MavType::MAV_TYPE_QUADROTOR,
@@ -91,39 +120,63 @@ impl Line {
         };
         let mut out = [0; frame::MAX_SENT];
         let length = frame::encode(Header { system: 1, component: 1, sequence: 0 }, &beat, &mut out);
-        self.link.send(&out[..length])
+        self.put(&out[..length]);
     }
 }
 
 impl Link for Line {
     fn receive(&mut self, buffer: &mut [u8]) -> Result<usize> {
-        if matches!(*self.cut.lock().unwrap(), Cut::At(at) if Clock::now() >= at) {
+        let now_us = self.now_us();
+        if matches!(*self.cut.lock().unwrap(), Cut::At(at_us) if now_us >= at_us) {
             return Err(ErrorKind::ConnectionAborted.into());
         }
         if let Some(armed) = self.armed
-            && Clock::now() >= self.beat_at
+            && now_us >= self.beat_at_us
         {
-            self.beat_at = Clock::now() + Duration::from_millis(250);
-            self.beat(armed)?;
+            self.beat_at_us = now_us + BEAT_US;
+            self.beat(armed);
         }
-        self.link.receive(buffer)
+        let length = self.received.len().min(buffer.len());
+        buffer[..length].copy_from_slice(&self.received[..length]);
+        self.received.drain(..length);
+        Ok(length)
     }
 
     fn send(&mut self, bytes: &[u8]) -> Result<()> {
-        let mut cut = self.cut.lock().unwrap();
-        if let Cut::AfterBytes(left) = &mut *cut {
-            if let Some(rest) = left.checked_sub(bytes.len()) {
-                *left = rest;
-            } else {
-                self.link.send(&bytes[..*left])?;
-                return Err(Error::from(ErrorKind::ConnectionAborted));
+        let passes = match &mut *self.cut.lock().unwrap() {
+            Cut::AfterBytes(left) => {
+                let passes = bytes.len().min(*left);
+                *left -= passes;
+                passes
             }
+            Cut::Never | Cut::At(_) => bytes.len(),
+        };
+        self.put(&bytes[..passes]);
+        if passes < bytes.len() {
+            // The board receives what came before.
+            self.rest();
+            return Err(Error::from(ErrorKind::ConnectionAborted));
         }
-        self.link.send(bytes)
+        Ok(())
     }
 
     fn local_address(&self) -> Option<SocketAddr> {
-        self.link.local_address()
+        None
+    }
+
+    fn now(&self) -> Instant {
+        self.began + Duration::from_micros(self.now_us())
+    }
+
+    fn rest(&mut self) {
+        let mut until_us = self.now_us() + STEP_US;
+        if let Cut::At(at_us) = *self.cut.lock().unwrap() {
+            until_us = until_us.min(at_us);
+        }
+        let sent = core::mem::take(&mut self.sent);
+        let answer = self.board.lock().unwrap().run(until_us, &sent).expect("the board runs");
+        let ours = answer.sent.into_iter().filter(|piece| piece.port == Port::Autopilot);
+        self.received.extend(ours.flat_map(|piece| piece.bytes));
     }
 }
 
@@ -148,12 +201,12 @@ fn roadmap(nodes: u32, shift_m: f32) -> Vec<u8> {
 }
 
 /// What a client sees of a board until a cut.
-fn client(board: &Emulated, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Client {
+fn client(board: &Shared, armed: Option<bool>, cut: &Arc<Mutex<Cut>>) -> Client {
     Client::new(Line::new(board, armed, cut), None)
 }
 
 /// One that found it, and is never cut.
-fn uncut(board: &Emulated, armed: Option<bool>) -> Client {
+fn uncut(board: &Shared, armed: Option<bool>) -> Client {
     let mut client = client(board, armed, &Arc::new(Mutex::new(Cut::Never)));
     client.find().expect("the board is there");
     client
@@ -200,13 +253,14 @@ enum Part {
 }
 
 /// Begins an upload and cuts it at a random moment of a part; whether it was over before.
-fn cut_upload(board: &Emulated, file: &[u8], part: Part, rng: &mut Pcg32) -> bool {
-    let after_ms = Duration::from_millis(u64::from(rng.next_u32() % ERASE_MS));
-    let seal_in = Duration::from_micros(u64::from(rng.next_u32() % SEAL_US));
+fn cut_upload(board: &Shared, file: &[u8], part: Part, rng: &mut Pcg32) -> bool {
+    let after_us = 1000 * u64::from(rng.next_u32() % ERASE_MS);
+    let seal_in_us = u64::from(rng.next_u32() % SEAL_US);
+    let now_us = || board.lock().unwrap().now_us();
     // Beside every piece of 239 bytes travel 24 or so.
     let bytes = rng.next_u32() as usize % (file.len() * 11 / 10);
     let cut = Arc::new(Mutex::new(match part {
-        Part::Erasing => Cut::At(Clock::now() + after_ms),
+        Part::Erasing => Cut::At(now_us() + after_us),
         Part::Taking => Cut::AfterBytes(bytes),
         Part::Sealing => Cut::Never,
     }));
@@ -214,46 +268,50 @@ fn cut_upload(board: &Emulated, file: &[u8], part: Part, rng: &mut Pcg32) -> boo
     let all = file.len() as u64;
     let sealing = |arrived| {
         if part == Part::Sealing && arrived == all {
-            *cut.lock().unwrap() = Cut::At(Clock::now() + seal_in);
+            *cut.lock().unwrap() = Cut::At(now_us() + seal_in_us);
         }
     };
     client.find().and_then(|_| client.upload(File::Roadmap, file, sealing)).is_ok()
 }
 
-/// Halts a board; every second time, if it may, where a word of the kind that the part has is torn. The torn words.
-fn halt(board: &mut Emulated, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
+/// Stops a board; every second time, if it may, where a word of the kind that the part has is torn. The torn words.
+fn stop(board: &Shared, part: Part, moves_on: bool, rng: &mut Pcg32) -> Vec<usize> {
+    let mut board = board.lock().unwrap();
     for _ in 0..LOOKS {
-        board.halt(true);
-        let torn = board.torn();
+        let torn = board.torn().expect("a board");
         let found = torn.first().is_some_and(|word| part != Part::Sealing || word % SLOT == SEAL);
         if found || !moves_on {
             return torn;
         }
-        board.halt(false);
-        sleep(Duration::from_micros(u64::from(rng.next_u32() % MOVE_US)));
+        let until_us = board.now_us() + u64::from(rng.next_u32() % MOVE_US);
+        board.run(until_us, &[]).expect("a board");
     }
-    board.halt(true);
-    board.torn()
+    board.torn().expect("a board")
+}
+
+/// A board, its flash empty.
+fn start(program: &Path, folder: &Path) -> Shared {
+    Arc::new(Mutex::new(Emulated::start(program, &folder.join("log")).expect("a board")))
 }
 
 /// Cuts uploads to one board again and again.
 fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let mut board = Emulated::start(program, None, None);
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let board = start(program, folder.path());
     let mut tally = Tally::default();
     let file = roadmap(20, seed as f32);
     let mut old = crc32(&file);
     let first = || uncut(&board, Some(false)).upload(File::Roadmap, &file, |_| ()).is_ok();
     assert!((0..TRIES).any(|_| first()), "no upload is possible");
-    board.reset();
+    reset(&mut board.lock().unwrap());
     for cut in 0..cuts {
         let file = roadmap(10 + rng.next_u32() % NODES, cut as f32);
         let new = crc32(&file);
         let part = [Part::Erasing, Part::Taking, Part::Sealing][rng.next_u32() as usize % 3];
         let whole = cut_upload(&board, &file, part, &mut rng);
-        let torn = halt(&mut board, part, cut % 2 == 0, &mut rng);
-        board.reset();
-        board.halt(false);
+        let torn = stop(&board, part, cut % 2 == 0, &mut rng);
+        reset(&mut board.lock().unwrap());
         tally.note_torn(&torn);
         let now = uncut(&board, Some(false)).sum(File::Roadmap).expect("it holds a roadmap");
         assert!(
@@ -270,7 +328,7 @@ fn cut_again_and_again(program: &Path, cuts: usize, seed: u64) -> Tally {
 fn an_upload_cut_anywhere_leaves_the_old_or_the_new() {
     let Some(program) = board::program("flockmate") else { return };
     let cuts = std::env::var("FLOCKMATE_CUTS").map_or(CUTS, |n| n.parse().expect("a number"));
-    let began = Clock::now();
+    let began = Instant::now();
     let mut tally = Tally::default();
     scope(|scope| {
         let of_board = |i: usize| {
@@ -287,23 +345,31 @@ fn an_upload_cut_anywhere_leaves_the_old_or_the_new() {
 #[test]
 fn an_armed_board_erases_nothing() {
     let Some(program) = board::program("flockmate") else { return };
-    let mut board = Emulated::start(&program, None, None);
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let board = start(&program, folder.path());
     let file = roadmap(20, 0.0);
+    let torn = || board.lock().unwrap().torn().expect("a board");
+    let run = |time_us: u64| {
+        let mut board = board.lock().unwrap();
+        let until_us = board.now_us() + time_us;
+        board.run(until_us, &[]).expect("a board");
+    };
     let mut client = uncut(&board, Some(true));
     for _ in 0..3 {
         let refused = client.upload(File::Roadmap, &file, |_| ()).expect_err("it is armed");
         assert!(format!("{refused:#}").contains("the companion protects its file"), "{refused:#}");
-        sleep(Duration::from_secs(1));
-        assert!(board.torn().is_empty());
+        run(1_000_000);
+        assert!(torn().is_empty());
     }
     drop(client);
-    // Without an autopilot it is known after ten seconds of the board's time that none is armed; no time of its own passes faster.
-    let began = Clock::now();
-    board.reset();
-    while board.torn().is_empty() {
-        assert!(began.elapsed() < PATIENCE, "it erases nothing without an autopilot");
-        sleep(Duration::from_millis(100));
+    // Without an autopilot it is known after ten seconds of the board's time that none is armed.
+    reset(&mut board.lock().unwrap());
+    while torn().is_empty() {
+        let now_us = board.lock().unwrap().now_us();
+        assert!(now_us < ALONE_AFTER_US + ERASES_WITHIN_US, "it erases nothing without an autopilot");
+        run(100_000);
     }
-    assert!(began.elapsed() > ALONE_AFTER, "erased after {:?}", began.elapsed());
+    let erased_us = board.lock().unwrap().now_us();
+    assert!(erased_us > ALONE_AFTER_US, "erased after {erased_us} µs");
     uncut(&board, None).upload(File::Roadmap, &file, |_| ()).expect("nothing is armed");
 }

@@ -1,5 +1,5 @@
 //! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both lines. The board is the firmware
-//! as it is flashed, the autopilot beside it the simulated one, in real time.
+//! as it is flashed, the autopilot beside it the simulated one, both in lock step: what is told here happens the same every time.
 //!
 //! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture` resets fifty times, and
 //! `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.
@@ -7,13 +7,14 @@
 use std::io;
 use std::net::SocketAddr;
 use std::path::Path;
-use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, scope};
-use std::time::{Duration, Instant as Clock};
+use std::time::{Duration, Instant};
 
 use companion::storage::store::File;
 use companion::{Link as Port, State};
-use flockmate_tests::board::{self, Downfall, Emulated};
+use flockmate_tests::board;
+use flockmate_tests::downfall::{self, Downfall};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
 use host_sim::autopilot::ardupilot;
 use host_sim::link::Link;
@@ -21,7 +22,7 @@ use host_sim::mission::Mission;
 use host_sim::upload::Client;
 use mavlink::dialects::ardupilotmega::{COMMAND_INT_DATA, MavCmd, MavFrame};
 use planner_core::Point;
-use planner_core::frames::enu_to_geodetic;
+use planner_core::frames::{Geodetic, enu_to_geodetic};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -64,16 +65,16 @@ const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 const VEHICLE: &str = "[[vehicles]]";
 /// Garbage on each line of a run that does not say how much, bytes.
 const GARBAGE: usize = 200_000;
-/// So much of it in a millisecond of the board's time, beside the autopilot's 4 kB/s; the emulated UART takes 18 kB/s.
+/// So much of it in a millisecond, beside the autopilot's 4 kB/s.
 const PER_MS: usize = 10;
-/// The most at once: the board's time is heard with each setpoint, 50 ms apart.
-const HANDFUL: usize = 400;
-/// An instruction takes 2⁴ ns of the board's time, as in `cargo xtask emulate`.
-const SHIFT: u32 = 4;
-/// Flights of which one has to be as it should be.
-const FLIGHTS: usize = 3;
-/// Setpoints may be no further apart by the board's own time, milliseconds.
-const GAP_MS: u32 = 150;
+/// What a plan takes longer that is slowed on purpose.
+const BURST: Duration = Duration::from_millis(38);
+/// For how long setpoints are held up on purpose.
+const HELD_UP: [Duration; 2] = [Duration::from_millis(83), Duration::from_millis(217)];
+/// Between two setpoints, microseconds of the board's time, and how late one may be: the longest that other interrupts and
+/// calls of the companion hold it up.
+const PERIOD_US: u64 = 50_000;
+const LATE_US: u64 = 100;
 
 /// Brings the companion down at a random moment of a flight, and sees the flight to its end; what came of it.
 fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut Pcg32) -> Option<String> {
@@ -108,8 +109,6 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     }
     vehicle.until_said(FOUND);
     vehicle.run(FINDS);
-    // A board that stood still had less time.
-    let finds = FINDS + 4 * vehicle.stood_still;
     let heard = &vehicle.heard;
     let context = format!("{how:?} in {state:?} at {place:?}: {heard:?}");
     assert!(!vehicle.autopilot.truth().armed, "{context}");
@@ -118,7 +117,7 @@ fn reset_in_flight(vehicle: &mut Vehicle, how: Downfall, brakes: bool, rng: &mut
     assert!(farthest_m < STOPS_M && highest_m < 1.0, "{farthest_m} m away, {highest_m} m up, {context}");
     let said = |text: &str| heard.texts.iter().any(|said| said == text);
     assert!(heard.texts.iter().any(|said| said.starts_with(how.said())), "{context}");
-    if in_air > finds {
+    if in_air > FINDS {
         assert!(said("Found in flight: no mission"), "{context}");
         assert!(said("Landed after failsafe: mission over"), "{context}");
     }
@@ -133,9 +132,7 @@ fn reset_again_and_again(program: &Path, missions: [&Mission; 2], resets: usize,
     while lines.len() < resets {
         let brakes = (flights + seed).is_multiple_of(2);
         let mission = missions[usize::from(brakes)];
-        let bank = board::bank(&mission.roadmap_file, &mission.mission_file);
-        let board = Emulated::start(program, None, Some(&bank));
-        let mut vehicle = Vehicle::new(board, mission, rng.next_u64());
+        let mut vehicle = Vehicle::new(program, mission, mission, rng.next_u64());
         // Every other flight is by the other autopilot: each meets every downfall.
         let how = Downfall::ALL[(lines.len() / 2 + seed as usize) % Downfall::ALL.len()];
         let outcome = reset_in_flight(&mut vehicle, how, brakes, &mut rng);
@@ -153,7 +150,7 @@ fn a_companion_reset_in_flight_leaves_it_to_the_autopilot_and_says_so() {
     let Some(program) = board::program("flockmate") else { return };
     let resets = std::env::var("FLOCKMATE_RESETS").map_or(RESETS, |n| n.parse().expect("a number"));
     let missions = [mission(LOBBY), mission(&format!("{LOBBY}{ARDUPILOT}"))];
-    let (began, mut lines) = (Clock::now(), Vec::new());
+    let (began, mut lines) = (Instant::now(), Vec::new());
     scope(|scope| {
         let of_board = |i: usize| {
             let (program, missions) = (&program, missions.each_ref());
@@ -168,20 +165,9 @@ fn a_companion_reset_in_flight_leaves_it_to_the_autopilot_and_says_so() {
     assert_eq!(lines.len(), resets);
 }
 
-/// Flies until one flight is as it should be: where this machine stands still for a second the autopilot's failsafe ends a
-/// mission, and so long no setpoint comes.
-fn one_is_good(mut fly: impl FnMut() -> Result<(), String>) {
-    let bad: Vec<String> = (0..FLIGHTS).map_while(|_| fly().err()).collect();
-    bad.iter().for_each(|why| println!("{why}"));
-    assert!(bad.len() < FLIGHTS, "no flight was as it should be: {bad:?}");
-}
-
 /// Whether the mission was flown to its end.
-fn done(vehicle: &Vehicle) -> Result<(), String> {
-    match vehicle.heard.state {
-        State::Done => Ok(()),
-        state => Err(format!("{state:?}: {:?}", vehicle.heard.texts)),
-    }
+fn done(vehicle: &Vehicle) {
+    assert_eq!(vehicle.heard.state, State::Done, "{:?}", vehicle.heard.texts);
 }
 
 /// Whether the mission is over.
@@ -193,15 +179,9 @@ fn is_over(vehicle: &mut Vehicle) -> bool {
 fn cables_are_pulled_and_put_back_without_a_restart() {
     let Some(program) = board::program("flockmate") else { return };
     let mission = mission(LOBBY);
-    one_is_good(|| pull_cables(&program, &mission));
-}
-
-fn pull_cables(program: &Path, mission: &Mission) -> Result<(), String> {
-    let bank = board::bank(&mission.roadmap_file, &mission.mission_file);
-    let mut vehicle = Vehicle::new(Emulated::start(program, None, Some(&bank)), mission, 1);
+    let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
     vehicle.until("ready", |vehicle| vehicle.heard.state == State::Ready);
-    // On the pad: said when it is silent, said when it is back, and ready again. Where this machine stood still it was said before
-    // too: what counts is what was said last.
+    // On the pad: said when it is silent, said when it is back, and ready again. What counts is what was said last.
     let last = |vehicle: &Vehicle, text| vehicle.heard.texts.iter().rposition(|said| said == text);
     let heard = |vehicle: &Vehicle| last(vehicle, FOUND) > last(vehicle, SILENT);
     vehicle.plug(Port::Autopilot, false);
@@ -224,15 +204,14 @@ fn pull_cables(program: &Path, mission: &Mission) -> Result<(), String> {
     println!("{:?}", heard.texts);
     assert!(!heard.texts.iter().any(|text| text.starts_with("Restarted")), "{:?}", heard.texts);
     assert_eq!(heard.missing, [0, 0], "frames were lost: {:?}", heard.texts);
-    done(&vehicle)
+    done(&vehicle);
 }
 
 #[test]
 fn a_board_beside_an_autopilot_that_the_mission_does_not_name_says_so() {
     let Some(program) = board::program("flockmate") else { return };
     let [ours, others] = [mission(LOBBY), mission(&LOBBY.replace("id = 1", "id = 7"))];
-    let bank = board::bank(&others.roadmap_file, &others.mission_file);
-    let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &ours, 1);
+    let mut vehicle = Vehicle::new(&program, &ours, &others, 1);
     vehicle.until_said("This system id is not in the mission: no plan");
 }
 
@@ -243,22 +222,13 @@ const ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     let Some(program) = board::program("flockmate") else { return };
     let mission = mission(LOBBY);
-    let bank = board::bank(&mission.roadmap_file, &mission.mission_file);
-    let mut vehicle = Vehicle::new(Emulated::start(&program, None, Some(&bank)), &mission, 1);
-    let mut in_a_row = 0;
-    while in_a_row < 3 {
-        vehicle.board.break_planner();
+    let mut vehicle = Vehicle::new(&program, &mission, &mission, 1);
+    for in_a_row in 1..=3 {
+        vehicle.break_planner();
         vehicle.heard = Heard::default();
         let crashed =
             |vehicle: &Vehicle| vehicle.heard.texts.iter().any(|text| text.starts_with("Restarted: fault"));
-        vehicle.until("planning", |vehicle| crashed(vehicle) || vehicle.heard.state == State::Ready);
-        // Where this machine stood still the planner was done before it could be broken.
-        if crashed(&vehicle) {
-            in_a_row += 1;
-        } else {
-            in_a_row = 0;
-            vehicle.board.reset();
-        }
+        vehicle.until("planning", |vehicle| crashed(vehicle));
         let texts = &vehicle.heard.texts;
         let aside = texts.iter().any(|text| text == ASIDE);
         assert!(in_a_row == 3 || !aside, "after {in_a_row} in a row: {texts:?}");
@@ -266,7 +236,7 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     // The mission is left alone from that start on, whose planner is broken again: the board stays up.
     vehicle.until_said(ASIDE);
     vehicle.run(FINDS);
-    vehicle.board.break_planner();
+    vehicle.break_planner();
     vehicle.heard = Heard::default();
     vehicle.run(2 * FINDS);
     let heard = &vehicle.heard;
@@ -274,27 +244,42 @@ fn a_mission_that_brings_the_planner_down_in_three_starts_is_set_aside() {
     assert_eq!(heard.state, State::Aborted, "there is no plan");
 }
 
-/// A client's end of a radio that the vehicle's thread serves.
+/// A client's end of a radio that the vehicle's thread serves: each has its turn, and time passes between the client's.
 struct Radio {
-    heard: Receiver<Vec<u8>>,
-    sent: Sender<Vec<u8>>,
+    turns: Receiver<(Instant, Vec<u8>)>,
+    sends: SyncSender<Vec<u8>>,
+    now: Instant,
+    heard: Vec<u8>,
+    sent: Vec<u8>,
 }
 
 impl Link for Radio {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-        let bytes = self.heard.try_recv().unwrap_or_default();
-        buffer[..bytes.len()].copy_from_slice(&bytes);
-        Ok(bytes.len())
+        let length = self.heard.len().min(buffer.len());
+        buffer[..length].copy_from_slice(&self.heard[..length]);
+        self.heard.drain(..length);
+        Ok(length)
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // Nobody is there any more when the vehicle has landed.
-        let _ = self.sent.send(bytes.to_vec());
+        self.sent.extend(bytes);
         Ok(())
     }
 
     fn local_address(&self) -> Option<SocketAddr> {
         None
+    }
+
+    fn now(&self) -> Instant {
+        self.now
+    }
+
+    fn rest(&mut self) {
+        // Nobody is there any more when the vehicle has landed.
+        let _ = self.sends.send(core::mem::take(&mut self.sent));
+        if let Ok((now, heard)) = self.turns.recv() {
+            (self.now, self.heard) = (now, heard);
+        }
     }
 }
 
@@ -302,31 +287,81 @@ impl Link for Radio {
 fn setpoints_flow_through_planning_uploading_and_garbage() {
     let Some(program) = board::program("flockmate") else { return };
     let length = std::env::var("FLOCKMATE_GARBAGE").map_or(GARBAGE, |n| n.parse().expect("a number"));
-    one_is_good(|| fly_through_garbage(&program, length));
+    let (mut vehicle, place) = demo_on_its_way(&program);
+    // An upload by the radio, another roadmap than the one that is flown on.
+    let ((turn, turns), (sends, sent)) = (sync_channel(1), sync_channel(1));
+    let other = mission(LOBBY).roadmap_file;
+    let began = Instant::now();
+    let upload = thread::spawn(move || {
+        let radio = Radio { turns, sends, now: began, heard: Vec::new(), sent: Vec::new() };
+        let mut client = Client::new(Box::new(radio), Some(1));
+        client.find().and_then(|_| client.upload(File::Roadmap, &other, |_| ()))
+    });
+    block(&mut vehicle, &place);
+    let mut rng = Pcg32::seed_from_u64(1);
+    let (mut left, mut steps, mut uploads) = (length, 0, true);
+    vehicle.until("done with garbage and upload", |vehicle| {
+        steps += 1;
+        let handful = (4 * PER_MS).min(left);
+        for port in [Port::Autopilot, Port::Swarm] {
+            let mut garbage = [0; 4 * PER_MS];
+            rng.fill_bytes(&mut garbage);
+            vehicle.send(port, &garbage[..handful]);
+        }
+        left -= handful;
+        let heard = core::mem::take(&mut vehicle.radio);
+        if uploads {
+            // It ends amid its turn.
+            match sent.recv() {
+                Ok(bytes) => vehicle.send(Port::Swarm, &bytes),
+                Err(_) => uploads = false,
+            }
+            uploads &= turn.send((began + vehicle.time, heard)).is_ok();
+        }
+        let around = vehicle.heard.texts.iter().any(|text| text == "Flying around");
+        if around && left > 0 && vehicle.heard.state == State::Follow && steps % 250 == 0 {
+            // It hovers, rather than to land before all has come.
+            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
+        } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
+            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
+        }
+        !uploads && is_over(vehicle)
+    });
+    let stack = vehicle.board.stack_used().expect("a board");
+    let (count, gap_ms) = reported(&mut vehicle);
+    let heard = &vehicle.heard;
+    println!("{:?}", heard.texts);
+    println!(
+        "{length} bytes of garbage on each line: {count} setpoints reported, {} heard, at most {gap_ms} ms apart; {} µs late at \
+         most; {stack} bytes of stack",
+        heard.setpoints.len(),
+        late_us(heard)
+    );
+    assert_eq!(count, heard.setpoints.len(), "setpoints were lost");
+    assert_eq!(heard.missing, [0, 0], "frames were lost");
+    done(&vehicle);
+    assert_eq!(left, 0, "over before the end of the garbage: {:?}", heard.texts);
+    upload.join().expect("a client").expect("the upload arrives");
+    assert!(heard.texts.iter().any(|text| text == "Flying around"));
+    assert!(late_us(heard) <= LATE_US && gap_ms <= 51, "setpoints were {gap_ms} ms apart");
+    assert!(stack <= 64 << 10, "{stack} bytes of stack");
 }
 
-fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
+/// The demo's first vehicle alone, on its way, and a place ahead of it.
+fn demo_on_its_way(program: &Path) -> (Vehicle, Geodetic) {
     let demo = DEMO.match_indices(VEHICLE).nth(1).map_or(DEMO, |(second, _)| &DEMO[..second]);
     let mut demo = mission(demo);
     let plan = demo.plan().expect("the demo has a plan");
     let place = enu_to_geodetic(&demo.scenario.map.origin, &ahead(&plan.flights[0].path));
-    let bank = board::bank(&demo.roadmap_file, &demo.mission_file);
-    let mut vehicle = Vehicle::new(Emulated::start(program, Some(SHIFT), Some(&bank)), &demo, 1);
+    let mut vehicle = Vehicle::new(program, &demo, &demo, 1);
     vehicle.start();
-    vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow || is_over(vehicle));
-    if is_over(&mut vehicle) {
-        return Err(format!("over before it was on its way: {:?}", vehicle.heard.texts));
-    }
+    vehicle.until("on its way", |vehicle| vehicle.heard.state == State::Follow);
+    (vehicle, place)
+}
 
-    // An upload by the radio, another roadmap than the one that is flown on.
-    let ((to_client, heard), (sent, from_client)) = (channel(), channel());
-    let other = mission(LOBBY).roadmap_file;
-    let upload = thread::spawn(move || {
-        let mut client = Client::new(Box::new(Radio { heard, sent }), Some(1));
-        client.find().and_then(|_| client.upload(File::Roadmap, &other, |_| ()))
-    });
-    // Something lies on the path: it has to be planned around, in the air.
-    let exclude = COMMAND_INT_DATA {
+/// Something lies on the path: it has to be planned around, in the air.
+fn block(vehicle: &mut Vehicle, place: &Geodetic) {
+    vehicle.tell(&COMMAND_INT_DATA {
         command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
         target_system: 1,
         frame: MavFrame::MAV_FRAME_GLOBAL,
@@ -335,58 +370,64 @@ fn fly_through_garbage(program: &Path, length: usize) -> Result<(), String> {
         y: (place.lon_deg * 1e7).round() as i32,
         z: place.alt_m as f32,
         ..COMMAND_INT_DATA::DEFAULT
-    };
-    vehicle.tell(&exclude);
-    let mut rng = Pcg32::seed_from_u64(1);
-    let (mut left, mut steps) = (length, 0);
-    let board_ms = |vehicle: &Vehicle| vehicle.heard.setpoints.last().map_or(0, |last| last.time_boot_ms);
-    let began_ms = board_ms(&vehicle);
-    vehicle.until("done with garbage and upload", |vehicle| {
-        steps += 1;
-        let due = PER_MS * (board_ms(vehicle) - began_ms) as usize;
-        let handful = due.saturating_sub(length - left).min(HANDFUL).min(left);
-        for port in [Port::Autopilot, Port::Swarm] {
-            let mut garbage = [0; HANDFUL];
-            rng.fill_bytes(&mut garbage);
-            vehicle.send(port, &garbage[..handful]);
-        }
-        left -= handful;
-        let heard = core::mem::take(&mut vehicle.radio);
-        heard.chunks(1024).for_each(|bytes| to_client.send(bytes.to_vec()).unwrap_or_default());
-        from_client.try_iter().for_each(|bytes| vehicle.send(Port::Swarm, &bytes));
-        let around = vehicle.heard.texts.iter().any(|text| text == "Flying around");
-        if around && left > 0 && vehicle.heard.state == State::Follow && steps % 250 == 0 {
-            // It hovers, rather than to land before all has come.
-            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0);
-        } else if left == 0 && vehicle.heard.state == State::Paused && steps % 250 == 0 {
-            vehicle.order(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0);
-        }
-        upload.is_finished() && is_over(vehicle)
     });
+}
+
+/// How many setpoints a board reports, and how far apart at most, milliseconds.
+fn reported(vehicle: &mut Vehicle) -> (usize, u64) {
     vehicle.until_said("Setpoints: ");
-    let upload = upload.join().expect("a client");
-    let heard = &vehicle.heard;
-    println!("{:?}", heard.texts);
-    let told =
-        heard.texts.iter().find_map(|text| text.strip_prefix("Setpoints: ")?.strip_suffix(" ms apart"));
-    let (count, gap) = told.and_then(|told| told.split_once(", at most ")).expect("two numbers");
-    let (count, gap_ms): (usize, u32) = (count.parse().expect("a number"), gap.parse().expect("a number"));
-    let times: Vec<u32> = heard.setpoints.iter().map(|setpoint| setpoint.time_boot_ms).collect();
-    let longest_ms = times.windows(2).map(|pair| pair[1] - pair[0]).max().expect("many");
-    let still_ms = vehicle.stood_still.as_millis() as u32;
+    let mut texts = vehicle.heard.texts.iter();
+    let said = texts.find_map(|text| text.strip_prefix("Setpoints: ")?.strip_suffix(" ms apart"));
+    let (count, gap) = said.and_then(|said| said.split_once(", at most ")).expect("two numbers");
+    (count.parse().expect("a number"), gap.parse().expect("a number"))
+}
+
+/// How late a setpoint was at most, microseconds of the board's time. One that a change of state brings comes early.
+fn late_us(heard: &Heard) -> u64 {
+    let gaps = heard.setpoints_us.windows(2).map(|pair| pair[1] - pair[0]);
+    gaps.max().expect("many").saturating_sub(PERIOD_US)
+}
+
+#[test]
+fn a_plan_of_38_ms_in_the_air_moves_no_setpoint() {
+    let Some(program) = board::program("flockmate") else { return };
+    let fly = |blocks: bool, burst: Duration| {
+        let (mut vehicle, place) = demo_on_its_way(&program);
+        if blocks {
+            vehicle.slow_planner(burst);
+            block(&mut vehicle, &place);
+            vehicle.until_said("Flying around");
+        }
+        let planned = vehicle.time;
+        vehicle.until("over", is_over);
+        done(&vehicle);
+        (late_us(&vehicle.heard), planned)
+    };
+    let (quiet_us, _) = fly(false, Duration::ZERO);
+    let (plain_us, planned) = fly(true, Duration::from_nanos(4));
+    let (burst_us, planned_late) = fly(true, BURST);
     println!(
-        "{length} bytes of garbage on each line: {count} setpoints told, {} heard, at most {gap_ms} ms apart as told, {longest_ms} \
-         by their own times; this machine stood still for up to {still_ms} ms",
-        times.len()
+        "setpoints are late by {quiet_us} µs at most, by {plain_us} µs beside a plan, by {burst_us} µs beside one that takes \
+         38 ms longer and comes {:?} later",
+        planned_late - planned
     );
-    assert_eq!(count, times.len(), "setpoints were lost");
-    assert_eq!(heard.missing, [0, 0], "frames were lost");
-    done(&vehicle)?;
-    if left > 0 {
-        return Err(format!("over {left} bytes before the end of the garbage: {:?}", heard.texts));
+    assert!(planned_late - planned > BURST / 2, "the planner was not slowed");
+    assert!(quiet_us.max(plain_us).max(burst_us) <= LATE_US);
+}
+
+#[test]
+fn a_setpoint_that_is_held_up_is_reported_with_its_gap() {
+    let Some(program) = board::program("flockmate") else { return };
+    for held_up in HELD_UP {
+        let (mut vehicle, _) = demo_on_its_way(&program);
+        downfall::block(&mut vehicle.board, held_up);
+        vehicle.until("over", is_over);
+        let (_, gap_ms) = reported(&mut vehicle);
+        // The board counts whole milliseconds.
+        let times = vehicle.heard.setpoints_us.iter().map(|us| us / 1000).collect::<Vec<_>>();
+        let longest_ms = times.windows(2).map(|pair| pair[1] - pair[0]).max().expect("many");
+        println!("held up for {held_up:?}: {gap_ms} ms reported, {longest_ms} ms seen");
+        assert_eq!(gap_ms, longest_ms);
+        assert!(gap_ms >= held_up.as_millis() as u64 && gap_ms < held_up.as_millis() as u64 + 52);
     }
-    upload.expect("the upload arrives");
-    assert!(heard.texts.iter().any(|text| text == "Flying around"));
-    assert!(gap_ms <= GAP_MS, "setpoints were {gap_ms} ms apart");
-    Ok(())
 }

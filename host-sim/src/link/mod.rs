@@ -21,7 +21,7 @@ use std::fmt;
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use crate::quote::quoted;
 
@@ -45,6 +45,16 @@ pub trait Link: Send {
 
     /// The local address, where there is one: it tells the port when port 0 was asked for.
     fn local_address(&self) -> Option<SocketAddr>;
+
+    /// Now, by the time in which the other end lives: the clock's, unless the link leads into a simulation.
+    fn now(&self) -> Instant {
+        Instant::now()
+    }
+
+    /// Lets a millisecond pass: nothing has come.
+    fn rest(&mut self) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
 }
 
 /// Where a link leads.
@@ -182,7 +192,6 @@ fn is_quiet(error: &io::Error) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Instant;
 
     pub(super) fn hear(link: &mut dyn Link) -> Vec<u8> {
         let mut buffer = [0; 2048];
