@@ -83,7 +83,7 @@ impl Default for Workspace {
 pub struct PlanCase {
     /// Of the cost matrix.
     pub costs: u32,
-    /// Of who flies where, and the total.
+    /// Of which vehicle flies where, and the total.
     pub assignment: u32,
     /// Of the nodes, places, arc lengths and clearances of all paths.
     pub paths: u32,

@@ -56,7 +56,7 @@ pub enum Work {
     Plan = 3,
 }
 
-/// Work with certain files, told by a checksum.
+/// Work with certain files, identified by a checksum.
 type Task = (Work, u32);
 
 /// What is kept.

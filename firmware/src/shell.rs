@@ -31,7 +31,7 @@ const CHUNK: usize = 256;
 const GATHER: Duration = Duration::from_millis(1);
 /// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// Errors of a line are told at once, and then no more often than this.
+/// Errors of a line are reported at once, and then no more often than this.
 const TELL_EVERY: Duration = Duration::from_secs(10);
 /// What is said of them: errors that the UART reported, and frames that were damaged or cut.
 const LINE_TEXTS: [&str; 2] =
@@ -105,9 +105,9 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
 pub const NO_AUTOPILOT: u8 = 250;
 /// An autopilot tells of itself once a second.
 const HEAR_WITHIN: Duration = Duration::from_secs(3);
-/// So long after the first, every autopilot on the line has told of itself.
+/// So long after the first, every autopilot on the line has been heard.
 const COMPARE_FOR: Duration = Duration::from_millis(1100);
-/// Autopilots told apart.
+/// Autopilots that are distinguished.
 const HEARD: usize = 8;
 
 /// Listens for autopilots.
@@ -130,7 +130,7 @@ impl Ear {
             let beats = frame.message_id == HEARTBEAT;
             match self.heard.iter_mut().find(|(id, ..)| *id == frame.system) {
                 Some((_, frames, beat)) => (*frames, *beat) = (*frames + 1, *beat || beats),
-                // More than these are not told apart.
+                // More than these are not distinguished.
                 None => _ = self.heard.push((frame.system, 1, beats)),
             }
         }
@@ -202,8 +202,8 @@ impl Shell {
                     Event::PlanRequested => self.wants_plan.signal(()),
                     Event::RestartRequested => self.ask_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
-                        if let Some(told) = self.setpoints.take(now_ms()) {
-                            companion.say_count(false, "Setpoints: #, at most # ms apart", told);
+                        if let Some(reported) = self.setpoints.take(now_ms()) {
+                            companion.say_count(false, "Setpoints: #, at most # ms apart", reported);
                         }
                     }
                     // Its text says so.
@@ -239,7 +239,7 @@ impl Shell {
         let mut chunk = [0; CHUNK];
         let mut ear = for_autopilot.then(Ear::new);
         let errors = &self.line_errors[link as usize];
-        let (mut told, mut tells_at) = (0, Instant::MIN);
+        let (mut reported, mut tells_at) = (0, Instant::MIN);
         loop {
             match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
@@ -256,8 +256,8 @@ impl Shell {
                 Err(_) => {}
             }
             let count = errors.load(Ordering::Relaxed);
-            if count != told && Instant::now() >= tells_at {
-                (told, tells_at) = (count, Instant::now() + TELL_EVERY);
+            if count != reported && Instant::now() >= tells_at {
+                (reported, tells_at) = (count, Instant::now() + TELL_EVERY);
                 self.with(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
@@ -321,7 +321,7 @@ impl Shell {
         }
     }
 
-    /// Does one thing that the companion asks of its flash; false if it asks for none, or is about to start anew: that must
+    /// Does one thing that the companion asks of its flash; false if it asks for none, or is about to restart: that must
     /// not tear what is being written.
     async fn serve_flash(&'static self, flash: &mut impl Flash) -> bool {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {
@@ -428,8 +428,8 @@ impl Setpoints {
     /// Number and longest gap of a flight that is over; none if it had none.
     fn take(&self, now_ms: u32) -> Option<[u32; 2]> {
         self.end(now_ms);
-        let told = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
-        (told[0] > 0).then_some(told)
+        let reported = [&self.count, &self.gap_ms].map(|number| number.swap(0, Ordering::Relaxed));
+        (reported[0] > 0).then_some(reported)
     }
 }
 

@@ -1,4 +1,4 @@
-//! A line that fails under the shell: overruns and framing errors at the driver's boundary are counted, told and survived. The
+//! A line that fails under the shell: overruns and framing errors at the driver's boundary are counted, reported and survived. The
 //! clock is the test's.
 
 use std::collections::VecDeque;
@@ -113,12 +113,12 @@ fn errors_of_a_line_are_counted_and_told_and_what_comes_after_is_heard() {
     run(300);
     receive(Ok(beat()));
     run(300);
-    let told = |link: usize| texts(&lines[link].sent.lock().unwrap());
+    let reported = |link: usize| texts(&lines[link].sent.lock().unwrap());
     let errors =
-        |link: usize| told(link).into_iter().filter(|text| text.contains("errors")).collect::<Vec<_>>();
+        |link: usize| reported(link).into_iter().filter(|text| text.contains("errors")).collect::<Vec<_>>();
     assert_eq!(shell.line_errors[0].load(Ordering::Relaxed), 2);
-    assert!(told(0).contains(&"Autopilot found".to_owned()), "{:?}", told(0));
-    // The first is told at once, on both links, the others ten seconds later with all that came meanwhile.
+    assert!(reported(0).contains(&"Autopilot found".to_owned()), "{:?}", reported(0));
+    // The first is reported at once, on both links, the others ten seconds later with all that came meanwhile.
     assert_eq!(errors(0), ["Autopilot line: 1 errors, 0 damaged frames"]);
     assert_eq!(errors(1), errors(0));
     (0..500).for_each(|_| receive(Err(ErrorKind::Other)));

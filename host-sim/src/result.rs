@@ -109,7 +109,7 @@ pub struct Timing {
     pub roadmap_parts: Parts,
     /// The shortest paths that tell what each goal would cost each vehicle.
     pub search_s: f64,
-    /// Who flies to which goal.
+    /// Which vehicle flies to which goal.
     pub assignment_s: f64,
     /// The whole plan: search, assignment, schedule.
     pub plan_s: f64,

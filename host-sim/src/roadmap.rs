@@ -44,7 +44,7 @@ pub struct Roadmap {
 /// How long each part took, seconds. Boxes and nodes are made at the same time.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize)]
 pub struct Parts {
-    /// The tree of boxes over the map, from which distances are told.
+    /// The tree of boxes over the map, from which distances are read.
     pub boxes_s: f64,
     /// Random free nodes, and their heights over the ground.
     pub nodes_s: f64,
@@ -137,15 +137,15 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     };
     let unsure_m = rounding_m(grid.shape()) + 1e-5 * config.clearance_m;
     in_pieces(nodes.len(), |range, edges| {
-        let told = Cell::new(None);
+        let known = Cell::new(None);
         let hint = |edge| {
             let nearest_m = clearance_m(edge, config.clearance_m - unsure_m);
-            told.set(Some(nearest_m));
+            known.set(Some(nearest_m));
             let sure = (nearest_m - config.clearance_m).abs() > unsure_m;
             sure.then_some(nearest_m > config.clearance_m)
         };
         prm::connect_range_with(grid, workspace, config, range, hint, |edge, room_m| {
-            let clearance_m = match told.take() {
+            let clearance_m = match known.take() {
                 Some(nearest_m) if room_m == 0.0 => nearest_m,
                 _ if room_m + ALIKE_M >= most_m(edge) => most_m(edge),
                 _ => clearance_m(edge, 0.0),
@@ -172,7 +172,7 @@ fn in_pieces<T: Copy + Send>(
     Ok(pieces.concat())
 }
 
-/// What distances told by cells and by boxes may differ by, metres, many times over: both are rounded as coordinates are.
+/// What distances from cells and from boxes may differ by, metres, many times over: both are rounded as coordinates are.
 fn rounding_m(shape: &GridShape) -> f32 {
     let longest = shape.dims.into_iter().max().unwrap_or(0) as f32;
     (1e-3 + longest * 16.0 * f32::EPSILON) * shape.resolution_m

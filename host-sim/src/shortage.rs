@@ -1,6 +1,6 @@
 //! What a mission is short of: goals that no vehicle flies to, vehicles without a goal, and what would help.
 //!
-//! Whether a way is missing in the roadmap or in the building is told by the map itself: the widest way from a goal to a
+//! Whether a way is missing in the roadmap or in the building is read from the map itself: the widest way from a goal to a
 //! start, over the centres of its cells, by a flood that always goes on from the widest cell it has reached. Its width is
 //! the distance to the nearest obstacle at the narrowest cell. Cost: the cells, once a goal, and a search of the neighbourhood
 //! of each near a wall; only missions that fall short pay it.
@@ -14,7 +14,7 @@ use planner_core::segment::point_clearance;
 use crate::map::VoxelMap;
 use crate::mission::{Mission, SwarmPlan};
 
-/// Widths are told apart by this much, metres.
+/// Widths that differ by less are the same, metres.
 const STEP_M: f32 = 0.05;
 /// Larger grids are not flooded: the list of cells takes 4 bytes each.
 const MOST_CELLS: usize = 1 << 25;

@@ -207,7 +207,7 @@ impl Client {
         bail!("the companion does not answer")
     }
 
-    /// Uploads a file; `progress` is told how many bytes have arrived.
+    /// Uploads a file; `progress` gets the number of bytes that have arrived.
     ///
     /// # Errors
     /// The companion refuses it, does not answer, or got something else.
@@ -288,7 +288,7 @@ fn why(data: &[u8]) -> String {
     let known = match data {
         [2, 5, ..] => "the file is no such file, damaged, or the flash failed; the old one was kept",
         [2, 27, ..] => "the file is too large",
-        [4, ..] => "the companion was started anew",
+        [4, ..] => "the companion was restarted",
         [5, ..] => "another client is uploading",
         [9, ..] => {
             "the companion protects its file: the vehicle is armed, or a roadmap waits for a restart already\n\

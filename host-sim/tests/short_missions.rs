@@ -51,8 +51,8 @@ fn a_serial_link_that_fails_a_mission_is_told_with_what_would_do() {
     ] {
         let flight = fly(&format!("[simulation]\n{key} = {value}"));
         assert!(!flight.result.complete, "{key}");
-        let told = flight.log.iter().find(|event| event.text.contains(cause)).map(|event| &event.text);
-        let (_, remedy) = told.expect(key).split_once(&format!("simulation.{key} of ")).expect(key);
+        let found = flight.log.iter().find(|event| event.text.contains(cause)).map(|event| &event.text);
+        let (_, remedy) = found.expect(key).split_once(&format!("simulation.{key} of ")).expect(key);
         let remedy = remedy.split(' ').next().unwrap();
         // What it says would do does.
         assert!(fly(&format!("[simulation]\n{key} = {remedy}")).result.complete, "{key} = {remedy}");

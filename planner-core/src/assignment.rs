@@ -1,4 +1,4 @@
-//! Who flies to which task: the linear sum assignment and the bottleneck assignment, on dense cost matrices.
+//! Which vehicle flies to which task: the linear sum assignment and the bottleneck assignment, on dense cost matrices.
 //!
 //! Source: R. Jonker, A. Volgenant, "A shortest augmenting path algorithm for dense and sparse linear assignment
 //! problems", Computing 38 (1987): column reduction with reduction transfer, augmenting row reduction, then one shortest
@@ -6,7 +6,7 @@
 //!
 //! Beyond the paper: fewer rows than columns or the other way round, and pairs that cannot be (`f32::INFINITY`). The
 //! answer has the most pairs there can be and, among those, the least total. No large number stands in for infinity.
-//! Where every row of the shorter side can be served, Jonker–Volgenant answers; where one cannot, it is begun anew with
+//! Where every row of the shorter side can be served, Jonker–Volgenant answers; where one cannot, it begins again with
 //! shortest augmenting paths from *all* free rows at once. Each of those keeps the matching the cheapest of its size,
 //! so when no path is left it is the largest and the cheapest of that size.
 //!

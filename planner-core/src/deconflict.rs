@@ -291,7 +291,7 @@ mod tests {
         assert_eq!((advice.stop_within_m, advice.waiting_for), (2.5, 7), "an unheard vehicle has not passed");
         heard[0] = Neighbour { out: true, grounded: true, ..neighbour(7, 1, Point::new(9.0, 9.0, 0.0)) };
         let advice = advise(&cfg(Method::Priority), &own(&path), &gates[2..], &heard);
-        assert_eq!(advice, Advice::FREE, "who is out of the plan will never pass");
+        assert_eq!(advice, Advice::FREE, "a vehicle out of the plan will never pass");
     }
 
     #[test]

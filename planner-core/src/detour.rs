@@ -40,9 +40,9 @@ pub struct KeepOff {
 pub enum Nature {
     /// Something, all along the stretch for all one knows.
     Solid,
-    /// Somebody at `from` who comes down to `to`: not to be rested below, nor flown up to.
+    /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
     Landing,
-    /// Somebody who lies on the ground below `from`: where the roadmap knows the ground, that place only is kept off.
+    /// A vehicle on the ground below `from`: where the roadmap knows the ground, that place only is kept off.
     Lying,
 }
 
@@ -54,7 +54,7 @@ impl KeepOff {
         not_negative("radius_m", self.radius_m)
     }
 
-    /// The same, with no more distance than `here` has: who is too near already may fly off.
+    /// The same, with no more distance than `here` has: a vehicle that is too near already may fly off.
     fn seen_from(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
@@ -77,7 +77,7 @@ impl KeepOff {
         Self { from, to, ..*self }
     }
 
-    /// What of it is not to be flown through. One who comes down may be met half way by who flies up as fast: of its column
+    /// What of it is not to be flown through. A vehicle that descends may be met half way by one that climbs as fast: of its column
     /// the lower third of what is above `here` is left to cross.
     fn solid(&self, here: &Point) -> Self {
         if self.nature != Nature::Landing {

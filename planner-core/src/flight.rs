@@ -208,7 +208,7 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub descent_m: f32,
     /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad instead of in the air.
     pub depart_s: f32,
-    /// Where to wait for whom.
+    /// Where to wait, and for which vehicle.
     pub gates: Vec<Gate, G>,
     /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every gate.
     pub plan_crc: u32,

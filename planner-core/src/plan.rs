@@ -1,4 +1,4 @@
-//! The plan of a whole swarm: who flies to which goal, along which path, in which order.
+//! The plan of a whole swarm: which vehicle flies to which goal, along which path, in which order.
 //!
 //! Every companion computes this for the whole swarm from the mission's starts and goals, never from live positions, so all
 //! agree; the CRC of the plan is what they compare. P3D §3.3: one roadmap, a shortest path per vehicle (labelled) or the
@@ -84,7 +84,7 @@ pub fn costs<const N: usize, const V: usize, const P: usize>(
     Ok(())
 }
 
-/// Second step: who flies to which goal, from the costs left in the workspace by [`costs`].
+/// Second step: which vehicle flies to which goal, from the costs left in the workspace by [`costs`].
 pub fn assign<const N: usize, const V: usize, const P: usize>(
     request: &PlanRequest<'_>,
     ws: &mut PlanWorkspace<N, V, P>,

@@ -101,7 +101,7 @@ pub trait Graph {
     /// Which of these half-edges may shorten the way to their targets, `reached` being the way to `here`: their places in
     /// `half_edges` go to `out`, their number is returned. `first` is the index of the first. None that does is left out.
     ///
-    /// Most do not: the target is settled, or reached more cheaply. They are told apart by selects, since which they are
+    /// Most do not: the target is settled, or reached more cheaply. They are distinguished by selects, since which they are
     /// cannot be predicted.
     fn gains<const N: usize>(
         &self,
@@ -238,7 +238,7 @@ pub fn dijkstra_all<const N: usize>(
 /// none. One row of the cost matrix; stops when all targets are settled.
 ///
 /// For few targets the search is drawn to them one after another: what A* settled for one target stays settled, its
-/// distance is final, and only the waiting nodes are ordered anew for the next. For many it is Dijkstra's.
+/// distance is final, and only the waiting nodes are ordered again for the next. For many it is Dijkstra's.
 pub fn dijkstra_row<const N: usize>(
     graph: &impl Graph,
     from: u16,

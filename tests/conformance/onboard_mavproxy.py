@@ -87,7 +87,7 @@ def use(proxy, roadmap, mission, back):
         name, size = os.path.basename(path), os.path.getsize(path)
         holds(f"{name} goes up", proxy.does(f"ftp put {path} {name}", f"Sent file of length {size}"))
         holds("it is listed", proxy.does("ftp list /", f"{name}\t{size}", "Total size"))
-        holds("its CRC is told", proxy.does(f"ftp crc {name}", f"crc: {name} 0x"))
+        holds("its CRC is answered", proxy.does(f"ftp crc {name}", f"crc: {name} 0x"))
         holds("it comes back", proxy.does(f"ftp get {name} {back}", f"Wrote {size} bytes"))
         # It closes the file after it says so.
         end = time.monotonic() + PATIENCE_S

@@ -130,7 +130,7 @@ def main():
     check("a roadmap goes up", done(put(roadmap, "/roadmap.bin")))
     check("it is listed", names() == {"roadmap.bin": os.path.getsize(roadmap)}, names())
     check("it comes back the same", get("roadmap.bin") == bytes_of(roadmap))
-    check("its CRC is told", done(ftp.cmd_crc(["roadmap.bin"])))
+    check("its CRC is answered", done(ftp.cmd_crc(["roadmap.bin"])))
     check("a mission goes up", done(put(mission, "mission.bin")))
     check("and comes back the same", get("/mission.bin") == bytes_of(mission))
     with tempfile.NamedTemporaryFile() as damaged:

@@ -307,8 +307,8 @@ impl Flight {
                 self.check.restart();
             }
             // In a mode that is none of setpoints, as far as was reported, they go with the vehicle.
-            let told = self.companion.telemetry();
-            self.check.follows = told.custom_mode != told.kind.unwrap_or_default().setpoint_mode();
+            let telemetry = self.companion.telemetry();
+            self.check.follows = telemetry.custom_mode != telemetry.kind.unwrap_or_default().setpoint_mode();
             self.check.urgent = self.companion.stops_urgently();
             self.check.take(self.now.micros() as f64 * 1e-6, &data);
         }

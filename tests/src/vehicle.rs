@@ -1,4 +1,4 @@
-//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and somebody who gives orders by its radio.
+//! One vehicle: a board in QEMU in lock step with a simulated autopilot, and a ground station on its radio.
 
 use std::path::{self, PathBuf};
 use std::time::Duration;
@@ -50,7 +50,7 @@ pub struct Heard {
     pub setpoints_us: Vec<u64>,
     /// Commands to the autopilot: number and first parameter.
     pub commands: Vec<(u32, f32)>,
-    /// Its state as last told.
+    /// Its state as last reported.
     pub state: State,
     /// Frames missing in the row of each line, by their numbers. A companion that restarts counts from zero, which shows too.
     pub missing: [u32; 2],

@@ -1,5 +1,5 @@
 //! An emulated board in flight, treated badly: reset at any moment, cables pulled, garbage on both lines. The board is the firmware
-//! as it is flashed, the autopilot beside it the simulated one, both in lock step: what is told here happens the same every time.
+//! as it is flashed, the autopilot beside it the simulated one, both in lock step: what is tested here happens the same every time.
 //!
 //! `FLOCKMATE_FIRMWARE=… FLOCKMATE_RESETS=50 cargo test --workspace --test board_flights -- --nocapture` resets fifty times, and
 //! `FLOCKMATE_GARBAGE=1000000` puts a megabyte on each line.

@@ -1,4 +1,4 @@
-//! A roadmap with more edges than a board holds is cut down so that it fits: whoever was connected stays so, whatever
+//! A roadmap with more edges than a board holds is cut down so that it fits: nodes that were connected stay so, whatever
 //! clearance is required, and paths lengthen little.
 
 use std::time::Instant;
@@ -59,7 +59,7 @@ fn paths_stay_short(name: &str, all: &RoadmapView<'_>, kept: &RoadmapView<'_>) {
         }
         ratios.sort_by(f32::total_cmp);
         if ratios.is_empty() {
-            println!("{name}: nobody who needs {required_m} m gets anywhere");
+            println!("{name}: no vehicle that needs {required_m} m gets anywhere");
             continue;
         }
         let at = |share: f32| ratios[((ratios.len() - 1) as f32 * share) as usize];

@@ -56,7 +56,7 @@ fn ten_vehicles_fly_the_building_clean_with_other_seeds() {
     for seed in 1..=8 {
         let result = fly(&scenario_path("host-sim/scenarios/demo.toml"), Some(seed));
         let served = result.vehicles.iter().filter(|v| v.goal.is_some()).count();
-        // A roadmap of 2300 nodes may leave a goal out of reach (P3D Fig. 10); whoever flies, flies clean.
+        // A roadmap of 2300 nodes may leave a goal out of reach (P3D Fig. 10); every vehicle that flies, flies clean.
         assert!(served >= 8, "seed {seed}: only {served} goals in reach");
         let safety = &result.safety;
         assert_eq!(

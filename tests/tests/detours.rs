@@ -1,4 +1,4 @@
-//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of somebody who has the map.
+//! Detours with the floor that the roadmap file knows, as desk and board plan them, beside those of a planner that has the map.
 //!
 //! A vehicle flies from node to node; another one fell silent above its path and lies on the ground there. With a file of
 //! version 1 the whole column below is kept off.
@@ -27,7 +27,7 @@ const KEPT_M: f32 = 2.5;
 const NEAREST_M: f32 = 1.2;
 /// Share of the ways around that the ground of the roadmap leaves as they are.
 const SAME_PERCENT: usize = 85;
-/// Where the ground is deeper than told, what lies there is not kept off: at most this share of the places.
+/// Where the ground is deeper than the file says, what lies there is not kept off: at most this share of the places.
 const DEEPER_PERCENT: f64 = 0.25;
 /// Capacity of a board and of the desk.
 const BOARD: usize = 4096;
@@ -89,7 +89,7 @@ fn grounds(name: &str, map: &VoxelMap, view: &RoadmapView<'_>, dice: &mut Dice) 
     }
     let share = |count: usize| 100.0 * count as f64 / PLACES as f64;
     println!(
-        "{name}: ground not told at {:.2} %, deeper than told at {:.2} %, higher at {:.2} %; lowest and highest told \
+        "{name}: ground unknown at {:.2} %, deeper than the file says at {:.2} %, higher at {:.2} %; lowest and highest known \
          are {:.2} m apart in the mean",
         share(unknown),
         share(deeper),
@@ -157,8 +157,8 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         assert_eq!(by_desk, by_board, "desk and board fly other ways");
         let by_map = planned(&new, &request, exact, &mut desk);
         let by_old = planned(&old, &request, column, &mut board);
-        let told = |planned: &Planned| usize::from(planned.is_ok());
-        found += told(&by_map);
+        let is_found = |planned: &Planned| usize::from(planned.is_ok());
+        found += is_found(&by_map);
         same += usize::from(by_map == by_board && by_map.is_ok());
         found_by_old += usize::from(by_map.is_ok() && by_map == by_old);
         let passed_m = |leg: &[Point]| {
@@ -174,7 +174,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
         "{name}: of {cases} vehicles {found} find a way with the map; the same way {same} with the ground of the \
          roadmap, {found_by_old} without; the nearest passes what lies there at {nearest_m:.2} m"
     );
-    // Whoever is nearer to where something may lie than it should be has to come no nearer, so it may pass nearer than KEPT_M.
+    // A vehicle that is nearer to where something may lie than it should be has to come no nearer, so it may pass nearer than KEPT_M.
     assert!(nearest_m > NEAREST_M, "{name}: {nearest_m}");
     assert!(same * 100 >= found * SAME_PERCENT, "{name}: {same} of {found}");
     assert!(found_by_old < same, "{name}: the ground makes no difference");

@@ -15,7 +15,7 @@ use host_sim::mission::{Mission, SwarmPlan};
 use host_sim::progress::Progress;
 use host_sim::report::Event;
 use host_sim::result::VehicleResult;
-use host_sim::scenario::{self, Fault, Geofence};
+use host_sim::scenario::{self, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence};
 use host_sim::swarm::{self, Flight};
 use planner_core::Point;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ use rayon::prelude::*;
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 /// Seeds of a run that does not say how many.
 const SEEDS: u64 = 2;
-/// Everybody who is not held up has landed by then, seconds.
+/// Every vehicle that is not held up has landed by then, seconds.
 const TIME_LIMIT_S: f32 = 500.0;
 
 /// What is expected of a kind of fault.
@@ -141,7 +141,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
     let goes_on = case.then == GoesOn
         && !["start cancelled", "Disarmed in flight", "landing stopped"].iter().any(|text| said(text));
     let (mut too_near, mut hit) = (0, 0);
-    // Who could not help being hit is struck from then on; that it flies on at all is the simulation's.
+    // A vehicle that could not help being hit is struck from then on; that it flies on at all is the simulation's.
     let is_hit = |e: &&Event| e.text.contains("is hit by falling") && is_unavoidable(flight, at_s, e);
     let hit_at: Vec<(u8, f32)> =
         flight.log.iter().filter(is_hit).filter_map(|e| Some((e.vehicle?, e.t_s))).collect();
@@ -248,6 +248,13 @@ fn print_log(flight: &Flight) {
     log.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
     for e in log {
         println!("{:7.2} s {:?} {}", e.t_s, e.vehicle, e.text);
+    }
+}
+
+#[test]
+fn every_kind_of_fault_has_a_case() {
+    for kind in FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]) {
+        assert!(CASES.iter().any(|case| case.script.contains(&format!("'{kind}'"))), "no case of {kind}");
     }
 }
 

@@ -106,7 +106,7 @@ fn messages_are_counted_as_pymavlink_counts_them() {
     }
 }
 
-/// Whoever must survive: a companion and a simulated autopilot of each kind, and what they say.
+/// What must survive: a companion and a simulated autopilot of each kind, and what they say.
 #[derive(Clone)]
 struct Victims {
     now: Instant,

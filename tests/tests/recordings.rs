@@ -141,7 +141,7 @@ fn the_simulated_px4_answers_as_the_recorded_one_did() {
     let (real, simulated) = replay(&recording(&path), &config, 1.0);
     assert_same_acks(&real, &simulated);
     assert_eq!(real.modes, simulated.modes);
-    // Where exactly LANDING is told is the land detector's; the rest is the flight's.
+    // Where exactly LANDING is reported is the land detector's; the rest is the flight's.
     assert_eq!(
         (real.landed.first(), real.landed.last()),
         (simulated.landed.first(), simulated.landed.last())
@@ -156,12 +156,12 @@ struct Seen {
     frames: u32,
 }
 
-/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global position was told, the
+/// Plays what the autopilot said to a companion whose mission origin is `origin`. Wherever a global position was sent, the
 /// companion's own, from local metres by that autopilot's projection, must be the same place.
 fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_ORIGIN_DATA>) -> (Seen, Seen) {
     let mut companion: Companion<2, 4, 2> =
         Companion::new(CompanionConfig::new(1, Point::zeros(), origin)).unwrap();
-    let (mut told, mut seen, mut compared, mut buffer) = (Story::default(), Seen::default(), 0, [0; 512]);
+    let (mut story, mut seen, mut compared, mut buffer) = (Story::default(), Seen::default(), 0, [0; 512]);
     let (mut grounded, mut sent) = (Vec::new(), 0);
     let from_autopilot =
         |entry: &&Recorded| entry.frame.as_ref().is_none_or(|f| (f.system, f.component) == (1, 1));
@@ -190,7 +190,7 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
             seen.grounded.push(on_ground);
         }
         let Some(heard) = &entry.frame else { continue };
-        told.hear(entry.t_s, heard);
+        story.hear(entry.t_s, heard);
         if heard.message_id == EXTENDED_SYS_STATE {
             let on_ground = heard.padded()[1] == 1;
             if grounded.last() != Some(&on_ground) {
@@ -206,7 +206,7 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
             };
             let age_s = (now - at).secs_f32();
             let apart = telemetry.position + telemetry.velocity * age_s - geodetic_to_enu(&origin, &place);
-            // The two are told up to a stream's period apart.
+            // The two are sent up to a stream's period apart.
             assert!(age_s > 0.2 || apart.xy().norm() < 0.1, "{apart} at {} s, {age_s} s old", entry.t_s);
             compared += 1;
         }
@@ -214,7 +214,7 @@ fn play(recorded: &[Recorded], origin: Geodetic, announced: Option<&GPS_GLOBAL_O
     println!("{compared} places compared");
     assert!(compared > 300, "{compared} places compared");
     seen.frames = companion.counters(Link::Autopilot).frames;
-    (Seen { modes: told.modes, grounded, frames: sent }, seen)
+    (Seen { modes: story.modes, grounded, frames: sent }, seen)
 }
 
 #[test]
@@ -224,14 +224,14 @@ fn the_companion_sees_px4s_recorded_flight_as_it_was() {
     let announced =
         GPS_GLOBAL_ORIGIN_DATA { latitude: 473_977_415, longitude: 85_455_963, altitude: 489_824 };
     let origin = Geodetic { lat_deg: 47.405, lon_deg: 8.55, alt_m: 480.0 };
-    let (told, seen) = play(&recording(&path), origin, Some(&announced));
-    assert_eq!(told, seen);
+    let (story, seen) = play(&recording(&path), origin, Some(&announced));
+    assert_eq!(story, seen);
 }
 
 #[test]
 fn the_companion_sees_arducopters_recorded_flight_as_it_was() {
     let Some(path) = shared_data("mavlink/arducopter-4.6-guided.tlog") else { return };
     let origin = Geodetic { lat_deg: -35.357, lon_deg: 149.17, alt_m: 580.0 };
-    let (told, seen) = play(&recording(&path), origin, None);
-    assert_eq!(told, seen);
+    let (story, seen) = play(&recording(&path), origin, None);
+    assert_eq!(story, seen);
 }

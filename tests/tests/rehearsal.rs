@@ -219,7 +219,7 @@ fn px4_lands_when_its_companion_stalls_and_gets_no_setpoint_afterwards() {
     let (_autopilot, at) = autopilot(&[&format!("udp:127.0.0.1:{port}"), "udp-listen:127.0.0.1:0"], &[]);
     let mut pilot = Ground::new(&format!("udp:{}", at[1]));
     let mut flight = Flight::begin(&format!("udp-listen:127.0.0.1:{port}"));
-    // Again and again: who is silent for long is told nothing any more.
+    // Again and again: an address that is silent for long is sent nothing any more.
     flight.until("Climb → Follow", || pilot.set_integer("COM_OBL_RC_ACT", 4));
     pilot.set_integer("COM_OBL_RC_ACT", 4);
     flight.signal("-STOP");

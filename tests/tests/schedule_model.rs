@@ -10,7 +10,7 @@
 //!   A gate counts as open as soon as some report may open it.
 //! - No deadlock: some vehicle can go on until all have landed. A gate counts as open only if every report opens it.
 //!
-//! Planted errors must be found. Which plans they spoil is told without the search: gates only open, so two vehicles can be at
+//! Planted errors must be found. Which plans they spoil is known without the search: gates only open, so two vehicles can be at
 //! two places at once if they come there when each goes as far as it may and no further than its place, with all others out of the
 //! plan. So a dropped gate *matters* in a plan, and every gate that does is dropped. Likewise for vehicles that do not stop
 //! at a gate when they already stand at it (`<` for `≤` in the gate's place). Gates that open only beyond their progress (`<` for
@@ -59,7 +59,7 @@ enum Obeys {
     Right,
     /// A planted error: the progress asked for does not open a gate, more does.
     OpensBeyond,
-    /// A planted error: a gate does not hold who already stands at it.
+    /// A planted error: a gate does not hold a vehicle that already stands at it.
     NotAtGate,
 }
 
@@ -157,7 +157,7 @@ impl Model {
         })
     }
 
-    /// Where everybody ends up who goes as far as it may, and no further than `most`; vehicles may begin out of the plan.
+    /// Where each vehicle ends up that goes as far as it may, and no further than `most`; vehicles may begin out of the plan.
     fn furthest(&self, begin: State, until: State, most: bool) -> State {
         let mut state = begin;
         loop {
@@ -173,7 +173,7 @@ impl Model {
         }
     }
 
-    /// Whether two vehicles can come too near, told without a search: nobody but they has to wait for them.
+    /// Whether two vehicles can come too near, found without a search: no other vehicle has to wait for them.
     fn meets(&self) -> bool {
         (0..self.courses.len()).flat_map(|i| (0..i).map(move |j| (i, j))).any(|(i, j)| {
             let mut begin = [OUT; 4];
@@ -186,7 +186,7 @@ impl Model {
         })
     }
 
-    /// Whether somebody waits forever when nobody leaves the plan, told without a search.
+    /// Whether a vehicle waits forever when none leaves the plan, found without a search.
     fn sticks(&self) -> bool {
         let last = |i: usize| self.courses.get(i).map_or(0, Course::last);
         let ends = std::array::from_fn(last);
@@ -297,7 +297,7 @@ fn one(seed: u64, count: usize) -> Option<Sum> {
     matter.iter().for_each(|model| {
         expect("a gate dropped", model, conflict);
     });
-    expect("gates hold nobody who stands at them", &short.model(Obeys::NotAtGate), conflict);
+    expect("gates hold no vehicle that stands at them", &short.model(Obeys::NotAtGate), conflict);
     let beyond = short.model(Obeys::OpensBeyond);
     let sticks = beyond.sticks();
     if sticks {
@@ -305,7 +305,7 @@ fn one(seed: u64, count: usize) -> Option<Sum> {
     }
     let right = short.model(Obeys::Right);
     if right.meets() || right.sticks() {
-        expect("told without a search", &right, |_| false);
+        expect("found without a search", &right, |_| false);
     }
     if let Outcome::Good(states) = expect("as planned", &right, |outcome| matches!(outcome, Outcome::Good(_)))
     {

@@ -1,5 +1,5 @@
 //! What brought the firmware down, kept in memory that a warm reset leaves alone
-//! ([`kept`](crate::kept)), and told at the next start.
+//! ([`kept`](crate::kept)), and reported at the next start.
 #![expect(unsafe_code, reason = "memory that the start does not touch")]
 
 use core::fmt::Write;

@@ -11,7 +11,7 @@ use super::chosen::LINKS_PRIORITY;
 /// ever, and the lower one never comes to let it go.
 pub struct HoldsExecutors(());
 
-// SAFETY: who takes it runs at the priority of an executor or below, never in a device's interrupt. Then nothing that may take
+// SAFETY: a task that takes it runs at the priority of an executor or below, never in a device's interrupt. Then nothing that may take
 // it runs beside.
 unsafe impl RawMutex for HoldsExecutors {
     const INIT: Self = Self(());

@@ -24,7 +24,7 @@ pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 /// The same where most have left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
-/// The same where all are near and off the plan, and few are in the way: the safety filter looks at all of them.
+/// The same where all are near and off the plan, and few are on the path: the safety filter looks at all of them.
 pub const NEAR_STEP: &str = "a control step, 32 near";
 /// The safety filter alone, which is part of each of them.
 pub const FILTER: &str = "Companion::ask_filter, 32 near";
@@ -193,7 +193,7 @@ pub fn fly<M: Meter>(
     STEPS
 }
 
-/// One flight among neighbours that are near but seldom in the way, the safety filter alone counted by `meter`: in full flight,
+/// One flight among neighbours that are near but seldom on the path, the safety filter alone counted by `meter`: in full flight,
 /// and stopped, when it looks further ahead.
 ///
 /// # Panics
@@ -419,7 +419,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         }
     }
 
-    /// Does what the autopilot is told by a frame.
+    /// Does what a frame commands the autopilot.
     fn obey(&mut self, frame: &[u8]) {
         let mut p = [0; 255];
         let payload = &frame[10..frame.len() - 2];

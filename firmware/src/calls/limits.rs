@@ -38,7 +38,7 @@ pub trait Listener {
     fn next(&mut self, name: &'static str);
 }
 
-/// What is told, and the sum of the answers.
+/// What is reported, and the sum of the answers.
 pub struct Answers<'a, L> {
     listener: &'a mut L,
     sum: u32,

@@ -104,8 +104,8 @@ pub(super) fn files(
     for at in 0..head.len() {
         let mut head = head;
         head[at] ^= 0xff;
-        let told = to.call("roadmap::declared_len", || roadmap::declared_len(&head));
-        assert!(told == Ok(len) || told.is_err());
+        let answer = to.call("roadmap::declared_len", || roadmap::declared_len(&head));
+        assert!(answer == Ok(len) || answer.is_err());
     }
     for cut in 0..len {
         assert!(RoadmapView::parse(&file[..cut]).is_err());
@@ -187,17 +187,17 @@ pub(super) fn searches(
         let all = to.call("search::dijkstra_all", || search::dijkstra_all(view, a, any, ws));
         assert_eq!(all.is_ok(), usize::from(a) < view.node_count());
         let mut row = [0.0; 2];
-        let told =
+        let answer =
             to.call("search::dijkstra_row", || search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row));
-        assert_eq!(told.is_ok(), there);
+        assert_eq!(answer.is_ok(), there);
         assert_eq!(
             search::dijkstra_row(view, a, &[b, 0], any, ws, &mut row[..1]),
             Err(SearchError::OutputLength)
         );
         let mut costs = [0.0; 4];
-        let told = to
+        let answer = to
             .call("search::cost_matrix", || search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs));
-        assert_eq!(told.is_ok(), there);
+        assert_eq!(answer.is_ok(), there);
         assert!(search::cost_matrix(view, &[a, 0], &[b, 1], any, ws, &mut costs[..3]).is_err());
     }
     assert_eq!(search::cost_matrix(view, &[], &[1], any, ws, &mut []), Ok(()));

@@ -164,14 +164,14 @@ fn schedules(
     to.call("schedule::ScheduleWorkspace::new", || size_of_val(&ScheduleWorkspace::new()));
     to.call("sipp::SippWorkspace::new", || size_of_val(&SippWorkspace::<1, 1>::new()));
     for index in [0, 1, 2, usize::MAX] {
-        let told = to
+        let answer = to
             .call("plan::vehicle_plan", || plan::vehicle_plan(plan, index, &SCHEDULE, &mut ws.schedule, own));
-        assert_eq!(told, if index < 2 { Ok(()) } else { Err(ScheduleError::BadIndex) });
+        assert_eq!(answer, if index < 2 { Ok(()) } else { Err(ScheduleError::BadIndex) });
         let mut none: Vec<Gate, 0> = Vec::new();
-        let told = to.call("schedule::gates", || {
+        let answer = to.call("schedule::gates", || {
             schedule::gates(&SCHEDULE, &plan.flights, index, &mut ws.schedule, &mut none)
         });
-        assert!(told.is_ok() || index > 1 || told == Err(ScheduleError::GatesFull));
+        assert!(answer.is_ok() || index > 1 || answer == Err(ScheduleError::GatesFull));
     }
     for (i, hard) in HARD.into_iter().enumerate() {
         let other = HARD[(i * 5) % HARD.len()];
@@ -189,13 +189,13 @@ fn schedules(
         ] {
             for cfg in [SCHEDULE, cfg] {
                 // A number that is none has no right answer; it must only end.
-                let told = to.call("schedule::earliest_departure", || {
+                let answer = to.call("schedule::earliest_departure", || {
                     schedule::earliest_departure(&cfg, &flight, hard, flights[1..].iter(), &mut ws.schedule)
                 });
-                to.is(told.is_ok());
+                to.is(answer.is_ok());
                 let pair = [flight.clone(), flights[1].clone()];
-                let told = schedule::gates(&cfg, &pair, 1, &mut ws.schedule, &mut own.gates);
-                to.is(told.is_ok());
+                let answer = schedule::gates(&cfg, &pair, 1, &mut ws.schedule, &mut own.gates);
+                to.is(answer.is_ok());
                 let mut found = flight.clone();
                 let route = Route {
                     cfg: &cfg,
@@ -204,10 +204,10 @@ fn schedules(
                     not_before_s: hard,
                     parked: &[Point::new(hard, 0.0, 0.0)],
                 };
-                let told = to.call("sipp::route", || {
+                let answer = to.call("sipp::route", || {
                     sipp::route(view, &route, any, flights[1..].iter(), &mut ws.sipp, &mut found)
                 });
-                to.is(told.is_ok());
+                to.is(answer.is_ok());
             }
         }
     }
@@ -215,11 +215,11 @@ fn schedules(
         let (from, to_node) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
         let route = Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[] };
         let mut flight = plan.flights[0].clone();
-        let told =
+        let answer =
             to.call("sipp::route", || sipp::route(view, &route, any, [].iter(), &mut ws.sipp, &mut flight));
         let there = usize::from(from.max(to_node)) < view.node_count();
-        assert!(there || told == Err(ScheduleError::BadIndex));
-        to.is(told.is_ok());
+        assert!(there || answer == Err(ScheduleError::BadIndex));
+        to.is(answer.is_ok());
     }
 }
 
@@ -260,23 +260,23 @@ fn detours(
             let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
             assert!(finite(&[request.here, request.leg[0], request.leg[1]]) || bad[0]);
             assert!((finite(&[thing.from, thing.to]) && hard >= 0.0 && hard.is_finite()) != bad[1]);
-            let told = to.call("detour::plan", || {
+            let answer = to.call("detour::plan", || {
                 detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
             });
             assert_eq!(
                 bad.contains(&true),
-                matches!(told, Err(DetourError::Config(_))),
+                matches!(answer, Err(DetourError::Config(_))),
                 "{request:?} {thing:?}"
             );
             assert!(
-                told.is_err()
+                answer.is_err()
                     || own.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite()))
             );
-            to.is(told.is_ok());
+            to.is(answer.is_ok());
             let again = to.call("detour::plan_vehicle", || {
                 detour::plan_vehicle(view, &request, &mut [thing], ws, &mut nodes, own)
             });
-            assert_eq!(again, told);
+            assert_eq!(again, answer);
         }
         for goal in [2, 4, u16::MAX - 1, u16::MAX] {
             let request = DetourRequest { goal, ..good };

@@ -19,7 +19,7 @@ function buildView(host, onPick) {
 
   const scene = new THREE.Scene();
   scene.background = new THREE.Color(0x15181c);
-  // Far edges of the map fade, so that near and far walls can be told apart.
+  // Far edges of the map fade, so that near and far walls can be distinguished.
   scene.fog = new THREE.Fog(0x15181c, 1, 2);
   const sun = new THREE.DirectionalLight(0xffffff, 1.7);
   sun.position.set(0.5, -0.8, 1.2);

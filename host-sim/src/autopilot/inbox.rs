@@ -69,19 +69,19 @@ impl Autopilot {
     fn send_named_param(&mut self, port: usize, name: Option<&str>) {
         let params = self.firmware.params();
         if let Some(index) = name.and_then(|name| params.index(name)) {
-            let told = if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
-            self.send_param(port, index, told);
+            let reported = if params.encoding() == Encoding::Cast { u16::MAX } else { index as u16 };
+            self.send_param(port, index, reported);
         }
     }
 
-    pub(super) fn send_param(&mut self, port: usize, index: usize, told: u16) {
+    pub(super) fn send_param(&mut self, port: usize, index: usize, reported: u16) {
         let params = self.firmware.params();
         let Some((name, value)) = params.get(index) else { return };
         // By field: value, count, index, name, type.
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&params.wire(value).to_le_bytes());
         payload[4..6].copy_from_slice(&(params.len() as u16).to_le_bytes());
-        payload[6..8].copy_from_slice(&told.to_le_bytes());
+        payload[6..8].copy_from_slice(&reported.to_le_bytes());
         payload[8..8 + name.len()].copy_from_slice(name.as_bytes());
         payload[24] = value.wire_type();
         self.body.ports[port].send_raw(22, &payload);

@@ -3,7 +3,7 @@
 //! All are Ornstein–Uhlenbeck processes (first-order Gauss–Markov; a Dryden gust is one of these along each axis with
 //! τ = L / V). They advance in slots of 20 ms and are held between: nothing they model moves faster.
 //!
-//! A gust is told by its peak over the mean wind, as weather reports and MIL-F-8785C's discrete gust tell it, not by a
+//! A gust is given by its peak over the mean wind, as in weather reports and MIL-F-8785C's discrete gust, not by a
 //! standard deviation: the peak lies [`PEAK_FACTOR`] deviations out, and nothing goes beyond it.
 
 use rand_core::{Rng, SeedableRng};

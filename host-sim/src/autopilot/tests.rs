@@ -242,8 +242,8 @@ fn lost_setpoints_start_the_return_within_1_23_s_and_a_stream_ends_it_by_itself(
     assert_eq!(bench.heartbeat(), (RETURN, 157, 5));
     let gimbal =
         |f: &Frame| (u16::from_le_bytes([f.padded()[28], f.padded()[29]]), f.padded()[30], f.padded()[31]);
-    let told: Vec<_> = bench.of(76).map(|(_, frame)| gimbal(frame)).collect();
-    assert_eq!(told, [(1001, 1, 0), (1000, 1, 0), (1001, 1, 0)], "gimbal commands to component 0");
+    let commands: Vec<_> = bench.of(76).map(|(_, frame)| gimbal(frame)).collect();
+    assert_eq!(commands, [(1001, 1, 0), (1000, 1, 0), (1001, 1, 0)], "gimbal commands to component 0");
     bench.stream(20.0, setpoint(POSITION, 1, [0.0, 0.0, -5.0], [0.0; 3], 0.0));
     let back = bench.until(1.0, |a| !a.in_failsafe());
     assert!(back < 0.1, "back in Offboard after {back} s");

@@ -2,7 +2,7 @@
 //!
 //! 1. *Connected.* The edges of a spanning forest of greatest clearances are kept (Kruskal 1956): between two nodes it has a
 //!    way whose narrowest edge is as wide as that of the widest way there is (Hu 1961). So whatever clearance is
-//!    required, who could reach whom before still can.
+//!    required, a node that could reach another one before still can.
 //! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the room.
 //! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`SOURCES`] nodes lose most by: the number of
 //!    paths over an edge, times how much longer the way around it is over the edges kept so far. Half of them are chosen

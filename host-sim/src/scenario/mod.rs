@@ -113,7 +113,7 @@ pub enum Terminals {
 /// `[mission]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mission {
-    /// Who goes where.
+    /// Which vehicle goes where.
     pub mode: Mode,
     /// What an assignment minimises.
     pub objective: Objective,
@@ -129,7 +129,7 @@ pub struct Mission {
     pub ground_stations: [u8; GROUND_STATIONS],
 }
 
-/// Who goes where.
+/// Which vehicle goes where.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Mode {
     /// Goals are shared out.
@@ -268,7 +268,7 @@ pub struct Fault {
     pub at_s: f32,
     /// How long it lasts; for good if absent.
     pub duration_s: Option<f32>,
-    /// Whom it strikes, if one.
+    /// The vehicle that it strikes, if one.
     pub vehicle: Option<u8>,
     /// What it is, one of [`FAULT_KINDS`].
     pub kind: &'static str,

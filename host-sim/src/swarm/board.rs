@@ -86,12 +86,12 @@ impl Board {
         Ok(Self::new(Ends::Links { autopilot: autopilot.open()?, radio }))
     }
 
-    /// Its state as last told.
+    /// Its state as last reported.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Its way along its own path as last told, metres; none if it has told of none.
+    /// Its way along its own path as last reported, metres; none if it has reported none.
     pub fn progress_m(&self) -> Option<f32> {
         self.progress_m
     }
@@ -240,6 +240,6 @@ impl LockStep {
 
 /// The state that a companion's HEARTBEAT tells.
 pub fn told_state(frame: &Frame) -> Option<State> {
-    let told = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
-    State::ALL.iter().copied().find(|state| *state as u32 == told)
+    let reported = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
+    State::ALL.iter().copied().find(|state| *state as u32 == reported)
 }

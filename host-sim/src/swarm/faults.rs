@@ -11,12 +11,12 @@
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
-//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station tells the companion to go on | |
+//! | `pilot-return` | Offboard or Guided by the pilot's switch, and the ground station commands the companion to go on | |
 //! | `autopilot-reboot` | motors off, everything forgotten, silent while it boots | 3 s if not given |
 //! | `companion-reset` | a new companion with a new clock | |
-//! | `late-plan` | who asks for a plan gets no answer | answered |
+//! | `late-plan` | a request for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
-//! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and tells all companions | gone; the companions keep off on |
+//! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
 //!
 //! A fault without a vehicle strikes all; an obstacle strikes nobody.
 

@@ -1,5 +1,5 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! tells a vehicle to go on that its pilot gave back, and all of an obstacle it sees. Who cannot fly is not waited for, and who is late not for ever.
+//! tells a vehicle to go on that its pilot gave back, and all of an obstacle it sees. A vehicle that cannot fly is not waited for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -17,7 +17,7 @@ const COMPONENT_ID: u8 = 190;
 const REPEAT_US: u64 = 1_000_000;
 /// After this long with some vehicle ready those that are ready are started, microseconds.
 const PATIENCE_US: u64 = 90_000_000;
-/// A vehicle is told to go on for this long, microseconds.
+/// The command to go on is repeated for this long, microseconds.
 const RESUME_US: u64 = 10_000_000;
 
 /// Sends MISSION_START to system 0.

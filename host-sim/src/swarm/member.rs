@@ -143,7 +143,7 @@ impl Member {
         self.killed = true;
     }
 
-    /// Starts the autopilot anew; it is silent and deaf until `until_us`.
+    /// Restarts the autopilot; it is silent and deaf until `until_us`.
     pub fn reboot_autopilot(&mut self, until_us: u64) {
         self.cut_motors();
         self.boots_until_us = until_us;
@@ -155,7 +155,7 @@ impl Member {
         self.autopilot.reboot();
     }
 
-    /// Starts the companion anew, its clock with it.
+    /// Restarts the companion, its clock with it.
     ///
     /// # Errors
     /// None that the first start had not.
@@ -315,7 +315,7 @@ impl Member {
         }
     }
 
-    /// Moves what a ground station is told into `out`, whole frames; the bytes moved.
+    /// Moves what a ground station gets into `out`, whole frames; the bytes moved.
     pub fn tell_ground(&mut self, now_us: u64, out: &mut [u8]) -> usize {
         let length = self.autopilot.poll_ground_transmit(out);
         if self.is_mute(now_us) { 0 } else { length }
@@ -401,7 +401,7 @@ impl Member {
             (false, true) => Phase::Flying,
             _ => Phase::TakeOffOrLanding,
         };
-        // Who stands by order of a person is in no deadlock.
+        // A vehicle that stands by order of a person is in no deadlock.
         let ordered = matches!(state, State::Paused | State::PilotControl | State::PilotReturned);
         let progress_m =
             self.board.as_ref().map_or_else(|| Some(self.companion.progress_m()), Board::progress_m);

@@ -358,7 +358,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
         .collect()
 }
 
-/// What the companion of one vehicle is told; the same whether it runs in a swarm simulation or alone.
+/// The settings of the companion of one vehicle; the same whether it runs in a swarm simulation or alone.
 pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
     mission.index_of(id)?;
     let config = mission.mission_view().config(id);

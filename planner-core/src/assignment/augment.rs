@@ -152,7 +152,7 @@ pub(super) fn from_all_bottleneck(
     paths: &mut Paths<'_>,
 ) -> Option<f32> {
     // The path to a settled column is final: its distance moves to infinity so that it is not chosen again, and
-    // `settled_price` keeps it from being reached anew.
+    // `settled_price` keeps it from being reached again.
     let done = &mut *paths.settled_price;
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);

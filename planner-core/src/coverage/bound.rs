@@ -10,7 +10,7 @@ use libm::{fmaxf, fminf};
 use super::CoverageError;
 use super::pack::Work;
 
-/// Most vehicles that are told apart.
+/// Most vehicles that are distinguished.
 const MOST: usize = 32;
 
 /// The bound, seconds.

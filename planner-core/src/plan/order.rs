@@ -1,7 +1,7 @@
 //! The order of the swarm: each vehicle in turn gets its path and its place in the schedule.
 //!
 //! Prioritised planning: a vehicle keeps clear of those before it. Shortest path and a wait on the pad where that is enough,
-//! stepping aside on the way ([`sipp`]) where it is not. Who cannot be fitted in goes first in the next round; when that
+//! stepping aside on the way ([`sipp`]) where it is not. A vehicle that cannot be fitted in goes first in the next round; when that
 //! does not help, the others leave it a head start; then all of it again with the shortest path first. Rounds are bounded.
 
 use heapless::Vec;
@@ -40,7 +40,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     }
     let mut failed = Ok(());
     for first in [First::Longest, First::Shortest] {
-        // Who stays on its pad comes first: it is in everybody's way. Ties go to the higher id (P3D §3.4).
+        // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher id (P3D §3.4).
         order.sort_unstable_by(|&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) =
@@ -64,7 +64,7 @@ enum First {
     Shortest,
 }
 
-/// Schedules in this order; who cannot be fitted in goes first in the next round, or later gets a head start.
+/// Schedules in this order; a vehicle that cannot be fitted in goes first in the next round, or later gets a head start.
 fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
@@ -94,7 +94,7 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
     failed
 }
 
-/// Rounds in which who cannot be fitted in goes first, before others are held back for it instead. No more than vehicles:
+/// Rounds in which a vehicle that cannot be fitted in goes first, before others are held back for it instead. No more than vehicles:
 /// in a crowd, where many swap places, nearly everybody has to leave its place before somebody else comes.
 const REORDERINGS: usize = 64;
 /// Rounds in which others are held back, each by [`HEAD_START_S`] more.

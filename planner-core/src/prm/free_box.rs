@@ -164,7 +164,7 @@ impl<'g, 'a> Sight<'g, 'a> {
         !snapped_rest_touches(self.grid, a, &b, known)
     }
 
-    /// Whether the segment from here is clear, where that can be told for certain.
+    /// Whether the segment from here is clear, where that is certain.
     #[inline(always)]
     fn judge(&self, view: &View, there: [f32; 3]) -> Judgement {
         let d = [0, 1, 2].map(|axis| (there[axis] - self.here[axis]) * self.cells_per_m);

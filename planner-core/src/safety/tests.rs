@@ -122,13 +122,13 @@ struct Flier {
     along_m: f32,
     speed_mps: f32,
     /// What the other heard of it last: place, velocity, when.
-    told: (Point, Point, f32),
+    reported: (Point, Point, f32),
 }
 
 impl Flier {
     fn new(path: StdVec<Point>) -> Self {
-        let told = (path[0], Point::zeros(), 0.0);
-        Self { path, along_m: 0.0, speed_mps: 0.0, told }
+        let reported = (path[0], Point::zeros(), 0.0);
+        Self { path, along_m: 0.0, speed_mps: 0.0, reported }
     }
 
     fn at(&self, along_m: f32) -> (Point, usize, Point) {
@@ -187,14 +187,14 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
         for tick in 0..600 {
             let now_s = tick as f32 * 0.05;
             for flier in &mut fliers {
-                if tick % 4 == 0 && (draw(0.0, 1.0) > loss || now_s - flier.told.2 > 0.7) {
+                if tick % 4 == 0 && (draw(0.0, 1.0) > loss || now_s - flier.reported.2 > 0.7) {
                     let (place, _, way) = flier.at(flier.along_m);
-                    flier.told = (place, way * flier.speed_mps, now_s);
+                    flier.reported = (place, way * flier.speed_mps, now_s);
                 }
             }
             let stop = [0, 1].map(|i| {
                 let other = &fliers[1 - i];
-                let (position, velocity, at_s) = other.told;
+                let (position, velocity, at_s) = other.reported;
                 let next = other.at(other.along_m).1.saturating_sub(1).min(other.path.len() - 1);
                 let heard = Heard {
                     position,

@@ -297,7 +297,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         Ok(Landing { down: Leg::climb(goal, ground, descent_m / cfg.vertical_mps), after_s })
     }
 
-    /// Whether some interval of the hop's node would be reached earlier if nobody were in the way.
+    /// Whether some interval of the hop's node would be reached earlier if no vehicle were on it.
     fn may_improve(&self, hop: &Hop) -> bool {
         let &Hop { node, leave_s: (from_s, until_s), duration_s, .. } = hop;
         let mut at = self.first[usize::from(node)];
@@ -368,7 +368,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
 }
 
 /// Writes the way that ends in a state, left for the descent at a time (`end`), labelled with seconds after take-off. Every wait is moved as near to
-/// the pad as the safe intervals allow: who waits in the air is in the way, and its battery drains.
+/// the pad as the safe intervals allow: a vehicle that waits in the air blocks others, and its battery drains.
 fn write<const N: usize, const P: usize, const W: usize>(
     route: &Route<'_>,
     view: &RoadmapView<'_>,

@@ -95,7 +95,7 @@ pub enum What {
     Healed,
 }
 
-/// What happens, when and to whom.
+/// What happens, when, and to which vehicle.
 #[derive(Clone, Copy, Debug)]
 pub struct Happening {
     /// Seconds.

@@ -82,7 +82,7 @@ pub fn instructions() -> u64 {
 }
 
 impl Clock {
-    /// Wakes who is due, and sets timer 1 for who is next.
+    /// Wakes the tasks that are due, and sets timer 1 for the next one.
     fn arm(&self, cs: CriticalSection<'_>) {
         let mut queue = self.queue.borrow(cs).borrow_mut();
         loop {

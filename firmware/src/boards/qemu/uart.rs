@@ -67,7 +67,7 @@ impl Uart {
         self.register(CTRL).write(ENABLED);
         interrupts::enable(receives, interrupts::DEVICES);
         interrupts::enable(self.transmits, interrupts::DEVICES);
-        (Receiver { uart: self, told: 0 }, Transmitter(self))
+        (Receiver { uart: self, reported: 0 }, Transmitter(self))
     }
 
     /// Takes bytes that a line in lock step brings: all that there is room for.
@@ -124,8 +124,8 @@ impl embedded_io_async::Error for Lost {
 /// The end that bytes come out of.
 pub struct Receiver {
     uart: &'static Uart,
-    /// Losses that were told.
-    told: u32,
+    /// Losses that were reported.
+    reported: u32,
 }
 
 /// The end that bytes go into.
@@ -139,7 +139,7 @@ impl embedded_io_async::Read for Receiver {
     async fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
         let lost = [&self.uart.counters.overruns, &self.uart.counters.dropped];
         let lost = lost.iter().fold(0, |sum: u32, count| sum.wrapping_add(count.load(Ordering::Relaxed)));
-        if core::mem::replace(&mut self.told, lost) != lost {
+        if core::mem::replace(&mut self.reported, lost) != lost {
             return Err(Lost);
         }
         Ok(self.uart.received.read(buffer).await)

@@ -48,7 +48,7 @@ impl Copter {
         // ArduPilot's derivative acts on the error, not on what is measured: what the reference shall do is added back.
         let d = 1.0 + tuning.gains.velocity_d[0];
         if sense.touching && v.z < 0.0 {
-            // The ground is in the way: the reference does not run on below it.
+            // The reference does not run on below the ground.
             self.reference.position.z = sense.position.z;
         }
         Demand {

@@ -127,7 +127,7 @@ pub struct Copter {
     /// Those of them that act.
     pub tuning: Tuning,
     ready_us: u64,
-    told: [bool; 2],
+    said: [bool; 2],
     runtime_us: u64,
     armed: bool,
     since: Since,
@@ -155,7 +155,7 @@ impl Copter {
             tuning: Tuning::new(&params),
             params,
             ready_us: micros(ready_s),
-            told: [false; 2],
+            said: [false; 2],
             runtime_us: 0,
             armed: false,
             since: Since::default(),
@@ -327,7 +327,7 @@ impl Copter {
         true
     }
 
-    /// Changes the mode as a pilot's switch does. The mode it is in is not entered anew.
+    /// Changes the mode as a pilot's switch does. The mode it is in is not entered again.
     pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
         if mode == self.mode {
             return;

@@ -19,14 +19,14 @@ impl Copter {
 
     /// Tells what has become so since the last step.
     pub(super) fn tell_progress(&mut self, body: &mut Body, now_us: u64) {
-        if !self.told[0] && self.origin_known(now_us) {
-            self.told[0] = true;
+        if !self.said[0] && self.origin_known(now_us) {
+            self.said[0] = true;
             body.announce_origin();
             body.announce(HOME_POSITION);
             body.say(6, "EKF3 IMU0 origin set");
         }
-        if !self.told[1] && self.position_known(now_us) {
-            self.told[1] = true;
+        if !self.said[1] && self.position_known(now_us) {
+            self.said[1] = true;
             body.say(6, "EKF3 IMU0 is using GPS");
         }
         if now_us >= self.runtime_us + RUNTIME_EVERY_US {

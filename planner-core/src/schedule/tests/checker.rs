@@ -8,7 +8,7 @@ use super::super::*;
 use crate::Point;
 
 /// Flies all in lock-step along their paths, gates obeyed, vehicle `i` at `speeds[i]`. Returns the smallest distance
-/// between two of which one moves, or who was still under way after `steps` of 50 ms.
+/// between two of which one moves, or that were still under way after `steps` of 50 ms.
 pub(crate) fn fly<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],

@@ -225,7 +225,7 @@ impl<'a> Ours<'a> {
         }
     }
 
-    /// Builds the roadmap anew; milliseconds.
+    /// Builds the roadmap again; milliseconds.
     fn build(&mut self, seed: u64, threads: bool) -> Result<f64> {
         let config = Config {
             nodes: NODES,

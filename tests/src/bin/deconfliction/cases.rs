@@ -1,4 +1,4 @@
-//! The meetings: maps of corridors and open halls, who swaps places with whom, and the disturbances each is flown under.
+//! The meetings: maps of corridors and open halls, which vehicles swap places, and the disturbances each is flown under.
 
 use std::f32::consts::TAU;
 use std::fmt::Write as _;
@@ -19,7 +19,7 @@ const HEIGHT_M: f32 = 1.5;
 /// The gusts of every case: what a mission is planned for.
 pub const GUSTS: &str = "gust_mps = 3.0\n";
 
-/// A map and who flies on it: planned once a seed, flown once for each disturbance and method.
+/// A map and the vehicles that fly on it: planned once a seed, flown once for each disturbance and method.
 pub struct Meeting {
     /// What is flown, one row of the table each: the name, and more lines of `[simulation]` and `[[faults]]`.
     pub cases: Vec<(&'static str, &'static str)>,
@@ -41,7 +41,7 @@ pub struct Meeting {
 }
 
 impl Meeting {
-    /// Whom the faults of the cases strike, and which share of its flight it has behind it then.
+    /// The vehicle that the faults of the cases strike, and which share of its flight it has behind it then.
     pub fn strikes(&self, seed: u64) -> (u8, f32) {
         match self.struck {
             Some(id) => (id, 0.0),
@@ -216,7 +216,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
 }
 
 /// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
-/// Whoever stands in front crosses straight to the far goal, whoever stands behind turns left to the near one: so
+/// The vehicle in front crosses straight to the far goal, the one behind turns left to the near one: so
 /// everybody crosses the way of everybody else from another arm.
 fn crossing_vehicles(z: f32) -> Vec<(Point, Point)> {
     let place = |arm: usize, along: f32, left: f32| {
@@ -267,7 +267,7 @@ fn doorway(dir: &Path) -> Result<PathBuf> {
         let wall = (8.2..8.6).contains(&p.x) && !(3.6..5.2).contains(&p.y);
         let ends = (0.2..3.2).contains(&p.x) || (13.8..16.8).contains(&p.x);
         let passage = (10.0..13.0).contains(&p.y) && (0.2..16.8).contains(&p.x);
-        // Low: nobody flies over who stands in it.
+        // Low: no vehicle flies over one that stands in it.
         let lintel = (8.2..8.6).contains(&p.x) && p.z > 2.4;
         (rooms && !wall && !lintel) || passage || (ends && (9.0..10.2).contains(&p.y))
     })
