@@ -13,6 +13,10 @@ pub(crate) mod filter;
 mod follower;
 mod hold;
 pub(crate) mod limits;
+mod motion;
+mod nearest;
+mod orders;
+mod output;
 mod phase;
 mod progress;
 mod raw;
@@ -29,8 +33,8 @@ use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
 use self::hold::Hold;
 use self::limits::{Limits, Settings};
+use self::nearest::nearest_m;
 use self::phase::Phase;
-use self::progress::nearest_m;
 use self::setpoint::correction;
 use self::waypoints::Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
@@ -72,20 +76,10 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Less than this is no progress, metres.
 const PROGRESS_M: f32 = 0.25;
-/// A setpoint that stands this near the end of the path has flown it, metres.
-const AT_END_M: f32 = 0.02;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
-
-/// Acceleration for each metre off the reference, 1/s²: with what PX4's cascade asks for by itself (`MPC_XY_P` 0.95 ·
-/// `MPC_XY_VEL_P_ACC` 1.8) it makes the loop 2.8 times as stiff, and a gust carries the vehicle less than half as far.
-const HOLD_PER_S2: f32 = 3.0;
-/// Acceleration for each m/s beside the reference's velocity, 1/s: keeps the stiffer loop damped (ratio 0.76).
-const DAMP_PER_S: f32 = 1.5;
-/// Bound on both together, m/s²: a position that jumps must not throw the vehicle about.
-const HOLD_MOST_MPS2: f32 = 1.5;
 
 /// Before the neighbours were asked: wait.
 const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };

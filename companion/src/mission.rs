@@ -6,88 +6,18 @@
 
 pub(crate) mod course;
 mod guard;
+mod row;
 mod state;
 pub mod table;
 pub(crate) mod waits;
 
-use crate::mission::table::TABLE;
-use crate::time::Duration;
+use self::table::TABLE;
 
 pub(crate) use self::guard::FRESH;
 pub use self::guard::{Guard, Inputs};
+use self::row::bits;
+pub use self::row::{Action, Row};
 pub use self::state::{Interrupted, State, To};
-
-/// What a row does beside changing the state.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Action {
-    /// Nothing.
-    None,
-    /// Ask for the streams and the EKF origin.
-    Connect,
-    /// Ask the shell for a plan.
-    RequestPlan,
-    /// Forget MISSION_START.
-    ForgetStart,
-    /// Hold here, from now on.
-    HoldHere,
-    /// Ask for Offboard or Guided, again every second.
-    AskOffboard,
-    /// Ask to arm, again every second.
-    AskArm,
-    /// Ask for NAV_TAKEOFF to the height of the climb, again every four seconds.
-    AskTakeOff,
-    /// Begin the climb.
-    BeginClimb,
-    /// Hold where the landing was stopped, and ask for Offboard or Guided, again every second.
-    HoldOver,
-    /// Let the reference run along the path.
-    RunPath,
-    /// Brake the reference along the path.
-    BrakeOnPath,
-    /// Go on in the interrupted state: from the nearest point of the path, from here in a climb or a descent.
-    Rejoin,
-    /// Fly the path flown so far back to the start.
-    TurnBack,
-    /// Ask for AUTO.LAND or LAND, again every second.
-    AskLand,
-    /// Ask the shell for a way around, from here.
-    RequestDetour,
-    /// Ask the shell for a way aside, from here.
-    RequestAside,
-    /// Ask the shell for a way aside, from here, to land there.
-    RequestLanding,
-    /// Give the shell up, this time.
-    MissDetour,
-    /// Fly it.
-    FlyDetour,
-    /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
-    AskDisarm,
-    /// Forget MISSION_START, and ask to disarm, again every second.
-    CancelStart,
-}
-
-/// One row of the table.
-#[derive(Clone, Copy, Debug)]
-pub struct Row {
-    /// States it applies to.
-    pub from: &'static [State],
-    /// The same, a bit for each.
-    pub(crate) states: u32,
-    /// What must hold.
-    pub guard: Guard,
-    /// How long it must have held; zero: at once.
-    pub limit: Duration,
-    /// The next state.
-    pub to: To,
-    /// What is done.
-    pub action: Action,
-    /// STATUSTEXT for a person, at most 50 bytes; empty: none.
-    pub text: &'static str,
-    /// Whether the text is a warning rather than information.
-    pub warning: bool,
-}
-
-pub(crate) const NOW: Duration = Duration::from_millis(0);
 
 /// Whether some row of `state` waits for `guard`: a command that none waits for is refused.
 pub fn awaits(state: State, guard: Guard) -> bool {
@@ -98,16 +28,6 @@ pub fn awaits(state: State, guard: Guard) -> bool {
 pub fn update(state: State, inputs: &Inputs) -> Option<&'static Row> {
     let here = bits(&[state]);
     TABLE.iter().find(|row| row.states & here != 0 && row.guard.holds(inputs, row.limit))
-}
-
-/// States, a bit for each.
-pub(crate) const fn bits(states: &[State]) -> u32 {
-    let (mut bits, mut i) = (0, 0);
-    while i < states.len() {
-        bits |= 1 << states[i] as u32;
-        i += 1;
-    }
-    bits
 }
 
 #[cfg(test)]

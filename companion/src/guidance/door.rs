@@ -22,8 +22,8 @@ use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
 use super::fence::Fence;
-use super::follower::{Motion, shortened};
 use super::limits::{Limits, SMOOTH_MOST_S};
+use super::motion::{Motion, shortened};
 
 /// Time between two raw points, seconds: the rate of the setpoints.
 pub const TICK_S: f32 = 0.05;

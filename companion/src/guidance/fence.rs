@@ -11,8 +11,8 @@
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
-use super::follower::{Motion, shortened};
 use super::limits::Limits;
+use super::motion::{Motion, shortened};
 
 /// A setpoint keeps so far inside, metres: the autopilot's frame rounds it by up to 1.4 mm, 30 km from its origin.
 const ROUNDING_M: f32 = 2e-3;

@@ -13,32 +13,15 @@
 //! ENU metres, seconds. Constant work.
 
 use libm::fmaxf;
-use planner_core::Point;
 
 use super::fence::Fence;
 use super::limits::Limits;
+use super::motion::{Motion, shortened};
 
 /// Rate of the loop, as a share of jerk over acceleration: twice the rate is how fast a change of velocity dies away.
 const RATE_SHARE: f32 = 0.45;
 
-/// A moving point: place, velocity, acceleration.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Motion {
-    pub(super) position: Point,
-    pub(super) velocity: Point,
-    pub(super) acceleration: Point,
-}
-
 impl Motion {
-    /// At rest at a place.
-    pub(super) fn at(position: Point) -> Self {
-        Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
-    }
-
-    pub(super) fn is_finite(&self) -> bool {
-        [self.position, self.velocity, self.acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()))
-    }
-
     /// Moves on by `dt_s` towards where the curve is then, and stops before the fence.
     pub(super) fn follow(
         &mut self,
@@ -62,9 +45,4 @@ impl Motion {
         self.velocity = velocity + (before + jerk * (0.5 * dt_s)) * dt_s;
         self.position += (velocity + (before * 0.5 + jerk * (dt_s / 6.0)) * dt_s) * dt_s;
     }
-}
-
-/// A vector no longer than `most`.
-pub(super) fn shortened(vector: Point, most: f32) -> Point {
-    vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
 }

@@ -1,19 +1,11 @@
 //! How far the vehicle has come along its flight, and which parts of it are flown.
 
-use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
 
 use super::{
-    ARRIVED_M, AT_END_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene,
-    WINDOW_EDGE_M,
+    ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene, WINDOW_EDGE_M,
 };
 use crate::mission::State;
-
-/// Arc length of the nearest point of the path; its end, if that is as near as counts as there.
-pub(super) fn nearest_m<const W: usize>(path: &Path<W>, place: &Point, near_m: f32, window_m: f32) -> f32 {
-    let (along_m, length_m) = (path.project(place, near_m, window_m), path.length_m());
-    if length_m - along_m < AT_END_M { length_m } else { along_m.max(0.0) }
-}
 
 impl Guidance {
     /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the

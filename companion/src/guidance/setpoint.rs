@@ -2,10 +2,15 @@
 
 use planner_core::Point;
 
-use super::{DAMP_PER_S, Guidance, HOLD_MOST_MPS2, HOLD_PER_S2, Scene};
-use crate::autopilot::Kind;
 use crate::autopilot::telemetry::Telemetry;
-use crate::mission::State;
+
+/// Acceleration for each metre off the reference, 1/s²: with what PX4's cascade asks for by itself (`MPC_XY_P` 0.95 ·
+/// `MPC_XY_VEL_P_ACC` 1.8) it makes the loop 2.8 times as stiff, and a gust carries the vehicle less than half as far.
+const HOLD_PER_S2: f32 = 3.0;
+/// Acceleration for each m/s beside the reference's velocity, 1/s: keeps the stiffer loop damped (ratio 0.76).
+const DAMP_PER_S: f32 = 1.5;
+/// Bound on both together, m/s²: a position that jumps must not throw the vehicle about.
+const HOLD_MOST_MPS2: f32 = 1.5;
 
 /// What the autopilot is sent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,32 +34,4 @@ pub(super) fn correction(position: &Point, velocity: &Point, telemetry: &Telemet
     }
     let share = if across > HOLD_MOST_MPS2 { HOLD_MOST_MPS2 / across } else { 1.0 };
     Point::new(off.x * share, off.y * share, 0.0)
-}
-
-impl Guidance {
-    /// The setpoint of this moment.
-    pub fn setpoint<const W: usize, const G: usize>(
-        &self,
-        state: State,
-        scene: &Scene<'_, W, G>,
-    ) -> Setpoint {
-        if !state.streams_setpoints() {
-            return Setpoint::None;
-        }
-        let door = &self.door;
-        let still = Point::zeros();
-        if scene.telemetry.position_at.is_none() || state == State::PositionLost {
-            return Setpoint::Stop(if door.is_live() { door.velocity() } else { still });
-        }
-        if !door.is_live() {
-            // The state is newer than the step: the next one begins where the vehicle is.
-            return Setpoint::None;
-        }
-        // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
-        let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);
-        let velocity = door.velocity() + door.acceleration() * lead_s;
-        let most = door.velocity().norm().max(door.raw_speed_mps());
-        let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
-        Setpoint::Move(door.position(), velocity, self.sent_acceleration)
-    }
 }

@@ -1,6 +1,8 @@
 //! The rows of the mission's transition table; [`crate::mission`] says what states, guards and actions are.
 
-use crate::mission::{Action, Guard, NOW, Row, State, To, bits};
+use super::guard::Guard;
+use super::row::{Action, NOW, Row, bits};
+use super::state::{State, To};
 use crate::time::Duration;
 
 pub(crate) const fn s(secs: u64) -> Duration {

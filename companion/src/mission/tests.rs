@@ -6,8 +6,10 @@ use std::string::String;
 use std::vec::Vec;
 
 use super::guard::HEARD;
+use super::row::NOW;
 use super::*;
 use crate::mission::table::*;
+use crate::time::Duration;
 use Action as A;
 use Guard as G;
 use State::*;

@@ -18,6 +18,7 @@ mod stream;
 use heapless::Deque;
 
 use self::memory::Memory;
+pub use self::packet::DATA;
 #[cfg(test)]
 pub(crate) use self::packet::TEXTS;
 use self::packet::{
@@ -33,8 +34,6 @@ use crate::time::{Duration, Instant};
 pub const MESSAGE: u32 = 110;
 /// Bytes of its payload: network, system, component, then the packet.
 pub const PAYLOAD_LEN: usize = 254;
-/// Most data of a packet.
-pub const DATA: usize = 239;
 
 /// Whether a FILE_TRANSFER_PROTOCOL begins an upload or removes a file.
 pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {

@@ -1,9 +1,11 @@
 //! The packet inside a FILE_TRANSFER_PROTOCOL: 12 bytes of header (sequence u16, session, opcode, size, opcode answered, burst
 //! complete, 0, offset u32), then at most 239 of data.
 
-use super::DATA;
 use crate::link::frame::Frame;
 use crate::storage::store::{File, UploadError, crc32};
+
+/// Most data of a packet.
+pub const DATA: usize = 239;
 
 /// Bytes before the data.
 pub const HEAD: usize = 12;

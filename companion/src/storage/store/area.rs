@@ -10,7 +10,7 @@
 //! A word that was cut while it was programmed may read as anything, or not at all; no decision hangs on one such word being
 //! one or the other: a seal is believed only with its CRC, an area is written only if it is clean and unused.
 
-use super::{BLOCK, Fault, Layout, ReadFlash, WORD, crc32};
+use super::flash::{BLOCK, Fault, Layout, ReadFlash, WORD, crc32};
 
 /// Where an area's data begins, bytes.
 pub const DATA_AT: u32 = BLOCK as u32;
@@ -168,13 +168,13 @@ pub fn look(layout: &Layout, area: Area, flash: &mut impl ReadFlash) -> Conditio
 /// CRC-32 over a file in flash without its last four bytes.
 fn file_crc(at: u32, len: u32, flash: &mut impl ReadFlash) -> Result<u32, Fault> {
     let mut block = [0; BLOCK];
-    let (mut sum, mut done) = (super::CRC_START, 0);
+    let (mut sum, mut done) = (super::flash::CRC_START, 0);
     let covered = len.saturating_sub(4);
     while done < covered {
         let count = (covered - done).min(BLOCK as u32);
         let block = &mut block[..count as usize];
         flash.read(at + done, block)?;
-        sum = super::crc_step(sum, block);
+        sum = super::flash::crc_step(sum, block);
         done += count;
     }
     Ok(!sum)

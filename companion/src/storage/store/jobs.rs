@@ -1,41 +1,12 @@
 //! What the store does with its flash, one request at a time: which job is next, what it asks for, what follows.
 
+use super::Store;
 use super::area::{self, Area, Condition, Seal};
+use super::flash::{Answer, BLOCK, CRC_START, Erasing, Fault, File, FlashRequest, READ, WORD, crc_step};
+use super::job::Job;
 use super::journal;
 use super::records::{Compaction, Record, Source, Step};
-use super::upload::{UploadError, UploadState};
-use super::{Answer, BLOCK, CRC_START, Erasing, Fault, File, FlashRequest, READ, Store, WORD, crc_step};
-
-/// What the store is at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Job {
-    /// Nothing.
-    None,
-    /// What is under way does not matter any more.
-    Ignored,
-    /// Reading for somebody.
-    Read { at: u32, len: usize },
-    /// Summing for somebody.
-    Sum { at: u32, end: u32, sum: u32 },
-    /// Erasing an area, sector by sector.
-    Erase { area: Area, at: u32 },
-    /// Saying that it is clean.
-    MarkClean(Area),
-    /// Saying that it is written to.
-    MarkUsed(Area),
-    /// The window's first block.
-    Flush(Area),
-    /// The window's last bytes, from there on.
-    FlushRest { slot: Area, done: u32 },
-    /// Reading the roadmap back.
-    Check { slot: Area, done: u32, sum: u32, tail: [u8; 4] },
-    /// Sealing an area.
-    Seal(Area, Seal),
-    /// Reading the seal back.
-    SealCheck(Area, Seal),
-    /// A record of the journal.
-    Record(Record),
-}
+use super::upload_state::{UploadError, UploadState};
 
 impl Store {
     /// What the shell is to do next, once; its result goes to [`Self::handle`]. Areas are erased only

@@ -1,15 +1,20 @@
 //! How records get into the journal: the next one, a copy of what counts into the other half when the first is full.
 
+use super::flash::WORD;
 use core::ops::Range;
 
-use super::area::{Area, Condition, Seal};
-use super::jobs::Job;
-use super::journal::{self, Kind, record_len};
-use super::upload::{UploadError, UploadState};
-use super::{BLOCK, CRC_START, Erasing, File, Store, WORD, crc_step, crc32};
+/// What a record holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// Which roadmaps were removed, and the parameters.
+    Parameters = 1,
+    /// The mission file; of length 0 when it was removed.
+    Mission = 2,
+}
 
 /// Tries to write the journal before that is given up until the next start.
-const TRIES: u8 = 4;
+pub(super) const TRIES: u8 = 4;
 
 /// A record being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -56,173 +61,4 @@ pub struct Compaction {
     /// Next: 0 the parameters, 1 the mission, 2 the seal.
     pub step: u8,
     pub mission: Option<Range<u32>>,
-}
-
-impl Store {
-    /// The journal's next step.
-    pub(super) fn choose_record(&mut self, erasing: Erasing) -> Option<Job> {
-        if let Some(compaction) = self.journal.compacting.clone() {
-            let Compaction { half, at, step, mission } = compaction;
-            return Some(match (step, self.journal.mission.clone()) {
-                (0, _) => Job::Record(self.parameters_record(at)),
-                (1, Some(kept)) => Job::Record(Record {
-                    kind: Kind::Mission,
-                    at,
-                    len: kept.end - kept.start,
-                    crc: self.journal.mission_crc,
-                    source: Source::Flash(kept.start),
-                    step: Step::Head,
-                    done: 0,
-                    sum: CRC_START,
-                }),
-                _ => {
-                    let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
-                    let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
-                    self.journal.compacting = Some(Compaction { half, at, step: 2, mission });
-                    Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0 })
-                }
-            });
-        }
-        let closing = self.upload == Some((File::Mission, UploadState::Closing));
-        if self.journal.failures >= TRIES {
-            if closing {
-                self.end(Err(UploadError::Flash));
-            }
-            return None;
-        }
-        let (kind, len) = if closing {
-            (Kind::Mission, self.window.file_len())
-        } else if self.journal.removed {
-            (Kind::Mission, 0)
-        } else if self.unsaved {
-            (Kind::Parameters, journal::PARAMETERS_LEN as u32)
-        } else {
-            return None;
-        };
-        let fits = |active: usize| self.journal.end + record_len(len) <= Area::Half(active).end(&self.layout);
-        if !self.journal.active.is_some_and(fits) {
-            return self.begin_compaction(erasing, closing);
-        }
-        let at = self.journal.end;
-        Some(Job::Record(match kind {
-            Kind::Parameters => self.parameters_record(at),
-            Kind::Mission => {
-                let crc = if len == 0 { crc32(&[]) } else { crc32(self.window.rest().unwrap_or_default()) };
-                let (step, source) = (Step::Head, Source::Window);
-                Record { kind, at, len, crc, source, step, done: 0, sum: CRC_START }
-            }
-        }))
-    }
-
-    fn begin_compaction(&mut self, erasing: Erasing, closing: bool) -> Option<Job> {
-        let half = usize::from(self.journal.active == Some(0));
-        match self.journal.halves[half] {
-            Condition::Clean => Some(Job::MarkUsed(Area::Half(half))),
-            _ => {
-                let refused = match erasing {
-                    _ if self.erasure_failed => UploadError::Flash,
-                    Erasing::Allowed => return Some(self.erase(Area::Half(half))),
-                    Erasing::NotYet => return None,
-                    Erasing::Forbidden => UploadError::Armed,
-                };
-                if closing {
-                    self.end(Err(refused));
-                }
-                None
-            }
-        }
-    }
-
-    fn parameters_record(&mut self, at: u32) -> Record {
-        let len = journal::PARAMETERS_LEN;
-        self.buffer.fill(0xFF);
-        self.buffer[..4].copy_from_slice(&self.forgotten.to_le_bytes());
-        self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
-        self.unsaved = false;
-        Record {
-            kind: Kind::Parameters,
-            at,
-            len: len as u32,
-            crc: crc32(&self.buffer[..len]),
-            source: Source::Buffer,
-            step: Step::Head,
-            done: 0,
-            sum: CRC_START,
-        }
-    }
-
-    pub(super) fn record(&mut self, mut record: Record, bytes: &[u8]) {
-        match (record.step, record.source) {
-            (Step::Head, Source::Buffer) => record.step = Step::Data,
-            (Step::Head, _) => record.step = Step::Load,
-            (Step::Load, Source::Flash(_)) => {
-                let count = bytes.len().min(BLOCK);
-                self.buffer.fill(0xFF);
-                self.buffer[..count].copy_from_slice(&bytes[..count]);
-                record.step = Step::Data;
-                self.job = Job::Record(record);
-                return;
-            }
-            (Step::Load | Step::Data, _) => {
-                record.done = (record.done + BLOCK as u32).min(record.len);
-                record.step = if matches!(record.source, Source::Buffer) { Step::Data } else { Step::Load };
-            }
-            (Step::Verify, _) => {
-                let head = if record.done == 0 { WORD } else { 0 };
-                let Some((head, data)) = bytes.split_at_checked(head).filter(|_| !bytes.is_empty()) else {
-                    return self.fail_record();
-                };
-                if !head.is_empty() && head != journal::head(record.kind, record.len, record.crc) {
-                    return self.fail_record();
-                }
-                record.sum = crc_step(record.sum, data);
-                record.done += bytes.len() as u32;
-            }
-        }
-        if record.done < record.whole() {
-            self.job = Job::Record(record);
-        } else if record.step != Step::Verify {
-            self.job = Job::Record(Record { step: Step::Verify, done: 0, ..record });
-        } else if !record.sum != record.crc {
-            self.fail_record();
-        } else {
-            self.finish_record(&record);
-        }
-    }
-
-    fn finish_record(&mut self, record: &Record) {
-        let data_at = record.at + WORD as u32;
-        let held = (record.len > 0).then_some(data_at..data_at + record.len);
-        let end = record.at + record_len(record.len);
-        if let Some(compaction) = &mut self.journal.compacting {
-            compaction.at = end;
-            compaction.step += 1;
-            if record.kind == Kind::Mission {
-                compaction.mission = held;
-            }
-            return;
-        }
-        self.journal.end = end;
-        self.journal.failures = 0;
-        if record.kind == Kind::Mission {
-            self.journal.mission = held;
-            self.journal.mission_crc = record.crc;
-            self.journal.removed = false;
-            if record.len > 0 {
-                self.end(Ok(()));
-            }
-        }
-    }
-
-    /// A record did not come out whole: nothing more is written behind it.
-    pub(super) fn fail_record(&mut self) {
-        if let Some(compaction) = self.journal.compacting.clone() {
-            return self.fail(Area::Half(compaction.half));
-        }
-        self.journal.failures += 1;
-        self.unsaved = true;
-        if let Some(active) = self.journal.active {
-            self.journal.end = Area::Half(active).end(&self.layout);
-        }
-    }
 }

@@ -410,7 +410,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
 }
 
 fn flown_head(flown: &[u8]) -> [u8; WORD] {
-    journal::head(journal::Kind::Mission, flown.len() as u32, 0)
+    journal::head(records::Kind::Mission, flown.len() as u32, 0)
 }
 
 #[test]

@@ -1,39 +1,12 @@
 //! A file coming in: from the first piece in the window to the seal.
 
-use planner_core::roadmap;
-
+use super::Store;
 use super::area::{Area, Condition, DATA_AT};
+use super::flash::{Erasing, File};
+use super::upload_state::{UploadError, UploadState};
 use super::window::{Taken, WINDOW};
-use super::{Erasing, File, Store};
 use crate::storage::mission_file::MissionView;
-
-/// Why an upload came to nothing. What was there before is still there.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UploadError {
-    /// An area would have to be erased, and the vehicle is armed.
-    Armed,
-    /// A roadmap waits for a restart, and the other slot is in use.
-    Waiting,
-    /// Pieces are missing.
-    Incomplete,
-    /// It is no such file, or damaged.
-    Damaged,
-    /// The flash failed.
-    Flash,
-}
-
-/// How far an upload has come.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum UploadState {
-    /// Its area is being erased or marked.
-    Opening,
-    /// Pieces are taken.
-    Taking,
-    /// All was sent; it is written, read back and sealed.
-    Closing,
-    /// Over.
-    Ended(Result<(), UploadError>),
-}
+use planner_core::roadmap;
 
 impl Store {
     /// How far the upload has come, if there is one.

@@ -1,6 +1,6 @@
 //! What was received of a file being uploaded and is not yet in flash: pieces may come in any order within the window.
 
-use super::BLOCK;
+use super::flash::BLOCK;
 
 /// Bytes of the window: a mission file waits here whole, a roadmap passes through. 4 kB, and 512 bytes of marks.
 pub const WINDOW: usize = 4096;

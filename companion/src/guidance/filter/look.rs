@@ -1,0 +1,165 @@
+//! One look of the filter: the way ahead, compared with all neighbours.
+
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::flight::{Path, VehiclePlan};
+use planner_core::safety::{REACTION_S, Set};
+
+use super::super::limits::bounds;
+use super::super::{Guidance, Scene};
+use super::{CLEAR, Filter, LOWER_M, RESUME_M, STRANGER, TURNS_M, TURNS_MPS, WAITS_M, Way};
+use crate::mission::State;
+use crate::swarm::neighbours::Neighbours;
+use crate::time::Instant;
+
+impl Guidance {
+    /// Compares the way ahead with all neighbours; to be called once a step, before the reference moves.
+    pub(in crate::guidance) fn filter<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) {
+        let priority = self.deconflict.method == Method::Priority;
+        let Some(plan) = scene.plan.filter(|_| priority) else {
+            self.filter = Filter { column_clear: true, ..Filter::default() };
+            return;
+        };
+        let position = &scene.telemetry.position;
+        let ground_m = self.ground_m(plan).min(position.z);
+        // Between pad and goal the ground may be lower than below either.
+        let lands = matches!(state, State::Land | State::LandingHeld);
+        let between = lands && self.on_path && !self.reached_end(&plan.path);
+        let ground_m = if between { ground_m - LOWER_M } else { ground_m };
+        let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
+        let way = match state {
+            State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
+            State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
+            State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.door.velocity().z.max(0.0) },
+            State::Follow if self.descends() => {
+                Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) }
+            }
+            State::Follow
+            | State::Paused
+            | State::Alone
+            | State::Blocked
+            | State::Replanning
+            | State::Stopping
+                if self.on_path =>
+            {
+                Way::Path { back: self.flies_back(&plan.path) }
+            }
+            _ => Way::Stands,
+        };
+        if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
+            (self.filter.column_clear, self.filter.column_since) = (true, None);
+            self.filter.held_since = self.filter.held_since.filter(|_| state == State::Replanning);
+        }
+        if matches!(way, Way::Stands) {
+            self.filter.reset();
+            return;
+        }
+        let whole_column = matches!(state, State::Scheduled | State::Land | State::LandingHeld);
+        let back = matches!(way, Way::Path { back: true });
+        if back != self.filter.back {
+            self.filter.reset_stop();
+            self.filter.back = back;
+        }
+        let stopped = self.filter.is_stopped();
+        let extra_m = if stopped { RESUME_M } else { 0.0 };
+        let bounds = bounds(&self.track);
+        let own = match way {
+            Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
+            Way::Vertical { to_m, speed_mps } => {
+                let speed_mps = if stopped { 0.0 } else { speed_mps };
+                let stop_m = if stopped { 0.0 } else { self.door.braking_m(true) };
+                let braking_m = bounds.braking.stop_m(speed_mps).max(stop_m);
+                let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
+                let down = to_m < position.z;
+                let reference_m = self.door.position().z;
+                let end_m = if down {
+                    (reference_m - fly_m).max(to_m).min(reference_m)
+                } else {
+                    (reference_m + fly_m).min(to_m).max(reference_m)
+                };
+                Set::vertical(Point::new(position.x, position.y, reference_m), end_m)
+            }
+            Way::Path { back } => self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back),
+            Way::Stands => return,
+        };
+        let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
+        if whole_column {
+            self.filter.note_column(found.is_none(), now);
+            self.filter.reset_stop();
+            self.filter.blocker = found.map_or(0, |found| found.id);
+            return;
+        }
+        self.filter.meets = found.is_some();
+        match found {
+            Some(found) => {
+                if !stopped {
+                    self.filter.stopped_since = Some(now);
+                    self.filter.activations = self.filter.activations.wrapping_add(1);
+                }
+                self.filter.clear_since = None;
+                // A stranger hinders it for good only where the hull would touch it.
+                if !found.stranger || self.filter.passes_stranger(now) {
+                    self.filter.hinder(now);
+                }
+                (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
+                (self.filter.stranger, self.filter.rests) = (found.stranger, found.rests);
+            }
+            None if stopped => {
+                let since = *self.filter.clear_since.get_or_insert(now);
+                // Past a stranger it goes on in the same stop, slowly.
+                let clear_for = if self.filter.passes_stranger(now) { STRANGER } else { CLEAR };
+                if now - since >= clear_for {
+                    self.filter.reset_stop();
+                }
+            }
+            None => self.count_standstill(state, scene, neighbours, now),
+        }
+    }
+
+    /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
+    /// reference that turns back leaves the setpoint on its way.
+    fn flies_back<const W: usize>(&self, path: &Path<W>) -> bool {
+        let along_m = self.tracker.along_m;
+        let velocity = self.door.velocity();
+        let beside = |by_m: f32| path.point_at((self.setpoint_m + by_m).clamp(0.0, path.length_m()));
+        let onward = match (beside(-TURNS_M), beside(TURNS_M)) {
+            (Some(from), Some(to)) => velocity.dot(&(to - from)),
+            _ => 0.0,
+        };
+        let moves = velocity.norm_squared() > TURNS_MPS * TURNS_MPS;
+        if along_m > self.setpoint_m + TURNS_M || (moves && onward > 0.0) {
+            return false;
+        }
+        (moves && onward < 0.0) || self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
+    }
+
+    /// A standstill before a vehicle that no gate waits for counts as one of the filter's.
+    fn count_standstill<const V: usize, const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) {
+        let id = self.advice.waiting_for;
+        let along_m = self.tracker.along_m;
+        let gate = |plan: &VehiclePlan<W, G>| {
+            let near = |at_m: f32| (along_m - WAITS_M..along_m + WAITS_M).contains(&at_m);
+            plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
+        };
+        if matches!(state, State::Follow | State::Blocked | State::Replanning)
+            && id != 0
+            && self.advice.stop_within_m.min(self.waits_m) < WAITS_M
+            && !scene.plan.is_some_and(gate)
+        {
+            self.filter.hinder(now);
+            (self.filter.yields, self.filter.rests) = (id < scene.id, neighbours.rests(id, now));
+        }
+    }
+}

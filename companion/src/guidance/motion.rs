@@ -1,0 +1,28 @@
+//! A point that moves.
+
+use libm::fmaxf;
+use planner_core::Point;
+
+/// A moving point: place, velocity, acceleration.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion {
+    pub(super) position: Point,
+    pub(super) velocity: Point,
+    pub(super) acceleration: Point,
+}
+
+impl Motion {
+    /// At rest at a place.
+    pub(super) fn at(position: Point) -> Self {
+        Self { position, velocity: Point::zeros(), acceleration: Point::zeros() }
+    }
+
+    pub(super) fn is_finite(&self) -> bool {
+        [self.position, self.velocity, self.acceleration].iter().all(|v| v.iter().all(|c| c.is_finite()))
+    }
+}
+
+/// A vector no longer than `most`.
+pub(super) fn shortened(vector: Point, most: f32) -> Point {
+    vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
+}

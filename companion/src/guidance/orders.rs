@@ -1,0 +1,111 @@
+//! What guidance is ordered: to begin the path, to go on, to turn back, to settle where it stands.
+
+use super::door::TICK_S;
+use super::nearest::nearest_m;
+use super::phase::Phase;
+use super::waypoints::Waypoints;
+use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M};
+use crate::time::Instant;
+use planner_core::Point;
+use planner_core::flight::{Path, VehiclePlan};
+use planner_core::track::Tracker;
+
+impl Guidance {
+    /// Goes on where the flight was interrupted.
+    pub fn run(&mut self, now: Instant) {
+        self.on_path = true;
+        self.shelter.reset();
+        self.linked_m = f32::INFINITY;
+        self.progress_m = self.tracker.along_m;
+        self.progress_at = now;
+    }
+
+    /// Begins another path, from where the setpoint stands.
+    pub fn begin_path(&mut self, now: Instant) {
+        self.tracker = Tracker::default();
+        self.phase = Phase::Path;
+        self.leg = None;
+        self.waypoints = Waypoints::default();
+        self.aside = false;
+        self.reported_m = f32::NEG_INFINITY;
+        // Whatever kept it from going on did so on the other path.
+        self.filter.reset();
+        self.run(now);
+    }
+
+    /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down
+    /// its descent, or by the nearest point of the path.
+    pub fn go_on<const W: usize, const G: usize>(
+        &mut self,
+        plan: &VehiclePlan<W, G>,
+        climbs: bool,
+        position: &Point,
+        now: Instant,
+    ) {
+        self.hold_at(*position);
+        if climbs {
+            self.phase = Phase::Climb;
+            return;
+        }
+        let (path, place) = (&plan.path, self.door.position());
+        let below = path
+            .point_at(path.length_m())
+            .is_some_and(|end| end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M);
+        if self.settled && self.phase != Phase::Climb && !(self.phase == Phase::Descent && below) {
+            self.phase = Phase::Path;
+            self.tracker.along_m = nearest_m(path, &place, self.tracker.along_m, REJOIN_WINDOW_M);
+        }
+        self.run(now);
+    }
+
+    /// Replaces the path by the way back to its first point. The clearance of each leg goes with it. The raw point may still
+    /// move on: the new path begins where it can have braked, and it begins on it backwards.
+    pub fn turn_back<const W: usize>(&mut self, path: &mut Path<W>, now: Instant) {
+        let speed = self.tracker.speed_mps.max(0.0);
+        let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
+        let braking_m = speed * speed / (2.0 * accel) + speed * TICK_S;
+        let from_m = (self.tracker.along_m + braking_m).min(path.length_m());
+        let mut back = Path::new();
+        let ahead = path.waypoints().iter().find(|w| w.along_m >= from_m);
+        let mut clearance_m = ahead.map_or(0.0, |w| w.clearance_m);
+        if let Some(turn) = path.point_at(from_m) {
+            // No more points than the path has: those behind, and this one for at least one ahead.
+            let _ = back.push(turn, clearance_m);
+        }
+        for waypoint in path.waypoints().iter().rev().filter(|w| w.along_m < from_m) {
+            let _ = back.push(waypoint.position, clearance_m);
+            clearance_m = waypoint.clearance_m;
+        }
+        let tracker = Tracker { along_m: from_m - self.tracker.along_m, speed_mps: -self.tracker.speed_mps };
+        let (phase, leg) = (self.phase, self.leg.take());
+        *path = back;
+        self.begin_path(now);
+        self.tracker = tracker;
+        self.returning = true;
+        match phase {
+            Phase::Climb | Phase::Join => (self.phase, self.leg) = (phase, leg),
+            Phase::Descent => {
+                // Back up: what is still sunk while it brakes is flown backwards.
+                if let (Some(leg), false) = (leg, self.settled) {
+                    let mut up = Path::new();
+                    let ends = (leg.waypoints().last(), leg.waypoints().first());
+                    for end in [ends.0, ends.1].into_iter().flatten() {
+                        let _ = up.push(end.position, end.clearance_m);
+                    }
+                    self.leg_tracker.along_m = leg.length_m() - self.leg_tracker.along_m;
+                    self.leg_tracker.speed_mps = -self.leg_tracker.speed_mps;
+                    (self.phase, self.leg) = (Phase::Join, Some(up));
+                }
+            }
+            Phase::Hold | Phase::Path => {}
+        }
+    }
+
+    /// The raw point is where the setpoint stands: going on begins with a way from there.
+    pub(super) fn settle(&mut self) {
+        self.settled = true;
+        self.leg = None;
+        self.leg_tracker = Tracker::default();
+        self.tracker.speed_mps = 0.0;
+    }
+}

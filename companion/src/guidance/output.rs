@@ -1,0 +1,36 @@
+//! The setpoint of the moment.
+
+use planner_core::Point;
+
+use super::setpoint::Setpoint;
+use super::{Guidance, Scene};
+use crate::autopilot::Kind;
+use crate::mission::State;
+
+impl Guidance {
+    /// The setpoint of this moment.
+    pub fn setpoint<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+    ) -> Setpoint {
+        if !state.streams_setpoints() {
+            return Setpoint::None;
+        }
+        let door = &self.door;
+        let still = Point::zeros();
+        if scene.telemetry.position_at.is_none() || state == State::PositionLost {
+            return Setpoint::Stop(if door.is_live() { door.velocity() } else { still });
+        }
+        if !door.is_live() {
+            // The state is newer than the step: the next one begins where the vehicle is.
+            return Setpoint::None;
+        }
+        // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
+        let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);
+        let velocity = door.velocity() + door.acceleration() * lead_s;
+        let most = door.velocity().norm().max(door.raw_speed_mps());
+        let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
+        Setpoint::Move(door.position(), velocity, self.sent_acceleration)
+    }
+}

@@ -1,0 +1,139 @@
+//! What the store and its shell share: the flash's layout, requests to it, the files.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// Bytes that are programmed at once and are whole or torn: the H743's flash word. Smaller ones divide it.
+pub const WORD: usize = 32;
+/// Most bytes of one request to program: a page of the RP2350's flash.
+pub const BLOCK: usize = 256;
+/// Most bytes of one request to read.
+pub const READ: usize = 1024;
+
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// State of a CRC-32 before its first byte.
+pub(crate) const CRC_START: u32 = u32::MAX;
+
+/// A running CRC-32 (ISO-HDLC without its last inversion) after some more bytes.
+pub(crate) fn crc_step(state: u32, bytes: &[u8]) -> u32 {
+    let mut digest = CRC.digest_with_initial(state.reverse_bits());
+    digest.update(bytes);
+    !digest.finalize()
+}
+
+pub(crate) fn crc32(bytes: &[u8]) -> u32 {
+    CRC.checksum(bytes)
+}
+
+/// Where things are in the storage bank, counted from its first byte: two slots, then two halves of the journal.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Layout {
+    /// What is erased at once, bytes.
+    pub sector_len: u32,
+    /// Length of a roadmap slot, whole sectors.
+    pub slot_len: u32,
+    /// Length of a half of the journal, whole sectors.
+    pub half_len: u32,
+    /// Whether nothing runs while it programs: then it does so on the ground alone.
+    pub stalls: bool,
+}
+
+impl Layout {
+    /// Bank 2 of the STM32H743: 8 sectors of 128 kB, roadmap slots in 0–2 and 3–5, journal in 6 and 7.
+    pub const H743: Self =
+        Self { sector_len: 128 << 10, slot_len: 384 << 10, half_len: 128 << 10, stalls: false };
+    /// 832 kB of the RP2350's external flash, sectors of 4 kB.
+    pub const PICO2: Self =
+        Self { sector_len: 4 << 10, slot_len: 384 << 10, half_len: 32 << 10, stalls: true };
+
+    /// Bytes of the whole bank.
+    pub const fn len(&self) -> u32 {
+        2 * self.slot_len + 2 * self.half_len
+    }
+
+    /// Whether it has no room at all.
+    pub const fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+/// Flash did not do what it was asked for: an erasure or program failed, or what was to be read is torn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Fault;
+
+/// Flash as it is read at the start, when nothing flies and waiting harms nobody.
+pub trait ReadFlash {
+    /// Reads bytes at an offset of the storage bank.
+    ///
+    /// # Errors
+    /// They cannot be read: a word among them is torn.
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault>;
+}
+
+/// What the shell is asked to do, at an offset of the storage bank.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FlashRequest<'a> {
+    /// Erase the sector that begins there.
+    Erase {
+        /// Its first byte.
+        at: u32,
+    },
+    /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`BLOCK`], all erased before.
+    Program {
+        /// The first byte.
+        at: u32,
+        /// What to put there.
+        bytes: &'a [u8],
+    },
+    /// Read bytes, at most [`READ`].
+    Read {
+        /// The first byte.
+        at: u32,
+        /// How many.
+        len: usize,
+    },
+}
+
+/// Whether areas may be erased now: it may stall the processor for seconds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Erasing {
+    /// Nothing flies.
+    Allowed,
+    /// The vehicle is armed, or about to be.
+    Forbidden,
+    /// The roadmap is planned on, or it is soon known whether there is an autopilot, and whether it is armed: what needs it
+    /// waits.
+    NotYet,
+}
+
+/// A file as ground tools see it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum File {
+    /// The roadmap.
+    Roadmap,
+    /// The mission.
+    Mission,
+}
+
+impl File {
+    /// Both, in the order of a listing.
+    pub const ALL: [Self; 2] = [Self::Roadmap, Self::Mission];
+
+    /// Its name.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Roadmap => "roadmap.bin",
+            Self::Mission => "mission.bin",
+        }
+    }
+}
+
+/// What came of reading.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answer<'a> {
+    /// The bytes asked for by [`Store::read`].
+    Bytes(&'a [u8]),
+    /// The running CRC asked for by [`Store::sum`].
+    Sum(u32),
+    /// They cannot be read.
+    Failed,
+}

@@ -1,0 +1,63 @@
+//! The journal, read when the store is mounted.
+
+use super::Store;
+use super::area::{self, Area, is_closed, u32_at};
+use super::flash::{BLOCK, ReadFlash, WORD};
+use super::journal::*;
+use super::records::Kind;
+
+impl Store {
+    pub(super) fn mount_journal(&mut self, flash: &mut impl ReadFlash) {
+        let layout = self.layout;
+        self.journal.halves = [0, 1].map(|i| area::look(&layout, Area::Half(i), flash));
+        let number = |i: &usize| self.journal.halves[*i].seal().map(|seal| seal.sequence);
+        let Some(active) = (0..2).filter(|i| number(i).is_some()).max_by_key(number) else { return };
+        self.journal.active = Some(active);
+        let half = Area::Half(active);
+        let (mut at, end) = (half.data_at(&layout), half.end(&layout));
+        while at + WORD as u32 <= end {
+            let mut word = [0; WORD];
+            if flash.read(at, &mut word).is_err() {
+                at = end;
+                break;
+            }
+            if word == [0xFF; WORD] {
+                break;
+            }
+            let len = u32_at(&word, 8);
+            let fits = len <= end - at && record_len(len) <= end - at;
+            if word[..4] != MAGIC || !is_closed(&word) || !fits {
+                at = end;
+                break;
+            }
+            self.take_record(word[4], at + WORD as u32, len, u32_at(&word, 12), flash);
+            at += record_len(len);
+        }
+        self.journal.end = at;
+    }
+
+    fn take_record(&mut self, kind: u8, at: u32, len: u32, crc: u32, flash: &mut impl ReadFlash) {
+        let mut block = [0; BLOCK];
+        let (mut sum, mut done) = (super::flash::CRC_START, 0);
+        while done < len {
+            let count = (len - done).min(BLOCK as u32);
+            if flash.read(at + done, &mut block[..count as usize]).is_err() {
+                return;
+            }
+            sum = super::flash::crc_step(sum, &block[..count as usize]);
+            done += count;
+        }
+        if !sum != crc {
+            return;
+        }
+        if kind == Kind::Mission as u8 {
+            self.journal.mission = (len > 0).then_some(at..at + len);
+            self.journal.mission_crc = crc;
+        } else if kind == Kind::Parameters as u8 && (4..=BLOCK as u32).contains(&len) {
+            // Short enough to be in the block whole.
+            self.forgotten = u32_at(&block, 0);
+            let (entries, _) = block[4..len as usize].as_chunks();
+            entries.iter().for_each(|entry| self.parameters.restore(entry));
+        }
+    }
+}
