@@ -89,8 +89,8 @@ fn parameters_are_listed_read_set_and_kept() {
             param_id: name.into(),
         };
         assert_eq!(values(&ground.ask(link, &read(2, "")))[0].param_id.to_str(), Ok("FLK_CLIMB_MAX"));
-        assert_eq!(values(&ground.ask(link, &read(-1, "FLK_SYS_ID")))[0].param_index, 7);
-        for unknown in [read(8, ""), read(-1, "FLK_NONE"), read(i16::MIN, "")] {
+        assert_eq!(values(&ground.ask(link, &read(-1, "FLK_SYS_ID")))[0].param_index, TABLE.len() as u16 - 1);
+        for unknown in [read(TABLE.len() as i16, ""), read(-1, "FLK_NONE"), read(i16::MIN, "")] {
             let heard = ground.ask(link, &unknown);
             assert_eq!(errors(&heard)[0].error, MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST);
             assert!(values(&heard).is_empty());
