@@ -15,6 +15,7 @@ pub mod map;
 pub mod margins;
 pub mod mission;
 pub mod output;
+pub mod paper;
 pub mod progress;
 pub mod quote;
 pub mod report;

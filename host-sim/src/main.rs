@@ -30,6 +30,8 @@ enum Command {
     Fly(commands::fly::FlyArgs),
     /// Plan how a fleet photographs an area; no flight
     Cover(commands::cover::Args),
+    /// Print a paper's tables, ours beside theirs
+    Paper(commands::paper::Args),
     /// Simulate one autopilot for any MAVLink client
     Autopilot(autopilot::server::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
@@ -64,6 +66,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Plan(args) => commands::plan::run(&args),
         Command::Fly(args) => commands::fly::run(&args),
         Command::Cover(args) => commands::cover::run(&args),
+        Command::Paper(args) => commands::paper::run(&args),
         Command::Autopilot(args) => autopilot::server::run(&args),
         Command::Companion(args) => commands::companion::run(&args),
         Command::Upload(args) => commands::upload::run(&args),

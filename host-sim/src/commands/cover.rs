@@ -12,7 +12,7 @@ use crate::coverage::{Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
 use crate::report;
-use crate::result::{self, Timing, Totals, VehicleResult, rounded};
+use crate::result::{self, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
 use crate::say;
 use crate::scenario::coverage::{Coverage, Method};
 use crate::scenario::load_coverage;
@@ -33,7 +33,7 @@ pub struct Args {
 
 /// `result.json` of a coverage plan.
 #[derive(Debug, Serialize)]
-struct CoverResult {
+pub(crate) struct CoverResult {
     command: &'static str,
     scenario: String,
     seed: u64,
@@ -41,6 +41,8 @@ struct CoverResult {
     complete: bool,
     vehicles: Vec<VehicleResult>,
     totals: Totals,
+    safety: Safety,
+    roadmap: RoadmapSize,
     coverage: CoverageResult,
 }
 
@@ -73,6 +75,7 @@ struct RouteResult {
     last: u32,
     backward: bool,
     layer_m: f64,
+    depart_s: f64,
     cost_s: f64,
     cost_m: f64,
 }
@@ -130,7 +133,8 @@ fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results)
     results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())
 }
 
-fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
+/// What `result.json` says of a plan.
+pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
     let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
@@ -148,7 +152,8 @@ fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     });
     let vehicles: Vec<VehicleResult> = vehicles.collect();
     let heights = scenario.area.heights;
-    let route = |route: &Route| RouteResult {
+    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
+        depart_s: rounded(*depart_s),
         vehicle: scenario.vehicles[usize::from(route.vehicle)].id,
         first: route.first,
         last: route.end - 1,
@@ -158,6 +163,9 @@ fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
         cost_m: rounded(route.cost_m),
     };
     let max_cost_s = planned.plan.max_cost_s();
+    let ends_s = routes.iter().zip(&planned.departures_s).map(|(route, depart_s)| route.cost_s + depart_s);
+    let makespan_s = ends_s.fold(0.0, f32::max);
+    let least_m = planned.least_separation_m;
     let costs: Vec<f64> = routes.iter().map(|route| f64::from(route.cost_s)).collect();
     let (mean, sd) = mean_and_sd(&costs);
     let along = planned.tracks.along();
@@ -169,8 +177,17 @@ fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
         complete: findings.is_clean(),
         totals: Totals {
             path_m: rounded(routes.iter().map(|route| route.cost_m).sum()),
-            makespan_s: rounded(max_cost_s),
+            makespan_s: rounded(makespan_s),
         },
+        safety: Safety {
+            wall_contacts: 0,
+            min_clearance_m: None,
+            min_separation_m: least_m.is_finite().then(|| rounded(least_m)),
+            safety_distance_m: rounded(scenario.safety_distance_m),
+            violations: u32::from(least_m < scenario.safety_distance_m * 0.999),
+            deadlocks: 0,
+        },
+        roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
         coverage: CoverageResult {
             covered_share: findings.covered_share,
             waypoints: planned.tracks.waypoint_count(),
@@ -187,7 +204,7 @@ fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
             photos: findings.photos,
             twice: findings.twice,
             left: findings.left,
-            routes: routes.iter().map(route).collect(),
+            routes: routes.iter().zip(&planned.departures_s).map(route).collect(),
         },
         vehicles,
     }
@@ -203,15 +220,16 @@ fn mean_and_sd(values: &[f64]) -> (f64, f64) {
 
 fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
     let coverage = &result.coverage;
-    say!("vehicle  waypoints         layer m   cost s   cost m");
+    say!("vehicle  waypoints         layer m  leaves s   cost s   cost m");
     for route in &coverage.routes {
         let (first, last) =
             if route.backward { (route.last, route.first) } else { (route.first, route.last) };
         say!(
-            "{:>7}  {:<16}  {:>7.1}  {:>7.1}  {:>7.1}",
+            "{:>7}  {:<16}  {:>7.1}  {:>8.1}  {:>7.1}  {:>7.1}",
             route.vehicle,
             format!("{first} to {last}"),
             route.layer_m,
+            route.depart_s,
             route.cost_s,
             route.cost_m
         );

@@ -3,6 +3,7 @@
 pub mod companion;
 pub mod cover;
 pub mod fly;
+pub mod paper;
 pub mod plan;
 pub mod radio;
 pub mod roadmap;

@@ -1,6 +1,6 @@
 //! Flights as ground stations read them: QGroundControl `.plan`, `.waypoints` (QGC WPL 110), CSV and GeoJSON.
 //!
-//! A flight is NAV_TAKEOFF (22), DO_CHANGE_SPEED (178), waypoints (16), the camera's trigger, and
+//! A flight is NAV_DELAY (93) where it leaves later than others, NAV_TAKEOFF (22), DO_CHANGE_SPEED (178), waypoints (16), the camera's trigger, and
 //! NAV_RETURN_TO_LAUNCH (20) above the pad. Heights are relative to the vehicle's home (frame 3), so that neither map nor
 //! geoid matters. Between both ends of a lane nothing is written where the autopilot triggers by distance.
 
@@ -18,6 +18,7 @@ use crate::scenario::coverage::{Heading, Trigger};
 const NAV_WAYPOINT: u16 = 16;
 const NAV_RETURN_TO_LAUNCH: u16 = 20;
 const NAV_TAKEOFF: u16 = 22;
+const NAV_DELAY: u16 = 93;
 const DO_CHANGE_SPEED: u16 = 178;
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
@@ -86,7 +87,13 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
     };
     let speed = f64::from(planned.vehicles[usize::from(route.vehicle)].cruise_mps);
     let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
-    let mut items = vec![
+    let index = planned.plan.routes.iter().position(|other| other == route);
+    let depart_s = index.map_or(0.0, |index| planned.departures_s[index]);
+    let mut items = Vec::new();
+    if depart_s > 0.0 {
+        items.push(Item::command(NAV_DELAY, [f64::from(depart_s), -1.0, -1.0, -1.0]));
+    }
+    items.extend([
         Item {
             command: NAV_TAKEOFF,
             frame: FRAME_RELATIVE,
@@ -94,7 +101,7 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
             place: [round(home.lat_deg, 1e9), round(home.lon_deg, 1e9), round(top, 1e3)],
         },
         Item::command(DO_CHANGE_SPEED, [1.0, round(speed, 1e3), -1.0, 0.0]),
-    ];
+    ]);
     for (index, stop) in stops.iter().enumerate().skip(2) {
         let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
         let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;

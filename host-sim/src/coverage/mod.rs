@@ -7,6 +7,7 @@ pub mod check;
 pub mod export;
 pub mod flight;
 pub mod page;
+pub mod separation;
 
 use std::time::Instant;
 
@@ -57,6 +58,10 @@ pub struct Planned<'a> {
     pub plan: Plan<VEHICLES>,
     /// No division can end before, seconds.
     pub lower_bound_s: f32,
+    /// When each route's vehicle leaves its pad, seconds.
+    pub departures_s: Vec<f32>,
+    /// The least distance between two vehicles, as planned; infinite for one.
+    pub least_separation_m: f32,
     /// What lanes, ways and routes took of the clock, seconds.
     pub seconds: [f64; 3],
 }
@@ -106,9 +111,21 @@ impl<'a> Planned<'a> {
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
-        let planned =
-            Self { scenario, area, method, vehicles, tracks, transit, plan, lower_bound_s, seconds };
+        let mut planned = Self {
+            scenario,
+            area,
+            method,
+            vehicles,
+            tracks,
+            transit,
+            departures_s: vec![0.0; plan.routes.len()],
+            least_separation_m: f32::INFINITY,
+            plan,
+            lower_bound_s,
+            seconds,
+        };
         planned.check_endurance()?;
+        planned.set_departures()?;
         Ok(planned)
     }
 
@@ -127,12 +144,30 @@ impl<'a> Planned<'a> {
 
     /// Each route with its stops, and when they are passed.
     pub fn flights(&self) -> Vec<Flight> {
-        let flight = |route: &Route| {
+        let flight = |(route, depart_s): (&Route, &f32)| {
             let stops = flight::stops(self, route);
-            let times_s = flight::times_s(self, route, &stops);
+            let mut times_s = flight::times_s(self, route, &stops);
+            times_s.iter_mut().for_each(|time| *time += depart_s);
             (*route, stops, times_s)
         };
-        self.plan.routes.iter().map(flight).collect()
+        self.plan.routes.iter().zip(&self.departures_s).map(flight).collect()
+    }
+
+    /// Nobody leaves before it keeps the separation to the others.
+    fn set_departures(&mut self) -> anyhow::Result<()> {
+        let flights = self.flights();
+        let timed: Vec<_> =
+            flights.iter().map(|(_, stops, times_s)| separation::Timed { stops, times_s }).collect();
+        let separation_m = self.scenario.separation_m;
+        let Some(found) = separation::departures(&timed, separation_m) else {
+            bail!(
+                "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: fewer \
+                 vehicles, or places further apart",
+                self.scenario.area.place
+            );
+        };
+        (self.departures_s, self.least_separation_m) = found;
+        Ok(())
     }
 
     /// Nobody is sent out for longer than its battery lasts.

@@ -1,0 +1,45 @@
+//! `host-sim paper`: a paper's tables, ours beside theirs.
+
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+use anyhow::bail;
+
+use crate::paper::cpp;
+
+/// Arguments of `host-sim paper`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Which paper: cpp (Luna 2022, coverage)
+    paper: Paper,
+    /// Directory for `tables.json`, `result.json`, `timing.json` and `report.html`
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// The papers.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Paper {
+    /// Madridano 2020
+    P3d,
+    /// Madridano 2019
+    P2d,
+    /// Luna 2022
+    Cpp,
+    /// Muñoz 2021
+    Fm2,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// A paper that is not built yet; results that cannot be written.
+pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
+    match args.paper {
+        Paper::Cpp => cpp::run(&args.out),
+        other => bail!(
+            "not available yet: paper {}: of the papers, cpp is built",
+            format!("{other:?}").to_lowercase()
+        ),
+    }
+}

@@ -1,0 +1,113 @@
+//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. Who flies longest
+//! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
+//!
+//! Flights are compared every [`STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety
+//! filter is what keeps vehicles apart, and this only keeps it from having to.
+
+use planner_core::Point;
+
+use super::flight::Stop;
+
+/// Times at which places are compared, seconds apart.
+const STEP_S: f32 = 0.25;
+/// Departures that are tried, seconds apart.
+const DELAY_S: f32 = 2.0;
+/// Nobody waits longer on the ground, seconds.
+const LONGEST_S: f32 = 900.0;
+
+/// A flight as planned, from its own departure on.
+pub struct Timed<'a> {
+    /// The stops.
+    pub stops: &'a [Stop],
+    /// When each is passed after the departure, seconds.
+    pub times_s: &'a [f32],
+}
+
+/// Departures of all flights, seconds, and the least distance between any two vehicles, one of them in the air; infinite
+/// for one vehicle. None where no departure within [`LONGEST_S`] keeps the separation.
+pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>, f32)> {
+    let tracks: Vec<Vec<Point>> = flights.iter().map(sampled).collect();
+    let mut order: Vec<usize> = (0..flights.len()).collect();
+    order.sort_by_key(|i| std::cmp::Reverse(tracks[*i].len()));
+    let mut delays: Vec<Option<usize>> = vec![None; flights.len()];
+    let mut least_m = f32::INFINITY;
+    let step = (DELAY_S / STEP_S) as usize;
+    for &own in &order {
+        let gap = |delay: usize| {
+            let others = order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
+            let mut least_m = f32::INFINITY;
+            for other in others {
+                let own = (&tracks[own][..], delay);
+                // Pads may be nearer than that; nothing can be done about it here.
+                let enough_m = separation_m.min((own.0[0] - other.0[0]).norm());
+                let gap_m = nearest_m(own, other);
+                if gap_m < enough_m * 0.999 {
+                    return None;
+                }
+                least_m = least_m.min(gap_m);
+            }
+            Some(least_m)
+        };
+        let tried = (0..=(LONGEST_S / DELAY_S) as usize).map(|k| k * step);
+        let (delay, gap_m) = tried.into_iter().find_map(|delay| gap(delay).map(|gap_m| (delay, gap_m)))?;
+        delays[own] = Some(delay);
+        least_m = least_m.min(gap_m);
+    }
+    Some((delays.iter().map(|delay| delay.unwrap_or(0) as f32 * STEP_S).collect(), least_m))
+}
+
+/// Where a vehicle is at each step of its flight.
+fn sampled(flight: &Timed<'_>) -> Vec<Point> {
+    let end_s = flight.times_s.last().copied().unwrap_or(0.0);
+    let mut next = 1;
+    let place = |step: usize| {
+        let time_s = step as f32 * STEP_S;
+        while next + 1 < flight.times_s.len() && flight.times_s[next] < time_s {
+            next += 1;
+        }
+        let (from, to) = (flight.times_s[next - 1], flight.times_s[next]);
+        let share = if to > from { ((time_s - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
+        flight.stops[next - 1].position.lerp(&flight.stops[next].position, share)
+    };
+    (0..=(end_s / STEP_S).ceil() as usize).map(place).collect()
+}
+
+/// The least distance between two flights that begin with these delays, while one of them is in the air.
+fn nearest_m(a: (&[Point], usize), b: (&[Point], usize)) -> f32 {
+    let at = |(track, delay): (&[Point], usize), step: usize| {
+        track[step.saturating_sub(delay).min(track.len() - 1)]
+    };
+    let end = (a.0.len() + a.1).max(b.0.len() + b.1);
+    let from = a.1.min(b.1);
+    (from..end).map(|step| (at(a, step) - at(b, step)).norm_squared()).fold(f32::INFINITY, f32::min).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::coverage::flight::Act;
+
+    fn flight(places: &[[f32; 3]]) -> (Vec<Stop>, Vec<f32>) {
+        let stop = |p: &[f32; 3]| Stop { position: Point::from(*p), act: Act::Lane, lane: None };
+        let stops: Vec<Stop> = places.iter().map(stop).collect();
+        let mut times = vec![0.0];
+        for pair in stops.windows(2) {
+            times.push(times[times.len() - 1] + (pair[1].position - pair[0].position).norm() / 5.0);
+        }
+        (stops, times)
+    }
+
+    #[test]
+    fn lanes_side_by_side_are_not_flown_at_once() {
+        let long = flight(&[[0.0, 0.0, 0.0], [0.0, 0.0, 30.0], [100.0, 0.0, 30.0], [0.0, 9.0, 30.0]]);
+        let beside = flight(&[[0.0, 3.0, 0.0], [0.0, 1.0, 30.0], [100.0, 1.0, 30.0]]);
+        let timed = |f: &'static (Vec<Stop>, Vec<f32>)| Timed { stops: &f.0, times_s: &f.1 };
+        let (long, beside) = (&*Box::leak(Box::new(long)), &*Box::leak(Box::new(beside)));
+        let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");
+        assert!(departures_s[1] == 0.0 && departures_s[0] > 0.0, "{departures_s:?}");
+        assert!((2.0 * 0.999..3.1).contains(&least_m), "{least_m}");
+        let apart = flight(&[[0.0, 30.0, 0.0], [0.0, 30.0, 30.0], [90.0, 30.0, 30.0]]);
+        let apart = &*Box::leak(Box::new(apart));
+        assert_eq!(departures(&[timed(long), timed(apart)], 2.0).expect("apart").0, [0.0, 0.0]);
+    }
+}

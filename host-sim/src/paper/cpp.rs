@@ -1,0 +1,308 @@
+//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs.
+//!
+//! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in [`SHORT_TRACK`],
+//! [`LONG_TRACK`], [`CONVEX`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
+//! A12 were flown in Gazebo; ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
+
+use std::path::Path;
+use std::process::ExitCode;
+use std::time::Instant;
+
+use serde::Serialize;
+
+use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT};
+use crate::commands::cover;
+use crate::coverage::check::check_plan;
+use crate::coverage::{Planned, page};
+use crate::files::Results;
+use crate::result::{self, Timing, rounded};
+use crate::say;
+use crate::scenario::coverage::{Coverage, Method};
+use crate::scenario::parse_coverage;
+use crate::{output, report};
+
+/// Lanes to 150 m.
+const SHORT_TRACK: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
+/// Lanes to 320 m.
+const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
+/// Of Table 2: convex, five vertices.
+const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
+/// Of Table 4: small, so that the way there counts.
+const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
+const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+/// Plans of each kind that are timed.
+const RUNS: usize = 51;
+
+/// One line of a table.
+#[derive(Debug, Serialize)]
+struct Row {
+    table: String,
+    method: &'static str,
+    lane_m: f64,
+    height_m: f64,
+    unit: &'static str,
+    ours: Vec<f64>,
+    theirs: Vec<f64>,
+    ours_summary: Option<Summary>,
+    theirs_summary: Option<Summary>,
+}
+
+/// Max, Av, SD and CV.
+#[derive(Clone, Copy, Debug, Serialize)]
+struct Summary {
+    max: f64,
+    mean: f64,
+    sd: f64,
+    cv_percent: f64,
+}
+
+impl Summary {
+    fn of(values: &[f64]) -> Self {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let sd = (squares / (count - 1.0)).sqrt();
+        let short = |value: f64| rounded(value as f32);
+        let max = values.iter().copied().fold(0.0, f64::max);
+        Self { max, mean: short(mean), sd: short(sd), cv_percent: short(100.0 * sd / mean) }
+    }
+}
+
+/// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
+fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Coverage> {
+    let mut text = format!(
+        "[area]\npolygon = {polygon}\nlane_m = {lane_m:?}\nwaypoint_m = {lane_m:?}\nheight_m = {height_m:?}\n\
+         layer_m = 5.0\n[mission]\ncruise_mps = 5.0\n"
+    );
+    for (i, [x, y]) in places.iter().enumerate() {
+        text += &format!(
+            "[[vehicles]]\nid = {}\nstart = [{x:?}, {y:?}, 0.0]\nclimb_mps = 3.0\ndescend_mps = 1.0\n",
+            i + 1
+        );
+    }
+    Ok(parse_coverage(&text, "paper cpp")?)
+}
+
+fn in_a_row(count: usize) -> Vec<[f64; 2]> {
+    (0..count).map(|i| [5.0 * i as f64, -20.0]).collect()
+}
+
+/// What all plans together come to.
+struct Tables {
+    rows: Vec<Row>,
+    complete: bool,
+    /// The largest cost in seconds of the plan whose result is kept.
+    worst: Option<(f64, serde_json::Value)>,
+}
+
+impl Tables {
+    /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
+    fn costs(&mut self, scenario: &Coverage, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
+        let planned = Planned::new(scenario, method)?;
+        let findings = check_plan(&planned);
+        let result = cover::described(&planned, &findings);
+        self.complete &= findings.is_clean();
+        let rank = f64::from(planned.plan.max_cost_s()) + if findings.is_clean() { 0.0 } else { 1e9 };
+        if self.worst.as_ref().is_none_or(|(worst, _)| rank > *worst) {
+            self.worst = Some((rank, serde_json::to_value(&result)?));
+        }
+        let mut costs = vec![0.0; scenario.vehicles.len()];
+        for route in &planned.plan.routes {
+            let cost = if unit == "m" { route.cost_m } else { route.cost_s };
+            costs[usize::from(route.vehicle)] = rounded(cost);
+        }
+        Ok(costs)
+    }
+
+    fn add(
+        &mut self,
+        table: &str,
+        method: Method,
+        spacing: (f64, f64),
+        unit: &'static str,
+        both: [Vec<f64>; 2],
+    ) {
+        let [ours, theirs] = both;
+        let summary = |values: &[f64]| (values.len() > 1).then(|| Summary::of(values));
+        self.rows.push(Row {
+            table: table.to_owned(),
+            method: method.name(),
+            lane_m: spacing.0,
+            height_m: spacing.1,
+            unit,
+            ours_summary: summary(&ours),
+            theirs_summary: summary(&theirs),
+            ours,
+            theirs,
+        });
+    }
+}
+
+/// Runs `host-sim paper cpp`.
+///
+/// # Errors
+/// Results that cannot be written.
+pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
+    let began = Instant::now();
+    let mut results = Results::open(out, &[&output::NAMES[..], &["tables.json"]].concat())?;
+    let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
+    table_2(&mut tables)?;
+    let planning = table_3()?;
+    table_4(&mut tables)?;
+    flown(&mut tables)?;
+    table_6(&mut tables)?;
+    print(&tables);
+    print_planning(&planning);
+    results.add("tables.json", result::json(&tables.rows)?.as_bytes())?;
+    let (_, mut worst) = tables.worst.clone().unwrap_or_default();
+    worst["command"] = "paper cpp".into();
+    worst["complete"] = tables.complete.into();
+    results.add(output::NAMES[0], result::json(&worst)?.as_bytes())?;
+    let plan_s = planning.iter().flatten().sum();
+    let timing = Timing { plan_s, wall_s: began.elapsed().as_secs_f64(), ..Timing::default() };
+    results.add(output::NAMES[1], result::json(&timing)?.as_bytes())?;
+    // Fig. 8 d: Table 2's plan by POWELL-BINPAT.
+    let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let planned = Planned::new(&scenario, Method::PowellBinpat)?;
+    let findings = check_plan(&planned);
+    let result = serde_json::to_value(cover::described(&planned, &findings))?;
+    let page = page::page(&planned, &planned.flights(), &findings, result);
+    results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
+    results.keep()?;
+    say!();
+    say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
+    Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
+    let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    for (method, theirs) in METHODS.into_iter().zip(COSTS_M) {
+        let ours = tables.costs(&scenario, method, "m")?;
+        tables.add("2", method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
+    }
+    Ok(())
+}
+
+/// Our medians, seconds: the whole plan, by method, for 2 to 7 vehicles.
+fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
+    let mut all = [[0.0; 6]; 3];
+    for (row, method) in all.iter_mut().zip(METHODS) {
+        for (slot, count) in row.iter_mut().zip(2..) {
+            let scenario = scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
+            let mut times = Vec::with_capacity(RUNS);
+            for _ in 0..RUNS {
+                times.push(Planned::new(&scenario, method)?.seconds.iter().sum::<f64>());
+            }
+            times.sort_by(f64::total_cmp);
+            *slot = times[RUNS / 2];
+        }
+    }
+    Ok(all)
+}
+
+/// One vehicle stands so far away that the others are done sooner without it.
+fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
+    let places = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
+    let scenario = scenario(SMALL, &places, 10.0, 35.0)?;
+    for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {
+        let ours = tables.costs(&scenario, *method, "m")?;
+        tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
+    }
+    Ok(())
+}
+
+fn flown(tables: &mut Tables) -> anyhow::Result<()> {
+    let mut mean_max = [[0.0; 3]; 2];
+    for table in &FLOWN {
+        let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
+        let (polygon, columns) = if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT) };
+        for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
+            let scenario = scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
+            let ours = tables.costs(&scenario, method, "s")?;
+            let index = METHODS.iter().position(|m| *m == method).unwrap_or(0);
+            mean_max[usize::from(table.long)][index] += ours.iter().copied().fold(0.0, f64::max) / 12.0;
+            tables.add(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
+        }
+    }
+    for ((track, ours), theirs) in ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_MAX_S) {
+        for (i, method) in METHODS.into_iter().enumerate() {
+            let both = [vec![rounded(ours[i] as f32)], vec![theirs[i]]];
+            tables.add(track, method, (0.0, 0.0), "s", both);
+        }
+    }
+    Ok(())
+}
+
+fn table_6(tables: &mut Tables) -> anyhow::Result<()> {
+    let scenario = scenario(SHORT_TRACK, &in_a_row(3), 10.0, 20.0)?;
+    for (method, theirs) in METHODS.into_iter().zip(REAL_S) {
+        let ours = tables.costs(&scenario, method, "s")?;
+        tables.add("6", method, (10.0, 20.0), "s", [ours, theirs.to_vec()]);
+    }
+    Ok(())
+}
+
+fn print(tables: &Tables) {
+    say!(
+        "Costs; areas and places are ours. Theirs in A1 to A12 were flown in Gazebo, in 6 in the field; ours are planned."
+    );
+    say!("table     method         lanes  height  ours: max    CV %  theirs: max    CV %");
+    for row in &tables.rows {
+        let max = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
+        let cv =
+            |summary: &Option<Summary>| summary.map_or("-".to_owned(), |s| format!("{:.2}", s.cv_percent));
+        say!(
+            "{:<8}  {:<13}  {:>5}  {:>6}  {:>7.1} {}  {:>6}  {:>10.1} {}  {:>6}",
+            row.table,
+            row.method,
+            row.lane_m,
+            row.height_m,
+            max(&row.ours),
+            row.unit,
+            cv(&row.ours_summary),
+            max(&row.theirs),
+            row.unit,
+            cv(&row.theirs_summary)
+        );
+    }
+}
+
+fn print_planning(ours: &[[f64; 6]; 3]) {
+    say!();
+    say!("Table 3, planning time in ms for 2 to 7 UAVs: ours (this machine), theirs (Ryzen 7 3750H, Python)");
+    let line = |times: &[f64; 6]| times.map(|s| format!("{:>9.3}", s * 1e3)).join(" ");
+    for ((method, ours), theirs) in METHODS.into_iter().zip(ours).zip(PLANNING_S) {
+        say!("{:<13}  ours   {}", method.name(), line(ours));
+        say!("{:<13}  theirs {}", "", line(&theirs));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_printed_agrees_with_itself() {
+        let mut mean_max = [[0.0; 3]; 2];
+        for table in &FLOWN {
+            let index = METHODS.iter().position(|m| m.name() == table.method).expect("a method");
+            for times in table.times_s {
+                mean_max[usize::from(table.long)][index] += Summary::of(times).max / 12.0;
+            }
+        }
+        for (ours, printed) in mean_max.iter().flatten().zip(MEAN_MAX_S.iter().flatten()) {
+            assert!((ours - printed).abs() < 0.01, "{ours} {printed}");
+        }
+        assert!((Summary::of(&COSTS_M[2]).sd - 3.53).abs() < 0.01);
+    }
+
+    #[test]
+    fn fewer_vehicles_finish_sooner() {
+        let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
+        table_4(&mut tables).expect("a plan");
+        let [binpat, powell] = [&tables.rows[0].ours, &tables.rows[1].ours];
+        let max = |costs: &[f64]| costs.iter().copied().fold(0.0, f64::max);
+        assert!(tables.complete && !binpat.contains(&0.0) && powell.contains(&0.0), "{binpat:?} {powell:?}");
+        assert!(max(powell) < max(binpat));
+    }
+}

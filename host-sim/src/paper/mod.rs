@@ -1,0 +1,4 @@
+//! What the papers measured, and the same measured here.
+
+pub mod cpp;
+mod cpp_data;
