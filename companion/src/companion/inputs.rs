@@ -113,6 +113,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             battery_low: t.charge_below(self.config.battery_low_percent),
             battery_critical: t.charge_below(self.config.battery_low_percent / 2),
             column_blocked: self.guidance.filter.column_blocked_for(now),
+            column_barred: self.guidance.filter.column_barred_for(now),
             column_clear: self.guidance.filter.column_clear_for(now),
             must_land: self.must_land(),
             can_turn_back: self.guidance.along_m() >= 0.0

@@ -11,6 +11,7 @@
 mod conflict;
 mod look;
 
+use self::conflict::Found;
 use crate::time::{Duration, Instant};
 
 /// So much of the way has to be free before the vehicle goes on, metres.
@@ -57,11 +58,15 @@ pub(crate) struct Filter {
     /// Since when the column is, or is not, free.
     column_clear: bool,
     column_since: Option<Instant>,
+    /// Since when a vehicle that rests has been in it.
+    barred_since: Option<Instant>,
     /// Since when a landing has been waiting, now and then.
     held_since: Option<Instant>,
     /// Since when it has kept the vehicle from going on for good, and when it last did.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
+    /// Whether it was to yield then.
+    hindered_yields: bool,
     /// How often it stopped the vehicle.
     activations: u32,
 }
@@ -90,9 +95,10 @@ impl Filter {
         self.stopped_since.is_some()
     }
 
-    /// For how long it has kept the vehicle stopped although it goes first.
-    pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
-        if self.yields { Duration::default() } else { self.hindered_for(now) }
+    /// For how long it has kept the vehicle from going on although it goes first; zero once it has not for `free`.
+    pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
+        let since = self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
+        since.map_or(Duration::default(), |at| now - at)
     }
 
     /// For how long it has kept the vehicle from going on for one that rests.
@@ -102,7 +108,7 @@ impl Filter {
 
     /// For how long it has made the vehicle yield.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
-        if self.yields { self.hindered_for(now) } else { Duration::default() }
+        if self.hindered_yields { self.hindered_for(now) } else { Duration::default() }
     }
 
     /// Whether it looked back along the path in this step.
@@ -128,6 +134,11 @@ impl Filter {
     /// For how long the column has not been free.
     pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
         self.column_since.filter(|_| !self.column_clear).map_or(Duration::default(), |at| now - at)
+    }
+
+    /// For how long a vehicle that rests, or is lost, has been in the column.
+    pub(crate) fn column_barred_for(&self, now: Instant) -> Duration {
+        self.barred_since.map_or(Duration::default(), |at| now - at)
     }
 
     /// For how long the column has been free.
@@ -176,15 +187,18 @@ impl Filter {
 }
 
 impl Filter {
-    fn hinder(&mut self, now: Instant) {
+    fn hinder(&mut self, yields: bool, now: Instant) {
         if now - self.hindered_at > FREE {
             self.hindered_since = None;
         }
         self.hindered_since.get_or_insert(now);
-        self.hindered_at = now;
+        (self.hindered_at, self.hindered_yields) = (now, yields);
     }
 
-    fn note_column(&mut self, clear: bool, now: Instant) {
+    fn note_column(&mut self, found: Option<&Found>, now: Instant) {
+        let clear = found.is_none();
+        let rests = found.is_some_and(|found| found.rests);
+        self.barred_since = self.barred_since.or(Some(now)).filter(|_| rests);
         if !clear {
             self.held_since.get_or_insert(now);
         }

@@ -115,7 +115,7 @@ pub enum Guard {
     LandingBlocked,
     /// It has found none for the limit.
     LandingClear,
-    /// It has found one for the limit, and the path leads back to the pad.
+    /// It has found one for the limit, or one that rests for 5 s, and the path leads back to the pad.
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
@@ -249,7 +249,9 @@ pub struct Inputs {
     pub near_path: bool,
     /// Time that the column to the ground, or before take-off to the top, was not free of other vehicles.
     pub column_blocked: Duration,
-    /// Time that it was.
+    /// Time that a vehicle was in it that rests, or is lost.
+    pub column_barred: Duration,
+    /// Time that it was free.
     pub column_clear: Duration,
     /// On its path, and not on the way back yet.
     pub can_turn_back: bool,
@@ -288,6 +290,16 @@ pub struct Inputs {
     pub underneath: Duration,
     /// Slower than a hovering vehicle sways.
     pub standing: bool,
+}
+
+/// A vehicle that rests makes no room: nobody waits longer above it.
+const BARRED: Duration = Duration::from_secs(5);
+
+impl Inputs {
+    /// Whether the column has not been free for `limit`, or a vehicle rests in it.
+    fn no_room_for(&self, limit: Duration) -> bool {
+        self.column_blocked >= limit || self.column_barred >= BARRED
+    }
 }
 
 /// HEARTBEAT comes at 1 Hz: one late is not yet silence.
@@ -352,8 +364,8 @@ impl Guard {
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
-            Self::NoRoomToLand => i.column_blocked >= limit && i.offboard && i.can_turn_back,
-            Self::NoRoomHere => i.column_blocked >= limit && i.offboard && i.can_land_aside,
+            Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
+            Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,
             Self::PadTaken => i.pad_taken >= limit && i.can_land_aside,
             Self::NoPlaceAside => i.plan_failed && i.lands_aside,
             Self::AsideReached => i.aside_reached,

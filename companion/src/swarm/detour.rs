@@ -48,16 +48,20 @@ const RETRY_S: u64 = 10;
 /// Standing and waiting while all others stand for this long is a dead end: whoever is waited for has found no way around.
 const DEAD_END: Duration = Duration::from_secs(30);
 /// After no place to land was found aside, the next is sought so much later.
-const ASIDE_AGAIN_S: u64 = 70;
+const ASIDE_AGAIN_S: u64 = 30;
 /// A vehicle that hears nobody seeks it once its landing has waited for so long.
 const DEAF_ASIDE: Duration = Duration::from_secs(60);
 /// So many ways around that are not found are enough, or one less in this time, seconds.
 const DETOURS_TRIED: u8 = 4;
-const GIVES_UP_S: u64 = 100;
+const GIVES_UP_S: u64 = 60;
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
+/// What kept the vehicle from going on within this time still does; once it counts as blocked, within [`FREE`]: what sways
+/// at the edge of its way must not make it begin again and again.
+const LATELY: Duration = Duration::from_millis(500);
+const FREE: Duration = Duration::from_secs(3);
 /// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
 const KEPT: Duration = Duration::from_secs(20);
 /// An abort whose end the autopilot does not tell is over by then.
@@ -333,7 +337,8 @@ impl Detours {
         let aside = self.aside && view.guidance.is_at_end(&view.scene);
         let astray = self.left && (!self.flying || aside) && !self.lands;
         let dead_end = self.is_held(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END);
-        let stopped = view.guidance.filter.blocked_for(now) > STUCK;
+        let free = if view.mission.state() == State::Blocked { FREE } else { LATELY };
+        let stopped = view.guidance.filter.blocked_for(now, free) > STUCK;
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.in_the_way);
         if !view.neighbours.all_stand(now) {

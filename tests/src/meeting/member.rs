@@ -39,6 +39,8 @@ pub(super) struct Member {
     pub(super) stops: u32,
     pub(super) stopped_since: Option<Instant>,
     pub(super) longest_stop_s: f32,
+    /// How often it found its path blocked.
+    pub(super) blocked: u32,
 }
 
 fn config(scene: &Scene, i: usize) -> Config<VEHICLES> {
@@ -97,6 +99,7 @@ impl Member {
             stops: 0,
             stopped_since: None,
             longest_stop_s: 0.0,
+            blocked: 0,
         }
     }
 

@@ -14,7 +14,7 @@ pub mod scene;
 
 use companion::link::frame::{self, Framer, Header, MAX_SENT};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Event, Instant, Link, PlanFailure};
+use companion::{COMPONENT, Event, Instant, Link, PlanFailure, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
@@ -265,6 +265,7 @@ impl<'a> World<'a> {
             match event {
                 Event::PlanRequested => self.plan(i),
                 Event::StateChanged { from, to, text, .. } => {
+                    self.members[i].blocked += u32::from((from, to) == (State::Follow, State::Blocked));
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
                 }
                 Event::RestartRequested | Event::WaitsForStart { .. } => {}
@@ -361,6 +362,7 @@ impl<'a> World<'a> {
             arrived,
             filter_stops: self.members.iter().map(|member| member.stops).sum(),
             longest_stop_s: self.members.iter().map(|m| m.longest_stop_s).fold(0.0, f32::max),
+            most_blocked: self.members.iter().map(|member| member.blocked).max().unwrap_or_default(),
             trace: self.trace.unwrap_or_default(),
         }
     }

@@ -40,6 +40,8 @@ pub struct Outcome {
     pub filter_stops: u32,
     /// For how long at most, seconds.
     pub longest_stop_s: f32,
+    /// How often one vehicle found its path blocked, at most.
+    pub most_blocked: u32,
     /// What happened, if that was asked for.
     pub trace: Vec<String>,
 }

@@ -27,14 +27,19 @@ pub(super) fn around(request: &DetourRequest, keep: &[KeepOff], own: &Plan) -> O
     });
     let offs: Vec<Point> = offs.collect();
     if request.aside {
-        for length in [3.0, 5.0, 8.0] {
-            for off in &offs {
-                ways.push(vec![here, here + off * length]);
+        for rise in [0.0, 2.5, 5.0].map(|rise| Point::new(0.0, 0.0, rise)) {
+            for length in [3.0, 5.0, 8.0] {
+                for off in &offs {
+                    let way = [here, here + rise, here + rise + off * length];
+                    ways.push(if rise.z > 0.0 { way.to_vec() } else { vec![here, way[2]] });
+                }
             }
         }
         let rests =
             |at: &Point| keep.iter().all(|k| oracle::distance((*at, *at), (k.from, k.to)) >= k.radius_m);
-        let way = ways.into_iter().find(|way| clear(way[0], way[1]) && rests(&way[1]))?;
+        let way = ways
+            .into_iter()
+            .find(|way| way.windows(2).all(|leg| clear(leg[0], leg[1])) && way.last().is_some_and(rests))?;
         return along(&way, own, request.descent_m);
     }
     ways.push(vec![here, last]);

@@ -84,6 +84,7 @@ impl Guidance {
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
         let deaf = lands && neighbours.is_deaf(now);
+        let floor_m = scene.plan.map(|plan| self.lands_at_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
@@ -141,8 +142,9 @@ impl Guidance {
             } else {
                 safety_m + STRAY_M
             };
-            if lands && silent && !deaf && !met.stranger && neighbours.may_lie_below(i, &place, apart_m) {
-                return Some(Found { id: met.id, yields: true, stranger: false, rests: true });
+            let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
+            if lands && silent && !deaf && !met.stranger && floor_m.is_some_and(may_lie_below) {
+                return Some(Found { id: met.id, yields: true, stranger: false, rests: met.lost });
             }
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);
             let away = met.heard.position - place;

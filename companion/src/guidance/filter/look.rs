@@ -27,19 +27,12 @@ impl Guidance {
             return;
         };
         let position = &scene.telemetry.position;
-        let ground_m = self.ground_m(plan).min(position.z);
-        // Between pad and goal the ground may be lower than below either.
-        let lands = matches!(state, State::Land | State::LandingHeld);
-        let between = lands && self.on_path && !self.reached_end(&plan.path);
-        let ground_m = if between { ground_m - LOWER_M } else { ground_m };
+        let ground_m = self.lands_at_m(state, scene, plan);
         let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
             State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
             State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
             State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.door.velocity().z.max(0.0) },
-            State::Follow if self.descends() => {
-                Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) }
-            }
             State::Follow
             | State::Paused
             | State::Alone
@@ -48,12 +41,17 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                Way::Path { back: self.flies_back(&plan.path) }
+                // What stopped its descent is looked at on while it stands.
+                match self.descends() {
+                    true => Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) },
+                    false => Way::Path { back: self.flies_back(&plan.path) },
+                }
             }
             _ => Way::Stands,
         };
         if !matches!(state, State::Scheduled | State::Land | State::LandingHeld) {
             (self.filter.column_clear, self.filter.column_since) = (true, None);
+            self.filter.barred_since = None;
             self.filter.held_since = self.filter.held_since.filter(|_| state == State::Replanning);
         }
         if matches!(way, Way::Stands) {
@@ -90,7 +88,7 @@ impl Guidance {
         };
         let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if whole_column {
-            self.filter.note_column(found.is_none(), now);
+            self.filter.note_column(found.as_ref(), now);
             self.filter.reset_stop();
             self.filter.blocker = found.map_or(0, |found| found.id);
             return;
@@ -105,7 +103,7 @@ impl Guidance {
                 self.filter.clear_since = None;
                 // A stranger hinders it for good only where the hull would touch it.
                 if !found.stranger || self.filter.passes_stranger(now) {
-                    self.filter.hinder(now);
+                    self.filter.hinder(found.yields, now);
                 }
                 (self.filter.blocker, self.filter.yields) = (found.id, found.yields);
                 (self.filter.stranger, self.filter.rests) = (found.stranger, found.rests);
@@ -120,6 +118,25 @@ impl Guidance {
             }
             None => self.count_standstill(state, scene, neighbours, now),
         }
+    }
+
+    /// How low the ground below it may be, metres: not above the vehicle.
+    pub(super) fn lands_at_m<const W: usize, const G: usize>(
+        &self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        plan: &VehiclePlan<W, G>,
+    ) -> f32 {
+        let z_m = scene.telemetry.position.z;
+        let mut ground_m = self.ground_m(plan).min(z_m);
+        if self.returning && scene.detours {
+            // Its way back ends where a way around began: nobody knows how high that is above the ground.
+            ground_m = plan.path.point_at(0.0).map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
+        }
+        // Between pad and goal the ground may be lower than below either.
+        let lands = matches!(state, State::Land | State::LandingHeld);
+        let between = lands && self.on_path && !self.reached_end(&plan.path);
+        if between { ground_m - LOWER_M } else { ground_m }
     }
 
     /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
@@ -158,7 +175,7 @@ impl Guidance {
             && self.advice.stop_within_m.min(self.waits_m) < WAITS_M
             && !scene.plan.is_some_and(gate)
         {
-            self.filter.hinder(now);
+            self.filter.hinder(id < scene.id, now);
             (self.filter.yields, self.filter.rests) = (id < scene.id, neighbours.rests(id, now));
         }
     }

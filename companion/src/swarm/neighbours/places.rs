@@ -68,8 +68,9 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of `place`, seen from above.
-    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, apart_m: f32) -> bool {
+    /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column from `place` down to the
+    /// ground at `floor_m`: from where it may have come along its path it comes down, never up.
+    pub(crate) fn may_lie_below(&self, i: usize, place: &Point, floor_m: f32, apart_m: f32) -> bool {
         let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {
             return false;
         };
@@ -77,7 +78,8 @@ impl<const V: usize> Neighbours<V> {
         let mut near = |a: Point, b: Point| {
             let (leg, away) = ((b - a).xy(), (place - a).xy());
             let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
-            below |= (away - leg * share).norm_squared() < apart_m * apart_m;
+            let high_m = libm::fmaxf(a.z, b.z);
+            below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
         };
         contact.stretch(|at| near(core::mem::replace(&mut from, at), at));
         below

@@ -110,8 +110,10 @@ impl Contact {
         if self.heard_within(now, SPEAKS) || (own_m.is_none() && self.belongs_at.is_some()) {
             return own_m;
         }
-        let relayed_m = self.relayed_m?;
-        Some(own_m.map_or(relayed_m, |own_m| libm::fmaxf(own_m, relayed_m)))
+        match (own_m, self.relayed_m) {
+            (Some(own_m), Some(relayed_m)) => Some(libm::fmaxf(own_m, relayed_m)),
+            (own_m, relayed_m) => own_m.or(relayed_m),
+        }
     }
 
     /// When it was last known how it is: heard from itself, or on its way by others.

@@ -338,7 +338,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let away = met.heard.position - reach.place;
         let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
-        let below = lands && silent && table.may_lie_below(1, &reach.place, reach.within_m);
+        let below = lands && silent && table.may_lie_below(1, &reach.place, -COLUMN_M, reach.within_m);
         if table.is_beyond(1, now, &reach) {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
@@ -348,4 +348,52 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         }
     }
     assert!(beyond > 2000 && reached > 1000 && missed < beyond, "{beyond} {reached} {missed}");
+}
+
+#[test]
+fn nobody_falls_up() {
+    let mut rng = Pcg32::seed_from_u64(7);
+    let apart_m = 1.75;
+    let (mut below, mut above) = (0, 0);
+    for _ in 0..2000 {
+        let mut table = joined(0);
+        let here = Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
+        let points: heapless::Vec<Point, { crate::link::intent::POINTS }> =
+            (0..3).map(|_| here + Point::from_fn(|_, _| uniform(&mut rng, -3.0, 3.0))).collect();
+        let told = Intent { points: points.clone(), ..intent(0, 1, 2) };
+        table.handle_intent(Instant::from_millis(500), 1, &told, 1, None);
+        table.handle_position(Instant::from_millis(500), &ORIGIN, 9, &place(50, 0));
+        // Where the position says it is.
+        let from = table.contacts[1].state.position;
+        let mut place = Point::from_fn(|_, _| uniform(&mut rng, -6.0, 6.0));
+        place.z = uniform(&mut rng, 0.0, 30.0);
+        let floor_m = place.z - uniform(&mut rng, 0.5, 20.0);
+        let says = table.may_lie_below(1, &place, floor_m, apart_m);
+        let highest_m = points.iter().fold(from.z, |most, p| most.max(p.z));
+        let near = table.may_lie_below(1, &place, -1e6, apart_m);
+        assert!(near || !says);
+        if says {
+            below += 1;
+            assert!(highest_m > floor_m - apart_m, "it would have to climb");
+        } else if near {
+            above += 1;
+            // Whatever of its way is beside the column is too far below the floor.
+            let (mut nearest, mut at) = (f32::INFINITY, from);
+            let mut left_m = table.contacts[1].stretch_m();
+            for next in &points {
+                let leg_m = (next - at).norm();
+                let share = (left_m / leg_m).clamp(0.0, 1.0);
+                left_m -= leg_m;
+                for step in 0..=50 {
+                    let way = at + (next - at) * (share * step as f32 / 50.0);
+                    if (way - place).xy().norm() < apart_m {
+                        nearest = nearest.min((way - Point::new(place.x, place.y, floor_m)).norm());
+                    }
+                }
+                at = *next;
+            }
+            assert!(nearest > apart_m - 1e-3 || nearest.is_infinite(), "{nearest}");
+        }
+    }
+    assert!(below > 100 && above > 20, "{below} {above}");
 }

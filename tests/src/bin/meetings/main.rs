@@ -72,6 +72,12 @@ fn main() {
     let stops: u32 = outcomes.iter().map(|outcome| outcome.filter_stops).sum();
     let longest_s = outcomes.iter().map(|outcome| outcome.longest_stop_s).fold(0.0, f32::max);
     println!("{stops} stops by the safety filter, the longest {longest_s:.2} s");
+    let mut blocked: Vec<_> = outcomes.iter().map(|o| (o.most_blocked, o.seed)).collect();
+    blocked.sort_unstable();
+    println!(
+        "paths found blocked at most, and seeds: {:?}",
+        blocked.iter().rev().take(8).collect::<Vec<_>>()
+    );
     if args.passing {
         for kind in scene::PASSINGS {
             let of = || outcomes.iter().filter(|outcome| outcome.kind == kind);

@@ -7,8 +7,8 @@ use anyhow::{Context, Result};
 use clap::Parser;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::result::MissionResult;
-use host_sim::{scenario, swarm};
+use host_sim::scenario;
+use host_sim::swarm::{self, Flight};
 use rayon::prelude::*;
 
 const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
@@ -24,6 +24,9 @@ struct Args {
     /// Only this range, metres.
     #[arg(long, value_name = "METRES")]
     range: Option<f32>,
+    /// Only this seed, with what the companions said.
+    #[arg(long, value_name = "SEED")]
+    seed: Option<u64>,
 }
 
 fn main() -> Result<()> {
@@ -33,11 +36,16 @@ fn main() -> Result<()> {
         if args.range.is_some_and(|only| only != range_m) {
             continue;
         }
-        let flown: Vec<(u64, Result<MissionResult>)> =
-            (1..=args.seeds).into_par_iter().map(|seed| (seed, fly(seed, range_m))).collect();
+        let seeds = args.seed.map_or(1..=args.seeds, |seed| seed..=seed);
+        let flown: Vec<(u64, Result<Flight>)> =
+            seeds.into_par_iter().map(|seed| (seed, fly(seed, range_m))).collect();
+        let flights = flown.len();
         let (mut complete, mut safety, mut left, mut unnamed) = (0, [0; 3], 0, 0);
-        for (seed, result) in flown {
-            let result = result.with_context(|| format!("seed {seed}"))?;
+        for (seed, flight) in flown {
+            let Flight { result, log, .. } = flight.with_context(|| format!("seed {seed}"))?;
+            for event in log.iter().filter(|_| args.seed.is_some()) {
+                println!("  {:7.2} s, vehicle {:?}: {}", event.t_s, event.vehicle, event.text);
+            }
             complete += usize::from(result.complete);
             let counts = [result.safety.violations, result.safety.wall_contacts, result.safety.deadlocks];
             safety.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
@@ -53,9 +61,9 @@ fn main() -> Result<()> {
         println!(
             "range {range_m} m: {complete}/{} complete, {} violations, {} contacts, {} deadlocks, {left} not landed, \
              {unnamed} without a reason",
-            args.seeds, safety[0], safety[1], safety[2]
+            flights, safety[0], safety[1], safety[2]
         );
-        let least = complete_least * args.seeds as usize / 20;
+        let least = complete_least * flights / 20;
         bad |= complete < least || safety != [0; 3] || left > 0;
     }
     if bad {
@@ -64,11 +72,11 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-fn fly(seed: u64, range_m: f32) -> Result<MissionResult> {
+fn fly(seed: u64, range_m: f32) -> Result<Flight> {
     let text = DEMO.replacen("seed = 1", &format!("seed = {seed}"), 1);
     let mut parsed = scenario::parse(&text, "demo.toml")?;
     parsed.simulation.radio_range_m = range_m;
     let mut mission = Mission::prepare(parsed, &Progress::hidden())?;
     let plan = mission.plan()?;
-    Ok(swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())?.result)
+    swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())
 }

@@ -4,6 +4,8 @@ extern crate std;
 use std::vec::Vec as List;
 
 use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
 use super::*;
 use crate::config::RosterEntry;
@@ -121,4 +123,30 @@ fn a_vehicle_that_was_heard_off_the_plan_is_not_believed_back_onto_it() {
     assert_eq!(swarm.believed_m(1, 0), None);
     let held_m = swarm.believed_m(2, 0);
     assert!(held_m.is_some_and(|m| m < swarm.progress_m(0) - 5.0), "{held_m:?}");
+}
+
+/// What was heard of a vehicle stays known, and is passed on, when it is not heard any more: nobody may have relayed it before.
+#[test]
+fn progress_outlives_the_sight_of_a_vehicle() {
+    let mut rng = Pcg32::seed_from_u64(11);
+    for _ in 0..200 {
+        let count = 3 + rng.next_u32() as u8 % 4;
+        let mut swarm = Swarm::new(count);
+        let together = 1 + rng.next_u32() % 20;
+        (0..together).for_each(|_| swarm.step(&[true; 8], &[false; 8], true));
+        let last_m = swarm.progress_m(0) - 0.2;
+        let before_m = swarm.believed_m(1, 0).unwrap();
+        // The first one leaves the range of all.
+        let lost: List<_> = (0..8).map(|i| i == 0).collect();
+        let apart = 1 + rng.next_u32() % 100;
+        for _ in 0..apart {
+            swarm.step(&[true; 8], &lost, true);
+            let held_m = swarm.believed_m(1, 0);
+            assert!(held_m.is_some_and(|m| before_m <= m && m <= last_m + 0.3), "{held_m:?} of {before_m}");
+        }
+        if apart > 40 {
+            let passed_on_m = swarm.believed_m(usize::from(count) - 1, 0);
+            assert!(passed_on_m.is_some_and(|m| m <= last_m + 0.3), "{passed_on_m:?}");
+        }
+    }
 }
