@@ -31,7 +31,7 @@ impl ScheduleConfig {
 /// Why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
-    /// More than [`PIECES`] pieces in one flight.
+    /// More than [`PIECES`](super::PIECES) pieces in one flight.
     PiecesFull,
     /// More than `G` gates for one vehicle.
     GatesFull,

@@ -130,9 +130,9 @@ impl File {
 /// What came of reading.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer<'a> {
-    /// The bytes asked for by [`Store::read`].
+    /// The bytes asked for by [`Store::read`](super::Store::read).
     Bytes(&'a [u8]),
-    /// The running CRC asked for by [`Store::sum`].
+    /// The running CRC asked for by [`Store::sum`](super::Store::sum).
     Sum(u32),
     /// They cannot be read.
     Failed,
