@@ -15,8 +15,8 @@ use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
 use firmware::boards::chosen::{self, Flash, LAYOUT, Receiver, Transmitter, Watchdog};
-use firmware::boards::crash;
 use firmware::boards::parts::{Parts, WARNINGS};
+use firmware::boards::{crash, sleep};
 use firmware::capacity::{VEHICLES, WAYPOINTS};
 use firmware::kept::Work;
 use firmware::lent::Lent;
@@ -79,7 +79,7 @@ fn main() -> ! {
     let said = Said { crashed, warnings };
     plans.spawn(work(shell, links, autopilot, swarm, flash, said).expect("there is one such task"));
     loop {
-        cortex_m::asm::wfi();
+        sleep();
     }
 }
 

@@ -2,13 +2,21 @@
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
+use std::thread::sleep;
+use std::time::{Duration, Instant};
 
+use host_sim::link::LinkUrl;
+use host_sim::mission::Mission;
+use host_sim::scenario::Companion;
+use host_sim::swarm::Flight;
 use planner_core::voxel::VoxelGrid;
 
-use crate::workspace;
+use crate::{Guard, free_port, workspace};
 
 /// Where bank 2 of the emulated flash lies.
 const BANK2: u32 = 0x6000_0000;
+/// A loaded machine starts nothing at once.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// Where a map for measurements lies.
 const MAP: u32 = 0x6080_0000;
 
@@ -69,4 +77,44 @@ pub fn measure(program: &Path, roadmap: &[u8], map: &[u8]) -> Vec<String> {
     let text = String::from_utf8_lossy(&out.stdout);
     assert!(out.status.success(), "{text}\n{}", String::from_utf8_lossy(&out.stderr));
     text.lines().map(str::to_owned).collect()
+}
+
+/// A board that runs by the wall clock, and its ports: to the autopilot, to the radio.
+///
+/// # Panics
+/// QEMU does not start.
+pub fn by_the_clock(program: &Path) -> (Guard, [LinkUrl; 2]) {
+    let ports = [free_port(), free_port()];
+    let mut qemu = qemu(program);
+    qemu.args(["-monitor", "none", "-icount", "shift=4", "-semihosting-config", "enable=on,target=native"]);
+    for port in ports {
+        qemu.args(["-serial", &format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on")]);
+    }
+    let board = Guard(qemu.stdout(Stdio::null()).spawn().expect("qemu-system-arm starts"));
+    let urls = ports.map(|port| LinkUrl::Tcp(format!("127.0.0.1:{port}")));
+    // It listens as soon as it runs.
+    let began = Instant::now();
+    while urls[1].open().is_err() {
+        assert!(began.elapsed() < PATIENCE, "QEMU does not listen");
+        sleep(Duration::from_millis(20));
+    }
+    (board, urls)
+}
+
+/// Every vehicle of a mission has a board in lock step from now on, which logs to `folder`.
+pub fn put_on_boards(mission: &mut Mission, program: &Path, folder: &Path) {
+    for vehicle in &mut mission.scenario.vehicles {
+        let log = folder.join(format!("board-{}.defmt", vehicle.id));
+        vehicle.companion = Companion::Emulated { program: program.to_owned(), log };
+    }
+}
+
+/// All of a flight that anybody can see: its result, what was said and when, and where everybody was.
+///
+/// # Panics
+/// The result cannot be written.
+pub fn record(flight: &Flight) -> String {
+    let result = serde_json::to_string(&flight.result).expect("a result");
+    let log: Vec<_> = flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();
+    format!("{result}\n{log:?}\n{:?}", flight.tracks)
 }

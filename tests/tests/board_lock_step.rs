@@ -1,4 +1,5 @@
-//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine does.
+//! Boards in lock step with the simulation: a flight is the same twice, whatever else this machine does. By the wall clock, for
+//! foreign ground tools, a board has ports.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{available_parallelism, scope};
@@ -7,8 +8,8 @@ use flockmate_tests::board;
 use flockmate_tests::vehicle::mission;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::scenario::Companion;
 use host_sim::swarm::{self, Flight};
+use host_sim::upload::Client;
 
 /// Three vehicles in the lobby of the built-in building; two of them cross.
 const THREE: &str = r#"
@@ -37,22 +38,12 @@ fn fly(mission: &mut Mission) -> Flight {
     swarm::fly(mission, &plan, "fly", false, &Progress::on_terminal()).expect("the boards answer")
 }
 
-/// All of a flight that anybody can see.
-fn record(flight: &Flight) -> String {
-    let result = serde_json::to_string(&flight.result).expect("a result");
-    let log: Vec<_> = flight.log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect();
-    format!("{result}\n{log:?}\n{:?}", flight.tracks)
-}
-
 #[test]
 fn a_flight_of_boards_is_the_same_twice_on_any_load() {
     let Some(program) = board::program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
     let mut mission = mission(THREE);
-    for vehicle in &mut mission.scenario.vehicles {
-        let log = folder.path().join(format!("board-{}.defmt", vehicle.id));
-        vehicle.companion = Companion::Emulated { program: program.clone(), log };
-    }
+    board::put_on_boards(&mut mission, &program, folder.path());
     let first = fly(&mut mission);
     assert!(first.result.complete, "{:?}", first.log.iter().map(|event| &event.text).collect::<Vec<_>>());
     let over = AtomicBool::new(false);
@@ -68,5 +59,13 @@ fn a_flight_of_boards_is_the_same_twice_on_any_load() {
         second
     });
     println!("{:.0} s in {:.1} s, beside a load {:.1} s", first.simulated_s, first.took_s, second.took_s);
-    assert!(record(&first) == record(&second), "{:?}\n{:?}", first.result, second.result);
+    assert!(board::record(&first) == board::record(&second), "{:?}\n{:?}", first.result, second.result);
+}
+
+#[test]
+fn by_the_wall_clock_a_board_answers_through_its_port() {
+    let Some(program) = board::program("flockmate") else { return };
+    let (_board, [autopilot, _]) = board::by_the_clock(&program);
+    let mut client = Client::new(autopilot.open().expect("its port is open"), None);
+    assert_eq!(client.find().expect("it speaks"), 250);
 }

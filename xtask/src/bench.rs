@@ -17,7 +17,7 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case; or one of the
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case, boards; or one of the
     /// suites: deconfliction, meetings, hostile, range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
@@ -56,7 +56,8 @@ pub fn run_bench(args: &Args) -> Result<()> {
     }
     install::debian(install::COUNTER)?;
     bench.args(["bench", "--"]);
-    if args.only.as_deref().is_none_or(|only| "worst-case".contains(only)) {
+    let runs = |group: &str| args.only.as_deref().is_none_or(|only| group.contains(only));
+    if runs("worst-case") || runs("boards") {
         install::debian(install::EMULATOR)?;
         bench.env("FLOCKMATE_FIRMWARE", bare_metal::build(Board::Qemu)?.folder);
     }

@@ -31,6 +31,16 @@ pub use qemu as chosen;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use lock::HoldsExecutors;
 
+/// Sleeps until an interrupt comes.
+#[cfg(all(target_os = "none", feature = "qemu"))]
+pub use qemu::sleep;
+
+/// Sleeps until an interrupt comes.
+#[cfg(all(target_os = "none", feature = "board", not(feature = "qemu")))]
+pub fn sleep() {
+    cortex_m::asm::wfi();
+}
+
 /// On the desk there is no other executor to hold back.
 #[cfg(not(all(target_os = "none", feature = "board")))]
 pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;

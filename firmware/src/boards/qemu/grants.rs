@@ -44,6 +44,8 @@ struct Desk {
     done: usize,
     /// Bytes that wait for the grant's end.
     sent: usize,
+    /// When the next of it is due, counts.
+    due: u64,
 }
 
 static DESK: Mutex<RefCell<Option<Desk>>> = Mutex::new(RefCell::new(None));
@@ -55,7 +57,7 @@ pub fn start() {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
         // What is logged goes to the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
-        let mut desk = Desk { input, output, length: 0, done: 0, sent: 0 };
+        let mut desk = Desk { input, output, length: 0, done: 0, sent: 0, due: 0 };
         desk.say(FromBoard::Started, &[]);
         desk.flush();
         desk.read();
@@ -63,6 +65,16 @@ pub fn start() {
         interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
         critical_section::with(|cs| DESK.borrow_ref_mut(cs).insert(desk).go_on(cs));
     }
+}
+
+/// Whether the board is in lock step.
+pub fn are_needed() -> bool {
+    critical_section::with(|cs| DESK.borrow_ref(cs).is_some())
+}
+
+/// When something is due, counts of the clock.
+pub fn due(cs: CriticalSection<'_>) -> u64 {
+    DESK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
 }
 
 /// Something is due.
@@ -101,6 +113,7 @@ impl Desk {
             };
             let (due, now) = (due_us * COUNTS_US, CLOCK_NOW(cs));
             if due > now {
+                self.due = due;
                 // What is farther is looked at again.
                 Register::new(TIMER, LOAD).write((due - now).min(u64::from(u32::MAX)) as u32);
                 return;

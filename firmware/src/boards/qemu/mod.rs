@@ -32,6 +32,15 @@ pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
+/// Sleeps until an interrupt comes.
+pub fn sleep() {
+    if grants::are_needed() {
+        clock::skip();
+    } else {
+        cortex_m::asm::wfi();
+    }
+}
+
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
     mpu::enable(&[Some(mpu::guard())]);

@@ -1,8 +1,12 @@
 //! CMSDK watchdog: resets the board unless it is fed.
 #![expect(unsafe_code, reason = "the handler of the interrupt that nothing masks")]
 
-use cortex_m_rt::exception;
+use core::cell::Cell;
 
+use cortex_m_rt::exception;
+use critical_section::{CriticalSection, Mutex};
+
+use super::clock::CLOCK_NOW;
 use super::registers::Register;
 
 const WATCHDOG: usize = 0x4000_8000;
@@ -20,6 +24,22 @@ const ENABLED: u32 = 0b11;
 #[exception]
 unsafe fn NonMaskableInt() {}
 
+/// When it was last fed, counts of the clock.
+static FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
+
+/// How far time may be skipped, counts of the clock: the device counts none of it, so what is left is counted here.
+pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
+    let bites = FED.borrow(cs).get() + u64::from(2 * COUNTS);
+    if now >= bites {
+        super::reset();
+    }
+    due.min(bites)
+}
+
+fn note_fed() {
+    critical_section::with(|cs| FED.borrow(cs).set(CLOCK_NOW(cs)));
+}
+
 /// The watchdog.
 pub struct Watchdog(pub(super) ());
 
@@ -29,10 +49,12 @@ impl Watchdog {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
         Register::new(WATCHDOG, LOAD).write(COUNTS);
         Register::new(WATCHDOG, CTRL).write(ENABLED);
+        note_fed();
     }
 
     /// Puts the reset off.
     pub fn feed(&mut self) {
         Register::new(WATCHDOG, INTCLR).write(1);
+        note_fed();
     }
 }

@@ -4,6 +4,7 @@
 //! `[{ "name", "ours", "theirs", "ratio", "required", "unit", "n" }]`.
 
 mod assignment;
+mod boards;
 mod coverage;
 mod fidelity;
 mod roadmap;
@@ -43,7 +44,7 @@ struct Args {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
     /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case,
-    /// fidelity.
+    /// fidelity, boards.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
@@ -87,6 +88,9 @@ fn main() -> Result<()> {
     }
     if "fidelity".contains(&args.only) {
         rows.extend(fidelity::rows());
+    }
+    if "boards".contains(&args.only) {
+        boards::run()?;
     }
     println!("{:24} {:>5} {:>13} {:>13} {:>8} {:>9}", "name", "n", "ours", "theirs", "ratio", "required");
     for Row { name, ours, theirs, ratio, required, unit, n } in &rows {

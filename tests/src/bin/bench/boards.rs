@@ -1,0 +1,39 @@
+//! Ten emulated boards fly the demo twice, once beside eight busy processes: the same flight.
+
+use std::process::{Command, Stdio};
+
+use anyhow::{Context, Result, ensure};
+use flockmate_tests::{Guard, board, workspace};
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::{scenario, swarm};
+
+/// Processes that keep this machine busy.
+const BUSY: usize = 8;
+
+/// Flies, compares and prints.
+pub fn run() -> Result<()> {
+    let Some(program) = board::program("flockmate") else { return Ok(()) };
+    let folder = tempfile::tempdir()?;
+    let demo = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
+    let progress = Progress::on_terminal();
+    let mut mission = Mission::prepare(demo, &progress)?;
+    board::put_on_boards(&mut mission, &program, folder.path());
+    let plan = mission.plan()?;
+    let fly = || swarm::fly(&mission, &plan, "fly", false, &progress);
+    let alone = fly()?;
+    let busy = || Command::new("sh").args(["-c", "while :; do :; done"]).stdin(Stdio::null()).spawn();
+    let others: Vec<_> = (0..BUSY).map(|_| busy().map(Guard)).collect::<Result<_, _>>().context("no sh")?;
+    let beside = fly()?;
+    drop(others);
+    println!(
+        "{} boards, {:.0} s of flight: {:.0} s alone, {:.0} s beside {BUSY} busy processes",
+        mission.scenario.vehicles.len(),
+        alone.simulated_s,
+        alone.took_s,
+        beside.took_s
+    );
+    ensure!(alone.result.complete, "the flight is not complete");
+    ensure!(board::record(&alone) == board::record(&beside), "the flights differ");
+    Ok(())
+}
