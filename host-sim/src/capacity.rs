@@ -3,6 +3,7 @@
 use companion::storage::mission_file::MissionView;
 use companion::storage::store::Layout;
 use companion::storage::store::area::DATA_AT;
+use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
 
 /// Nodes of a roadmap, terminals among them: 30 bytes each in scratch.
@@ -17,6 +18,19 @@ pub const WAYPOINTS: usize = 64;
 pub const GATES: usize = 2048;
 /// Pieces of flights among which a vehicle steps aside: 44 bytes each.
 pub const PIECES: usize = 32_768;
+
+/// A companion with the desk's capacities.
+pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
+
+/// A companion on the heap: it is too large for a stack.
+///
+/// # Errors
+/// The configuration names what is wrong.
+pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
+    let companion =
+        DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
+    Ok(Box::new(companion))
+}
 
 /// What a board can hold: its firmware's capacities.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

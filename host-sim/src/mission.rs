@@ -17,14 +17,13 @@ use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError};
 use planner_core::search::SearchWorkspace;
 
-use crate::capacity::{Board, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{Board, DeskCompanion, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::{self, ClearanceField, VoxelMap};
 use crate::margins;
 use crate::progress::Progress;
 use crate::result::{Left, RoadmapSize, Timing};
 use crate::roadmap::{self, Roadmap};
 use crate::scenario::{self, Scenario};
-use crate::swarm::member::DeskCompanion;
 
 /// The plan of a swarm with the desk's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
@@ -66,6 +65,35 @@ pub struct Mission {
     clearance_field: OnceLock<ClearanceField>,
 }
 
+/// Separation and nominal speeds of a scenario.
+fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
+    ScheduleConfig {
+        separation_m: scenario.deconfliction.separation_m,
+        parked_separation_m: margins::parked_separation_m(
+            &scenario.simulation,
+            scenario.deconfliction.safety_distance_m,
+            &scenario.vehicles,
+        ),
+        cruise_mps: PACE * scenario.mission.cruise_mps,
+        vertical_mps: VERTICAL_MPS,
+    }
+}
+
+/// Height of each goal over where a vehicle of the largest radius stands below it, metres.
+fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<Vec<f32>> {
+    let largest_m = scenario.largest_radius_m();
+    goals
+        .iter()
+        .enumerate()
+        .map(|(i, goal)| {
+            // The slots around a single goal stand where that stands.
+            let places = &scenario.mission.goal_places;
+            let place = places.get(i).or(places.first());
+            places::height_over_ground(scenario, map, &format!("goal {i}"), place, goal, largest_m)
+        })
+        .collect()
+}
+
 impl Mission {
     /// Reads the map and builds the roadmap.
     ///
@@ -93,30 +121,10 @@ impl Mission {
 
         let begun = Instant::now();
         let stage = progress.stage("roadmap");
-        let safety_m = scenario.deconfliction.safety_distance_m;
-        let schedule = ScheduleConfig {
-            separation_m: scenario.deconfliction.separation_m,
-            parked_separation_m: margins::parked_separation_m(
-                &scenario.simulation,
-                safety_m,
-                &scenario.vehicles,
-            ),
-            cruise_mps: PACE * scenario.mission.cruise_mps,
-            vertical_mps: VERTICAL_MPS,
-        };
+        let schedule = schedule_config(&scenario);
         let goals = places::goals(&scenario, &map, &schedule)?;
         let tasks = places::tasks(&scenario, &map)?;
-        let largest_m = scenario.largest_radius_m();
-        let descents_m = goals
-            .iter()
-            .enumerate()
-            .map(|(i, goal)| {
-                // The slots around a single goal stand where that stands.
-                let places = &scenario.mission.goal_places;
-                let place = places.get(i).or(places.first());
-                places::height_over_ground(&scenario, &map, &format!("goal {i}"), place, goal, largest_m)
-            })
-            .collect::<anyhow::Result<_>>()?;
+        let descents_m = descents_m(&scenario, &map, &goals)?;
         if let Some(Board { name, vehicles, .. }) =
             board.filter(|b| b.vehicles < tasks.len().max(goals.len()))
         {

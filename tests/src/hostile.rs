@@ -18,11 +18,10 @@ use crate::meeting::autopilot::Autopilot;
 use crate::meeting::dice::Dice;
 use crate::setpoints::{Limits, SetpointCheck, SetpointStats, rounding_m};
 
-use self::forge::READ;
-
+mod entropy;
 mod forge;
 
-pub use self::forge::{Bytes, Entropy};
+pub use self::entropy::{Bytes, Entropy};
 
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 const ID: u8 = 42;
@@ -31,6 +30,9 @@ const FENCE: (Point, Point) = (Point::new(-40.0, -40.0, -5.0), Point::new(70.0, 
 const STEP: Duration = Duration::from_millis(25);
 /// More than this in a second of simulated time is no bounded answer, frames to each link.
 const ANSWERS_MOST: [u32; 2] = [200, 60];
+/// Messages that a companion reads, and one that it does not.
+const READ: [u32; 20] =
+    [0, 1, 20, 21, 22, 23, 32, 33, 49, 66, 75, 76, 77, 110, 111, 193, 230, 245, 253, TUNNEL_DATA::ID];
 /// Speed of a setpoint, m/s.
 const SPEED_MPS: f32 = 2.2;
 

@@ -222,34 +222,39 @@ impl SetpointCheck {
             stats.speed_mps = stats.speed_mps.max(velocity.norm());
             stats.mismatch_mps = stats.mismatch_mps.max((sent - velocity).norm());
             next.velocity = Some(velocity);
-            if let Some(velocity_before) = before.velocity {
-                let accel = (velocity - velocity_before) / (0.5 * (dt_s + before.dt_s[0]));
-                next.accel = Some(accel);
-                stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
-                if let Some(accel_before) = before.accel {
-                    let over_s = (dt_s + before.dt_s[0] + before.dt_s[1]) / 3.0;
-                    let shortest_s = dt_s.min(before.dt_s[0]).min(before.dt_s[1]);
-                    let rounding = 8.0 * rounded_m.max(before.rounded_m) / shortest_s.powi(3);
-                    let jerk_mps3 = (((accel - accel_before) / over_s).norm() - rounding).max(0.0);
-                    next.jerk_mps3 = jerk_mps3;
-                    // The difference reaches three setpoints back.
-                    let (worst, most_mps3) = if calm <= 3 {
-                        (&mut stats.urgent_jerk_mps3, URGENT_JERK_MPS3)
-                    } else {
-                        (&mut stats.jerk_mps3, JERK_MPS3)
-                    };
-                    *worst = worst.max(jerk_mps3);
-                    // A thousandth for the sums.
-                    if jerk_mps3 > most_mps3 * 1.001 {
-                        stats.jerky += 1;
-                        if !jumps {
-                            self.fault(at_s, format!("{jerk_mps3:.1} m/s³ of {most_mps3}"));
-                        }
-                    }
+            self.take_change(&before, &mut next, jumps);
+        }
+        self.last = Some(next);
+    }
+
+    /// Acceleration and jerk, from this setpoint and those before it.
+    fn take_change(&mut self, before: &Last, next: &mut Last, jumps: bool) {
+        let (dt_s, stats) = (next.dt_s[0], &mut self.stats);
+        let (Some(velocity), Some(velocity_before)) = (next.velocity, before.velocity) else { return };
+        let accel = (velocity - velocity_before) / (0.5 * (dt_s + before.dt_s[0]));
+        next.accel = Some(accel);
+        stats.accel_mps2 = stats.accel_mps2.max(accel.norm());
+        if let Some(accel_before) = before.accel {
+            let over_s = (dt_s + before.dt_s[0] + before.dt_s[1]) / 3.0;
+            let shortest_s = dt_s.min(before.dt_s[0]).min(before.dt_s[1]);
+            let rounding = 8.0 * next.rounded_m.max(before.rounded_m) / shortest_s.powi(3);
+            let jerk_mps3 = (((accel - accel_before) / over_s).norm() - rounding).max(0.0);
+            next.jerk_mps3 = jerk_mps3;
+            // The difference reaches three setpoints back.
+            let (worst, most_mps3) = if next.calm <= 3 {
+                (&mut stats.urgent_jerk_mps3, URGENT_JERK_MPS3)
+            } else {
+                (&mut stats.jerk_mps3, JERK_MPS3)
+            };
+            *worst = worst.max(jerk_mps3);
+            // A thousandth for the sums.
+            if jerk_mps3 > most_mps3 * 1.001 {
+                stats.jerky += 1;
+                if !jumps {
+                    self.fault(next.at_s, format!("{jerk_mps3:.1} m/s³ of {most_mps3}"));
                 }
             }
         }
-        self.last = Some(next);
     }
 }
 

@@ -16,18 +16,33 @@ use self::sources::Tree;
 /// The crates that are looked at, by folder.
 const CRATES: [&str; 6] = ["planner-core", "companion", "host-sim", "firmware", "tests", "xtask"];
 
+/// Those of them that `cargo xtask test` holds to the rules.
+const HELD: [&str; 4] = ["planner-core", "host-sim", "tests", "xtask"];
+/// Folders of them that are still written: not held yet.
+const OPEN: [&str; 2] = ["planner-core/src/coverage", "host-sim/src/coverage"];
+
 /// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason.
 pub fn run() -> Result<()> {
+    check(&CRATES, &[])
+}
+
+/// The same of the crates that keep to the rules.
+pub fn run_held() -> Result<()> {
+    check(&HELD, &OPEN)
+}
+
+fn check(crates: &[&str], open: &[&str]) -> Result<()> {
+    let is_open = |what: &str| open.iter().any(|folder| what.starts_with(folder));
     let mut wrong = 0;
-    for name in CRATES {
+    for name in crates {
         for tree in Tree::of_crate(Path::new(name))? {
             for cycle in imports::cycles(&tree) {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
-                wrong += 1;
+                wrong += usize::from(!cycle.iter().all(|import| is_open(import)));
             }
             for (what, reason) in shape::beyond(&tree) {
                 println!("{name}: {what}: {}", reason.unwrap_or("no reason given"));
-                wrong += usize::from(reason.is_none());
+                wrong += usize::from(reason.is_none() && !is_open(&what));
             }
         }
     }

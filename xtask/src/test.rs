@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 
 use crate::bare_metal::{self, Board, Built};
 use crate::shell::{self, cargo};
-use crate::{emulate, install, size};
+use crate::{emulate, install, size, structure};
 
 /// Which steps to run.
 #[derive(clap::Args)]
@@ -16,8 +16,8 @@ pub struct Args {
     quick: bool,
 }
 
-/// Runs every step; the first failure ends it.
-fn steps(args: &Args) -> Result<()> {
+/// What is judged from the sources.
+fn sources() -> Result<()> {
     step("format", || shell::run(cargo().args(["fmt", "--all", "--check"])))?;
     step("lints", || {
         shell::run(cargo().args([
@@ -35,6 +35,12 @@ fn steps(args: &Args) -> Result<()> {
         doc.args(["doc", "--no-deps", "--locked", "-p", "planner-core", "-p", "companion"]);
         shell::run(doc.env("RUSTDOCFLAGS", "-D warnings"))
     })?;
+    step("structure", structure::run_held)
+}
+
+/// Runs every step; the first failure ends it.
+fn steps(args: &Args) -> Result<()> {
+    sources()?;
     if args.quick {
         return step("host tests", || {
             shell::run(cargo().args(["test", "--workspace", "--no-fail-fast", "--locked"]))

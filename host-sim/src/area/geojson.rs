@@ -2,7 +2,7 @@
 
 use geojson::{GeoJson, Geometry, GeometryValue};
 
-use super::{AreaFileError, Polygons, RingXy};
+use super::polygons::{AreaFileError, Polygons, RingXy};
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     let file: GeoJson = text.parse().map_err(|error| AreaFileError::malformed("GeoJSON", &error))?;

@@ -3,7 +3,7 @@
 use kml::Kml;
 use kml::types::{Geometry, LinearRing, Polygon};
 
-use super::{AreaFileError, Polygons, RingXy};
+use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Folders in folders, at most: a file that goes deeper is refused before it is read.
 const DEPTH: usize = 64;

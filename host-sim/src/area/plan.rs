@@ -4,7 +4,7 @@
 
 use serde::Deserialize;
 
-use super::{AreaFileError, Polygons, RingXy};
+use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Corners of the polygon around a circular fence.
 const CIRCLE_CORNERS: usize = 32;

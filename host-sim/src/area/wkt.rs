@@ -5,7 +5,7 @@ use std::str::FromStr as _;
 use wkt::Wkt;
 use wkt::types::{LineString, Polygon};
 
-use super::{AreaFileError, Polygons, RingXy};
+use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Collections in a file, at most: the reader calls itself for each collection within another one.
 const COLLECTIONS: usize = 64;

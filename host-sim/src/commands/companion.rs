@@ -11,16 +11,16 @@ use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
 use super::load;
-use crate::capacity::VEHICLES;
+use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::flash::{self, DeskFlash};
 use crate::link::{self, LinkUrl};
 use crate::mission::Mission;
 use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
+use crate::swarm::companion_config;
 use crate::swarm::ground_station::mission_start;
-use crate::swarm::member::{DeskCompanion, is_finished};
-use crate::swarm::{companion_config, new_companion};
+use crate::swarm::member::is_finished;
 
 /// Arguments of `host-sim companion`.
 #[derive(Debug, clap::Args)]

@@ -4,37 +4,42 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::{Link, LinkUrl};
+use super::transport::Link;
 
 /// Between two tries.
-const RETRY: Duration = Duration::from_secs(1);
+pub(super) const RETRY: Duration = Duration::from_secs(1);
+
+/// Opens the link again, if it can be opened now.
+type Open = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
 
 /// Nothing is heard while it is lost, and what is sent is dropped.
 pub struct Lasting {
-    url: LinkUrl,
+    /// Its URL.
+    name: String,
+    open: Open,
     link: Option<Box<dyn Link>>,
     retry_at: Instant,
 }
 
 impl Lasting {
-    /// Keeps a link that was opened by this URL.
-    pub fn new(url: LinkUrl, link: Box<dyn Link>) -> Self {
-        Self { url, link: Some(link), retry_at: Instant::now() }
+    /// Keeps an open link, and what opens it again.
+    pub fn new(name: String, link: Box<dyn Link>, open: Open) -> Self {
+        Self { name, open, link: Some(link), retry_at: Instant::now() }
     }
 
     fn reopen(&mut self) -> Option<&mut Box<dyn Link>> {
         if self.link.is_none() && Instant::now() >= self.retry_at {
-            self.link = self.url.open_once(RETRY / 4).ok();
+            self.link = (self.open)();
             self.retry_at = Instant::now() + RETRY;
             if self.link.is_some() {
-                eprintln!("link is back: {}", self.url);
+                eprintln!("link is back: {}", self.name);
             }
         }
         self.link.as_mut()
     }
 
     fn lose(&mut self, why: &io::Error) {
-        eprintln!("link lost: {}: {why}; trying again every second", self.url);
+        eprintln!("link lost: {}: {why}; trying again every second", self.name);
         self.link = None;
         self.retry_at = Instant::now() + RETRY;
     }

@@ -15,47 +15,20 @@
 mod lasting;
 mod serial;
 mod tcp;
+mod transport;
 mod udp;
 
 use std::fmt;
 use std::io;
 use std::net::{SocketAddr, ToSocketAddrs};
 use std::str::FromStr;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
+pub use self::transport::Link;
 use crate::quote::quoted;
 
 /// The longest wait for a TCP server at the start.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
-
-/// A nonblocking link.
-pub trait Link: Send {
-    /// Moves bytes that have arrived into `buffer` (2 kB fit any datagram of ours); 0 where none have.
-    ///
-    /// # Errors
-    /// When the link is gone for good. A server without a client, a peer that does not listen, a connection or device that is
-    /// lost for now are no errors.
-    fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize>;
-
-    /// Sends whole frames. What nobody takes in time is dropped.
-    ///
-    /// # Errors
-    /// When the link is gone for good.
-    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
-
-    /// The local address, where there is one: it tells the port when port 0 was asked for.
-    fn local_address(&self) -> Option<SocketAddr>;
-
-    /// Now, by the time in which the other end lives: the clock's, unless the link leads into a simulation.
-    fn now(&self) -> Instant {
-        Instant::now()
-    }
-
-    /// Lets a millisecond pass: nothing has come.
-    fn rest(&mut self) {
-        std::thread::sleep(Duration::from_millis(1));
-    }
-}
 
 /// Where a link leads.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
@@ -145,7 +118,11 @@ impl LinkUrl {
     pub fn open(&self) -> Result<Box<dyn Link>, LinkError> {
         let link = self.open_once(CONNECT_TIMEOUT)?;
         Ok(match self {
-            Self::Tcp(_) | Self::Serial { .. } => Box::new(lasting::Lasting::new(self.clone(), link)),
+            Self::Tcp(_) | Self::Serial { .. } => {
+                let url = self.clone();
+                let open = move || url.open_once(lasting::RETRY / 4).ok();
+                Box::new(lasting::Lasting::new(self.to_string(), link, Box::new(open)))
+            }
             _ => link,
         })
     }
@@ -183,15 +160,10 @@ fn resolve(at: &str) -> io::Result<SocketAddr> {
         .ok_or_else(|| io::Error::new(io::ErrorKind::NotFound, "the host has no address"))
 }
 
-/// Whether an error only means that nothing is there now.
-fn is_quiet(error: &io::Error) -> bool {
-    use io::ErrorKind::{ConnectionRefused, Interrupted, WouldBlock};
-    matches!(error.kind(), WouldBlock | Interrupted | ConnectionRefused)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Instant;
 
     pub(super) fn hear(link: &mut dyn Link) -> Vec<u8> {
         let mut buffer = [0; 2048];

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serialport::SerialPort;
 
-use super::{Link, is_quiet};
+use super::transport::{Link, is_quiet};
 
 /// What waits for a line that is slower than what is sent, bytes: at 57600 baud less than a second. Beyond it frames are
 /// dropped, since old setpoints are worse than none.

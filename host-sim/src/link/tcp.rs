@@ -4,7 +4,7 @@ use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::time::Duration;
 
-use super::{Link, is_quiet};
+use super::transport::{Link, is_quiet};
 
 /// About ten seconds of PX4's flood.
 const QUEUE: usize = 256 * 1024;

@@ -4,7 +4,7 @@ use std::io;
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
 
-use super::{Link, is_quiet};
+use super::transport::{Link, is_quiet};
 
 /// A client not heard for this long gets nothing more.
 const FORGET: Duration = Duration::from_secs(60);

@@ -112,20 +112,26 @@ impl OccupancyMap {
                 }
             }
         });
+        map.settle_free(&free_share);
+        Ok(map)
+    }
+
+    /// Unknown cells that are free in their whole volume are free; shares are in the order of the cells, x first.
+    fn settle_free(&mut self, free_share: &[f32]) {
+        let dims = self.shape.dims;
         // Far above the rounding of the sum, and an unknown cube of a twentieth of the cell's edge still counts.
         let whole = 1.0 - 1e-4;
         let mut at = 0;
         for k in 0..dims[2] {
             for j in 0..dims[1] {
                 for i in 0..dims[0] {
-                    if free_share[at] >= whole && map.at([i, j, k]) == Occupancy::Unknown {
-                        map.set([i, j, k], Occupancy::Free);
+                    if free_share[at] >= whole && self.at([i, j, k]) == Occupancy::Unknown {
+                        self.set([i, j, k], Occupancy::Free);
                     }
                     at += 1;
                 }
             }
         }
-        Ok(map)
     }
 
     /// The same cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner lies on a

@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use planner_core::Point;
 use serde::{Serialize, Serializer};
 
-use super::TrackPoint;
+use super::track::TrackPoint;
 
 fn base64<S: Serializer>(bytes: impl Iterator<Item = u8>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&STANDARD.encode(bytes.collect::<Vec<u8>>()))

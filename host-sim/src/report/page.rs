@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{ReportData, vehicle_color};
+use super::data::{ReportData, vehicle_color};
 
 const TEMPLATE: &str = include_str!("../../assets/report/page.html");
 const STYLE: &str =

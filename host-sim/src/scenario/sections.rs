@@ -3,31 +3,32 @@
 pub(super) mod area;
 mod checks;
 mod simulation;
+mod values;
 
 use std::path::Path;
 
 use companion::config::{GROUND_STATIONS, USUAL_GROUND_STATIONS};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
+use planner_core::prm::Sampling;
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
 use toml::de::DeTable;
 
 use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
 use self::simulation::{deconfliction, fault, simulation};
+use self::values::{MAX_ID, point};
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
-use super::{
-    Companion, Geofence, Map, Mission, Mode, Objective, Personality, Roadmap, Sampling, Scenario, Terminals,
-    Unbuilt, Vehicle,
+use super::types::{
+    Companion, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Terminals, Unbuilt, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
+use crate::kinds::Personality;
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTIONS_M, Source, Unknown};
 use crate::quote::{quoted, quoted_path};
 
-/// Most vehicles of a swarm: the system ids there are.
-const MAX_ID: u64 = 250;
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 1000;
 /// Mission origin where none is given: a test field.
@@ -167,10 +168,6 @@ fn unbuilt(
         .map_err(|error| root.text.error(&value.span, format!("not TOML: {}", error.message())))?;
     let table = whole.get(key).and_then(toml::Value::as_table).cloned().unwrap_or_default();
     Ok(Some(Unbuilt { table }))
-}
-
-fn point(value: &Value<'_>) -> Result<Point> {
-    value.triple().map(|[x, y, z]| Point::new(x as f32, y as f32, z as f32))
 }
 
 fn geodetic(value: &Value<'_>) -> Result<Geodetic> {

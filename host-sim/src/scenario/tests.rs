@@ -1,4 +1,7 @@
+use planner_core::Point;
+
 use super::*;
+use crate::map::Unknown;
 
 const GOOD: &str = r#"
 [map]

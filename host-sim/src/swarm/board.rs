@@ -15,9 +15,9 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, STATUSTEXT_DATA, TUNNEL_DATA};
 use planner_core::Point;
 
-use super::member::STEP_US;
 use super::radio::Radio;
 use super::serial::SerialLink;
+use super::step::STEP_US;
 use crate::boards::{self, Emulated, Piece};
 use crate::link::{Link, LinkUrl};
 

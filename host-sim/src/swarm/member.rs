@@ -1,29 +1,22 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
 use anyhow::Context;
-use companion::{Companion, Config, Event, Instant, Link, State};
+use companion::{Config, Event, Instant, Link, State};
 use planner_core::Point;
 
 use super::board::{Board, Lines};
 use super::monitor::{Observation, Phase};
-use super::new_companion;
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
+use super::step::{STEP_S, STEP_US};
 use crate::autopilot::{self, Autopilot};
 use crate::boards::STACK_LEN;
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
 use crate::report::{self, Level};
 use crate::say;
 
-/// A companion with the desk's capacities.
-pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
-
-/// Physics step, seconds; the autopilot's own.
-pub const STEP_S: f32 = 0.004;
-/// The same in microseconds.
-pub const STEP_US: u64 = 4_000;
 /// Steps between two looks for the ground below, which changes slowly.
 const GROUND_STEPS: u64 = 25;
 

@@ -12,6 +12,7 @@ pub mod member;
 pub mod monitor;
 pub mod radio;
 pub mod serial;
+pub mod step;
 
 use std::time::{Duration, Instant as Clock};
 
@@ -25,10 +26,11 @@ use self::board::Board;
 use self::faults::{Script, World};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
-use self::member::{DeskCompanion, Member, Planner, STEP_US, is_finished};
+use self::member::{Member, Planner, is_finished};
 use self::monitor::{Monitor, Sample};
 use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
+use self::step::STEP_US;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
 use crate::margins;
@@ -91,59 +93,120 @@ pub fn fly_shown(
     simulate(mission, plan, command, true, Some(gateway), progress)
 }
 
+/// A simulation under way.
+struct Run<'a> {
+    mission: &'a Mission,
+    plan: &'a SwarmPlan,
+    members: Vec<Member>,
+    radio: Radio,
+    monitor: Monitor<'a>,
+    ground_station: GroundStation,
+    gateway: Option<Gateway>,
+    script: Script<'a>,
+    log: Vec<report::Event>,
+    places: Vec<Point>,
+    nearest_goal_m: Vec<f32>,
+    /// Simulated seconds.
+    t_s: f64,
+    /// When some vehicle that may fly was last seen to, seconds.
+    moved_s: f64,
+    ends_at_s: f64,
+}
+
 fn simulate(
     mission: &Mission,
     plan: &SwarmPlan,
     command: &'static str,
     realtime: bool,
-    mut gateway: Option<Gateway>,
+    gateway: Option<Gateway>,
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
+    let mut run = Run::new(mission, plan, gateway)?;
     let scenario = &mission.scenario;
     let settings = &scenario.simulation;
-    let mut members = members(mission)?;
-    let mut radio = Radio::new(
-        RadioConfig {
-            range_m: settings.radio_range_m,
-            loss: f64::from(settings.radio_loss),
-            delay_s: f64::from(settings.radio_delay_s),
-        },
-        members.len(),
-        scenario.seed,
-    );
-    if let Some(gateway) = &gateway {
-        gateway.attach(&mut members, &mut radio);
-    }
-    let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
-    let safety_distance_m = scenario.deconfliction.safety_distance_m;
-    let mut monitor = Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
-    monitor.waits_end = !scenario.faults.is_empty();
-    let mut ground_station = GroundStation::new(scenario.mission.ground_stations[0]);
-    let mut script = Script::new(scenario);
-    let mut log = Vec::new();
-    let mut nearest_goal_m = vec![f32::INFINITY; members.len()];
-    let mut places: Vec<Point> = members.iter().map(|m| m.autopilot.truth().position).collect();
     // The time of a board behind links is the clock's.
     let by_clock = scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.steps("flight", settings.time_limit_s as u64);
     let began = Clock::now();
     let mut put_off = Duration::ZERO;
-    let mut ends_at_s = f64::INFINITY;
-    let mut moved_s = 0.0;
-    let mut t_s = 0.0;
     for step in 0..steps {
         let now_us = (step + 1) * STEP_US;
-        t_s = now_us as f64 * 1e-6;
+        run.step(step, now_us)?;
+        if step % 250 == 0 {
+            bar.at(run.t_s as u64);
+            run.look_for_end();
+        }
+        if run.t_s >= run.ends_at_s {
+            break;
+        }
+        if realtime || by_clock {
+            let due = Duration::from_micros(now_us) + put_off;
+            put_off += began.elapsed().saturating_sub(due + LATEST);
+            std::thread::sleep(due.saturating_sub(began.elapsed()));
+        }
+    }
+    let took_s = began.elapsed().as_secs_f64();
+    run.members.iter_mut().try_for_each(Member::say_stack)?;
+    let result = run.result(command);
+    run.log_losses(&result);
+    let tracks = (0..run.members.len()).map(|i| run.monitor.track(i).to_vec()).collect();
+    let Run { monitor, log, t_s, .. } = run;
+    Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
+}
+
+impl<'a> Run<'a> {
+    fn new(mission: &'a Mission, plan: &'a SwarmPlan, gateway: Option<Gateway>) -> anyhow::Result<Self> {
+        let scenario = &mission.scenario;
+        let settings = &scenario.simulation;
+        let mut members = members(mission)?;
+        let mut radio = Radio::new(
+            RadioConfig {
+                range_m: settings.radio_range_m,
+                loss: f64::from(settings.radio_loss),
+                delay_s: f64::from(settings.radio_delay_s),
+            },
+            members.len(),
+            scenario.seed,
+        );
+        if let Some(gateway) = &gateway {
+            gateway.attach(&mut members, &mut radio);
+        }
+        let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
+        let safety_distance_m = scenario.deconfliction.safety_distance_m;
+        let mut monitor =
+            Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
+        monitor.waits_end = !scenario.faults.is_empty();
+        Ok(Self {
+            mission,
+            plan,
+            radio,
+            monitor,
+            ground_station: GroundStation::new(scenario.mission.ground_stations[0]),
+            gateway,
+            script: Script::new(scenario),
+            log: Vec::new(),
+            places: members.iter().map(|m| m.autopilot.truth().position).collect(),
+            nearest_goal_m: vec![f32::INFINITY; members.len()],
+            members,
+            t_s: 0.0,
+            moved_s: 0.0,
+            ends_at_s: f64::INFINITY,
+        })
+    }
+
+    fn step(&mut self, step: u64, now_us: u64) -> anyhow::Result<()> {
+        let Self { mission, plan, members, radio, places, log, .. } = self;
+        self.t_s = now_us as f64 * 1e-6;
         let mut world = World {
-            members: &mut members,
-            radio: &mut radio,
-            ground_station: &mut ground_station,
-            obstacles: &mut monitor.obstacles,
+            members,
+            radio,
+            ground_station: &mut self.ground_station,
+            obstacles: &mut self.monitor.obstacles,
         };
-        script.step(now_us, &mut world, &mut log)?;
+        self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, &mission.map, &mut radio, &places, &mut log)?;
+            member.step(step, i, &mission.map, radio, places, log)?;
             if member.wants_plan && member.planner != Planner::Late {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
@@ -154,102 +217,110 @@ fn simulate(
             places[i] = member.autopilot.truth().position;
             if let Some(goal) = plan.flights[i].goal {
                 let goal = mission.goals[usize::from(goal)];
-                nearest_goal_m[i] = nearest_goal_m[i].min((places[i] - goal).norm());
+                self.nearest_goal_m[i] = self.nearest_goal_m[i].min((places[i] - goal).norm());
             }
         }
-        ground_station.step(now_us, &mut members, &mut radio, &places);
-        if let Some(gateway) = &mut gateway {
-            gateway.step(now_us, &mut members, &mut radio, &places).context("link lost: --qgc")?;
+        self.ground_station.step(now_us, members, radio, places);
+        if let Some(gateway) = &mut self.gateway {
+            gateway.step(now_us, members, radio, places).context("link lost: --qgc")?;
         }
         let seen: Vec<_> = members.iter().map(Member::observation).collect();
-        monitor.observe(t_s, &seen);
-        if step % 250 == 0 {
-            bar.at(t_s as u64);
-            let started = ground_station.started();
-            let done = |i: usize| {
-                let at_rest = is_finished(members[i].state()) || members[i].killed();
-                at_rest || (plan.flights[i].goal.is_none() && started) || left_to_pilot(&members[i])
-            };
-            let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
-            if !(script.is_over() && started && members.iter().all(still)) {
-                moved_s = t_s;
-            }
-            let over = (0..members.len()).all(done) || t_s - moved_s > STILL_S;
-            if ends_at_s.is_infinite() && script.is_over() && over {
-                ends_at_s = t_s + AFTERMATH_S;
-            }
+        self.monitor.observe(self.t_s, &seen);
+        Ok(())
+    }
+
+    /// Sets when the simulation ends, once nothing more is to come.
+    fn look_for_end(&mut self) {
+        let (members, plan) = (&self.members, self.plan);
+        let started = self.ground_station.started();
+        let done = |i: usize| {
+            let at_rest = is_finished(members[i].state()) || members[i].killed();
+            at_rest || (plan.flights[i].goal.is_none() && started) || left_to_pilot(&members[i])
+        };
+        let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
+        if !(self.script.is_over() && started && members.iter().all(still)) {
+            self.moved_s = self.t_s;
         }
-        if t_s >= ends_at_s {
-            break;
-        }
-        if realtime || by_clock {
-            let due = Duration::from_micros(now_us) + put_off;
-            put_off += began.elapsed().saturating_sub(due + LATEST);
-            std::thread::sleep(due.saturating_sub(began.elapsed()));
+        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > STILL_S;
+        if self.ends_at_s.is_infinite() && self.script.is_over() && over {
+            self.ends_at_s = self.t_s + AFTERMATH_S;
         }
     }
-    let took_s = began.elapsed().as_secs_f64();
-    members.iter_mut().try_for_each(Member::say_stack)?;
-    let vehicles: Vec<_> = (0..members.len())
-        .map(|i| {
-            // As far as the estimate is wrong, the vehicle cannot know.
-            let error_m = margins::estimate_m(settings.estimator, scenario.vehicles[i].personality);
-            let nearest_goal_m = nearest_goal_m[i] - error_m;
-            vehicle_result(&members[i], &plan.flights[i], monitor.flown_m(i), nearest_goal_m, t_s)
-        })
-        .collect();
-    let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
-    let all_served = served == mission.goals.len().min(members.len());
-    let did_its_task = |v: &VehicleResult| v.goal.is_none() || (v.reached && v.landed);
-    // A vehicle that a fault took out has done what it can when it stayed, or ended in a row of the table.
-    let taken_out = |i: usize| {
-        let member = &members[i];
-        script.struck(i)
+
+    fn result(&self, command: &'static str) -> MissionResult {
+        let Self { mission, plan, members, monitor, .. } = self;
+        let scenario = &mission.scenario;
+        let vehicles: Vec<_> = (0..members.len()).map(|i| self.vehicle_result(i)).collect();
+        let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
+        let all_served = served == mission.goals.len().min(members.len());
+        let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
+        let finite = |m: f32| m.is_finite().then(|| rounded(m));
+        let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
+        MissionResult {
+            command,
+            scenario: scenario.path.clone(),
+            seed: scenario.seed,
+            complete: clean
+                && all_served
+                && vehicles.iter().enumerate().all(|(i, v)| did_its_task(v) || self.is_taken_out(i)),
+            vehicles,
+            totals: Totals {
+                path_m: rounded(plan.total_m() as f32),
+                makespan_s: (last_landing_s - self.ground_station.started_s()).max(0.0),
+            },
+            safety: Safety {
+                wall_contacts: monitor.wall_contacts,
+                min_clearance_m: finite(monitor.min_clearance_m),
+                min_separation_m: finite(monitor.min_separation_m),
+                safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),
+                violations: monitor.violations,
+                deadlocks: monitor.deadlocks,
+            },
+            roadmap: mission.roadmap_size(),
+            left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
+        }
+    }
+
+    fn vehicle_result(&self, i: usize) -> VehicleResult {
+        let scenario = &self.mission.scenario;
+        // As far as the estimate is wrong, the vehicle cannot know.
+        let error_m = margins::estimate_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
+        let nearest_goal_m = self.nearest_goal_m[i] - error_m;
+        let flown_m = self.monitor.flown_m(i);
+        vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
+    }
+
+    /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row of the table.
+    fn is_taken_out(&self, i: usize) -> bool {
+        let member = &self.members[i];
+        self.script.struck(i)
             && (member.killed()
                 || member.took_off_s.is_none()
                 || is_finished(member.state())
                 || left_to_pilot(member))
-    };
-    let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
-    let finite = |m: f32| m.is_finite().then(|| rounded(m));
-    let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
-    let result = MissionResult {
-        command,
-        scenario: scenario.path.clone(),
-        seed: scenario.seed,
-        complete: clean
-            && all_served
-            && vehicles.iter().enumerate().all(|(i, v)| did_its_task(v) || taken_out(i)),
-        vehicles,
-        totals: Totals {
-            path_m: rounded(plan.total_m() as f32),
-            makespan_s: (last_landing_s - ground_station.started_s()).max(0.0),
-        },
-        safety: Safety {
-            wall_contacts: monitor.wall_contacts,
-            min_clearance_m: finite(monitor.min_clearance_m),
-            min_separation_m: finite(monitor.min_separation_m),
-            safety_distance_m: rounded(safety_distance_m),
-            violations: monitor.violations,
-            deadlocks: monitor.deadlocks,
-        },
-        roadmap: mission.roadmap_size(),
-        left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
-    };
-    for (member, vehicle) in members.iter().zip(&result.vehicles) {
-        if let (false, Some(text)) = (did_its_task(vehicle), member.link_trouble(t_s)) {
-            let level = report::Level::Error;
-            log.push(report::Event { t_s: t_s as f32, vehicle: Some(vehicle.id), level, text });
-        }
     }
-    log.extend(monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
-        t_s: *t_s as f32,
-        vehicle: Some(scenario.vehicles[*i].id),
-        level: Level::Error,
-        text: text.clone(),
-    }));
-    let tracks = (0..members.len()).map(|i| monitor.track(i).to_vec()).collect();
-    Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
+
+    /// Logs why links failed, and what the referee saw.
+    fn log_losses(&mut self, result: &MissionResult) {
+        let scenario = &self.mission.scenario;
+        for (member, vehicle) in self.members.iter().zip(&result.vehicles) {
+            if let (false, Some(text)) = (did_its_task(vehicle), member.link_trouble(self.t_s)) {
+                let (t_s, level) = (self.t_s as f32, Level::Error);
+                self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
+            }
+        }
+        self.log.extend(self.monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
+            t_s: *t_s as f32,
+            vehicle: Some(scenario.vehicles[*i].id),
+            level: Level::Error,
+            text: text.clone(),
+        }));
+    }
+}
+
+/// Whether a vehicle flew to its goal and landed, if it has one.
+fn did_its_task(vehicle: &VehicleResult) -> bool {
+    vehicle.goal.is_none() || (vehicle.reached && vehicle.landed)
 }
 
 /// Whether a pilot has the vehicle: nobody knows for how long.
@@ -367,14 +438,4 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
     Ok(Config { accel_mps2: ACCEL_MPS2, method: scenario.deconfliction.method, geofence, ..config })
-}
-
-/// A companion on the heap: it is too large for a stack.
-///
-/// # Errors
-/// The configuration names what is wrong.
-pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompanion>> {
-    let companion =
-        DeskCompanion::new(config).map_err(|e| anyhow::anyhow!("no companion can fly this: {e:?}"))?;
-    Ok(Box::new(companion))
 }

@@ -10,13 +10,13 @@
 //! metres about the vehicle's EKF origin, times are seconds of the wall clock.
 
 mod read;
+mod recording;
 mod replay;
 
-use host_sim::autopilot::Personality;
 use nalgebra::Vector3;
-use planner_core::frames::Geodetic;
 
 use self::read::read;
+pub use self::recording::{Recording, Sample};
 use crate::shared_data;
 
 /// The recorded runs.
@@ -57,58 +57,6 @@ pub enum Correction {
     Recorded,
     /// The simulated one: the same law about the vehicle that flies now. Nothing of the recorded estimate is left.
     Simulated,
-}
-
-/// One recorded row that says where something was or shall be.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sample {
-    /// Seconds.
-    pub t_s: f64,
-    /// NED about the EKF origin, metres.
-    pub position: Vector3<f64>,
-    /// NED, m/s.
-    pub velocity: Vector3<f64>,
-}
-
-#[derive(Clone, Copy, Debug)]
-struct Setpoint {
-    t_s: f64,
-    mask: u16,
-    position: [f32; 3],
-    velocity: [f32; 3],
-    acceleration: [f32; 3],
-    yaw: f32,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-enum Message {
-    /// System, component, command and its parameters.
-    Command(u8, u8, u16, [f32; 7]),
-    /// GUID_TIMEOUT.
-    GuidedTimeout(f32),
-}
-
-/// One vehicle's recorded flight.
-#[derive(Clone, Debug)]
-pub struct Recording {
-    /// Name of the run.
-    pub run: String,
-    /// System id.
-    pub vehicle: u8,
-    /// What flew it.
-    pub autopilot: Personality,
-    /// Its EKF origin.
-    pub origin: Geodetic,
-    /// What it believed.
-    pub estimate: Vec<Sample>,
-    /// Where it was.
-    pub truth: Vec<Sample>,
-    /// First arming that held, and disarming, seconds.
-    pub armed_s: (f64, f64),
-    /// From where the mission followed its path, and from where it landed, seconds.
-    pub follow_s: (f64, f64),
-    setpoints: Vec<Setpoint>,
-    messages: Vec<(f64, Message)>,
 }
 
 /// What a plain flight may differ by under the recorded errors, RMS metres; `None` where a person or a failsafe took the vehicle.

@@ -6,7 +6,7 @@ use host_sim::autopilot::Personality;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
-use super::{Message, Recording, Sample, Setpoint};
+use super::recording::{Message, Recording, Sample, Setpoint};
 
 /// The numbers between a command's brackets, and what follows them.
 fn bracketed(text: &str) -> Option<([f32; 7], &str)> {
@@ -34,6 +34,63 @@ fn message(text: &str) -> Option<Message> {
     }
 }
 
+/// What happens in a recording, line by line.
+struct Events {
+    /// Commands wait for their acks: what was refused is not replayed.
+    asked: Vec<(f64, Message)>,
+    armed: bool,
+}
+
+impl Events {
+    fn take(&mut self, t_s: f64, text: &str, recording: &mut Recording) {
+        if let Some(place) = text.strip_prefix("autopilot origin ") {
+            let numbers: Vec<f64> = place.split(' ').filter_map(|n| n.parse().ok()).collect();
+            recording.origin = Geodetic { lat_deg: numbers[0], lon_deg: numbers[1], alt_m: numbers[2] };
+        }
+        if text.contains("Stabilize") {
+            recording.autopilot = Personality::Ardupilot;
+        }
+        if let Some(message) = message(text) {
+            self.asked.push((t_s, message));
+        }
+        if let Some(ack) = text.strip_prefix("autopilot ack ") {
+            self.take_ack(t_s, ack, recording);
+        }
+        if text.starts_with("autopilot disarmed") && self.armed && t_s > recording.armed_s.0 + 3.0 {
+            recording.armed_s.1 = t_s;
+            self.armed = false;
+        }
+        if text.contains("-> Follow") && recording.follow_s.0.is_infinite() {
+            recording.follow_s.0 = t_s;
+        }
+        if text.contains("-> Land") && recording.follow_s.1.is_infinite() {
+            recording.follow_s.1 = t_s;
+        }
+    }
+
+    fn take_ack(&mut self, t_s: f64, ack: &str, recording: &mut Recording) {
+        let mut words = ack.split(' ');
+        let command: u16 = words.next().and_then(|w| w.parse().ok()).expect("an ack's command");
+        let result: u8 = words.nth(1).and_then(|w| w.parse().ok()).expect("an ack's result");
+        let first = self
+            .asked
+            .iter()
+            .position(|(_, message)| matches!(message, Message::Command(_, _, id, _) if *id == command));
+        if let Some(first) = first {
+            let (at_s, message) = self.asked.remove(first);
+            if result == 0 {
+                if let Message::Command(.., 400, params) = message {
+                    self.armed = params[0] == 1.0;
+                    if self.armed {
+                        recording.armed_s.0 = t_s;
+                    }
+                }
+                recording.messages.push((at_s, message));
+            }
+        }
+    }
+}
+
 /// One vehicle of a run.
 pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
     let text = std::fs::read_to_string(path).expect("a recording can be read");
@@ -49,9 +106,7 @@ pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
         setpoints: Vec::new(),
         messages: Vec::new(),
     };
-    // Commands wait for their acks: what was refused is not replayed.
-    let mut asked: Vec<(f64, Message)> = Vec::new();
-    let mut armed = false;
+    let mut events = Events { asked: Vec::new(), armed: false };
     for line in text.lines().skip(1) {
         let cells: Vec<&str> = line.splitn(16, ',').collect();
         let number = |k: usize| cells[k].parse::<f64>().unwrap_or(0.0);
@@ -77,52 +132,13 @@ pub(super) fn read(path: &Path, run: &str, vehicle: u8) -> Recording {
                 });
             }
             _ => {
-                let text = cells[15].trim_matches('"');
-                if let Some(place) = text.strip_prefix("autopilot origin ") {
-                    let numbers: Vec<f64> = place.split(' ').filter_map(|n| n.parse().ok()).collect();
-                    recording.origin =
-                        Geodetic { lat_deg: numbers[0], lon_deg: numbers[1], alt_m: numbers[2] };
-                }
-                if text.contains("Stabilize") {
-                    recording.autopilot = Personality::Ardupilot;
-                }
-                if let Some(message) = message(text) {
-                    asked.push((t_s, message));
-                }
-                if let Some(ack) = text.strip_prefix("autopilot ack ") {
-                    let mut words = ack.split(' ');
-                    let command: u16 = words.next().and_then(|w| w.parse().ok()).expect("an ack's command");
-                    let result: u8 = words.nth(1).and_then(|w| w.parse().ok()).expect("an ack's result");
-                    let first = asked.iter().position(
-                        |(_, message)| matches!(message, Message::Command(_, _, id, _) if *id == command),
-                    );
-                    if let Some(first) = first {
-                        let (at_s, message) = asked.remove(first);
-                        if result == 0 {
-                            if let Message::Command(.., 400, params) = message {
-                                armed = params[0] == 1.0;
-                                if armed {
-                                    recording.armed_s.0 = t_s;
-                                }
-                            }
-                            recording.messages.push((at_s, message));
-                        }
-                    }
-                }
-                if text.starts_with("autopilot disarmed") && armed && t_s > recording.armed_s.0 + 3.0 {
-                    recording.armed_s.1 = t_s;
-                    armed = false;
-                }
-                if text.contains("-> Follow") && recording.follow_s.0.is_infinite() {
-                    recording.follow_s.0 = t_s;
-                }
-                if text.contains("-> Land") && recording.follow_s.1.is_infinite() {
-                    recording.follow_s.1 = t_s;
-                }
+                events.take(t_s, cells[15].trim_matches('"'), &mut recording);
             }
         }
     }
-    recording.messages.extend(asked.into_iter().filter(|(_, m)| matches!(m, Message::GuidedTimeout(_))));
+    recording
+        .messages
+        .extend(events.asked.into_iter().filter(|(_, m)| matches!(m, Message::GuidedTimeout(_))));
     recording.messages.sort_by(|a, b| a.0.total_cmp(&b.0));
     recording
 }

@@ -8,7 +8,8 @@ use mavlink::dialects::ardupilotmega::{
 use nalgebra::Vector3;
 use planner_core::Point;
 
-use super::{Correction, Estimator, Message, Recording, Sample, Setpoint};
+use super::recording::{Message, Recording, Sample, Setpoint};
+use super::{Correction, Estimator};
 
 /// Simulated seconds for each second of the wall clock: PX4's SIH was recorded 0.4 to 1.1 % slow.
 const PX4_CLOCK: f64 = 0.9925;

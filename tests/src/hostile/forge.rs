@@ -9,42 +9,8 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 use planner_core::Point;
 use planner_core::frames;
 
+use super::entropy::Entropy;
 use super::{Flight, ID, NEIGHBOUR, ORIGIN, intent};
-use crate::meeting::dice::Dice;
-
-/// Where random numbers come from: a seed, or a fuzzer's bytes, which end.
-pub trait Entropy {
-    /// The next bits.
-    fn bits(&mut self) -> u64;
-    /// Whether there are no more.
-    fn is_spent(&self) -> bool {
-        false
-    }
-}
-
-impl Entropy for Dice {
-    fn bits(&mut self) -> u64 {
-        Self::bits(self)
-    }
-}
-
-/// A fuzzer's bytes.
-#[derive(Debug)]
-pub struct Bytes<'a>(pub &'a [u8]);
-
-impl Entropy for Bytes<'_> {
-    fn bits(&mut self) -> u64 {
-        let mut word = [0; 8];
-        let length = self.0.len().min(8);
-        word[..length].copy_from_slice(&self.0[..length]);
-        self.0 = &self.0[length..];
-        u64::from_le_bytes(word)
-    }
-
-    fn is_spent(&self) -> bool {
-        self.0.is_empty()
-    }
-}
 
 impl Flight {
     /// Gives one forged frame.
@@ -79,28 +45,7 @@ impl Flight {
     /// Fields random or at their bounds, and some of a message that would be believed.
     fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
         if id == TUNNEL_DATA::ID && how & 3 != 0 {
-            let mut intent = intent();
-            let bits = entropy.bits();
-            intent.system_id = if how & 8 == 0 { NEIGHBOUR } else { bits as u8 };
-            intent.flags = (bits >> 8) as u8;
-            intent.mission_crc = if how & 16 == 0 { 0xC0FFEE } else { bits as u32 };
-            intent.plan_crc = if how & 32 == 0 { 5 } else { (bits >> 16) as u32 };
-            intent.heard = (bits >> 24) as u32;
-            intent.floor_m = number(bits >> 32, 10.0);
-            intent.column = how & 64 != 0;
-            intent.progress_m = number(bits >> 40, 30.0);
-            intent.speed_mps = number(bits >> 48, 5.0);
-            for _ in 0..(bits >> 56) as usize % (POINTS + 1) {
-                let bits = entropy.bits();
-                let here = self.autopilot.position;
-                let near = |shift: u32| number(bits >> shift, 6.0);
-                let point = here + Point::new(near(0), near(16), near(32));
-                intent.points.push(point).expect("no more than fit");
-            }
-            let mut whole = [0; 133];
-            let length = intent.encode(&mut whole);
-            payload[..length].copy_from_slice(&whole[..length]);
-            return length;
+            return self.fill_intent(payload, entropy, how);
         }
         let length = LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
         for word in payload[..length].chunks_mut(4) {
@@ -114,6 +59,38 @@ impl Flight {
             };
             word.copy_from_slice(&value.to_le_bytes()[..word.len()]);
         }
+        self.make_believable(id, payload, how);
+        length
+    }
+
+    /// An intent like those of the neighbour.
+    fn fill_intent(&self, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
+        let mut intent = intent();
+        let bits = entropy.bits();
+        intent.system_id = if how & 8 == 0 { NEIGHBOUR } else { bits as u8 };
+        intent.flags = (bits >> 8) as u8;
+        intent.mission_crc = if how & 16 == 0 { 0xC0FFEE } else { bits as u32 };
+        intent.plan_crc = if how & 32 == 0 { 5 } else { (bits >> 16) as u32 };
+        intent.heard = (bits >> 24) as u32;
+        intent.floor_m = number(bits >> 32, 10.0);
+        intent.column = how & 64 != 0;
+        intent.progress_m = number(bits >> 40, 30.0);
+        intent.speed_mps = number(bits >> 48, 5.0);
+        for _ in 0..(bits >> 56) as usize % (POINTS + 1) {
+            let bits = entropy.bits();
+            let here = self.autopilot.position;
+            let near = |shift: u32| number(bits >> shift, 6.0);
+            let point = here + Point::new(near(0), near(16), near(32));
+            intent.points.push(point).expect("no more than fit");
+        }
+        let mut whole = [0; 133];
+        let length = intent.encode(&mut whole);
+        payload[..length].copy_from_slice(&whole[..length]);
+        length
+    }
+
+    /// Overwrites what would be dropped at once.
+    fn make_believable(&self, id: u32, payload: &mut [u8; 255], how: u8) {
         let near = |shift: u32, how: u8| f32::from(how.rotate_left(shift)) * 0.01 - 1.28;
         match id {
             // Near enough to be no jump, now and then.
@@ -168,7 +145,6 @@ impl Flight {
             }
             _ => {}
         }
-        length
     }
 }
 
@@ -177,9 +153,6 @@ fn number(bits: u64, size: f32) -> f32 {
     (f32::from(bits as u16) / 32768.0 - 1.0) * size
 }
 
-/// Messages that a companion reads, and one that it does not.
-pub(super) const READ: [u32; 20] =
-    [0, 1, 20, 21, 22, 23, 32, 33, 49, 66, 75, 76, 77, 110, 111, 193, 230, 245, 253, TUNNEL_DATA::ID];
 /// Bytes of their payloads.
 const LENGTHS: [(u32, usize); 19] = [
     (0, 9),

@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use super::ORIGIN;
+use super::packet::ORIGIN;
 use super::scene::Lie;
 
 /// ENU metres and metres per second.

@@ -8,8 +8,8 @@ use planner_core::frames::{self, Geodetic};
 
 use super::autopilot::{Autopilot, Flown};
 use super::oracle::{Heard, Seen};
+use super::packet::{ORIGIN, Packet};
 use super::scene::{self, CLIMB_MPS, CRUISE_MPS, GATES, SAFETY_M, Scene, VEHICLES, WAYPOINTS};
-use super::{ORIGIN, Packet};
 use crate::setpoints::{Limits, SetpointCheck};
 
 /// No vehicle leaves this box, metres: minimum and maximum corner.

@@ -9,6 +9,7 @@ mod forged;
 mod member;
 pub mod oracle;
 mod outcome;
+mod packet;
 mod planner;
 pub mod scene;
 
@@ -19,8 +20,6 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
 };
-use planner_core::Point;
-use planner_core::frames::Geodetic;
 
 use self::autopilot::{Flown, STEP_S};
 use self::dice::Dice;
@@ -28,6 +27,7 @@ use self::forged::{forge, place_of};
 use self::member::Member;
 use self::oracle::Oracle;
 pub use self::outcome::{Outcome, Summary, line, summary};
+use self::packet::{Packet, Said};
 use self::planner::around;
 use self::scene::{Scene, What, floor_z, landing};
 use crate::setpoints::SetpointStats;
@@ -36,23 +36,7 @@ use crate::setpoints::SetpointStats;
 pub const LIMIT_S: f32 = 180.0;
 /// After everything has happened and all stand, this much is still flown, seconds.
 const AFTERMATH_S: f32 = 3.0;
-const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 const STEP_MS: u64 = 25;
-
-/// What a radio frame says, for the judge.
-#[derive(Clone, Debug)]
-enum Said {
-    Position(Point, Point, u32),
-    Intent(Intent),
-    Other,
-}
-
-struct Packet {
-    at: Instant,
-    from: usize,
-    bytes: Vec<u8>,
-    said: Said,
-}
 
 struct World<'a> {
     scene: &'a Scene,

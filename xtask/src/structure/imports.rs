@@ -65,6 +65,9 @@ struct Paths {
 }
 
 impl Visit<'_> for Paths {
+    /// `pub(in path)` imports nothing.
+    fn visit_visibility(&mut self, _: &Visibility) {}
+
     fn visit_item_mod(&mut self, item: &ItemMod) {
         let name = item.ident.to_string();
         if item.content.is_some() && name != "tests" {

@@ -1,9 +1,12 @@
 //! The tables of how a mission is flown: deconfliction, simulation, faults.
 
-use super::{MAX_ID, point};
+use planner_core::deconflict::Method;
+
+use super::values::{MAX_ID, point};
+use crate::kinds::Estimator;
 use crate::margins;
 use crate::scenario::reader::{Result, Table};
-use crate::scenario::{Deconfliction, Estimator, FAULT_KINDS, FAULT_OBSTACLE, Fault, Method, Simulation};
+use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
 pub(super) fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use planner_core::assignment::{AssignmentWorkspace, assign};
 
-use crate::Row;
+use crate::row::Row;
 
 const LARGEST: usize = 1000;
 

@@ -20,7 +20,7 @@ use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 
-use crate::Row;
+use crate::row::Row;
 
 /// Runs of each round, of which the median counts.
 const RUNS: usize = 301;

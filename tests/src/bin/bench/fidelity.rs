@@ -8,7 +8,7 @@ use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
 };
 
-use crate::Row;
+use crate::row::Row;
 
 /// Flights of the same mission, by run and vehicle.
 const TWINS: [[(&str, usize); 2]; 3] = [

@@ -8,6 +8,7 @@ mod boards;
 mod coverage;
 mod fidelity;
 mod roadmap;
+mod row;
 mod steps;
 mod swarm;
 mod worst_case;
@@ -16,26 +17,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use serde::Serialize;
 
-/// One line of the bench: `ratio` is theirs / ours, so more is better.
-#[derive(Clone, Debug, Serialize)]
-pub struct Row {
-    /// What was done.
-    pub name: String,
-    /// Our median.
-    pub ours: f64,
-    /// Their median.
-    pub theirs: f64,
-    /// theirs / ours.
-    pub ratio: f64,
-    /// What `ratio` must be at least.
-    pub required: f64,
-    /// Unit of both.
-    pub unit: &'static str,
-    /// Size of the problem.
-    pub n: usize,
-}
+use self::row::Row;
 
 #[derive(Parser)]
 #[command(about = "Our times beside those of other programs")]

@@ -13,7 +13,7 @@
 //! Ten A*: both search each pair by itself. The matrix: theirs is a hundred A*, ours [`cost_matrix`].
 
 use std::io::Write as _;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
@@ -31,7 +31,7 @@ use planner_core::search::{SearchWorkspace, WithLengths, astar, cost_matrix};
 use planner_core::voxel::VoxelGrid;
 use serde::Deserialize;
 
-use crate::Row;
+use crate::row::Row;
 
 const RESOLUTION_M: f32 = 0.25;
 const NODES: usize = 2300;
@@ -65,12 +65,7 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
     let files = ["building.bt", "starts.txt", "goals.txt"].map(|name| dir.path().join(name));
     bt::write(&map.to_octree("builtin:building")?, &files[0])?;
     let terminals = terminals();
-    for (file, points) in files[1..].iter().zip(terminals.chunks(VEHICLES)) {
-        let mut out = std::fs::File::create(file)?;
-        for p in points {
-            writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
-        }
-    }
+    write_terminals(&files, &terminals)?;
     let voxels = map.voxel_map(Unknown::Blocked);
     let grid = voxels.grid();
     let mut ours = Ours::new(&grid, &terminals);
@@ -94,19 +89,7 @@ pub fn rows(peer: &Path) -> Result<Vec<Row>> {
             }
         }
     }
-    let last = &theirs[theirs.len() - 1];
-    println!(
-        "theirs: {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m",
-        last.nodes, last.rays, last.edges, last.solved, last.labelled_m
-    );
-    println!(
-        "ours:   {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m (other random nodes)",
-        ours.nodes.len(),
-        ours.rays(),
-        ours.edges.len(),
-        ours.solved,
-        ours.labelled_m
-    );
+    print_sizes(&theirs, &ours);
     print_parts(&whole);
     type Value = fn(&Theirs) -> f64;
     let build: Value = |t| t.nodes_ms + t.edges_ms;
@@ -172,6 +155,34 @@ fn print_parts(whole: &[Timing]) {
         part(|t| t.roadmap_parts.nodes_s),
         part(|t| t.roadmap_parts.edges_s),
         part(|t| t.roadmap_parts.file_s)
+    );
+}
+
+/// The starts and the goals as files for the other program; the first file is the map.
+fn write_terminals(files: &[PathBuf; 3], terminals: &[Point]) -> Result<()> {
+    for (file, points) in files[1..].iter().zip(terminals.chunks(VEHICLES)) {
+        let mut out = std::fs::File::create(file)?;
+        for p in points {
+            writeln!(out, "{} {} {}", p.x, p.y, p.z)?;
+        }
+    }
+    Ok(())
+}
+
+/// What both built last.
+fn print_sizes(theirs: &[Theirs], ours: &Ours<'_>) {
+    let Some(last) = theirs.last() else { return };
+    println!(
+        "theirs: {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m",
+        last.nodes, last.rays, last.edges, last.solved, last.labelled_m
+    );
+    println!(
+        "ours:   {} nodes, {} rays, {} edges, {} of {VEHICLES} solved, {:.1} m (other random nodes)",
+        ours.nodes.len(),
+        ours.rays(),
+        ours.edges.len(),
+        ours.solved,
+        ours.labelled_m
     );
 }
 

@@ -15,7 +15,7 @@ use planner_core::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
-use crate::Row;
+use crate::row::Row;
 
 const SEED: u64 = 1;
 /// The function whose instructions are counted, as callgrind calls it.

@@ -16,7 +16,7 @@ use host_sim::swarm;
 use planner_core::Point;
 use planner_core::voxel::GridShape;
 
-use crate::Row;
+use crate::row::Row;
 
 const DEMO: &str = include_str!("../../../../host-sim/scenarios/demo.toml");
 

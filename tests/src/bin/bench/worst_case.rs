@@ -8,7 +8,7 @@ use std::fs;
 use anyhow::{Context, Result};
 use flockmate_tests::{board, bounds, workspace};
 
-use crate::Row;
+use crate::row::Row;
 
 /// What a step may cost by deconfliction alone and in all, thousands of instructions.
 const LIMITS: [(&str, &str, f64); 6] = [

@@ -30,30 +30,33 @@ struct Args {
     kind: Option<String>,
 }
 
+/// Flies one meeting and prints what happened.
+fn trace(scene: &scene::Scene) {
+    let scene::Scene { kind, delay_s, loss, liar, .. } = scene;
+    println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
+    for vehicle in &scene.vehicles {
+        let plan = &vehicle.plan;
+        let points: Vec<_> = plan.path.waypoints().iter().map(|w| w.position.as_slice().to_vec()).collect();
+        println!(
+            "{}: {:?}, pad {:.2?}, departs {:.1} s, path {points:.1?}, gates {:.1?}",
+            vehicle.id,
+            vehicle.kind,
+            vehicle.pad.as_slice(),
+            plan.depart_s,
+            plan.gates
+        );
+    }
+    let outcome = meeting::fly(scene, true);
+    outcome.trace.iter().for_each(|line| println!("{line}"));
+    println!("{}", meeting::line(&outcome));
+    outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
+}
+
 fn main() {
     let args = Args::parse();
     let draw = if args.passing { scene::passing } else { scene::scene };
     if args.trace {
-        let scene = draw(args.seed);
-        let scene::Scene { kind, delay_s, loss, liar, .. } = &scene;
-        println!("{kind}, delay {delay_s:.2?} s, loss {loss:.2}, liar {liar:?}");
-        for vehicle in &scene.vehicles {
-            let plan = &vehicle.plan;
-            let points: Vec<_> =
-                plan.path.waypoints().iter().map(|w| w.position.as_slice().to_vec()).collect();
-            println!(
-                "{}: {:?}, pad {:.2?}, departs {:.1} s, path {points:.1?}, gates {:.1?}",
-                vehicle.id,
-                vehicle.kind,
-                vehicle.pad.as_slice(),
-                plan.depart_s,
-                plan.gates
-            );
-        }
-        let outcome = meeting::fly(&scene, true);
-        outcome.trace.iter().for_each(|line| println!("{line}"));
-        println!("{}", meeting::line(&outcome));
-        outcome.unfit.iter().for_each(|(i, at_s, what)| println!("  {}: {at_s:.2} s: {what}", i + 1));
+        trace(&draw(args.seed));
         return;
     }
     let began = Instant::now();

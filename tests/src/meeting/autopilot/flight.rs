@@ -60,20 +60,14 @@ impl Autopilot {
                 velocity.z = velocity.z.max(0.3);
             }
         }
-        let across = velocity.xy().norm();
-        if across > 5.0 {
-            (velocity.x, velocity.y) = (velocity.x * 5.0 / across, velocity.y * 5.0 / across);
-        }
+        bound_across(&mut velocity, 5.0);
         velocity.z = velocity.z.clamp(-1.5, 2.5);
         let mut wanted = (velocity - self.velocity).component_mul(&velocity_gain) + feed_forward;
         let (across_most, up_most, down_most) = match kind {
             Kind::Px4 => (5.0, 4.0, 3.0),
             Kind::ArduPilot => (2.5, 1.1, 1.1),
         };
-        let across = wanted.xy().norm();
-        if across > across_most {
-            (wanted.x, wanted.y) = (wanted.x * across_most / across, wanted.y * across_most / across);
-        }
+        bound_across(&mut wanted, across_most);
         wanted.z = wanted.z.clamp(-down_most, up_most);
         wanted
     }
@@ -124,5 +118,13 @@ impl Autopilot {
         if rested_s > after_s && (now - self.armed_at).secs_f32() > after_s {
             self.armed = false;
         }
+    }
+}
+
+/// Shortens a vector across to at most this length.
+fn bound_across(vector: &mut Point, most: f32) {
+    let across = vector.xy().norm();
+    if across > most {
+        (vector.x, vector.y) = (vector.x * most / across, vector.y * most / across);
     }
 }

@@ -92,6 +92,22 @@ impl Autopilot {
         }
     }
 
+    fn arm_or_disarm(&mut self, now: Instant, arm: bool) -> MavResult {
+        if arm == self.armed {
+            return MavResult::MAV_RESULT_ACCEPTED;
+        }
+        if !arm && self.airborne {
+            return match self.kind {
+                Kind::Px4 => MavResult::MAV_RESULT_TEMPORARILY_REJECTED,
+                Kind::ArduPilot => MavResult::MAV_RESULT_FAILED,
+            };
+        }
+        self.armed = arm;
+        self.armings += u32::from(arm);
+        (self.armed_at, self.grounded_since, self.lifted_at) = (now, None, None);
+        MavResult::MAV_RESULT_ACCEPTED
+    }
+
     fn handle_command(&mut self, now: Instant, data: &COMMAND_LONG_DATA, out: &mut Vec<u8>) {
         use MavResult::*;
         let mut result = MAV_RESULT_ACCEPTED;
@@ -116,21 +132,7 @@ impl Autopilot {
                 self.enter(self.kind.land_mode());
                 self.landing_commanded = true;
             }
-            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => {
-                let arm = data.param1 == 1.0;
-                if arm == self.armed {
-                } else if !arm && self.airborne {
-                    result = if self.kind == Kind::Px4 {
-                        MAV_RESULT_TEMPORARILY_REJECTED
-                    } else {
-                        MAV_RESULT_FAILED
-                    };
-                } else {
-                    self.armed = arm;
-                    self.armings += u32::from(arm);
-                    (self.armed_at, self.grounded_since, self.lifted_at) = (now, None, None);
-                }
-            }
+            MavCmd::MAV_CMD_COMPONENT_ARM_DISARM => result = self.arm_or_disarm(now, data.param1 == 1.0),
             MavCmd::MAV_CMD_NAV_TAKEOFF => {
                 if self.armed && self.mode == self.kind.setpoint_mode() {
                     self.takeoff_z = Some(self.home.z + data.param7);

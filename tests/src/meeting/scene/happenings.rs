@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-use super::{Happening, START_S, Vehicle, What};
+use super::types::{Happening, START_S, Vehicle, What};
 use crate::meeting::autopilot::Failsafe;
 use crate::meeting::dice::Dice;
 

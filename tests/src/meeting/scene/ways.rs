@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::flight::{Flight, Path};
 use planner_core::schedule;
 
-use super::{SAFETY_M, SCHEDULE, WAYPOINTS};
+use super::types::{SAFETY_M, SCHEDULE, WAYPOINTS};
 use crate::meeting::dice::Dice;
 
 /// No flight is longer, seconds.

@@ -1,0 +1,37 @@
+//! Where the random numbers of forged frames come from.
+
+use crate::meeting::dice::Dice;
+
+/// Where random numbers come from: a seed, or a fuzzer's bytes, which end.
+pub trait Entropy {
+    /// The next bits.
+    fn bits(&mut self) -> u64;
+    /// Whether there are no more.
+    fn is_spent(&self) -> bool {
+        false
+    }
+}
+
+impl Entropy for Dice {
+    fn bits(&mut self) -> u64 {
+        Self::bits(self)
+    }
+}
+
+/// A fuzzer's bytes.
+#[derive(Debug)]
+pub struct Bytes<'a>(pub &'a [u8]);
+
+impl Entropy for Bytes<'_> {
+    fn bits(&mut self) -> u64 {
+        let mut word = [0; 8];
+        let length = self.0.len().min(8);
+        word[..length].copy_from_slice(&self.0[..length]);
+        self.0 = &self.0[length..];
+        u64::from_le_bytes(word)
+    }
+
+    fn is_spent(&self) -> bool {
+        self.0.is_empty()
+    }
+}

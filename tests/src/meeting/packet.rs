@@ -1,0 +1,25 @@
+//! Frames on the radio, and where the meetings are.
+
+use companion::Instant;
+use companion::link::intent::Intent;
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+
+/// Origin of the mission frame.
+pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+
+/// What a radio frame says, for the judge.
+#[derive(Clone, Debug)]
+pub(super) enum Said {
+    Position(Point, Point, u32),
+    Intent(Intent),
+    Other,
+}
+
+/// A frame on its way.
+pub(super) struct Packet {
+    pub(super) at: Instant,
+    pub(super) from: usize,
+    pub(super) bytes: Vec<u8>,
+    pub(super) said: Said,
+}
