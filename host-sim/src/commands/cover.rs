@@ -137,31 +137,6 @@ fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results)
 pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
-    let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let route = routes.iter().find(|route| usize::from(route.vehicle) == index);
-        VehicleResult {
-            id: vehicle.id,
-            goal: None,
-            reached: false,
-            landed: false,
-            path_m: route.map_or(0.0, |route| rounded(route.cost_m)),
-            flown_m: 0.0,
-            flight_time_s: route.map_or(0.0, |route| rounded(route.cost_s)),
-            end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
-        }
-    });
-    let vehicles: Vec<VehicleResult> = vehicles.collect();
-    let heights = scenario.area.heights;
-    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
-        depart_s: rounded(*depart_s),
-        vehicle: scenario.vehicles[usize::from(route.vehicle)].id,
-        first: route.first,
-        last: route.end - 1,
-        backward: route.ends().0 != route.first,
-        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
-        cost_s: rounded(route.cost_s),
-        cost_m: rounded(route.cost_m),
-    };
     let max_cost_s = planned.plan.max_cost_s();
     let ends_s = routes.iter().zip(&planned.departures_s).map(|(route, depart_s)| route.cost_s + depart_s);
     let makespan_s = ends_s.fold(0.0, f32::max);
@@ -204,10 +179,42 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
             photos: findings.photos,
             twice: findings.twice,
             left: findings.left,
-            routes: routes.iter().zip(&planned.departures_s).map(route).collect(),
+            routes: route_results(planned),
         },
-        vehicles,
+        vehicles: vehicle_results(planned),
     }
+}
+
+fn vehicle_results(planned: &Planned<'_>) -> Vec<VehicleResult> {
+    let vehicles = planned.scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
+        let route = planned.plan.routes.iter().find(|route| usize::from(route.vehicle) == index);
+        VehicleResult {
+            id: vehicle.id,
+            goal: None,
+            reached: false,
+            landed: false,
+            path_m: route.map_or(0.0, |route| rounded(route.cost_m)),
+            flown_m: 0.0,
+            flight_time_s: route.map_or(0.0, |route| rounded(route.cost_s)),
+            end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
+        }
+    });
+    vehicles.collect()
+}
+
+fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
+    let heights = planned.scenario.area.heights;
+    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
+        depart_s: rounded(*depart_s),
+        vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
+        first: route.first,
+        last: route.end - 1,
+        backward: route.ends().0 != route.first,
+        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
+        cost_s: rounded(route.cost_s),
+        cost_m: rounded(route.cost_m),
+    };
+    planned.plan.routes.iter().zip(&planned.departures_s).map(route).collect()
 }
 
 /// Mean, and the sample's standard deviation: 0 for one value.
