@@ -7,7 +7,7 @@
 //! | `footprint.rs` | what a camera sees; spacing of lanes and waypoints (CPP eqs. 1, 2) |
 //! | `area.rs` | polygons, checked |
 //! | `sweep.rs` | the direction of the lanes: least width, rotating calipers |
-//! | `tracks.rs` | back-and-forth lanes over concave areas, holes and no-fly zones |
+//! | `tracks.rs` | back-and-forth lanes over concave areas, holes and no-fly zones: `strips.rs` lays them, `lanes.rs` holds them |
 //! | `patches.rs` | more lanes where a no-fly zone covers a lane and not what it should photograph |
 //! | `order.rs` | the order and the directions in which lanes are flown |
 //! | `transit.rs` | shortest ways around no-fly zones |
@@ -24,18 +24,20 @@ pub mod area;
 pub mod bound;
 pub mod divide;
 pub mod exact;
+mod flat;
 pub mod footprint;
 mod intervals;
+mod lanes;
 pub mod order;
 pub mod pack;
 mod patches;
 pub mod powell;
+mod strips;
 pub mod sweep;
 pub mod tracks;
 pub mod transit;
 
-/// A place seen from above: east, north, in metres.
-pub type Flat = nalgebra::Vector2<f32>;
+pub use self::flat::Flat;
 
 /// Why there is no coverage plan.
 #[derive(Clone, Copy, Debug, PartialEq)]

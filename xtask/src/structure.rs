@@ -16,33 +16,32 @@ use self::sources::Tree;
 /// The crates that are looked at, by folder.
 const CRATES: [&str; 6] = ["planner-core", "companion", "host-sim", "firmware", "tests", "xtask"];
 
-/// Those of them that `cargo xtask test` holds to the rules.
-const HELD: [&str; 4] = ["planner-core", "host-sim", "tests", "xtask"];
-/// Folders of them that are still written: not held yet.
-const OPEN: [&str; 2] = ["planner-core/src/coverage", "host-sim/src/coverage"];
+/// Those without import cycles; `cargo xtask test` holds them to that.
+const ACYCLIC: [&str; 5] = ["planner-core", "companion", "host-sim", "tests", "xtask"];
+/// Those whose structs and functions keep to the limits, but for the exceptions; held to that too.
+const SHAPED: [&str; 4] = ["planner-core", "host-sim", "tests", "xtask"];
 
 /// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason.
 pub fn run() -> Result<()> {
-    check(&CRATES, &[])
+    check(&CRATES, &CRATES)
 }
 
 /// The same of the crates that keep to the rules.
 pub fn run_held() -> Result<()> {
-    check(&HELD, &OPEN)
+    check(&ACYCLIC, &SHAPED)
 }
 
-fn check(crates: &[&str], open: &[&str]) -> Result<()> {
-    let is_open = |what: &str| open.iter().any(|folder| what.starts_with(folder));
+fn check(acyclic: &[&str], shaped: &[&str]) -> Result<()> {
     let mut wrong = 0;
-    for name in crates {
+    for name in CRATES {
         for tree in Tree::of_crate(Path::new(name))? {
-            for cycle in imports::cycles(&tree) {
+            for cycle in imports::cycles(&tree).into_iter().filter(|_| acyclic.contains(&name)) {
                 println!("{name}: import cycle:\n  {}", cycle.join("\n  "));
-                wrong += usize::from(!cycle.iter().all(|import| is_open(import)));
+                wrong += 1;
             }
-            for (what, reason) in shape::beyond(&tree) {
+            for (what, reason) in shape::beyond(&tree).into_iter().filter(|_| shaped.contains(&name)) {
                 println!("{name}: {what}: {}", reason.unwrap_or("no reason given"));
-                wrong += usize::from(reason.is_none() && !is_open(&what));
+                wrong += usize::from(reason.is_none());
             }
         }
     }

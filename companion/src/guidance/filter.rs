@@ -11,7 +11,6 @@
 mod conflict;
 mod look;
 
-use self::conflict::Found;
 use crate::time::{Duration, Instant};
 
 /// So much of the way has to be free before the vehicle goes on, metres.
@@ -36,6 +35,14 @@ const LATELY: Duration = Duration::from_millis(500);
 const FREE: Duration = Duration::from_secs(5);
 /// The vehicle that yields in a descent flies back up after this.
 const BACK_UP: Duration = Duration::from_secs(1);
+
+/// A neighbour whose set meets that of the vehicle.
+struct Found {
+    id: u8,
+    yields: bool,
+    stranger: bool,
+    rests: bool,
+}
 
 /// What the filter found.
 #[derive(Clone, Copy, Debug, Default)]

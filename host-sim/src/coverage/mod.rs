@@ -7,6 +7,7 @@ pub mod check;
 pub mod export;
 pub mod flight;
 pub mod page;
+mod planned;
 pub mod separation;
 
 use std::time::Instant;
@@ -21,15 +22,10 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
+pub use self::planned::{CORNERS, LANES, Planned, VEHICLES};
 use crate::area::MOST_VERTICES;
 use crate::scenario::coverage::{Coverage, Method};
 
-/// Most vehicles of a coverage mission.
-pub const VEHICLES: usize = 32;
-/// Most lanes on the desk.
-pub const LANES: usize = 8192;
-/// Most outward corners of no-fly zones on the desk.
-pub const CORNERS: usize = 256;
 /// Changes of the lanes' order that the desk looks at.
 pub const LOOKS: u32 = 20_000_000;
 /// V_a where a vehicle has none of its own, metres a second.
@@ -39,32 +35,6 @@ const DESCEND_MPS: f32 = 1.0;
 
 /// A route, its stops, and when each is passed, seconds.
 pub type Flight = (Route, Vec<flight::Stop>, Vec<f32>);
-
-/// A planned coverage mission.
-pub struct Planned<'a> {
-    /// What was asked for.
-    pub scenario: &'a Coverage,
-    /// Its area.
-    pub area: Area<'a>,
-    /// How work was divided.
-    pub method: Method,
-    /// Vehicles as the planner sees them, in the scenario's order.
-    pub vehicles: Vec<Vehicle>,
-    /// The lanes.
-    pub tracks: Box<Tracks<LANES>>,
-    /// Ways around no-fly zones.
-    pub transit: Box<Transit<'a, CORNERS>>,
-    /// The routes.
-    pub plan: Plan<VEHICLES>,
-    /// No division can end before, seconds.
-    pub lower_bound_s: f32,
-    /// When each route's vehicle leaves its pad, seconds.
-    pub departures_s: Vec<f32>,
-    /// The least distance between two vehicles, as planned; infinite for one.
-    pub least_separation_m: f32,
-    /// What lanes, ways and routes took of the clock, seconds.
-    pub seconds: [f64; 3],
-}
 
 impl<'a> Planned<'a> {
     /// Plans a mission.

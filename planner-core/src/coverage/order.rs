@@ -6,7 +6,7 @@
 //! `looks`.
 
 use super::Flat;
-use super::tracks::Lane;
+use super::lanes::Lane;
 use super::transit::Transit;
 
 /// Gains below it are rounding, metres.

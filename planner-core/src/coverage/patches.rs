@@ -10,7 +10,8 @@ use libm::{fmaxf, fminf};
 use super::CoverageError;
 use super::area::RingKind;
 use super::intervals::Span;
-use super::tracks::{Strips, Tracks, Workspace};
+use super::lanes::Tracks;
+use super::strips::{Strips, Workspace};
 use super::transit::CLEARANCE_M;
 
 /// How often a strip is halved.

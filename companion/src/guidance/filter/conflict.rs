@@ -5,7 +5,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, Bounds, REACTION_S, Set};
 
 use super::super::{Guidance, Phase, Scene};
-use super::STRANGER;
+use super::{Found, STRANGER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
 use crate::swarm::neighbours::{Met, Neighbours, Reach};
@@ -25,14 +25,6 @@ const HULLS_M: f32 = 0.3;
 const SWAY_MPS: f32 = 0.3;
 /// A landing that waited for so long needs no more room than the hulls.
 const LANDS_LATE: Duration = Duration::from_secs(40);
-
-/// A neighbour whose set meets that of the vehicle.
-pub(super) struct Found {
-    pub(super) id: u8,
-    pub(super) yields: bool,
-    pub(super) stranger: bool,
-    pub(super) rests: bool,
-}
 
 impl Guidance {
     /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the setpoint, which is all that a

@@ -1,0 +1,41 @@
+//! What a coverage plan holds.
+
+use planner_core::coverage::area::Area;
+use planner_core::coverage::pack::{Plan, Vehicle};
+use planner_core::coverage::tracks::Tracks;
+use planner_core::coverage::transit::Transit;
+
+use crate::scenario::coverage::{Coverage, Method};
+
+/// Most vehicles of a coverage mission.
+pub const VEHICLES: usize = 32;
+/// Most lanes on the desk.
+pub const LANES: usize = 8192;
+/// Most outward corners of no-fly zones on the desk.
+pub const CORNERS: usize = 256;
+
+/// A planned coverage mission.
+pub struct Planned<'a> {
+    /// What was asked for.
+    pub scenario: &'a Coverage,
+    /// Its area.
+    pub area: Area<'a>,
+    /// How work was divided.
+    pub method: Method,
+    /// Vehicles as the planner sees them, in the scenario's order.
+    pub vehicles: Vec<Vehicle>,
+    /// The lanes.
+    pub tracks: Box<Tracks<LANES>>,
+    /// Ways around no-fly zones.
+    pub transit: Box<Transit<'a, CORNERS>>,
+    /// The routes.
+    pub plan: Plan<VEHICLES>,
+    /// No division can end before, seconds.
+    pub lower_bound_s: f32,
+    /// When each route's vehicle leaves its pad, seconds.
+    pub departures_s: Vec<f32>,
+    /// The least distance between two vehicles, as planned; infinite for one.
+    pub least_separation_m: f32,
+    /// What lanes, ways and routes took of the clock, seconds.
+    pub seconds: [f64; 3],
+}

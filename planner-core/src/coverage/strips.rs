@@ -1,0 +1,281 @@
+//! An area in strips, one lane wide: what of each is to be photographed, and where a lane is laid.
+
+use heapless::Vec;
+use libm::{ceilf, fmaxf, fminf};
+
+use super::area::{Area, RingKind, edges_of};
+use super::intervals::{Intervals, Span};
+use super::sweep::Direction;
+use super::transit::CLEARANCE_M;
+use super::{CoverageError, Flat};
+
+use super::lanes::{Lane, Pattern, Tracks};
+
+/// Memory lent: `V` is at least the number of the area's vertices.
+pub struct Workspace<const V: usize> {
+    pub(super) hull: Vec<Flat, V>,
+    pub(super) crossings: Vec<f32, V>,
+    pub(super) need: Intervals<V>,
+    pub(super) line: Intervals<V>,
+    pub(super) free: Intervals<V>,
+}
+
+impl<const V: usize> Workspace<V> {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            hull: Vec::new(),
+            crossings: Vec::new(),
+            need: Intervals::new(),
+            line: Intervals::new(),
+            free: Intervals::new(),
+        }
+    }
+}
+
+impl<const V: usize> Default for Workspace<V> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// The area in strips.
+pub(super) struct Strips<'a> {
+    pub(super) area: Area<'a>,
+    pub(super) pattern: Pattern,
+    direction: Direction,
+    base: Flat,
+    low: f32,
+    pub(super) wide: f32,
+    pub(super) count: usize,
+}
+
+impl<'a> Strips<'a> {
+    pub(super) fn new(
+        area: &Area<'a>,
+        pattern: &Pattern,
+        direction: Direction,
+    ) -> Result<Self, CoverageError> {
+        let base = area.vertices()[0];
+        let outer = area.each().filter(|(kind, _)| *kind == RingKind::Outer).flat_map(|(_, ring)| ring);
+        let (low, high) = outer
+            .map(|vertex| direction.across.dot(&(vertex - base)))
+            .fold((f32::INFINITY, f32::NEG_INFINITY), |(low, high), v| (fminf(low, v), fmaxf(high, v)));
+        // A width that is a whole number of lanes is often a rounding above it.
+        let count = fmaxf(ceilf((high - low) / pattern.spacing.lane_m - 1e-3), 1.0);
+        if count > f32::from(u16::MAX) {
+            return Err(CoverageError::LanesFull);
+        }
+        let wide = (high - low) / count;
+        Ok(Self { area: *area, pattern: *pattern, direction, base, low, wide, count: count as usize })
+    }
+
+    /// A strip's borders across.
+    pub(super) fn span(&self, strip: usize) -> Span {
+        let low = self.low + strip as f32 * self.wide;
+        [low, low + self.wide]
+    }
+
+    pub(super) fn middle(&self, [low, high]: Span) -> f32 {
+        (low + high) / 2.0
+    }
+
+    /// A place in the lanes' frame.
+    pub(super) fn rotated(&self, place: &Flat) -> (f32, f32) {
+        let from_base = place - self.base;
+        (self.direction.along.dot(&from_base), self.direction.across.dot(&from_base))
+    }
+
+    /// The place of a point of the lanes' frame.
+    fn place(&self, u: f32, v: f32) -> Flat {
+        self.base + self.direction.along * u + self.direction.across * v
+    }
+
+    /// Where the line `v` crosses these edges, in rising order.
+    fn crossings<const V: usize>(
+        &self,
+        edges: impl Iterator<Item = (Flat, Flat)>,
+        v: f32,
+        out: &mut Vec<f32, V>,
+    ) -> Result<(), CoverageError> {
+        out.clear();
+        for (a, b) in edges {
+            let ((au, av), (bu, bv)) = (self.rotated(&a), self.rotated(&b));
+            if (av <= v) != (bv <= v) {
+                let u = au + (v - av) * (bu - au) / (bv - av);
+                out.push(u).map_err(|_| CoverageError::LanesFull)?;
+            }
+        }
+        out.sort_unstable_by(f32::total_cmp);
+        Ok(())
+    }
+
+    /// Adds every `u` at which these rings hold a place between two `v`: those of the places on the lines at both
+    /// borders, and those of the rings' own edges between them. Whoever is inside without being on a border line crosses
+    /// an edge before it.
+    fn shadow<const V: usize>(
+        &self,
+        edges: impl Iterator<Item = (Flat, Flat)> + Clone,
+        [low, high]: Span,
+        grown: f32,
+        crossings: &mut Vec<f32, V>,
+        out: &mut Intervals<V>,
+    ) -> Result<(), CoverageError> {
+        for v in [low, high] {
+            self.crossings(edges.clone(), v, crossings)?;
+            for pair in crossings.chunks_exact(2) {
+                out.add([pair[0] - grown, pair[1] + grown])?;
+            }
+        }
+        for [from, to] in edges.filter_map(|edge| self.between(edge, [low, high])) {
+            out.add([from - grown, to + grown])?;
+        }
+        Ok(())
+    }
+
+    /// Sets `ws.need` to every `u` at which there is something to photograph between two `v`.
+    pub(super) fn need<const V: usize>(
+        &self,
+        span: Span,
+        ws: &mut Workspace<V>,
+    ) -> Result<(), CoverageError> {
+        ws.need.clear();
+        // What only touches the border of a strip is its neighbour's.
+        let inset = self.wide * 1e-4;
+        let span = [span[0] + inset, span[1] - inset];
+        self.shadow(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
+    }
+
+    /// Takes from `ws.need` every `u` at which one no-fly zone holds all between two `v`: those inside it on both border
+    /// lines, without those of its edges between them.
+    pub(super) fn without_zones<const V: usize>(
+        &self,
+        span: Span,
+        ws: &mut Workspace<V>,
+    ) -> Result<(), CoverageError> {
+        for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            ws.line.clear();
+            self.crossings(edges_of(ring), span[0], &mut ws.crossings)?;
+            for pair in ws.crossings.chunks_exact(2) {
+                ws.line.add([pair[0], pair[1]])?;
+            }
+            self.crossings(edges_of(ring), span[1], &mut ws.crossings)?;
+            let mut outside = f32::NEG_INFINITY;
+            for pair in ws.crossings.chunks_exact(2) {
+                ws.line.remove([outside, pair[0]])?;
+                outside = pair[1];
+            }
+            ws.line.remove([outside, f32::INFINITY])?;
+            for edge in edges_of(ring) {
+                if let Some(edge) = self.between(edge, span) {
+                    ws.line.remove(edge)?;
+                }
+            }
+            for span in ws.line.spans() {
+                ws.need.remove(*span)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// From where to where an edge runs between two `v`, if it does.
+    fn between(&self, (a, b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
+        let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
+        if a.1 > b.1 {
+            core::mem::swap(&mut a, &mut b);
+        }
+        if a.1 > high || b.1 < low {
+            return None;
+        }
+        let at = |v: f32| a.0 + (v - a.1) * (b.0 - a.0) / (b.1 - a.1);
+        let from = if a.1 < low { at(low) } else { a.0 };
+        let to = if b.1 > high { at(high) } else { b.0 };
+        Some([fminf(from, to), fmaxf(from, to)])
+    }
+
+    /// Takes from `ws.free` every `u` at which the line `v` comes nearer than the clearance to a no-fly zone.
+    fn unblock<const V: usize>(&self, v: f32, ws: &mut Workspace<V>) -> Result<(), CoverageError> {
+        ws.line.clear();
+        let clear = CLEARANCE_M;
+        for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
+            let span = [v - clear, v + clear];
+            self.shadow(edges_of(ring), span, clear, &mut ws.crossings, &mut ws.line)?;
+        }
+        for span in ws.line.spans() {
+            ws.free.remove(*span)?;
+        }
+        Ok(())
+    }
+
+    /// Lays lanes along the line `v` for what `ws.need` holds.
+    pub(super) fn lay<const L: usize, const V: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        ws: &mut Workspace<V>,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        ws.free.clear();
+        self.crossings(self.area.edges(), v, &mut ws.crossings)?;
+        for &need in ws.need.spans() {
+            let inside = ws.crossings.iter().copied().filter(|u| (need[0]..=need[1]).contains(u));
+            let line = inside
+                .fold([f32::INFINITY, f32::NEG_INFINITY], |line, u| [fminf(line[0], u), fmaxf(line[1], u)]);
+            ws.free.add(self.extent(need, line))?;
+        }
+        if self.area.has_no_fly() {
+            self.unblock(v, ws)?;
+        }
+        ws.free.spans().iter().try_for_each(|span| self.push(strip, v, *span, out))
+    }
+
+    /// Lays a lane of one waypoint on the line `v`, as near as can be to the middle of `need`, if it shows all of it.
+    pub(super) fn lay_picture<const L: usize, const V: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        need: Span,
+        ws: &mut Workspace<V>,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        let (middle, room) = ((need[0] + need[1]) / 2.0, self.reach() - (need[1] - need[0]) / 2.0);
+        if room <= 0.0 {
+            return Ok(());
+        }
+        ws.free.clear();
+        ws.free.add([middle - room, middle + room])?;
+        self.unblock(v, ws)?;
+        let near = ws.free.spans().iter().map(|[from, to]| middle.clamp(*from, *to));
+        let far = |u: &f32| libm::fabsf(u - middle);
+        let nearest = near.min_by(|a, b| far(a).total_cmp(&far(b)));
+        nearest.map_or(Ok(()), |u| self.push(strip, v, [u, u], out))
+    }
+
+    fn push<const L: usize>(
+        &self,
+        strip: u16,
+        v: f32,
+        [from, to]: Span,
+        out: &mut Tracks<L>,
+    ) -> Result<(), CoverageError> {
+        let (from, to) = (self.place(from, v), self.place(to, v));
+        let lane = Lane { from, to, first: 0, count: 0, start_m: 0.0, strip };
+        out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
+    }
+
+    /// From where to where a lane runs for an area that reaches over `need` in its strip and over `line` along it: from
+    /// border to border, further where the first or last picture would else leave something out.
+    fn extent(&self, need: Span, line: Span) -> Span {
+        let reach = self.reach();
+        let (from, to) = (fminf(line[0], need[0] + reach), fmaxf(line[1], need[1] - reach));
+        let middle = (need[0] + need[1]) / 2.0;
+        let [from, to] = if from <= to { [from, to] } else { [middle, middle] };
+        [from - self.pattern.margin_m, to + self.pattern.margin_m]
+    }
+
+    /// How far beyond its middle a picture shows the lane: a little less than half its side.
+    pub(super) fn reach(&self) -> f32 {
+        let half = self.pattern.spacing.footprint.along_m / 2.0;
+        half - fminf(self.wide / 10.0, half / 2.0)
+    }
+}
