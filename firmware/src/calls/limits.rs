@@ -176,7 +176,7 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
         let grid = VoxelGrid::new(SHAPE, outside, &WORDS).expect("a good grid");
         let inside = Point::new(2.2, 2.7, 1.2);
         for p in points() {
-            let snapped = to.call("segment::snap", || segment::snap(&SHAPE, &p));
+            let snapped = to.call("lattice::snap", || segment::snap(&SHAPE, &p));
             for hard in HARD {
                 let clear = to.call("segment::segment_is_clear", || {
                     segment::segment_is_clear(&grid, &p, &inside, hard)
@@ -198,14 +198,14 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
             }
         }
         for cells in HARD {
-            let error = to.call("segment::snap_error_cells", || segment::snap_error_cells(cells));
+            let error = to.call("lattice::snap_error_cells", || segment::snap_error_cells(cells));
             to.add(error);
         }
         let edge = [MAX_SNAPPED, -MAX_SNAPPED, 0, i32::MAX, i32::MIN];
         for i in 0..25 {
             let (a, b) = ([edge[i % 5], 0, 1], [0, edge[i / 5], edge[(i * 3) % 5]]);
-            let touches = to
-                .call("segment::snapped_segment_touches", || segment::snapped_segment_touches(&grid, &a, &b));
+            let touches =
+                to.call("walk::snapped_segment_touches", || segment::snapped_segment_touches(&grid, &a, &b));
             let beyond = a.iter().chain(&b).any(|c| c.unsigned_abs() > MAX_SNAPPED as u32);
             assert!(touches || !beyond, "{a:?} {b:?}");
         }
@@ -234,7 +234,7 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
             Config { clearance_m: hard, ..good },
             Config { nodes: hard as usize, ..good },
         ] {
-            let checked = to.call("prm::Config::check", || config.check());
+            let checked = to.call("config::Config::check", || config.check());
             let sampled = to.call("prm::sample_nodes", || {
                 prm::sample_nodes(&grid, Some(&grid), &[], &config, &mut nodes)
             });
@@ -273,7 +273,7 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
             });
             to.is(found.is_ok());
         }
-        let square = to.call("prm::squared_length", || prm::squared_length(p.into(), [0.0; 3]));
+        let square = to.call("config::squared_length", || prm::squared_length(p.into(), [0.0; 3]));
         to.add(square);
         let pair = [p, Point::new(1.0, 1.0, 1.0)];
         for (a, b) in [(0, 1), (0, 0), (0, 2), (u16::MAX, 0)] {

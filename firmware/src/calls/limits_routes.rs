@@ -78,8 +78,8 @@ fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanReques
 }
 
 fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut Workspace, out: &mut Plan) {
-    *out = to.call("plan::SwarmPlan::new", Plan::new);
-    to.call("plan::PlanWorkspace::new", || size_of_val(&PlanWorkspace::<1, 1, 1>::new()));
+    *out = to.call("workspace::SwarmPlan::new", Plan::new);
+    to.call("workspace::PlanWorkspace::new", || size_of_val(&PlanWorkspace::<1, 1, 1>::new()));
     let heights = [1.5, 1.5];
     let good = request(&TASKS, &heights);
     let modes =
@@ -88,12 +88,12 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
         let request = PlanRequest { mode, ..good };
         assert_eq!(to.call("plan::plan_swarm", || plan::plan_swarm(view, &request, ws, out)), Ok(()));
         assert!(out.flights.iter().all(|flight| flight.goal.is_some()));
-        let total_m = to.call("plan::SwarmPlan::total_m", || out.total_m());
+        let total_m = to.call("workspace::SwarmPlan::total_m", || out.total_m());
         to.add(total_m as f32);
         to.count(out.crc as usize);
     }
     let mut refused = |request: &PlanRequest<'_>, error: PlanError| {
-        assert_eq!(to.call("plan::PlanRequest::check", || request.check()), Err(error));
+        assert_eq!(to.call("request::PlanRequest::check", || request.check()), Err(error));
         assert_eq!(plan::plan_swarm(view, request, ws, out), Err(error));
     };
     for hard in HARD.into_iter().filter(|&x| !(x >= 0.0 && x.is_finite())) {
@@ -177,7 +177,7 @@ fn schedules(
         let other = HARD[(i * 5) % HARD.len()];
         let cfg = ScheduleConfig { separation_m: other, cruise_mps: hard, ..SCHEDULE };
         let good = |x: f32| x > 0.0 && x.is_finite();
-        let checked = to.call("schedule::ScheduleConfig::check", || cfg.check());
+        let checked = to.call("config::ScheduleConfig::check", || cfg.check());
         assert_eq!(checked.is_ok(), good(other) && good(hard));
         let flights = plan.flights.clone();
         for flight in [

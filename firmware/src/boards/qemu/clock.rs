@@ -88,11 +88,12 @@ const ISRPENDING: u32 = 1 << 22;
 /// processor sleeps by WFI; but its main loop reads the clock before the last instructions are counted, if this machine is busy enough.
 pub fn skip() {
     critical_section::with(|cs| {
+        let now = CLOCK_NOW(cs);
+        let alarm_us = CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US);
+        // Asked after that: it wakes the tasks that are due by now, and their executors' interrupts wait then.
         if Register::new(ICSR, 0).read() & ISRPENDING != 0 {
             return;
         }
-        let now = CLOCK_NOW(cs);
-        let alarm_us = CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US);
         let due = alarm_us.saturating_mul(COUNTS_US).min(grants::due(cs));
         let skipped = CLOCK.skipped.borrow(cs);
         skipped.set(skipped.get() + watchdog::until_bite(cs, now, due).saturating_sub(now));
