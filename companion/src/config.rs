@@ -1,4 +1,4 @@
-//! What a companion is told before it starts: who it is, who flies with it, and how fast and how close.
+//! What a companion is given before it starts: its id, the vehicles that fly with it, and how fast and how close.
 
 mod check;
 

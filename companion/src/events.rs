@@ -16,7 +16,7 @@ pub enum Link {
 pub enum Event {
     /// Plan, and answer with [`crate::Companion::handle_plan`].
     PlanRequested,
-    /// Send what waits, then start the companion anew, from the newest roadmap, mission and parameters.
+    /// Send what waits, then start the companion again, from the newest roadmap, mission and parameters.
     RestartRequested,
     /// The mission moved on.
     StateChanged {

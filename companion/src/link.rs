@@ -86,7 +86,7 @@ impl Links {
         self.outboxes[link as usize].push(message);
     }
 
-    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
     pub(crate) fn say(&mut self, warning: bool, text: &'static str) {
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
@@ -163,7 +163,7 @@ impl Links {
         self.outboxes[link as usize].header(system)
     }
 
-    /// The header of an intent: its number is remembered, so that an echo of it tells how late messages are.
+    /// The header of an intent: its number is remembered, so that an echo of it shows how late messages are.
     pub(crate) fn intent_header(&mut self, system: u8, now: Instant) -> Header {
         let header = self.header(Link::Swarm, system);
         self.sent.note(header.sequence, now);

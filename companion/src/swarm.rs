@@ -4,3 +4,4 @@ pub(crate) mod detour;
 pub mod neighbours;
 pub(crate) mod obstacles;
 pub(crate) mod sweep;
+pub(crate) mod view;

@@ -103,7 +103,7 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
 
 /// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it restarts.
 pub const NO_AUTOPILOT: u8 = 250;
-/// An autopilot tells of itself once a second.
+/// An autopilot reports its state once a second.
 const HEAR_WITHIN: Duration = Duration::from_secs(3);
 /// So long after the first, every autopilot on the line has been heard.
 const COMPARE_FOR: Duration = Duration::from_millis(1100);

@@ -91,7 +91,7 @@ pub fn printed() -> anyhow::Result<()> {
 }
 
 /// Prints a line. Where that fails the work goes on, since it may fly something; [`printed`](crate::progress::printed)
-/// tells at its end.
+/// reports at its end.
 #[macro_export]
 macro_rules! say {
     () => { $crate::progress::print_line(format_args!("")) };

@@ -107,7 +107,7 @@ pub struct Timing {
     pub roadmap_s: f64,
     /// What of that each part took.
     pub roadmap_parts: Parts,
-    /// The shortest paths that tell what each goal would cost each vehicle.
+    /// The shortest paths that give what each goal would cost each vehicle.
     pub search_s: f64,
     /// Which vehicle flies to which goal.
     pub assignment_s: f64,

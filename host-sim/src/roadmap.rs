@@ -113,7 +113,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
 }
 
 /// The same edges, each with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`]. `tree` is over `grid`: it
-/// tells the distances, and with them which segments are clear; only one that keeps almost exactly the clearance is checked
+/// gives the distances, and with them which segments are clear; only one that keeps almost exactly the clearance is checked
 /// by cells.
 pub fn join<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,

@@ -214,7 +214,7 @@ impl Client {
     pub fn upload(&mut self, file: File, bytes: &[u8], progress: impl Fn(u64)) -> anyhow::Result<()> {
         self.done(RESET, &[])?;
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
-        // That it took long to erase its flash tells nothing of the link.
+        // That it took long to erase its flash says nothing of the link.
         self.pace = Pace::new(self.link.now());
         let mut pieces = bytes.chunks(DATA).enumerate();
         let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();

@@ -230,10 +230,10 @@ impl<const W: usize, const G: usize> VehiclePlan<W, G> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
 
-    fn corner_path(clearance_m: f32) -> Path<8> {
+    pub(crate) fn corner_path(clearance_m: f32) -> Path<8> {
         let mut path = Path::new();
         for (x, y) in [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)] {
             path.push(Point::new(x, y, 1.0), clearance_m).unwrap();

@@ -254,14 +254,7 @@ fn fmaxi(a: usize, b: usize) -> usize {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn corner_path(clearance_m: f32) -> Path<8> {
-        let mut path = Path::new();
-        for (x, y) in [(0.0, 0.0), (6.0, 0.0), (6.0, 6.0)] {
-            path.push(Point::new(x, y, 1.0), clearance_m).unwrap();
-        }
-        path
-    }
+    use crate::flight::tests::corner_path;
 
     #[test]
     fn a_vehicle_that_follows_arrives_and_slows_in_the_corner() {

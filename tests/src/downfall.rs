@@ -142,7 +142,7 @@ pub fn slow_planner(board: &mut Emulated, program: &Path, time: Duration) {
     board.poke(plans, &bytes(&branch)).expect("a board");
 }
 
-/// Puts code where nothing uses the memory, and tells where.
+/// Puts code where nothing uses the memory, and returns where.
 fn put(board: &mut Emulated, code: &[u16]) -> u32 {
     board.poke(SPARE, &bytes(code)).expect("a board");
     SPARE

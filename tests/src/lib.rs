@@ -56,7 +56,7 @@ pub fn python() -> Option<String> {
     python
 }
 
-/// Builds `host-sim` and tells where it is: cargo gives another package's binaries to no test.
+/// Builds `host-sim` and returns where it is: cargo gives another package's binaries to no test.
 pub fn host_sim(profile: Profile) -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
     build.current_dir(workspace()).args(["build", "--quiet", "--package", "host-sim", "--bin", "host-sim"]);
@@ -95,7 +95,7 @@ impl Drop for Guard {
     }
 }
 
-/// Starts a `host-sim` that listens on as many links; it tells the address each got, `127.0.0.1:PORT` or a path.
+/// Starts a `host-sim` that listens on as many links; it prints the address each got, `127.0.0.1:PORT` or a path.
 ///
 /// # Panics
 /// It does not start.
@@ -113,7 +113,7 @@ pub fn listening(mut command: Command, links: usize) -> (Guard, Vec<String>) {
     (guard, addresses)
 }
 
-/// Starts `host-sim autopilot` on these links; it tells the address each got.
+/// Starts `host-sim autopilot` on these links; it prints the address each got.
 ///
 /// # Panics
 /// It does not start.

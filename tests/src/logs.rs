@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::shared_data;
 
-/// One record: when, and the bytes of its frame as its header tells their number.
+/// One record: when, and the bytes of its frame, as many as its header says.
 #[derive(Clone, Debug)]
 pub struct Recorded {
     /// Microseconds; 0 in a plain stream.

@@ -74,7 +74,7 @@ enum Cut {
 /// A board that its clients share, one after the other.
 type Shared = Arc<Mutex<Emulated>>;
 
-/// What a client sees of its vehicle: the companion, and an autopilot that tells that it is there.
+/// What a client sees of its vehicle: the companion, and an autopilot that reports that it is there.
 struct Line {
     board: Shared,
     began: Instant,

@@ -129,12 +129,12 @@ impl Handshake {
             (State::Disarm, ARM_DISARM) if refused => self.disarm_refused = true,
             _ => {}
         }
-        let told = Some((ack.command, ack.result));
+        let refusal = Some((ack.command, ack.result));
         let reports = matches!(ack.command, DO_SET_MODE | ARM_DISARM | NAV_TAKEOFF);
-        if !refused || !reports || self.reported.contains(&told) {
+        if !refused || !reports || self.reported.contains(&refusal) {
             return None;
         }
-        *self.reported.iter_mut().find(|slot| slot.is_none())? = told;
+        *self.reported.iter_mut().find(|slot| slot.is_none())? = refusal;
         let text = match ack.command {
             DO_SET_MODE => "Autopilot refuses the mode: # (result #)",
             ARM_DISARM => "Autopilot refuses to arm or disarm: # (result #)",

@@ -102,7 +102,7 @@ impl Kind {
         }
     }
 
-    /// Whether it has to be told to take off: PX4 lifts off towards a setpoint, ArduCopter only by NAV_TAKEOFF, which a
+    /// Whether it needs a command to take off: PX4 lifts off towards a setpoint, ArduCopter only by NAV_TAKEOFF, which a
     /// setpoint before the lift-off would cancel.
     pub fn takes_off_by_command(self) -> bool {
         self == Self::ArduPilot

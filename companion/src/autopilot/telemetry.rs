@@ -39,7 +39,7 @@ const JUMP_MPS: f32 = 5.0;
 const ORIGIN_MOST_M: f32 = 30_000.0;
 /// No gap is longer than the mission waits for its autopilot, seconds.
 const GAP_MOST_S: f32 = 60.0;
-/// After a jump, or so long without one, the position is not used for this long; another one starts it anew. What comes first
+/// After a jump, or so long without one, the position is not used for this long; another one starts it again. What comes first
 /// after a silence may have waited on the way.
 pub const SETTLE: Duration = Duration::from_millis(1000);
 /// Another EKF origin is believed after this long without the known one: the autopilot is asked several times meanwhile.

@@ -24,7 +24,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.tune(&self.config, self.requests.limits());
     }
 
-    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] tells how it went. Drained like the
+    /// What the shell is to do with the flash next; once each, then [`Self::handle_flash`] takes the result. Drained like the
     /// other `poll_*`, but it may take long: nothing else waits for it.
     pub fn poll_flash(&mut self) -> Option<FlashRequest<'_>> {
         let erasing = self.erasing();

@@ -8,7 +8,8 @@ use crate::config::PlanFailure;
 use crate::events::Event;
 use crate::guidance::Scene;
 use crate::mission::State;
-use crate::swarm::detour::{Aim, View};
+use crate::swarm::detour::Aim;
+use crate::swarm::view::View;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// What decisions about ways around follow from.

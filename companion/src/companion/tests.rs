@@ -273,7 +273,7 @@ fn waits_on_the_ground_for_its_gate_until_the_neighbour_has_passed() {
 #[test]
 fn a_vehicle_that_never_starts_is_named_while_others_wait_for_it() {
     let named = |bench: &Bench| bench.texts.iter().filter(|text| text.contains("it has not started")).count();
-    // Never heard; on its pad; flying, whoever waits for it.
+    // Never heard; on its pad; flying, whatever waits for it.
     let grounded = crate::link::intent::ON_PLAN | crate::link::intent::GROUNDED;
     let flying = crate::link::intent::ON_PLAN | crate::link::intent::FLYING;
     for (flags, expected) in [(None, 2..5), (Some(grounded), 2..5), (Some(flying), 0..1)] {

@@ -74,7 +74,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
-    /// What was asked for, and what waits to be told.
+    /// What was asked for, and what waits to be sent.
     fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
         let system = self.config.system_id;
         if self.links.take_due(link, Fresh::Version) {
@@ -90,7 +90,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         frame::encode_raw(header, id, extra, &payload, out)
     }
 
-    /// Tells a person something by STATUSTEXT on both links, at most 50 bytes.
+    /// Sends a person a text by STATUSTEXT on both links, at most 50 bytes.
     pub fn say(&mut self, warning: bool, text: &'static str) {
         self.links.say(warning, text);
     }
@@ -152,16 +152,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     fn global_position(&self) -> GLOBAL_POSITION_INT_DATA {
-        let told = self.detours.told_place(&self.telemetry, self.now);
-        let place = frames::enu_to_geodetic(&self.config.origin, &told.position);
-        let cm = frames::swap_enu_ned(&told.velocity) * 100.0;
+        let reported = self.detours.reported_place(&self.telemetry, self.now);
+        let place = frames::enu_to_geodetic(&self.config.origin, &reported.position);
+        let cm = frames::swap_enu_ned(&reported.velocity) * 100.0;
         GLOBAL_POSITION_INT_DATA {
             // When the position was known, so that a copy is known as one.
-            time_boot_ms: told.at.boot_ms(),
+            time_boot_ms: reported.at.boot_ms(),
             lat: libm::round(place.lat_deg * 1e7) as i32,
             lon: libm::round(place.lon_deg * 1e7) as i32,
             alt: libm::round(place.alt_m * 1e3) as i32,
-            relative_alt: libm::roundf(told.position.z * 1e3) as i32,
+            relative_alt: libm::roundf(reported.position.z * 1e3) as i32,
             vx: cm.x as i16,
             vy: cm.y as i16,
             vz: cm.z as i16,

@@ -11,7 +11,7 @@ use crate::time::{Duration, Instant};
 
 /// A stop further ahead is no place to wait at yet, metres.
 const WAITS_WITHIN_M: f32 = 8.0;
-/// Who was heard to hear us within this time is linked.
+/// A vehicle that was heard to hear us within this time is linked.
 const LINKED: Duration = Duration::from_millis(800);
 /// What gusts carry a vehicle off that its autopilot lands from a standstill, and some room, metres.
 const ALONE_BESIDE_M: f32 = 0.5;
@@ -22,7 +22,7 @@ impl Guidance {
         self.shelter.reset();
     }
 
-    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. Who is
+    /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. One that is
     /// alone steps back from above one that lies below, to land beside it, but not beyond where others last heard it to be:
     /// they look for it from there on.
     pub(super) fn retreat<const V: usize, const W: usize>(

@@ -22,7 +22,7 @@ const PATIENCE: Duration = Duration::from_secs(4);
 pub(crate) struct Hold {
     since: Option<Instant>,
     on: bool,
-    /// When others were last told so, and how late they hear it.
+    /// When that was last sent to others, and how late they hear it.
     told_at: Option<Instant>,
     late: Duration,
 }

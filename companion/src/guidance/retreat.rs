@@ -1,9 +1,9 @@
-//! Out from under a vehicle that comes down: who waits below it flies back along its path until it is beside the column.
+//! Out from under a vehicle that comes down: one that waits below it flies back along its path until it is beside the column.
 //!
 //! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
 //! [`BESIDE_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
 //! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
-//! who follows behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
+//! a vehicle behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
 //!
 //! ENU metres. Cost: [`BUDGET`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
 //! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.
@@ -66,7 +66,7 @@ impl Search {
         neighbours: usize,
         tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
     ) {
-        // Who steps back while it searches waits ever further back; who waits further ahead asks anew.
+        // A vehicle that steps back while it searches waits ever further back; one that waits further ahead asks again.
         let from_m = self.from_m.filter(|from_m| wait_m <= from_m + STEP_M).unwrap_or_else(|| {
             self.held = 0;
             self.sweep.restart();
@@ -174,7 +174,7 @@ mod tests {
         let path = path();
         let mut search = Search { found: Shelter::Back(99.0), ..Search::default() };
         for steps in 1.. {
-            // A neighbour tells up to 16.
+            // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
             search.go_on(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
             if search.found != Shelter::Back(99.0) {

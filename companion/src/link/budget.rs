@@ -21,7 +21,7 @@ const STATE: u32 = POSITION as u32 + 145;
 /// Bytes of a heartbeat with its frame.
 const HEARTBEAT: u32 = 21;
 
-/// Most bytes a second of one vehicle's state, told so many times a second.
+/// Most bytes a second of one vehicle's state, sent so many times a second.
 pub const fn state_bps(swarm_hz: u8) -> u32 {
     STATE * swarm_hz as u32 + HEARTBEAT
 }

@@ -1,6 +1,6 @@
 //! How long the radio takes: a vehicle's intent echoes the sequence number of another one's.
 //!
-//! Who gets its own number back knows the round trip: since it sent that intent, without the time that the other one held it.
+//! A vehicle that gets its own number back knows the round trip: since it sent that intent, without the time that the other one held it.
 //! Half of that is what a message takes, if both ways are alike. Clocks need not agree.
 
 use crate::time::{Duration, Instant};

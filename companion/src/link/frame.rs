@@ -122,7 +122,7 @@ const _: () = assert!(size_of::<Framer>() <= 480);
 
 /// What the bytes at the front of the buffer are.
 enum Front {
-    /// Too few bytes to tell; this many are needed in all.
+    /// Too few bytes to decide; this many are needed in all.
     Needs(usize),
     /// Not a frame.
     False,

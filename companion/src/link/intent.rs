@@ -1,4 +1,4 @@
-//! What a companion tells the swarm of its intent: the payload of TUNNEL under a private payload type.
+//! What a companion reports to the swarm of its intent: the payload of TUNNEL under a private payload type.
 //!
 //! Little-endian, at most 128 bytes (`README.md` prints the same layout):
 //!
@@ -12,7 +12,7 @@
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
 //! | 16 | f32 | speed, m/s |
-//! | 20 | u32 | whom it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
+//! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |

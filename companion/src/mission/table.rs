@@ -93,7 +93,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Land, Disarm],     G::ModeTaken,        NOW,    PilotControl,    A::None,        "Pilot has control: landing stopped"),
     warn(ON_PAD,              G::FailsafeActs,     NOW,    Aborted,         A::ForgetStart, "Failsafe before take-off: start cancelled"),
     warn(ON_PAD,              G::ModeTaken,        NOW,    Aborted,         A::ForgetStart, "Mode changed by pilot: start cancelled"),
-    // Started anew in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
+    // Started again in the air: what flies the vehicle goes on doing so; without setpoints that is the autopilot alone.
     warn(WAITING,             G::FoundFlying,      NOW,    Failsafe,        A::ForgetStart, "Found in flight: no mission"),
     // Links and position.
     warn(WAITING,             G::NoHeartbeat,      s(3),   WaitAutopilot,   A::ForgetStart, "Autopilot silent: start cancelled"),

@@ -127,7 +127,7 @@ impl Ftp {
         Some(payload)
     }
 
-    /// What a person should be told.
+    /// What a person should read.
     pub fn text(&mut self) -> Option<Text> {
         self.text.take()
     }

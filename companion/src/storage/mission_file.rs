@@ -1,8 +1,8 @@
-//! The mission file: who flies, from where to which goals, how fast and how far apart; uploaded beside the roadmap.
+//! The mission file: which vehicles fly, from where to which goals, how fast and how far apart; uploaded beside the roadmap.
 //!
 //! Little-endian, versioned, closed by a CRC-32; byte by byte in `companion/README.md`. Lengths are metres, speeds m/s, points
-//! east, north, up in the mission frame. Its CRC is what companions compare on the radio: it covers the roadmap's, so who
-//! agrees on it plans the same. What one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
+//! east, north, up in the mission frame. Its CRC is what companions compare on the radio: it covers the roadmap's, so vehicles
+//! that agree on it plan the same. What one vehicle alone decides (own speed limit, tolerances) is a parameter, not here.
 //!
 //! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor can meet a number that is
 //! not sound, whatever the bytes were.

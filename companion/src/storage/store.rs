@@ -1,7 +1,7 @@
 //! What a companion keeps in flash: two slots for roadmaps, and a journal with the mission file and the parameters.
 //!
 //! Flash is I/O: the store asks ([`Store::poll`]) for one sector to be erased, one block to be programmed or some bytes to be
-//! read, and is told how that went ([`Store::handle`]). So a slow erasure never stops the setpoints, and the same code keeps
+//! read, and is given the result ([`Store::handle`]). So a slow erasure never stops the setpoints, and the same code keeps
 //! its files in a board's flash, an emulated one, or a desk's memory.
 //!
 //! A file is whole or not there: it is written into an area that was erased before, read back, and sealed last ([`area`]). A cut

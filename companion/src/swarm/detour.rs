@@ -3,14 +3,14 @@
 //! A vehicle that is out (landed elsewhere, with its pilot for good, or silent for so long that it counts as dead) opens every
 //! gate that waits for it, and is an obstacle where it rests. A vehicle whose path that blocks, or which was out itself and
 //! may fly again, stops and waits until all others are out or stand and wait themselves. Then the one with the lowest
-//! system id asks its shell for a way around everybody and flies it to its goal. All the while it tells the progress at which it
-//! left the plan: whoever waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
+//! system id asks its shell for a way around everybody and flies it to its goal. All the while it reports the progress at which it
+//! left the plan: a vehicle that waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
 //!
-//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle tells that its path is
+//! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle reports that its path is
 //! blocked and no longer that it waits, for [`CLAIM`], longer than a word takes to be heard. It begins only if all others
-//! wait then; who hears a lower system id claim waits again.
+//! wait then; a vehicle that hears a lower system id claim waits again.
 //!
-//! Who is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
+//! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
 //! step, so a look among many takes several steps.
 //!
 //! ENU metres.
@@ -20,15 +20,13 @@ use planner_core::detour::{self, DetourRequest, KeepOff};
 use planner_core::frames::Geodetic;
 
 use crate::autopilot::telemetry::Telemetry;
-use crate::config::Config;
 use crate::guidance::retreat;
-use crate::guidance::{Guidance, Scene};
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
-use crate::mission::course::Mission;
-use crate::swarm::neighbours::{Neighbours, STANDING_MPS};
+use crate::swarm::neighbours::STANDING_MPS;
 use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::Sweep;
+use crate::swarm::view::{Reported, View};
 use crate::time::{Duration, Instant};
 
 /// Time from one look along the path to the next.
@@ -45,7 +43,7 @@ const CLAIM: Duration = Duration::from_secs(1);
 const TURN_S: u64 = 2;
 /// After a way around was not found the next is sought so much later.
 const RETRY_S: u64 = 10;
-/// Standing and waiting while all others stand for this long is a dead end: whoever is waited for has found no way around.
+/// Standing and waiting while all others stand for this long is a dead end: the vehicle that is waited for has found no way around.
 const DEAD_END: Duration = Duration::from_secs(30);
 /// After no place to land was found aside, the next is sought so much later.
 const ASIDE_AGAIN_S: u64 = 30;
@@ -64,7 +62,7 @@ const LATELY: Duration = Duration::from_millis(500);
 const FREE: Duration = Duration::from_secs(3);
 /// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
 const KEPT: Duration = Duration::from_secs(20);
-/// An abort whose end the autopilot does not tell is over by then.
+/// An abort whose end the autopilot does not report is over by then.
 const SETTLED: Duration = Duration::from_secs(5);
 /// On its pad a vehicle that nobody hears for so long waits like one that waits for others.
 const UNHEARD: Duration = Duration::from_secs(10);
@@ -106,9 +104,9 @@ pub(crate) struct Detours {
     ready: bool,
     /// Ways around not found since somebody moved.
     failed: u8,
-    /// The last one was not found although all others lie or rest for good, or for a while from here, whoever moved.
+    /// The last one was not found although all others lie or rest for good, or for a while from here, whichever moved.
     hopeless: bool,
-    /// Ways around not found from here, whoever moved between; how far along the path that is, and since when.
+    /// Ways around not found from here, whichever moved between; how far along the path that is, and since when.
     failed_here: u8,
     failed_at_m: f32,
     failed_since: Instant,
@@ -129,29 +127,10 @@ pub(crate) struct Detours {
     in_the_way: bool,
 }
 
-/// What decisions about ways around follow from.
-pub(crate) struct View<'a, const V: usize, const W: usize, const G: usize> {
-    pub(crate) now: Instant,
-    pub(crate) config: &'a Config<V>,
-    pub(crate) mission: &'a Mission<W, G>,
-    pub(crate) guidance: &'a Guidance,
-    pub(crate) telemetry: &'a Telemetry,
-    pub(crate) neighbours: &'a Neighbours<V>,
-    pub(crate) scene: Scene<'a, W, G>,
-}
-
 /// What a look along the path found.
 struct Looked {
     /// When one that found nothing began.
     clear_at: Option<Instant>,
-}
-
-/// What it reports to the others of where it is.
-pub(crate) struct Told {
-    pub(crate) position: Point,
-    pub(crate) velocity: Point,
-    /// When that was known.
-    pub(crate) at: Instant,
 }
 
 impl Detours {
@@ -263,11 +242,11 @@ impl Detours {
     }
 
     /// What it reports of where it is.
-    pub(crate) fn told_place(&self, telemetry: &Telemetry, now: Instant) -> Told {
+    pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> Reported {
         let t = telemetry;
         let vague = self.lost_at.is_some() || t.position_age(now) > FRESH;
         let (position, at) = self.lost_at.unwrap_or((t.position, t.position_at.unwrap_or_default()));
-        Told { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
+        Reported { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
 
     /// Remembers, on entering a state, where it was before its position jumped: where that jumped to may be wrong.

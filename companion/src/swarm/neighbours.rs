@@ -248,7 +248,7 @@ impl<const V: usize> Neighbours<V> {
             shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
     }
 
-    /// Every neighbour whose position or progress was ever heard, with its age at `now`. Who is out opens no gate before it was looked at
+    /// Every neighbour whose position or progress was ever heard, with its age at `now`. A vehicle that is out opens no gate before it was looked at
     /// whether it blocks the path ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
@@ -358,7 +358,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.is_empty()
     }
 
-    /// There is another plan: what was found, and who was flown around, does not count any more.
+    /// There is another plan: what was found, and the vehicles flown around, do not count any more.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
         for contact in &mut self.contacts {

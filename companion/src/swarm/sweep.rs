@@ -1,7 +1,7 @@
-//! Is any of many things in the way? Asked a few at a time, since a control step is not to take longer with more neighbours.
+//! Is any of many things on the path? Asked a few at a time, since a control step is not to take longer with more neighbours.
 //!
-//! The things are stretches to keep off ([`KeepOff`]), told by sources: a neighbour tells up to 16 of them. A step asks about as
-//! many as its budget pays for, the next goes on from there. One thing that is in the way answers at once, and its source is
+//! The things are stretches to keep off ([`KeepOff`]), given by sources: a neighbour gives up to 16 of them. A step asks about as
+//! many as its budget pays for, the next goes on from there. One thing that is on the path answers at once, and its source is
 //! asked first the next time: what blocks the way mostly goes on doing so. That nothing is, is known after all were asked.
 
 use planner_core::detour::KeepOff;
@@ -9,7 +9,7 @@ use planner_core::detour::KeepOff;
 /// How far the question has come.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sweep {
-    /// Who is asked now, of how many.
+    /// The source that is asked now, of how many.
     source: usize,
     sources: usize,
     /// Sources that were asked.
@@ -20,8 +20,8 @@ pub struct Sweep {
 
 impl Sweep {
     /// Asks on: `tell` gives the things of a source, each costs `each` of `budget` and a source one. `Some(true)` once one of
-    /// them `is_in_the_way`, `Some(false)` when none of all `sources` is, then anew; `None` when the budget is spent, which has to
-    /// begin with at least `each`. Where the number of sources changes all are asked anew.
+    /// them `is_in_the_way`, `Some(false)` when none of all `sources` is, then from the first; `None` when the budget is spent, which has to
+    /// begin with at least `each`. Where the number of sources changes all are asked again.
     pub fn go_on(
         &mut self,
         sources: usize,
@@ -60,7 +60,7 @@ impl Sweep {
         Some(false)
     }
 
-    /// Asks all anew, from the source at hand on.
+    /// Asks all again, from the source at hand on.
     pub fn restart(&mut self) {
         (self.asked, self.things) = (0, 0);
     }
@@ -83,7 +83,7 @@ mod tests {
         }
     }
 
-    /// The answer where the thing `at` is in the way, and the steps it took.
+    /// The answer where the thing `at` is on the path, and the steps it took.
     fn ask(sweep: &mut Sweep, each: u16, at: Option<(f32, f32)>) -> (bool, usize) {
         for steps in 1.. {
             let mut budget = 5;

@@ -67,7 +67,7 @@ pub fn finish() {
     change(Kept::finish);
 }
 
-/// Restarts, as somebody asked for: there is nothing to tell.
+/// Restarts, as somebody asked for: there is nothing to report.
 pub fn restart() -> ! {
     cortex_m::interrupt::disable();
     change(Kept::ask);

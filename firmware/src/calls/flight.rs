@@ -1,6 +1,6 @@
 //! A companion in flight by script, 32 neighbours around it: whole control steps to be counted.
 //!
-//! The script is a PX4 that goes where its setpoint says, and neighbours that tell random places, intents and flags, or nothing.
+//! The script is a PX4 that goes where its setpoint says, and neighbours that send random places, intents and flags, or nothing.
 //! Half of the flights are hard: everybody is near, and off the plan, out of it, or silent for up to 90 s.
 
 use companion::link::frame::{self, Header, MAX_SENT};
@@ -354,7 +354,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         }
     }
 
-    /// A neighbour tells its intent and its position.
+    /// A neighbour sends its intent and its position.
     fn tell(&mut self, i: usize, rng: &mut Pcg32) {
         let Other { place, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;

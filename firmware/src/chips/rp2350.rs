@@ -26,7 +26,7 @@ pub const fn reset_cause(chip_reset: u32, watchdog_reason: u32) -> ResetCause {
     const DEBUGGER: u32 = 1 << 19 | 1 << 21 | 1 << 27;
     const TIMED_OUT: u32 = 1 << 0;
     const FORCED: u32 = 1 << 1;
-    // The chip's register tells of its last reset as a whole, the watchdog's of a later one.
+    // The chip's register shows its last reset as a whole, the watchdog's a later one.
     match chip_reset {
         _ if watchdog_reason & FORCED != 0 => ResetCause::Request,
         _ if watchdog_reason & TIMED_OUT != 0 => ResetCause::Watchdog,

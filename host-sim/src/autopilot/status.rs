@@ -1,8 +1,8 @@
-//! What a firmware tells of its state.
+//! What a firmware reports of its state.
 
 use crate::kinds::Personality;
 
-/// What telemetry tells of the firmware's state.
+/// What telemetry reports of the firmware's state.
 #[derive(Clone, Copy, Debug)]
 pub struct Status {
     /// Which firmware it is.

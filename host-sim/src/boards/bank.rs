@@ -9,7 +9,7 @@ use crate::flash::{DeskFlash, LAYOUT};
 
 /// Where bank 2 of the emulated flash lies.
 pub const BANK2: u32 = 0x6000_0000;
-/// Where a byte for each of its words tells what happened to that last: nothing since it was erased, or it was programmed, or
+/// Where a byte for each of its words keeps what happened to that last: nothing since it was erased, or it was programmed, or
 /// it is being programmed or erased.
 pub const MARKS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;

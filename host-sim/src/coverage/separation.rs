@@ -1,4 +1,4 @@
-//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. Who flies longest
+//! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. The vehicle that flies longest
 //! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
 //!
 //! Flights are compared every [`STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety

@@ -19,7 +19,7 @@ pub trait Link: Send {
     /// When the link is gone for good.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// The local address, where there is one: it tells the port when port 0 was asked for.
+    /// The local address, where there is one: it shows the port when port 0 was asked for.
     fn local_address(&self) -> Option<SocketAddr>;
 
     /// Now, by the time in which the other end lives: the clock's, unless the link leads into a simulation.

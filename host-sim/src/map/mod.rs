@@ -36,7 +36,7 @@ pub enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
-    /// Tells by the name alone.
+    /// Decides by the name alone.
     pub fn parse(file: &'a str) -> Result<Self, MapError> {
         let unknown = || MapError::UnknownKind { file: file.into(), expected: READS };
         if let Some(builtin) = file.strip_prefix("builtin:") {

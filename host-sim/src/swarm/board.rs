@@ -1,4 +1,4 @@
-//! A companion on a board or in another process: the far ends of its two serial ports, and what it tells of itself.
+//! A companion on a board or in another process: the far ends of its two serial ports, and what it reports of itself.
 //!
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
 //! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
@@ -188,7 +188,7 @@ impl Board {
         }
     }
 
-    /// Keeps what the board tells of itself.
+    /// Keeps what the board reports of itself.
     fn note(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
         if frame.component != COMPONENT {
             return;
@@ -238,7 +238,7 @@ impl LockStep {
     }
 }
 
-/// The state that a companion's HEARTBEAT tells.
+/// The state that a companion's HEARTBEAT reports.
 pub fn told_state(frame: &Frame) -> Option<State> {
     let reported = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
     State::ALL.iter().copied().find(|state| *state as u32 == reported)

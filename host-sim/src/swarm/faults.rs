@@ -71,7 +71,7 @@ pub struct World<'a> {
     pub members: &'a mut [Member],
     /// What carries their words.
     pub radio: &'a mut Radio,
-    /// Who tells them to go on.
+    /// The ground station that commands them to go on.
     pub ground_station: &'a mut GroundStation,
     /// Spheres that are on no map: centre and radius, metres.
     pub obstacles: &'a mut Vec<(Point, f32)>,
@@ -113,7 +113,7 @@ impl<'a> Script<'a> {
         pairs.all(|(fault, stage)| *stage == Stage::Over || (*stage == Stage::Acting && !ends(fault)))
     }
 
-    /// Lets begin and end what is due; tells each.
+    /// Lets begin and end what is due; reports each.
     pub fn step(&mut self, now_us: u64, world: &mut World<'_>, log: &mut Vec<Event>) -> anyhow::Result<()> {
         let t_s = (now_us as f64 * 1e-6) as f32;
         for (fault, stage) in self.scenario.faults.iter().zip(&mut self.stages) {

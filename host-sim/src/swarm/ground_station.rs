@@ -1,5 +1,5 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! tells a vehicle to go on that its pilot gave back, and all of an obstacle it sees. A vehicle that cannot fly is not waited for, and one that is late not for ever.
+//! commands a vehicle to go on that its pilot gave back, and reports each obstacle it sees to all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -28,9 +28,9 @@ pub struct GroundStation {
     ready_us: Option<u64>,
     first_us: Option<u64>,
     last_us: u64,
-    /// Vehicles to tell that they go on, and until when.
+    /// Vehicles to command to go on, and until when.
     resumes: Vec<(usize, u64)>,
-    /// Centres and radii of obstacles to tell, metres.
+    /// Centres and radii of obstacles to report, metres.
     obstacles: Vec<(Geodetic, f32)>,
 }
 
@@ -58,12 +58,12 @@ impl GroundStation {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Tells a vehicle to go on once its companion leaves it to the pilot.
+    /// Commands a vehicle to go on once its companion leaves it to the pilot.
     pub fn resume(&mut self, now_us: u64, vehicle: usize) {
         self.resumes.push((vehicle, now_us + RESUME_US));
     }
 
-    /// Tells all vehicles of an obstacle, from now on.
+    /// Reports an obstacle to all vehicles, from now on.
     pub fn exclude(&mut self, centre: Geodetic, radius_m: f32) {
         self.obstacles.push((centre, radius_m));
     }

@@ -294,7 +294,7 @@ impl Member {
         self.up.trouble(lasted_s).or_else(|| self.down.trouble(lasted_s))
     }
 
-    /// Passes on to a board without a radio what a ground station tells its companion: by the autopilot, as that forwards it.
+    /// Passes on to a board without a radio what a ground station sends its companion: by the autopilot, as that forwards it.
     pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
         if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_mute(now_us) {
             self.up.write(now_us, frame);
@@ -380,7 +380,7 @@ impl Member {
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.truth();
         let state = self.state();
-        // What a board tells of its state is up to a second old; what its autopilot does is seen.
+        // What a board reports of its state is up to a second old; what its autopilot does is seen.
         let lands = self.board.is_some() && self.autopilot.lands();
         let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {

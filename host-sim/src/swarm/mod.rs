@@ -2,7 +2,7 @@
 //!
 //! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario gives the same flight,
 //! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
-//! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and tells nobody.
+//! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and gives it to nobody.
 
 pub mod board;
 pub mod faults;

@@ -16,7 +16,7 @@ const TOUCH_M: f32 = 1e-3;
 const DEADLOCK_S: f64 = 20.0;
 /// Progress that counts, metres.
 const PROGRESS_M: f32 = 0.1;
-/// From where one that tells of no progress hovered, metres: more than it sways.
+/// From where one that reports no progress hovered, metres: more than it sways.
 const AWAY_M: f32 = 1.0;
 /// Spacing of recorded points, seconds.
 const RECORD_S: f64 = 0.2;

@@ -157,7 +157,7 @@ pub struct Work<'a, const L: usize, const N: usize> {
     pub tracks: &'a Tracks<L>,
     /// Ways around no-fly zones.
     pub transit: &'a Transit<'a, N>,
-    /// Who flies.
+    /// Which vehicle flies it.
     pub vehicles: &'a [Vehicle],
     /// Heights.
     pub heights: Heights,

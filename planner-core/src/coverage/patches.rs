@@ -55,20 +55,13 @@ fn lay_beside<const L: usize, const V: usize>(
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    let half = (span[1] - span[0]) / 2.0;
-    for step in 1..=EIGHTHS {
-        for side in [-1.0, 1.0] {
-            strips.need(span, ws)?;
-            without_shown(strips, span, out, ws)?;
-            if ws.need.spans().is_empty() {
-                return Ok(());
-            }
-            let v = strips.middle(span) + side * half * step as f32;
-            if !reaches(strips, v, span) {
-                return Ok(());
-            }
-            strips.lay(strip, v, ws, out)?;
+    for v in lines(strips, span, 1) {
+        strips.need(span, ws)?;
+        without_shown(strips, span, out, ws)?;
+        if ws.need.spans().is_empty() {
+            break;
         }
+        strips.lay(strip, v, ws, out)?;
     }
     Ok(())
 }
@@ -81,19 +74,21 @@ fn lay_pictures<const L: usize, const V: usize>(
     ws: &mut Workspace<V>,
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    let half = (span[1] - span[0]) / 2.0;
-    for step in 0..=EIGHTHS {
-        for side in [-1.0, 1.0] {
-            strips.need(span, ws)?;
-            without_shown(strips, span, out, ws)?;
-            let v = strips.middle(span) + side * half * step as f32;
-            let Some(&need) = ws.need.spans().first().filter(|_| reaches(strips, v, span)) else {
-                return Ok(());
-            };
-            strips.lay_picture(strip, v, need, ws, out)?;
-        }
+    for v in lines(strips, span, 0) {
+        strips.need(span, ws)?;
+        without_shown(strips, span, out, ws)?;
+        let Some(&need) = ws.need.spans().first() else { break };
+        strips.lay_picture(strip, v, need, ws, out)?;
     }
     Ok(())
+}
+
+/// Lines beside the middle of an eighth, half an eighth apart, from number `first` on; as far as pictures along them
+/// show all of it.
+fn lines(strips: &Strips<'_>, span: Span, first: u32) -> impl Iterator<Item = f32> {
+    let (middle, half) = (strips.middle(span), (span[1] - span[0]) / 2.0);
+    let both = move |step: u32| [-1.0, 1.0].map(|side| middle + side * half * step as f32);
+    (first..=EIGHTHS).flat_map(both).take_while(move |v| reaches(strips, *v, span))
 }
 
 /// Whether pictures along the line `v` show all between two other `v`, and a little more.

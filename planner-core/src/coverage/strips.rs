@@ -111,7 +111,7 @@ impl<'a> Strips<'a> {
     }
 
     /// Adds every `u` at which these rings hold a place between two `v`: those of the places on the lines at both
-    /// borders, and those of the rings' own edges between them. Whoever is inside without being on a border line crosses
+    /// borders, and those of the rings' own edges between them. A place inside that is not on a border line crosses
     /// an edge before it.
     fn shadow<const V: usize>(
         &self,

@@ -1,4 +1,4 @@
-//! What must change nothing, what is told to the swarm, and the memory it takes.
+//! What must change nothing, what is sent to the swarm, and the memory it takes.
 
 extern crate std;
 use std::vec::Vec;

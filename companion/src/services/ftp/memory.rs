@@ -1,14 +1,14 @@
 //! What the server remembers of requests that it must not obey twice.
 //!
 //! A repeated request is known for [`MEMORY`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
-//! what closing a session came to is told for [`CLOSED_MEMORY`] under any number, until its client opens the next.
+//! what closing a session came to is answered for [`CLOSED_MEMORY`] under any number, until its client opens the next.
 
 use super::packet::{No, Print, Request, op, print};
 use crate::time::{Duration, Instant};
 
 /// A repeated request is known as one for this long.
 const MEMORY: Duration = Duration::from_secs(3);
-/// What came of the last session is told for this long.
+/// What came of the last session is answered for this long.
 const CLOSED_MEMORY: Duration = Duration::from_secs(10);
 /// Requests remembered.
 const REQUESTS: usize = 8;
@@ -66,7 +66,7 @@ impl Memory {
         self.closed.as_ref().filter(known).map(|closed| closed.outcome)
     }
 
-    /// A client opens a session: the one before it is not told of any more.
+    /// A client opens a session: the one before it is forgotten.
     pub fn forget_closed(&mut self, client: (u8, u8)) {
         self.closed.take_if(|closed| closed.client == client);
     }

@@ -60,10 +60,10 @@ impl From<UploadError> for No {
     }
 }
 
-/// What a person is told: whether it is a warning, and the text.
+/// What a person reads: whether it is a warning, and the text.
 pub type Text = (bool, &'static str);
 
-/// All that is told.
+/// All texts.
 pub const TEXTS: [Text; 8] = [
     (false, "Roadmap stored: used from the next start"),
     (false, "Mission stored: used from the next start"),
@@ -75,10 +75,10 @@ pub const TEXTS: [Text; 8] = [
     (true, "Flash failed: old file kept"),
 ];
 
-/// What is told when a file was removed.
+/// What is said when a file was removed.
 pub const REMOVED: Text = TEXTS[2];
 
-/// What is told when an upload has ended.
+/// What is said when an upload has ended.
 pub fn told(file: File, result: Result<(), UploadError>) -> Text {
     TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,

@@ -1,4 +1,4 @@
-//! Records written to the journal, and the journal written anew where it is full.
+//! Records written to the journal, and the journal written again where it is full.
 
 use super::Store;
 use super::area::{Area, Condition, Seal};

@@ -50,7 +50,7 @@ impl Store {
         }
     }
 
-    /// All was sent: the file is to be checked and kept. [`Self::upload`] tells when that has ended.
+    /// All was sent: the file is to be checked and kept. [`Self::upload`] says when that has ended.
     pub fn close(&mut self) {
         let Some((file, UploadState::Taking)) = self.upload else { return };
         let state = match (file, self.window.rest()) {

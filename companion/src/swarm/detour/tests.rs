@@ -131,7 +131,7 @@ fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
         bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
-        // So many things beside the path that the one in the way is looked at in a later step.
+        // So many things beside the path that the one on it is looked at in a later step.
         for i in 0..OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }

@@ -30,7 +30,7 @@ pub(super) const SILENT: Duration = Duration::from_secs(3);
 pub(super) const BELOW_M: f32 = 15.0;
 /// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
 pub(super) const LANDS_MPS: f32 = 2.0;
-/// A place older than this tells little of how low a vehicle is that lands, seconds.
+/// A place older than this does not show how low a vehicle is that lands, seconds.
 pub(super) const OLD_S: f32 = 1.0;
 /// The same: what was heard within this time is no older.
 pub(super) const FRESHLY: Duration = Duration::from_secs(1);

@@ -199,7 +199,7 @@ impl Copter {
         self.position_ok && now_us >= self.ready_us
     }
 
-    /// What telemetry tells.
+    /// What telemetry reports.
     pub fn status(&self, sense: &Sense) -> Status {
         let now_us = sense.now_us;
         let known = self.position_known(now_us);

@@ -5,7 +5,7 @@ use crate::autopilot::body::Body;
 
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
-/// It counts its time in STAT_RUNTIME and tells so.
+/// It counts its time in STAT_RUNTIME and reports it.
 const RUNTIME_EVERY_US: u64 = 30_000_000;
 /// MAV_PARAM_TYPE_INT32.
 const INT32: u8 = 6;
@@ -17,7 +17,7 @@ impl Copter {
         body.announce(1);
     }
 
-    /// Tells what has become so since the last step.
+    /// Reports what has become so since the last step.
     pub(super) fn tell_progress(&mut self, body: &mut Body, now_us: u64) {
         if !self.said[0] && self.origin_known(now_us) {
             self.said[0] = true;

@@ -55,7 +55,7 @@ impl Px4 {
         order
     }
 
-    /// What telemetry tells.
+    /// What telemetry reports.
     pub fn status(&self, body: &Body, sense: &Sense) -> Status {
         let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
         Status {

@@ -301,7 +301,7 @@ impl Commander {
         true
     }
 
-    /// Changes the mode if it can run; the second ack of DO_SET_MODE tells.
+    /// Changes the mode if it can run; the second ack of DO_SET_MODE says so.
     pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.stream_fresh(sense.now_us, tuning),

@@ -1,0 +1,29 @@
+//! What decisions about other vehicles follow from, and what a vehicle reports to them.
+
+use planner_core::Point;
+
+use crate::autopilot::telemetry::Telemetry;
+use crate::config::Config;
+use crate::guidance::{Guidance, Scene};
+use crate::mission::course::Mission;
+use crate::swarm::neighbours::Neighbours;
+use crate::time::Instant;
+
+/// What decisions about ways around follow from.
+pub(crate) struct View<'a, const V: usize, const W: usize, const G: usize> {
+    pub(crate) now: Instant,
+    pub(crate) config: &'a Config<V>,
+    pub(crate) mission: &'a Mission<W, G>,
+    pub(crate) guidance: &'a Guidance,
+    pub(crate) telemetry: &'a Telemetry,
+    pub(crate) neighbours: &'a Neighbours<V>,
+    pub(crate) scene: Scene<'a, W, G>,
+}
+
+/// What it reports to the others of where it is.
+pub(crate) struct Reported {
+    pub(crate) position: Point,
+    pub(crate) velocity: Point,
+    /// When that was known.
+    pub(crate) at: Instant,
+}
