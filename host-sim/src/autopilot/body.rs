@@ -3,7 +3,8 @@
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use super::command::{ACCEPTED, Command, message_id};
+use super::camera::{Camera, Photo};
+use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, message_id};
 use super::config::Config;
 use super::estimator::Errors;
 use super::geodesy::LocalFrame;
@@ -12,6 +13,7 @@ use super::noise::{self, Disturbance};
 use super::port::{Ack, Port, Sender};
 use super::vehicle::{Demand, Vehicle};
 use super::wire::Fields;
+use crate::kinds::Personality;
 
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
@@ -91,6 +93,7 @@ pub struct Body {
     pub(super) demand: Option<Demand>,
     pub(super) ports: Vec<Port>,
     pub(super) missions: Missions,
+    pub(super) camera: Camera,
     /// When to reboot, once that was commanded.
     pub(super) reboot_us: Option<u64>,
 }
@@ -125,6 +128,7 @@ impl Body {
             demand: None,
             ports: ports.chain(ground).collect(),
             missions: Missions::default(),
+            camera: Camera::default(),
             reboot_us: None,
             vehicle,
             frame,
@@ -183,6 +187,32 @@ impl Body {
         self.home_enu = position;
         self.home = self.frame.geodetic(&position.cast::<f64>());
         self.announce(HOME_POSITION);
+    }
+
+    /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
+    pub(super) fn control_camera(&mut self, from: Sender, command: &Command) {
+        if command.id == DO_DIGICAM_CONTROL {
+            self.camera.control(command);
+        } else {
+            self.camera.set_distance(command);
+        }
+        let soon_us = self.time_us + ANSWER_US;
+        let answer_us = match self.config.personality {
+            Personality::Px4 => self.camera.looks_us().max(soon_us),
+            Personality::Ardupilot => soon_us,
+        };
+        let ack = Ack { command: command.id, result: ACCEPTED, to: from.id() };
+        self.ports[from.port].later.push((answer_us, ack));
+    }
+
+    /// Takes the picture that is due, if one is, and says so.
+    pub(super) fn update_camera(&mut self) {
+        let state = self.vehicle.state();
+        let truth = Photo { time_us: self.time_us, position: state.position, heading_rad: state.heading_rad };
+        let estimate = self.gps_ok.then(|| state.position + self.position_error());
+        if let Some(message) = self.camera.update(self.config.personality, truth, estimate) {
+            self.announce(message);
+        }
     }
 
     /// Reboots when the answer is out.

@@ -13,6 +13,8 @@ pub const FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
 pub const DO_SET_MODE: u16 = 176;
+pub const DO_DIGICAM_CONTROL: u16 = 203;
+pub const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 pub const AUTOPILOT_VERSION: u32 = 148;
 pub const PROTOCOL_VERSION: u32 = 300;
 
@@ -22,6 +24,8 @@ pub struct Command {
     pub id: u16,
     /// Parameters 1 to 4.
     pub param: [f32; 4],
+    /// Parameter 5 where it is no place.
+    pub number5: f32,
     /// Latitude and longitude in degrees, where given.
     pub place: [f64; 2],
     /// Parameter 7.
@@ -34,7 +38,14 @@ impl Command {
     /// From COMMAND_LONG.
     pub fn long(fields: &Fields<'_>) -> Self {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
-        Self { id: fields.u16(28), param: first_four(fields), place, z: fields.f32(24), relative: false }
+        Self {
+            id: fields.u16(28),
+            param: first_four(fields),
+            number5: fields.f32(16),
+            place,
+            z: fields.f32(24),
+            relative: false,
+        }
     }
 
     /// From COMMAND_INT.
@@ -45,7 +56,14 @@ impl Command {
         };
         let relative = matches!(fields.u8(32), 3 | 6);
         let place = [degrees(16), degrees(20)];
-        Self { id: fields.u16(28), param: first_four(fields), place, z: fields.f32(24), relative }
+        Self {
+            id: fields.u16(28),
+            param: first_four(fields),
+            number5: fields.i32(16) as f32,
+            place,
+            z: fields.f32(24),
+            relative,
+        }
     }
 }
 

@@ -28,6 +28,7 @@
 
 pub mod ardupilot;
 mod body;
+mod camera;
 mod command;
 mod config;
 pub mod estimator;
@@ -57,6 +58,7 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
 use self::body::{Body, Integral};
+pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
 use self::port::Port;
@@ -89,6 +91,11 @@ impl Autopilot {
     /// The truth about the vehicle.
     pub fn truth(&self) -> &State {
         self.body.vehicle.state()
+    }
+
+    /// Every picture taken since the last call, as it truly was taken: a camera fixed level to the body looks down from there.
+    pub fn take_photos(&mut self) -> Vec<Photo> {
+        self.body.camera.take_photos()
     }
 
     /// The flight mode that flies, as HEARTBEAT's `custom_mode`.
@@ -198,6 +205,7 @@ impl Autopilot {
         if was_armed && !armed {
             body.vehicle.set_flags(false, landed);
         }
+        body.update_camera();
         self.transmit();
         if self.body.reboot_us.is_some_and(|at_us| self.body.time_us >= at_us) {
             self.reboot();
@@ -273,6 +281,7 @@ impl Autopilot {
             system_id: body.config.system_id,
             status,
             armed,
+            pictures: body.camera.taken(),
             ned: body.frame.ned(&position),
             velocity: body.frame.ned_rate(&sense.velocity),
             geodetic: body.frame.geodetic(&position),
@@ -302,6 +311,7 @@ impl Autopilot {
         if let Ok(mut booted) = Self::new(&fresh) {
             booted.body.vehicle.set_battery(battery);
             booted.body.missions = self.body.missions.clone();
+            booted.body.camera = self.body.camera.rebooted();
             booted.firmware.keep_params(&self.firmware);
             *self = booted;
         }

@@ -21,6 +21,8 @@ pub struct Snapshot {
     pub status: Status,
     /// Armed.
     pub armed: bool,
+    /// Pictures taken since boot.
+    pub pictures: u32,
     /// Estimated NED about the EKF origin, metres.
     pub ned: Vector3<f64>,
     /// Estimated NED velocity, m/s.

@@ -53,6 +53,7 @@ impl Snapshot {
             || self.send_attitude(id, port)
             || self.send_position(id, port)
             || self.send_sensor(id, port)
+            || self.send_camera(id, port)
     }
 
     /// What it is and what state it is in.

@@ -2,6 +2,7 @@
 //! ArduCopter was seen to do.
 
 mod ardupilot;
+mod camera;
 mod protocol;
 
 use companion::link::frame::{self, Frame, Framer, Header};

@@ -4,7 +4,8 @@ use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
 use crate::autopilot::body::Body;
 use crate::autopilot::command::{
-    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, FAILED, FORCE, UNSUPPORTED, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST,
+    FAILED, FORCE, UNSUPPORTED, message_id,
 };
 use crate::autopilot::port::Sender;
 use crate::autopilot::wire::Fields;
@@ -31,6 +32,7 @@ impl Copter {
             176 => self.change_mode(body, command.param[0] as u8, command.param[1] as u32),
             400 if command.param[0] == 1.0 => done(self.arm(body, &sense, command.param[1] == FORCE)),
             400 if command.param[0] == 0.0 => done(self.disarm(body, command.param[1] == FORCE)),
+            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return body.control_camera(from, command),
             // The height counts from home.
             22 => done(self.take_off(sense.home.z + command.z, &sense)),
             21 => done(self.set_mode(Mode::Land, &sense)),

@@ -19,6 +19,8 @@ const DEFAULTS: &[(&str, Value)] = &[
     ("BATT_FS_LOW_ACT", Int8(0)),
     ("BATT_LOW_MAH", Real(0.0)),
     ("BATT_MONITOR", Int8(4)),
+    // An installer's, with a camera: 1 is a servo.
+    ("CAM1_TYPE", Int8(1)),
     ("DISARM_DELAY", Int8(10)),
     ("EK3_ENABLE", Int8(1)),
     ("EK3_SRC1_POSXY", Int8(3)),

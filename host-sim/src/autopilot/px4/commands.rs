@@ -5,8 +5,8 @@ use planner_core::frames::Geodetic;
 use super::{Mode, Px4};
 use crate::autopilot::body::Body;
 use crate::autopilot::command::{
-    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_SET_MODE, FAILED, FORCE, PROTOCOL_VERSION,
-    TEMPORARILY_REJECTED, UNSUPPORTED, accept, message_id,
+    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST,
+    DO_SET_MODE, FAILED, FORCE, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED, accept, message_id,
 };
 use crate::autopilot::port::Sender;
 use crate::autopilot::telemetry;
@@ -23,6 +23,7 @@ impl Px4 {
                 self.asked = Some((from, mode));
                 return;
             }
+            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return body.control_camera(from, command),
             400 => self.arm_or_disarm(body, command),
             22 => self.take_off(body, command),
             21 => accept(self.change_mode(body, Mode::Land)),

@@ -101,6 +101,8 @@ const DEFAULTS: &[(&str, Value)] = &[
     ("SYS_HAS_BARO", Int(1)),
     ("SYS_HAS_GPS", Int(1)),
     ("SYS_HAS_MAG", Int(1)),
+    // An installer's, with a camera: 4 is distance, on command.
+    ("TRIG_MODE", Int(4)),
 ];
 
 /// The defaults, with the airframe's limits in the parameters that carry them.

@@ -53,7 +53,7 @@ impl Bench {
     }
 
     /// Hovering in Guided.
-    fn in_guided(up: f32) -> Self {
+    pub(super) fn in_guided(up: f32) -> Self {
         let mut bench = Self::armed();
         assert_eq!(bench.take_off(up), [0]);
         bench.until(20.0, |a| a.truth().position.z > up);
