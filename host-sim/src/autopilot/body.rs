@@ -191,11 +191,7 @@ impl Body {
 
     /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
     pub(super) fn control_camera(&mut self, from: Sender, command: &Command) {
-        if command.id == DO_DIGICAM_CONTROL {
-            self.camera.control(command);
-        } else {
-            self.camera.set_distance(command);
-        }
+        self.do_camera(command);
         let soon_us = self.time_us + ANSWER_US;
         let answer_us = match self.config.personality {
             Personality::Px4 => self.camera.looks_us().max(soon_us),
@@ -203,6 +199,15 @@ impl Body {
         };
         let ack = Ack { command: command.id, result: ACCEPTED, to: from.id() };
         self.ports[from.port].later.push((answer_us, ack));
+    }
+
+    /// The same without an answer.
+    pub(super) fn do_camera(&mut self, command: &Command) {
+        if command.id == DO_DIGICAM_CONTROL {
+            self.camera.control(command);
+        } else {
+            self.camera.set_distance(command);
+        }
     }
 
     /// Takes the picture that is due, if one is, and says so.
@@ -226,7 +231,11 @@ impl Body {
 
     /// Sends one message through every port in the next step.
     pub(super) fn announce(&mut self, id: u32) {
-        self.ports.iter_mut().for_each(|port| port.once.push(id));
+        for port in &mut self.ports {
+            if !port.once.contains(&id) {
+                port.once.push(id);
+            }
+        }
     }
 
     /// Sends STATUSTEXT through every port.

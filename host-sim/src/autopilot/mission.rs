@@ -1,8 +1,9 @@
-//! The mission protocol: plans, geofences and rally points are stored and given back, not flown.
+//! The mission protocol: plans, geofences and rally points are stored and given back; plans are also flown (`itinerary`).
 //!
 //! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK. Download: REQUEST_LIST →
 //! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
 
+use super::itinerary::Progress;
 use super::port::{Port, Sender};
 use super::wire::Fields;
 
@@ -32,7 +33,7 @@ const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
 
 /// An item as it travels: 37 bytes of MISSION_ITEM_INT, less the kind.
-type Item = [u8; 37];
+pub(super) type Item = [u8; 37];
 
 /// An upload under way.
 #[derive(Clone, Debug)]
@@ -50,10 +51,18 @@ struct Upload {
 pub struct Missions {
     stored: [Vec<Item>; KINDS],
     upload: Option<Upload>,
-    current: u16,
+    /// How far the mission is flown.
+    pub(super) progress: Progress,
+    /// A speed that the mission asked for, m/s, until the firmware takes it.
+    pub(super) speed: Option<f32>,
 }
 
 impl Missions {
+    /// The items of the mission.
+    pub(super) fn items(&self) -> &[Item] {
+        &self.stored[0]
+    }
+
     /// Asks again for an item that does not come; gives up in the end.
     pub(super) fn ask_again(&mut self, now_us: u64, index: usize, port: &mut Port) {
         let Some(upload) = &mut self.upload else { return };
@@ -171,14 +180,16 @@ impl Missions {
             upload.ask(now_us, port);
         } else if let Some(done) = self.upload.take() {
             self.stored[usize::from(kind)] = done.items;
-            self.current = 0;
+            if kind == 0 {
+                self.progress = Progress::default();
+            }
             answer(port, from, ACCEPTED, kind);
         }
     }
 
     fn set_current(&mut self, port: &mut Port, from: Sender, sequence: u16) {
         if usize::from(sequence) < self.stored[0].len() {
-            self.current = sequence;
+            self.progress = Progress::at(sequence);
             port.send_raw(CURRENT, &sequence.to_le_bytes());
         } else {
             answer(port, from, INVALID_SEQUENCE, 0);

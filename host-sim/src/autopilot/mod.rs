@@ -36,6 +36,7 @@ mod firmware;
 pub mod frame;
 pub mod geodesy;
 mod inbox;
+mod itinerary;
 mod messages;
 mod mission;
 pub mod noise;
@@ -281,6 +282,7 @@ impl Autopilot {
             system_id: body.config.system_id,
             status,
             armed,
+            mission: (body.missions.progress.current, body.missions.items().len() as u16),
             pictures: body.camera.taken(),
             ned: body.frame.ned(&position),
             velocity: body.frame.ned_rate(&sense.velocity),

@@ -21,6 +21,8 @@ pub struct Snapshot {
     pub status: Status,
     /// Armed.
     pub armed: bool,
+    /// The item of the mission under way, and how many there are.
+    pub mission: (u16, u16),
     /// Pictures taken since boot.
     pub pictures: u32,
     /// Estimated NED about the EKF origin, metres.

@@ -71,7 +71,11 @@ impl Snapshot {
                 port.send_raw(4, &ping(self.time_us, seq, 0, 0));
             }
             8 | 380 | 410 | 411 | 441 => messages::send_recorded(id, port),
-            42 => port.send(&dialect::MISSION_CURRENT_DATA { seq: 0 }),
+            42 => {
+                let (current, total) = self.mission;
+                let [[a, b], [c, d]] = [current.min(total.saturating_sub(1)), total].map(u16::to_le_bytes);
+                port.send_raw(42, &[a, b, c, d, 0, 0]);
+            }
             111 => port.send(&dialect::TIMESYNC_DATA { tc1: 0, ts1: self.time_us as i64 * 1000 }),
             AUTOPILOT_VERSION => self.send_version(port),
             245 => {

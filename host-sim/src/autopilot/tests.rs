@@ -3,6 +3,7 @@
 
 mod ardupilot;
 mod camera;
+mod missions;
 mod protocol;
 
 use companion::link::frame::{self, Frame, Framer, Header};

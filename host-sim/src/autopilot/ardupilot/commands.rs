@@ -44,8 +44,8 @@ impl Copter {
                 ACCEPTED
             }
             179 => done(body.set_home(command)),
-            // Missions are stored, not flown.
-            193 | 300 => FAILED,
+            193 => FAILED,
+            300 => done(self.start_mission(body)),
             245 => ACCEPTED,
             241 | 246 if self.armed => FAILED,
             241 => ACCEPTED,
@@ -84,11 +84,13 @@ impl Copter {
         body.acknowledge(from, SET_MODE, result);
     }
 
-    fn change_mode(&mut self, body: &Body, base: u8, number: u32) -> u8 {
+    fn change_mode(&mut self, body: &mut Body, base: u8, number: u32) -> u8 {
         if base & CUSTOM_MODE == 0 {
             return DENIED;
         }
-        done(Mode::from_number(number).is_some_and(|mode| self.set_mode(mode, &body.sense())))
+        let runs = |mode: &Mode| *mode != Mode::Auto || self.auto_runs(body);
+        let mode = Mode::from_number(number).filter(runs);
+        done(mode.is_some_and(|mode| self.set_mode(mode, &body.sense())))
     }
 
     /// DO_REPOSITION: Guided, to a place.

@@ -26,6 +26,7 @@ impl Copter {
         let mut tuning = self.tuning;
         tuning.speed = self.speed.unwrap_or(tuning.speed);
         let goal = match self.mode {
+            Mode::Auto => self.auto_goal(sense),
             Mode::Guided if self.takeoff.is_some() => self.take_off_goal(),
             Mode::Guided => self.guided_goal(sense.now_us, dt),
             Mode::Brake => {
@@ -68,7 +69,7 @@ impl Copter {
         LIFT_OFF.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
     }
 
-    fn take_off_goal(&mut self) -> Goal {
+    pub(super) fn take_off_goal(&mut self) -> Goal {
         let Some(takeoff) = self.takeoff else { return Goal::STOP };
         let at = self.reference.position;
         let goal = Goal::hold(Point::new(at.x, at.y, takeoff.up));
@@ -94,7 +95,7 @@ impl Copter {
 
     /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and `WPNAV_SPEED_DN` at most
     /// (`Mode::land_run_vertical_control`): without a rangefinder it knows no other ground.
-    fn landing_goal(&self, sense: &Sense) -> Goal {
+    pub(super) fn landing_goal(&self, sense: &Sense) -> Goal {
         let tuning = &self.tuning;
         let above_low = sense.position.z - sense.home.z - tuning.land_slow_below.max(1.0);
         let rate = approach(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
@@ -102,7 +103,7 @@ impl Copter {
         Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
     }
 
-    fn return_goal(&mut self, sense: &Sense) -> Goal {
+    pub(super) fn return_goal(&mut self, sense: &Sense) -> Goal {
         let home = sense.home;
         let at = self.reference.position;
         let away = libm::hypotf(home.x - sense.position.x, home.y - sense.position.y);

@@ -11,6 +11,7 @@
 //! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever. Times are microseconds since
 //! boot and arguments; nothing here reads a clock.
 
+mod auto;
 mod commands;
 mod flight;
 mod modes;
@@ -24,6 +25,7 @@ pub use self::modes::Mode;
 
 use planner_core::Point;
 
+use self::auto::Auto;
 use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
@@ -145,6 +147,7 @@ pub struct Copter {
     reference: Reference,
     speed: Option<f32>,
     leg: ReturnLeg,
+    auto: Auto,
 }
 
 impl Copter {
@@ -172,6 +175,7 @@ impl Copter {
             reference: Reference::new(Point::zeros(), Point::zeros()),
             speed: None,
             leg: ReturnLeg::Land,
+            auto: Auto::default(),
         }
     }
 
@@ -221,6 +225,7 @@ impl Copter {
                 _ if self.landed => 1,
                 _ if self.takeoff.is_some() => 3,
                 Mode::Land => 4,
+                Mode::Auto if self.lands_in_auto() => 4,
                 Mode::Rtl if self.leg == ReturnLeg::Land => 4,
                 _ => 2,
             },
@@ -311,6 +316,7 @@ impl Copter {
         if self.armed {
             body.say(6, "Disarming motors");
         }
+        self.end_auto(body);
         self.armed = false;
         self.takeoff = None;
         self.failsafe = None;
@@ -351,6 +357,7 @@ impl Copter {
         if possible {
             let since_us = self.takeoff.map_or(sense.now_us, |takeoff| takeoff.since_us);
             self.takeoff = Some(TakeOff { since_us, up });
+            self.auto.may_lift = true;
         }
         possible
     }
@@ -362,6 +369,7 @@ impl Copter {
         if self.armed {
             self.update_failsafe(body, sense);
             self.update_timers(body, sense);
+            self.fly_mission(body, sense);
         }
         if !self.armed {
             // A vehicle disarmed in the air falls, and has landed when it lies still.
@@ -431,7 +439,7 @@ impl Copter {
             self.since.idle_us = sense.now_us;
         } else {
             let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
-            let landing = matches!(self.mode, Mode::Land | Mode::Rtl);
+            let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.lands_in_auto();
             if landing && since(self.since.landed_us) >= micros(LAND_DISARM_S)
                 || delay > 0.0 && since(self.since.idle_us) >= micros(delay)
             {

@@ -7,6 +7,8 @@ pub enum Mode {
     Stabilize = 0,
     /// Likewise.
     AltHold = 2,
+    /// The mission.
+    Auto = 3,
     /// Setpoints.
     Guided = 4,
     /// Likewise by sticks: with the throttle low it sinks at `PILOT_SPEED_UP`.
@@ -19,8 +21,16 @@ pub enum Mode {
     Brake = 17,
 }
 
-const MODES: [Mode; 7] =
-    [Mode::Stabilize, Mode::AltHold, Mode::Guided, Mode::Loiter, Mode::Rtl, Mode::Land, Mode::Brake];
+const MODES: [Mode; 8] = [
+    Mode::Stabilize,
+    Mode::AltHold,
+    Mode::Auto,
+    Mode::Guided,
+    Mode::Loiter,
+    Mode::Rtl,
+    Mode::Land,
+    Mode::Brake,
+];
 
 impl From<Mode> for u32 {
     fn from(mode: Mode) -> Self {
@@ -40,7 +50,7 @@ impl Mode {
     }
 
     pub(super) fn needs_position(self) -> bool {
-        matches!(self, Self::Guided | Self::Loiter | Self::Rtl | Self::Brake)
+        matches!(self, Self::Auto | Self::Guided | Self::Loiter | Self::Rtl | Self::Brake)
     }
 
     pub(super) fn allows_arming(self) -> bool {

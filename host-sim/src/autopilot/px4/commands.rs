@@ -37,8 +37,8 @@ impl Px4 {
             179 if body.set_home(command) => ACCEPTED,
             179 => DENIED,
             193 if command.param[0] == 0.0 => accept(self.change_mode(body, Mode::Hold)),
-            // Missions are stored, not flown.
-            193 | 300 => TEMPORARILY_REJECTED,
+            193 => TEMPORARILY_REJECTED,
+            300 => self.start_mission(body),
             245 => ACCEPTED,
             241 => TEMPORARILY_REJECTED,
             246 if self.commander.armed() => TEMPORARILY_REJECTED,
@@ -88,18 +88,31 @@ impl Px4 {
     fn arm_or_disarm(&mut self, body: &mut Body, command: &Command) -> u8 {
         let force = command.param[1] == FORCE;
         if command.param[0] == 1.0 {
-            let sense = body.sense();
-            let was_armed = self.commander.armed();
-            let armed = self.commander.arm(&sense, &self.tuning, force);
-            if armed && !was_armed {
-                body.set_home_here();
-            }
-            accept(armed)
+            accept(self.arm(body, force))
         } else if command.param[0] == 0.0 {
             accept(self.commander.disarm(force))
         } else {
             UNSUPPORTED
         }
+    }
+
+    /// MISSION_START: changes the mode and arms.
+    fn start_mission(&mut self, body: &mut Body) -> u8 {
+        self.commander.set_mission_ready(body.has_mission());
+        if !body.has_mission() || !self.change_mode(body, Mode::Mission) {
+            return DENIED;
+        }
+        if self.arm(body, false) { ACCEPTED } else { DENIED }
+    }
+
+    fn arm(&mut self, body: &mut Body, force: bool) -> bool {
+        let sense = body.sense();
+        let was_armed = self.commander.armed();
+        let armed = self.commander.arm(&sense, &self.tuning, force);
+        if armed && !was_armed {
+            body.set_home_here();
+        }
+        armed
     }
 
     fn take_off(&mut self, body: &Body, command: &Command) -> u8 {

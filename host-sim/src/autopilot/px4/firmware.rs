@@ -5,6 +5,7 @@ use super::setpoint;
 use super::{Commander, Mode};
 use crate::autopilot::body::{Body, Order, Sense};
 use crate::autopilot::command::{DO_SET_MODE, accept};
+use crate::autopilot::itinerary::Leg;
 use crate::autopilot::params::Params;
 use crate::autopilot::port::Sender;
 use crate::autopilot::status::Status;
@@ -43,16 +44,47 @@ impl Px4 {
 
     /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
     pub(in crate::autopilot) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
+        self.commander.set_mission_ready(body.has_mission());
         if let Some((from, mode)) = self.asked.take() {
             let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
             body.acknowledge(from, DO_SET_MODE, accept(changed));
         }
+        self.fly_mission(body, sense);
         let failed = self.commander.in_failsafe();
         let order = self.commander.update(sense, &self.tuning);
         if self.commander.in_failsafe() && !failed {
             turn_gimbal(body);
         }
         order
+    }
+
+    /// What the mission asks for, while AUTO.MISSION flies it. Its return is AUTO.RTL.
+    fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
+        if !self.commander.armed() {
+            if let Some(leg) = self.commander.mission_leg.take() {
+                if matches!(leg, Leg::Land { .. }) {
+                    body.pass_item();
+                }
+                body.rewind_mission();
+            }
+            return;
+        }
+        if self.commander.mode() != Mode::Mission {
+            if self.commander.mission_leg.take().is_some() {
+                body.missions.progress.interrupt();
+            }
+            return;
+        }
+        self.commander.mission_leg = body.fly_mission(sense, self.commander.landed());
+        if let Some(speed) = body.missions.speed.take() {
+            self.commander.set_cruise(speed);
+        }
+        if self.commander.mission_leg == Some(Leg::Return) {
+            self.commander.mission_leg = None;
+            body.pass_item();
+            body.rewind_mission();
+            self.commander.force_mode(Mode::Return, sense);
+        }
     }
 
     /// What telemetry reports.

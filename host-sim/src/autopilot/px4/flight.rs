@@ -4,6 +4,7 @@ use planner_core::Point;
 
 use super::params::Tuning;
 use super::{Commander, Mode, ReturnLeg, Sense};
+use crate::autopilot::itinerary::Leg;
 use crate::autopilot::shaping::Ramp;
 use crate::autopilot::vehicle::Demand;
 
@@ -13,6 +14,8 @@ const CLIMB_M: f32 = 0.15;
 const CLIMB_MPS: f32 = 0.05;
 /// An automatic mode is at its target within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
+/// Nearer than this it does not turn to where it flies, metres.
+const LOOKS_M: f32 = 2.0;
 /// Faster than this it was not seen to sink in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its height, which
 /// is also what it controls there; the velocity it reported meanwhile went up to 1.6.
 const LAND_MPS: f32 = 1.3;
@@ -42,6 +45,7 @@ impl Commander {
     pub(super) fn wants_up(&self, sense: &Sense, demand: &Demand) -> bool {
         match self.mode() {
             Mode::Takeoff => true,
+            Mode::Mission => demand.position.z - sense.position.z > CLIMB_M,
             Mode::Offboard => {
                 demand.position.z - sense.position.z > CLIMB_M
                     || demand.velocity.z > CLIMB_MPS
@@ -86,9 +90,41 @@ impl Commander {
                 let position = Point::new(self.hold.x, self.hold.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
+            Mode::Mission => self.mission_demand(sense, tuning, held),
             Mode::Land => self.landing(sense, tuning, held),
             Mode::Return => self.returning(sense, tuning, held),
             _ => held,
+        }
+    }
+
+    /// What an item of the mission asks for. Without a heading it looks where it flies (`MPC_YAW_MODE` 0).
+    fn mission_demand(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        match self.mission_leg {
+            Some(Leg::TakeOff { up }) => {
+                self.hold.z = up;
+                let climb_max = tuning.takeoff_speed.min(held.climb_max);
+                Demand { position: self.hold, climb_max, ..held }
+            }
+            Some(Leg::To { at, heading, .. }) => {
+                let off = at - sense.position;
+                if heading.is_finite() {
+                    self.hold_heading = heading;
+                } else if libm::hypotf(off.x, off.y) > LOOKS_M {
+                    self.hold_heading = libm::atan2f(off.x, off.y);
+                }
+                self.hold = at;
+                Demand { position: at, heading: self.hold_heading, ..held }
+            }
+            Some(Leg::Land { at }) => {
+                if let Some([east, north]) = at {
+                    (self.hold.x, self.hold.y) = (east, north);
+                    if libm::hypotf(east - sense.position.x, north - sense.position.y) > ARRIVED_M {
+                        return Demand { position: self.hold, ..held };
+                    }
+                }
+                self.landing(sense, tuning, held)
+            }
+            Some(Leg::Wait(_) | Leg::Return) | None => held,
         }
     }
 

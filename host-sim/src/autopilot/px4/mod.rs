@@ -24,6 +24,7 @@ pub use self::firmware::Px4;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
 use super::body::{Integral, Order, Sense};
+use super::itinerary::Leg;
 use super::shaping::Ramp;
 use super::vehicle::Demand;
 
@@ -151,6 +152,9 @@ pub struct Commander {
     /// Rate of sinking in Land, as of when.
     descent: Option<(u64, Ramp)>,
     position_ok: bool,
+    mission_ready: bool,
+    /// What the mission asks for, while it is flown.
+    mission_leg: Option<Leg>,
 }
 
 impl Default for Commander {
@@ -182,6 +186,8 @@ impl Commander {
             leg: ReturnLeg::Descend,
             descent: None,
             position_ok: true,
+            mission_ready: false,
+            mission_leg: None,
         }
     }
 
@@ -215,6 +221,8 @@ impl Commander {
         match self.mode() {
             _ if self.landed => 1,
             Mode::Takeoff => 3,
+            Mode::Mission if matches!(self.mission_leg, Some(Leg::TakeOff { .. })) => 3,
+            Mode::Mission if matches!(self.mission_leg, Some(Leg::Land { .. })) => 4,
             Mode::Land => 4,
             Mode::Return if self.leg == ReturnLeg::Land => 4,
             _ => 2,
@@ -246,6 +254,11 @@ impl Commander {
     /// The estimator lost or found its position.
     pub fn set_position_ok(&mut self, ok: bool) {
         self.position_ok = ok;
+    }
+
+    /// Whether a mission is stored that AUTO.MISSION can fly.
+    pub fn set_mission_ready(&mut self, ready: bool) {
+        self.mission_ready = ready;
     }
 
     /// Takes a setpoint that counts.
@@ -280,7 +293,8 @@ impl Commander {
         let runs = match self.intention {
             Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
             Mode::Hold | Mode::Takeoff => true,
-            Mode::Land | Mode::Return | Mode::Mission => false,
+            Mode::Mission => self.mission_ready,
+            Mode::Land | Mode::Return => false,
             Mode::Manual | Mode::Altitude | Mode::Position => false,
         };
         runs && self.position_ok && sense.battery >= tuning.battery_low
@@ -305,7 +319,7 @@ impl Commander {
     pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
-            Mode::Mission => false,
+            Mode::Mission => self.mission_ready,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {

@@ -25,7 +25,7 @@ impl Bench {
         self.command(id, [a, b, 0.0, 0.0, 0.0, 0.0, 0.0])
     }
 
-    fn mode(&mut self, number: f32) -> Vec<u8> {
+    pub(super) fn mode(&mut self, number: f32) -> Vec<u8> {
         self.ask(176, 1.0, number)
     }
 
@@ -37,13 +37,13 @@ impl Bench {
         assert_eq!(self.ask(511, id as f32, 1e5), [0]);
     }
 
-    fn texts(&self) -> Vec<String> {
+    pub(super) fn texts(&self) -> Vec<String> {
         let text = |f: &Frame| String::from_utf8_lossy(&f.padded()[1..51]).trim_end_matches('\0').to_owned();
         self.of(253).map(|(_, frame)| text(frame)).collect()
     }
 
     /// Ready, in Guided and armed.
-    fn armed() -> Self {
+    pub(super) fn armed() -> Self {
         let mut bench = Self::copter();
         bench.want(245);
         bench.run(f64::from(READY_S));
