@@ -8,7 +8,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, python, workspace};
+use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, python, shared_data, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
 /// ArduCopter, whose estimator is ready sooner than the real one's.
@@ -83,6 +83,45 @@ fn mavsdk_uses_the_simulated_px4s_parameters_and_missions() {
 #[test]
 fn mavsdk_uses_the_simulated_ardupilots_parameters_and_missions() {
     mavsdk("mavsdk_services.py", &["FS_GCS_TIMEOUT", "FS_GCS_ENABLE"], ARDUPILOT);
+}
+
+/// Plans the polygon of QGroundControl's sample survey for one vehicle, as `cover` does; `None` where the sample is not there.
+fn survey(personality: &str, out: &Path) -> Option<()> {
+    let sample = shared_data("plans/qgroundcontrol_sample_with_survey.plan")?;
+    let scenario = format!(
+        "[area]\nfile = {sample:?}\nheight_m = 8.0\nlayer_m = 2.0\nlane_m = 25.0\nwaypoint_m = 20.0\ntrigger = \"waypoint\"\n\
+         [mission]\ncruise_mps = 10.0\n[[vehicles]]\nid = 1\nspeed_max_mps = 10.0\npersonality = \"{personality}\"\n\
+         start = {{ lat_deg = 47.3977, lon_deg = 8.5463, alt_m = 0.0 }}\n"
+    );
+    let file = out.join("survey.toml");
+    std::fs::write(&file, scenario).expect("a scenario");
+    let cover = Command::new(host_sim(Profile::Debug)).arg("cover").arg(file).arg("--out").arg(out).status();
+    assert!(cover.expect("host-sim starts").success(), "it is planned and covers everything");
+    Some(())
+}
+
+/// MAVSDK and pymavlink read what `cover` wrote; MAVSDK has it flown, and pymavlink counts the pictures on a second link.
+fn plan_flies(personality: &str, options: &[&str]) {
+    let Some(python) = python() else { return };
+    let out = tempfile::tempdir().expect("a directory");
+    let Some(()) = survey(personality, out.path()) else { return };
+    let address = format!("127.0.0.1:{}", free_port());
+    let options = [options, &["--home", "47.3977,8.5463,488"]].concat();
+    let (_autopilot, at) = autopilot(&[&format!("udp:{address}"), "udp-listen:127.0.0.1:0"], &options);
+    let file = |name: &str| out.path().join(name).display().to_string();
+    let (plan, waypoints, csv) = (file("vehicle-1.plan"), file("vehicle-1.waypoints"), file("waypoints.csv"));
+    let urls = [format!("udpin://{address}"), format!("udpout:{}", at[1])];
+    run(&python, "plan_flight.py", &[&urls[0], &urls[1], &plan, &waypoints, &csv, personality]);
+}
+
+#[test]
+fn mavsdk_has_the_simulated_px4_fly_a_survey_plan() {
+    plan_flies("px4", &[]);
+}
+
+#[test]
+fn mavsdk_has_the_simulated_ardupilot_fly_a_survey_plan() {
+    plan_flies("ardupilot", ARDUPILOT);
 }
 
 /// A companion of the lobby's first vehicle beside the autopilot that sends to this port, and the two files it may be given.

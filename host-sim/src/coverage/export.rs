@@ -120,7 +120,7 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
                 if begins || ends {
                     items.push(waypoint(index));
                 }
-                if trigger == Trigger::Distance && begins {
+                if trigger == Trigger::Distance && begins && !ends {
                     let next = stops.get(index + 1).filter(|next| next.lane == stop.lane);
                     let step = next.map_or(planned.scenario.area.spacing.waypoint_m, |next| {
                         (next.position - stop.position).norm()
@@ -130,7 +130,9 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
                     items.push(Item::command(DO_SET_CAM_TRIGG_DIST, trigger));
                 }
                 if trigger == Trigger::Distance && ends {
-                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, [0.0; 4]));
+                    // The last one at once too: autopilots look some times a second, and by then are past the distance, so
+                    // that pictures are a little further apart than asked for, and the last would be behind the end.
+                    items.push(Item::command(DO_SET_CAM_TRIGG_DIST, [0.0, 0.0, 1.0, 0.0]));
                 }
             }
             (Act::Transit | Act::Lane, _) => items.push(waypoint(index)),

@@ -1,0 +1,211 @@
+//! The plans that `cover` writes, flown without a companion: uploaded to both simulated autopilots, in memory. Pictures are
+//! counted and placed by the truth.
+
+use companion::link::frame::{self, Framer, Header};
+use companion::time::Instant;
+use host_sim::autopilot::{Autopilot, Config, Personality, Photo};
+use host_sim::coverage::Planned;
+use host_sim::coverage::export::{self, Item};
+use host_sim::coverage::flight::{Act, Stop};
+use host_sim::scenario::coverage::Method;
+use host_sim::scenario::parse_coverage;
+use planner_core::Point;
+
+/// A waypoint is passed within 2 m across, and by what is flown in a step.
+const PASSED_M: f32 = 2.2;
+/// And 0.8 m in height.
+const PASSED_UP_M: f32 = 0.9;
+const CRUISE_MPS: f32 = 5.0;
+/// PX4's camera looks every 50 ms.
+const LATE_M: f32 = 0.05 * CRUISE_MPS;
+
+fn scenario(personality: &str, trigger: &str) -> String {
+    format!(
+        "[area]\npolygon = [[0, 0], [70, 0], [70, 20], [40, 45], [0, 45]]\nheight_m = 20.0\nlane_m = 9.0\n\
+         waypoint_m = 8.0\ntrigger = \"{trigger}\"\nno_fly = [[[20, 15], [30, 15], [30, 25], [20, 25]]]\n\
+         [mission]\ncruise_mps = {CRUISE_MPS}\n[[vehicles]]\nid = 1\nstart = [-10, -10, 0.3]\n\
+         personality = \"{personality}\"\n[[vehicles]]\nid = 2\nstart = [80, -10, 0.3]\n\
+         personality = \"{personality}\"\n"
+    )
+}
+
+/// One end of a link to an autopilot.
+struct Client {
+    autopilot: Autopilot,
+    framer: Framer,
+    acks: Vec<(u32, u8)>,
+    reached: Vec<u16>,
+    announced: usize,
+}
+
+impl Client {
+    fn send(&mut self, id: u32, payload: &[u8]) {
+        let header = Header { system: 255, component: 190, sequence: 0 };
+        let mut out = [0; frame::MAX_SENT];
+        let seed = frame::extra_crc(id).expect("a known message");
+        let len = frame::encode_raw(header, id, seed, payload, &mut out);
+        self.autopilot.handle_bytes(&out[..len]);
+    }
+
+    fn run(&mut self, seconds: f32) {
+        for _ in 0..(seconds / 0.004) as usize {
+            self.autopilot.step(0.004, 0.0);
+            let mut buffer = [0; 1024];
+            loop {
+                let len = self.autopilot.poll_transmit(&mut buffer);
+                if len == 0 {
+                    break;
+                }
+                let now = Instant::from_micros(self.autopilot.time_us());
+                let mut bytes = &buffer[..len];
+                while let Some(frame) = self.framer.next(now, &mut bytes) {
+                    let b = frame.padded();
+                    match frame.message_id {
+                        46 => self.reached.push(u16::from_le_bytes([b[0], b[1]])),
+                        47 => self.acks.push((47, b[2])),
+                        77 => self.acks.push((u32::from(u16::from_le_bytes([b[0], b[1]])), b[2])),
+                        180 | 263 => self.announced += 1,
+                        _ => {}
+                    }
+                }
+            }
+        }
+    }
+
+    fn upload(&mut self, items: &[Item]) {
+        let count = items.len() as u16;
+        let [low, high] = count.to_le_bytes();
+        self.send(44, &[low, high, 1, 1, 0]);
+        for (k, item) in items.iter().enumerate() {
+            let mut payload = [0; 37];
+            for (at, param) in item.params.iter().enumerate() {
+                let value = param.map_or(f32::NAN, |value| value as f32);
+                payload[4 * at..4 * at + 4].copy_from_slice(&value.to_le_bytes());
+            }
+            let scale = if item.frame == 2 { 1.0 } else { 1e7 };
+            for (at, value) in [(16, item.place[0]), (20, item.place[1])] {
+                payload[at..at + 4].copy_from_slice(&((value * scale).round() as i32).to_le_bytes());
+            }
+            payload[24..28].copy_from_slice(&(item.place[2] as f32).to_le_bytes());
+            payload[28..30].copy_from_slice(&(k as u16).to_le_bytes());
+            payload[30..32].copy_from_slice(&item.command.to_le_bytes());
+            payload[32..37].copy_from_slice(&[1, 1, item.frame, 0, 1]);
+            self.send(73, &payload);
+            self.run(0.01);
+        }
+        assert_eq!(self.acks.last(), Some(&(47, 0)), "the upload is accepted");
+    }
+
+    fn command(&mut self, id: u16, first: f32, second: f32) {
+        let mut payload = [0; 33];
+        payload[..4].copy_from_slice(&first.to_le_bytes());
+        payload[4..8].copy_from_slice(&second.to_le_bytes());
+        payload[28..30].copy_from_slice(&id.to_le_bytes());
+        payload[30..32].copy_from_slice(&[1, 1]);
+        self.send(76, &payload);
+        self.run(0.1);
+        assert_eq!(self.acks.last(), Some(&(u32::from(id), 0)), "command {id} is accepted");
+    }
+}
+
+/// Flies one vehicle's plan and returns its pictures.
+fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Personality) -> Vec<Photo> {
+    let origin = planned.scenario.area.origin;
+    let start = stops[0].position;
+    let config = Config {
+        personality,
+        world_origin: origin,
+        ekf_origin: origin,
+        start,
+        estimator_ready_s: 2.0,
+        ..Config::default()
+    };
+    let autopilot = Autopilot::new(&config).expect("a sound configuration");
+    let mut client =
+        Client { autopilot, framer: Framer::new(), acks: Vec::new(), reached: Vec::new(), announced: 0 };
+    client.run(3.0);
+    // The delay before it leaves is the swarm's; ArduPilot's item 0 is home.
+    let mut items: Vec<Item> = items.iter().filter(|item| item.command != 93).cloned().collect();
+    if personality == Personality::Ardupilot {
+        items.insert(0, Item { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] });
+    }
+    client.upload(&items);
+    if personality == Personality::Ardupilot {
+        client.command(176, 1.0, 4.0);
+        client.command(400, 1.0, 0.0);
+    }
+    client.command(300, 0.0, 0.0);
+    let mut seconds = 0;
+    while client.autopilot.truth().armed {
+        client.run(1.0);
+        seconds += 1;
+        assert!(
+            seconds < 600,
+            "it flies for ever: {:?}, at item {:?}",
+            client.autopilot.truth(),
+            client.reached
+        );
+    }
+    client.run(0.1);
+    let off = (client.autopilot.truth().position - stops[stops.len() - 1].position).xy().norm();
+    assert!(off < 1.0, "{personality:?} came home {off} m off");
+    let all: Vec<u16> = (u16::from(personality == Personality::Ardupilot)..items.len() as u16).collect();
+    assert_eq!(client.reached, all, "each item is reported once");
+    let photos = client.autopilot.take_photos();
+    assert_eq!(client.announced, photos.len(), "each picture is announced");
+    photos
+}
+
+fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
+    let off = photo.position - place;
+    (off.xy().norm(), off.z.abs())
+}
+
+#[test]
+fn each_plan_is_flown_and_photographs_what_was_planned() {
+    for (name, personality) in [("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)] {
+        for trigger in ["waypoint", "distance", "none"] {
+            let scenario = parse_coverage(&scenario(name, trigger), "plans").expect("a scenario");
+            let planned = Planned::new(&scenario, Method::Binpat).expect("a plan");
+            let flights = planned.flights();
+            assert_eq!(flights.len(), 2);
+            for (route, stops, _) in &flights {
+                let items = export::items(&planned, route, stops);
+                let photos = fly(&planned, stops, &items, personality);
+                let wanted: Vec<&Stop> = stops.iter().filter(|s| matches!(s.act, Act::Photo(_))).collect();
+                assert!(wanted.len() > 10);
+                let lanes = 1 + wanted.windows(2).filter(|pair| pair[0].lane != pair[1].lane).count();
+                let label = format!("{name}, {trigger}: {} of {}", photos.len(), wanted.len());
+                match trigger {
+                    "waypoint" => {
+                        assert_eq!(photos.len(), wanted.len(), "{label}");
+                        for (photo, stop) in photos.iter().zip(&wanted) {
+                            let (across, up) = off_by(photo, &stop.position);
+                            assert!(across < PASSED_M && up < PASSED_UP_M, "{label}: {across} m, {up} m off");
+                        }
+                    }
+                    "distance" => {
+                        // The last before the end of a lane may be behind it, or one more.
+                        let counts = wanted.len() - lanes..=wanted.len() + lanes;
+                        assert!(counts.contains(&photos.len()), "{label}, {lanes} lanes");
+                        // Both ends of a lane as they are passed; between them each is late by the looks before it.
+                        for (k, stop) in wanted.iter().enumerate() {
+                            let before = wanted[..k].iter().rev().take_while(|s| s.lane == stop.lane).count();
+                            let near = |photo: &Photo| {
+                                let (across, up) = off_by(photo, &stop.position);
+                                across < PASSED_M + LATE_M * before as f32 && up < PASSED_UP_M
+                            };
+                            assert!(photos.iter().any(near), "{label}: none at {}", stop.position);
+                        }
+                    }
+                    _ => assert_eq!(photos.len(), 0, "{label}"),
+                }
+                if personality == Personality::Px4 && trigger == "waypoint" {
+                    // The heading of a sweep: one for all, within what PX4 waits for.
+                    let turned = photos.iter().map(|photo| (photo.heading_rad - photos[0].heading_rad).abs());
+                    assert!(turned.fold(0.0, f32::max) < 0.43, "{label}");
+                }
+            }
+        }
+    }
+}
