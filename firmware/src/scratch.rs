@@ -1,8 +1,8 @@
-//! What a board plans with: one piece of memory, for planning on a roadmap or for building one.
+//! What a board plans with: one piece of memory, for planning on a roadmap, for building one, or for a coverage mission.
 //!
 //! An enum would do but for its change from one use to the other, which the compiler makes on the stack, where there is no
 //! room for it.
-#![expect(unsafe_code, reason = "two uses of one piece of memory")]
+#![expect(unsafe_code, reason = "three uses of one piece of memory")]
 
 use core::mem::{ManuallyDrop, MaybeUninit};
 
@@ -12,56 +12,75 @@ use planner_core::prm::{self, Config, PrmError};
 use planner_core::roadmap::Edge;
 use planner_core::voxel::VoxelGrid;
 
+use crate::calls::coverage;
 use crate::capacity::{HALF_EDGES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
 
 /// Scratch of planning a swarm.
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
 
-/// The memory; a board has one. The smaller use lies in the memory of the larger.
+/// The memory; a board has one. The smaller uses lie in the memory of the largest.
 pub struct Scratch {
     memory: Memory,
-    builds: bool,
+    used: Use,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Use {
+    Plan,
+    Build,
+    Coverage,
 }
 
 union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<Builder>,
+    coverage: ManuallyDrop<coverage::Lent>,
 }
 
-/// All zeros are a planner and a builder: the compiler refuses a constant that is no value of its
+/// All zeros are a value of each use: the compiler refuses a constant that is no value of its
 /// type.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ZEROS: (Planner, Builder) = {
+const ZEROS: (Planner, Builder, coverage::Lent) = {
     // SAFETY: the compiler checks it.
-    unsafe { (MaybeUninit::zeroed().assume_init(), MaybeUninit::zeroed().assume_init()) }
+    unsafe {
+        let zeroed = (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
+        (zeroed.0.assume_init(), zeroed.1.assume_init(), zeroed.2.assume_init())
+    }
 };
 
 impl Scratch {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
-        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, builds: false }
+        Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: Use::Plan }
     }
 
     /// For planning from here on.
     pub fn planner(&mut self) -> &mut Planner {
-        self.turn(false);
+        self.turn(Use::Plan);
         // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner was written since.
         unsafe { &mut self.memory.plan }
     }
 
     /// For building from here on; empty.
     pub fn builder(&mut self) -> &mut Builder {
-        self.turn(true);
+        self.turn(Use::Build);
         // SAFETY: as above; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
     }
 
+    /// For a coverage mission from here on; empty.
+    pub fn coverage(&mut self) -> &mut coverage::Lent {
+        self.turn(Use::Coverage);
+        // SAFETY: as above; all zeros is nothing lent yet.
+        unsafe { &mut self.memory.coverage }
+    }
+
     /// Zeros where the use changes.
-    fn turn(&mut self, builds: bool) {
-        if self.builds != builds {
-            // SAFETY: neither use has anything to drop, and any bytes may be written over their memory.
+    fn turn(&mut self, used: Use) {
+        if self.used != used {
+            // SAFETY: no use has anything to drop, and any bytes may be written over their memory.
             unsafe { (&raw mut self.memory).write_bytes(0, 1) };
-            self.builds = builds;
+            self.used = used;
         }
     }
 }

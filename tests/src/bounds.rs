@@ -4,7 +4,8 @@ use std::collections::HashMap;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
+use firmware::calls::{Meter, coverage};
 use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -73,6 +74,28 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("flight::Path::points_from, 16", "w and the points"),
     ("flight::Path::project", "w"),
     ("track::advance", "w"),
+    ("footprint::Camera::footprint", "constant"),
+    ("footprint::Camera::height_for_gsd", "constant"),
+    ("area::Area::new, 256", "edges²"),
+    ("area::Area::forbids", "edges"),
+    ("sweep::least_width, 256", "n · log n of n vertices"),
+    ("transit::Transit::learn, 32 corners", "corners² · edges, and corners³"),
+    ("transit::Transit::is_clear", "edges of no-fly zones"),
+    ("transit::Transit::distance_m", "corners² · edges"),
+    ("transit::Transit::way", "the same"),
+    ("tracks::build, 256 vertices", "lanes · vertices, and 2000 looks at the lanes' order, each one way"),
+    ("tracks::build, 512 lanes", "the same"),
+    ("tracks::Tracks::waypoint", "log of the lanes"),
+    ("tracks::Tracks::along_m", "log of the lanes"),
+    ("pack::binpat, 3", "v · log of the lanes, v² ways, one assignment"),
+    ("pack::binpat, 3 around zones", "the same"),
+    ("pack::binpat, 32", "the same"),
+    ("powell::powell, 3", "4000 `binpat`"),
+    ("bound::lower_bound_s, 3", "waypoints · v"),
+    ("divide::original, 32", "v"),
+    ("a coverage plan, 3", "`build` and `powell`"),
+    ("a division, 3", "`divide::left`, lanes · v, and one `binpat`"),
+    ("a division, 32", "the same"),
     ("frame::Framer::next, 256 hostile bytes", "the bytes × a frame's length"),
     ("frame::encode_raw, 255 bytes", "the bytes"),
     ("intent::Intent::encode", "constant"),
@@ -118,15 +141,30 @@ pub struct Seen {
     pub bytes: u64,
 }
 
+/// Makes calls on the desk.
+struct Uncounted;
+
+impl Meter for Uncounted {
+    fn call<T>(&mut self, _: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
+        work()
+    }
+}
+
 /// Runs the board's program `calls` on the demo's roadmap and a map of the building; what it counted, by name.
 ///
 /// # Errors
-/// The demo cannot be prepared, or the program says something else.
+/// The demo cannot be prepared, the program says something else, or its coverage plans are not the desk's, bit by bit.
 pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let scenario = scenario::load(&workspace().join("host-sim/scenarios/demo.toml"))?;
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let map = building::building(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
     let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
+    let desk = format!("coverage {:08x}", coverage::run(&mut Uncounted, &mut Box::default()));
+    ensure!(
+        lines.contains(&desk),
+        "the desk's coverage plans have {desk:?}, the board's\n{}",
+        lines.join("\n")
+    );
     lines.iter().filter_map(|line| line.strip_prefix("call ")).map(seen).collect()
 }
 

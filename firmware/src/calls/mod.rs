@@ -3,6 +3,7 @@
 //! The program `calls` runs them on a board in QEMU and counts instructions; `cargo xtask bench --only worst-case` prints the
 //! table. On the desk the same runs without counting, as a test.
 
+pub mod coverage;
 pub mod flight;
 pub mod limits;
 mod limits_graph;

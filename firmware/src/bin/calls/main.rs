@@ -27,7 +27,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 /// Flights in which the safety filter is counted.
 const FILTERED: u64 = 100;
 /// Most rows.
-const ROWS: usize = 96;
+const ROWS: usize = 128;
 
 /// Counts instructions, those of asking the clock left out.
 struct Instructions {
@@ -52,7 +52,7 @@ impl Meter for Instructions {
 fn main() -> ! {
     clock::start();
     let mut meter = Instructions { rows: Vec::new() };
-    planner_calls::run(&mut meter);
+    println!("coverage {:08x}", planner_calls::run(&mut meter));
     companion_calls::run(&mut meter);
     fly(&mut meter);
     filter(&mut meter);

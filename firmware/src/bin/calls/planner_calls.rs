@@ -1,7 +1,7 @@
 //! The calls of planner-core.
 
 use firmware::boards::chosen::memory;
-use firmware::calls::{Meter, flight};
+use firmware::calls::{Meter, coverage, flight};
 use firmware::capacity::{GATES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase, anywhere, below, uniform};
 use firmware::scratch::{Planner, Scratch};
@@ -58,9 +58,9 @@ static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
     lengths: [0.0; 2048],
 });
 
-/// All of them.
+/// All of them; the sum of the answers of a coverage mission.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter) {
+pub fn run(meter: &mut impl Meter) -> u32 {
     let scratch = SCRATCH.take();
     let beside = BESIDE.take();
     let view = meter
@@ -86,6 +86,7 @@ pub fn run(meter: &mut impl Meter) {
     builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
     desk(meter, &grid, search, beside);
+    coverage::run(meter, scratch.coverage())
 }
 
 fn geodetic(rng: &mut Pcg32) -> Geodetic {
