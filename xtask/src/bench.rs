@@ -17,13 +17,16 @@ pub struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case, boards; or one of the
-    /// suites: deconfliction, meetings, hostile, range.
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover, swarm, steps,
+    /// worst-case, boards; or one of the suites: deconfliction, meetings, hostile, range.
     #[arg(long, value_name = "NAME")]
     only: Option<String>,
     /// A checkout of cvar-upm/multi_uav_planning_binpat, which the coverage rows are beside.
     #[arg(long, value_name = "DIR")]
     binpat: Option<PathBuf>,
+    /// A checkout of Fields2Cover/Fields2Cover, which its rows are beside.
+    #[arg(long, value_name = "DIR")]
+    fields2cover: Option<PathBuf>,
     /// Seeds of each case of the deconfliction suite, or of each range.
     #[arg(long, value_name = "N")]
     seeds: Option<u64>,
@@ -69,6 +72,9 @@ pub fn run_bench(args: &Args) -> Result<()> {
     }
     if let Some(binpat) = &args.binpat {
         bench.arg("--binpat").arg(std::path::absolute(binpat)?);
+    }
+    if let Some(fields2cover) = &args.fields2cover {
+        bench.arg("--fields2cover").arg(std::path::absolute(fields2cover)?);
     }
     if let Some(out) = &args.out {
         bench.arg("--out").arg(std::path::absolute(out)?);

@@ -7,6 +7,7 @@ mod assignment;
 mod boards;
 mod coverage;
 mod fidelity;
+mod fields2cover;
 mod roadmap;
 mod row;
 mod steps;
@@ -26,8 +27,8 @@ struct Args {
     /// Write the rows to this file as JSON.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
-    /// Run only the groups whose name contains this: roadmap, assignment, coverage, swarm, steps, worst-case,
-    /// fidelity, boards.
+    /// Run only the groups whose name contains this: roadmap, assignment, coverage, fields2cover, swarm, steps,
+    /// worst-case, fidelity, boards.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
     /// The built C++ baseline for the roadmap rows; without it they are skipped.
@@ -36,6 +37,9 @@ struct Args {
     /// A checkout of cvar-upm/multi_uav_planning_binpat for the coverage rows; without it most are skipped.
     #[arg(long, value_name = "DIR")]
     binpat: Option<PathBuf>,
+    /// A checkout of Fields2Cover/Fields2Cover for its rows; without it they are skipped.
+    #[arg(long, value_name = "DIR")]
+    fields2cover: Option<PathBuf>,
     /// What the steps are counted under: only the work itself, with this many neighbours.
     #[arg(long, value_name = "N", hide = true)]
     steps_beside: Option<usize>,
@@ -59,6 +63,9 @@ fn main() -> Result<()> {
     }
     if "coverage".contains(&args.only) {
         rows.extend(coverage::rows(args.binpat.as_deref())?);
+    }
+    if "fields2cover".contains(&args.only) {
+        rows.extend(fields2cover::rows(args.fields2cover.as_deref())?);
     }
     if "swarm".contains(&args.only) {
         rows.extend(swarm::rows()?);
