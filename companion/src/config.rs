@@ -38,6 +38,8 @@ pub struct Config<const V: usize> {
     pub cruise_mps: f32,
     /// Speed of the climb, m/s.
     pub climb_mps: f32,
+    /// Speed of the descent, m/s.
+    pub descend_mps: f32,
     /// Acceleration and braking, m/s².
     pub accel_mps2: f32,
     /// Radius of the vehicle, metres.
@@ -100,6 +102,7 @@ impl<const V: usize> Config<V> {
             mission_crc: 0,
             cruise_mps: 2.0,
             climb_mps: 1.0,
+            descend_mps: 1.0,
             accel_mps2: 1.5,
             radius_m: 0.3,
             required_clearance_m: 0.8,
@@ -154,9 +157,10 @@ mod tests {
 
     type Number = fn(&mut Config<4>) -> &mut f32;
     /// Every number that must be positive.
-    const POSITIVE: [Number; 8] = [
+    const POSITIVE: [Number; 9] = [
         |c| &mut c.cruise_mps,
         |c| &mut c.climb_mps,
+        |c| &mut c.descend_mps,
         |c| &mut c.accel_mps2,
         |c| &mut c.radius_m,
         |c| &mut c.required_clearance_m,

@@ -51,6 +51,7 @@ mod guidance;
 pub mod link;
 pub mod margins;
 pub mod mission;
+pub mod planner;
 pub mod services;
 pub mod storage;
 pub mod swarm;

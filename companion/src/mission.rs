@@ -9,6 +9,7 @@ mod guard;
 mod row;
 mod state;
 pub mod table;
+pub(crate) mod task;
 pub(crate) mod waits;
 
 use self::table::TABLE;

@@ -55,8 +55,8 @@ pub(crate) struct Services {
     /// Those in use where there is no flash.
     parameters: Parameters,
     ftp: Ftp,
-    /// Cruise and climb of the mission, m/s, which parameters may limit.
-    nominal_mps: [f32; 2],
+    /// Cruise, climb and descent of the mission, m/s, which parameters may limit.
+    nominal_mps: [f32; 3],
     /// A parameter was set that is not in use yet.
     untuned: bool,
 }
@@ -64,7 +64,7 @@ pub(crate) struct Services {
 impl Services {
     /// Without a flash.
     pub(crate) fn new<const V: usize>(config: &Config<V>) -> Self {
-        let nominal_mps = [config.cruise_mps, config.climb_mps];
+        let nominal_mps = [config.cruise_mps, config.climb_mps, config.descend_mps];
         let (parameters, ftp) = (Parameters::default(), Ftp::default());
         Self { store: None, parameters, ftp, nominal_mps, untuned: false }
     }
@@ -82,7 +82,7 @@ impl Services {
     /// Puts the parameters to use.
     pub(crate) fn tune<const V: usize>(&mut self, config: &mut Config<V>) {
         self.untuned = false;
-        [config.cruise_mps, config.climb_mps] = self.nominal_mps;
+        [config.cruise_mps, config.climb_mps, config.descend_mps] = self.nominal_mps;
         self.parameters().apply(config);
     }
 

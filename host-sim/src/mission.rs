@@ -1,5 +1,6 @@
 //! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request every companion plans.
 
+mod coverage;
 mod places;
 
 use std::sync::OnceLock;
@@ -7,15 +8,17 @@ use std::time::Instant;
 
 use anyhow::{anyhow, bail};
 use companion::PlanFailure;
-use companion::storage::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{
+    self, Block, MissionGoal, MissionHeader, MissionVehicle, MissionView,
+};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
-use planner_core::flight::{PathError, VehiclePlan};
+use planner_core::flight::{PathError, Task, VehiclePlan};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use planner_core::plan::{self, Mode, Objective, PlanError, PlanRequest, VehicleTask};
 use planner_core::roadmap::RoadmapView;
 use planner_core::schedule::{ScheduleConfig, ScheduleError};
-use planner_core::search::SearchWorkspace;
+use planner_core::search::{SearchError, SearchWorkspace};
 
 use crate::capacity::{Board, DeskCompanion, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::map::{self, ClearanceField, VoxelMap};
@@ -112,6 +115,9 @@ impl Mission {
         board: Option<&'static Board>,
         progress: &Progress,
     ) -> anyhow::Result<Self> {
+        if scenario.area.is_some() {
+            return coverage::prepare(scenario, board);
+        }
         let mut timing = Timing::default();
         let begun = Instant::now();
         let stage = progress.stage("map");
@@ -144,23 +150,47 @@ impl Mission {
         let roadmap_file = roadmap::encode(&roadmap, &header)?;
         timing.roadmap_parts.file_s = encoding.elapsed().as_secs_f64();
         let mut mission = Self {
-            scenario,
-            map,
             goals,
             roadmap,
             roadmap_file,
-            mission_file: Vec::new(),
-            tasks,
             descents_m,
-            schedule,
             timing,
-            board,
-            clearance_field: OnceLock::new(),
+            ..Self::new(scenario, map, tasks, schedule, board)
         };
-        mission.mission_file = mission.encode()?;
+        let goals: Vec<_> = mission
+            .goals
+            .iter()
+            .zip(&mission.descents_m)
+            .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
+            .collect();
+        mission.mission_file = mission.encode(&Block::Goals(&goals))?;
         mission.timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
         Ok(mission)
+    }
+
+    /// One without goals, roadmap and files.
+    fn new(
+        scenario: Scenario,
+        map: VoxelMap,
+        tasks: Vec<VehicleTask>,
+        schedule: ScheduleConfig,
+        board: Option<&'static Board>,
+    ) -> Self {
+        Self {
+            scenario,
+            map,
+            goals: Vec::new(),
+            roadmap: Roadmap { nodes: Vec::new(), edges: Vec::new(), heights_m: Vec::new() },
+            roadmap_file: Vec::new(),
+            mission_file: Vec::new(),
+            tasks,
+            descents_m: Vec::new(),
+            schedule,
+            timing: Timing::default(),
+            board,
+            clearance_field: OnceLock::new(),
+        }
     }
 
     /// The map's distance field, made when first asked for: only a flight needs it.
@@ -171,6 +201,11 @@ impl Mission {
     /// Plans the whole swarm as every companion does.
     pub fn plan(&mut self) -> anyhow::Result<Box<SwarmPlan>> {
         let begun = Instant::now();
+        if self.scenario.area.is_some() {
+            let plan = self.plan_coverage()?;
+            self.timing.plan_s = begun.elapsed().as_secs_f64();
+            return Ok(plan);
+        }
         let view = self.view();
         let request = PlanRequest {
             vehicles: &self.tasks,
@@ -237,10 +272,10 @@ impl Mission {
 
     /// Goals that no vehicle flies to, and vehicles that no goal is left for.
     pub fn left(&self, plan: &SwarmPlan) -> Left {
-        let flown = |goal: &u16| plan.flights.iter().any(|f| f.goal == Some(*goal));
+        let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
         Left {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),
-            vehicles: plan.flights.iter().filter(|f| f.goal.is_none()).map(|f| f.id).collect(),
+            vehicles: plan.flights.iter().filter(|f| !f.task.flies()).map(|f| f.id).collect(),
             reasons: Vec::new(),
         }
     }
@@ -273,6 +308,9 @@ impl Mission {
         request: &DetourRequest,
         obstacles: &mut [KeepOff],
     ) -> Result<Box<OwnPlan>, DetourError> {
+        if self.roadmap_file.is_empty() {
+            return Err(DetourError::Search(SearchError::NoPath));
+        }
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();
@@ -327,10 +365,10 @@ impl Mission {
         MissionView::parse(&self.mission_file).expect("we wrote it ourselves")
     }
 
-    fn encode(&self) -> anyhow::Result<Vec<u8>> {
+    fn encode(&self, block: &Block<'_>) -> anyhow::Result<Vec<u8>> {
         let scenario = &self.scenario;
         let header = MissionHeader {
-            roadmap_crc: crc(&self.roadmap_file),
+            roadmap_crc: self.roadmap_file.last_chunk().map_or(0, |crc| u32::from_le_bytes(*crc)),
             mode: planner_mode(&scenario.mission),
             method: scenario.deconfliction.method,
             origin: scenario.map.origin,
@@ -351,22 +389,11 @@ impl Mission {
                 speed_max_mps: vehicle.speed_max_mps,
             })
             .collect();
-        let goals: Vec<_> = self
-            .goals
-            .iter()
-            .zip(&self.descents_m)
-            .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
-            .collect();
-        let mut bytes = vec![0; mission_file::encoded_len(vehicles.len(), goals.len())];
-        mission_file::write(&header, &vehicles, &goals, &mut bytes)
+        let mut bytes = vec![0; block.file_len(vehicles.len())];
+        mission_file::write(&header, &vehicles, block, &mut bytes)
             .map_err(|e| anyhow!("no mission file: {}: {e}", scenario.path))?;
         Ok(bytes)
     }
-}
-
-/// What the file ends with.
-fn crc(roadmap_file: &[u8]) -> u32 {
-    u32::from_le_bytes(*roadmap_file.last_chunk().expect("we wrote it ourselves"))
 }
 
 fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {

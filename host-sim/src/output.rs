@@ -29,9 +29,9 @@ pub fn planned_page(
             id: vehicle.id,
             radius_m: vehicle.radius_m,
             color: None,
-            goal_index: flight.goal.map(usize::from),
+            goal_index: flight.task.goal().map(usize::from),
             start: vehicle.start,
-            goal: flight.goal.map(|goal| mission.goals[usize::from(goal)]),
+            goal: flight.task.goal().map(|goal| mission.goals[usize::from(goal)]),
             planned: flight.path.waypoints().iter().map(|w| w.position).collect(),
             track: Vec::new(),
         })

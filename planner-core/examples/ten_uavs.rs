@@ -54,7 +54,7 @@ fn main() {
     plan::plan_swarm(&view, &request, &mut workspace, &mut swarm).expect("every goal can be reached");
     for (i, flight) in swarm.flights.iter().enumerate() {
         plan::vehicle_plan(&swarm, i, &schedule, &mut workspace.schedule, &mut own).expect("the gates fit");
-        let (id, goal, length_m, gates) = (flight.id, own.goal, own.path.length_m(), own.gates.len());
+        let (id, goal, length_m, gates) = (flight.id, own.task.goal(), own.path.length_m(), own.gates.len());
         println!("{id:2}: goal {goal:?}, {length_m:.1} m, {gates} gates, departs at {:.1} s", own.depart_s);
     }
     println!("plan CRC-32 {:08x}, {:.1} m in all", swarm.crc, swarm.total_m());

@@ -15,6 +15,7 @@
 //! | `powell.rs` | POWELL-BINPAT: the shares that make the largest cost least |
 //! | `exact.rs` | the least largest cost of all contiguous divisions |
 //! | `bound.rs` | a lower bound on it |
+//! | `flights.rs` | routes as flights of the swarm: paths, pictures, order |
 //! | `divide.rs` | what is left after a loss, divided among the rest |
 //!
 //! Places are metres, east and north, in the mission frame: [`Flat`]. A lane is two points; its waypoints follow from
@@ -25,6 +26,7 @@ pub mod bound;
 pub mod divide;
 pub mod exact;
 mod flat;
+pub mod flights;
 pub mod footprint;
 mod intervals;
 mod lanes;

@@ -11,7 +11,7 @@
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
-use crate::flight::{Path, PathError, VehiclePlan};
+use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::geometry::segments_distance_sq;
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::{self, SearchError, SearchWorkspace};
@@ -313,7 +313,7 @@ pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), DetourError> {
     plan(view, request, obstacles, ws, nodes, &mut out.path)?;
-    out.goal = Some(request.goal);
+    out.task = Task::Goto(request.goal);
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();
     out.plan_crc = 0;

@@ -2,9 +2,12 @@
 //!
 //! They hold data and answer for geometry alone. Metres, seconds, ENU in the mission frame; arc length runs along the path.
 
+mod photographs;
+
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+pub use self::photographs::{Look, Photographs, Shots, Trigger};
 use crate::Point;
 
 /// A corner of a path.
@@ -42,6 +45,21 @@ impl<const W: usize> Path<W> {
     /// A path without waypoints.
     pub const fn new() -> Self {
         Self { waypoints: Vec::new() }
+    }
+
+    /// Index of its last waypoint; none of an empty path.
+    pub fn last(&self) -> Option<usize> {
+        self.waypoints.len().checked_sub(1)
+    }
+
+    /// Labels every waypoint without a stop: the first at `first_s`, each other one `seconds` of its leg later.
+    pub fn label_by(&mut self, first_s: f32, seconds: impl Fn(&Point, &Point) -> f32) {
+        let mut before: Option<(Point, f32)> = None;
+        for waypoint in &mut self.waypoints {
+            waypoint.at_s = before.map_or(first_s, |(from, at_s)| at_s + seconds(&from, &waypoint.position));
+            waypoint.leave_s = waypoint.at_s;
+            before = Some((waypoint.position, waypoint.at_s));
+        }
     }
 
     /// Appends a waypoint; a leg too short to count is dropped, keeping the smaller clearance of the two.
@@ -157,13 +175,49 @@ impl<const W: usize> Path<W> {
 /// A vehicle that stands reports its progress at most this wrong, metres.
 pub const PROGRESS_ERROR_M: f32 = 0.25;
 
+/// What a vehicle does on its flight.
+///
+/// Every task's flight is one path: what differs is what happens along it, which the task says by arc length.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Task {
+    /// It stays on its pad.
+    #[default]
+    Stay,
+    /// It flies to the goal with this index and lands below it.
+    Goto(u16),
+    /// It photographs along lanes and lands at the end of its path.
+    Photograph(Photographs),
+}
+
+impl Task {
+    /// Whether it leaves its pad.
+    pub fn flies(&self) -> bool {
+        *self != Self::Stay
+    }
+
+    /// Index of the goal flown to.
+    pub fn goal(&self) -> Option<u16> {
+        match self {
+            Self::Goto(goal) => Some(*goal),
+            Self::Stay | Self::Photograph(_) => None,
+        }
+    }
+}
+
+impl From<Option<u16>> for Task {
+    /// To the goal; without one it stays.
+    fn from(goal: Option<u16>) -> Self {
+        goal.map_or(Self::Stay, Self::Goto)
+    }
+}
+
 /// One vehicle's way from its pad to the ground below its goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flight<const W: usize> {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// Index of the goal flown to; `None` stays on its pad.
-    pub goal: Option<u16>,
+    /// What it does.
+    pub task: Task,
     /// Air part, start to goal, labelled with seconds after take-off.
     pub path: Path<W>,
     /// Height of the start above the pad, metres.
@@ -198,8 +252,8 @@ pub struct Gate {
 /// What one companion needs of the swarm's plan.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehiclePlan<const W: usize, const G: usize> {
-    /// Index of the goal flown to; `None` when none is left for this vehicle.
-    pub goal: Option<u16>,
+    /// What the vehicle does.
+    pub task: Task,
     /// Air part, start to goal.
     pub path: Path<W>,
     /// Height of the start above the pad, metres.
@@ -218,7 +272,7 @@ impl<const W: usize, const G: usize> VehiclePlan<W, G> {
     /// One that stays on its pad. All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
         Self {
-            goal: None,
+            task: Task::Stay,
             path: Path::new(),
             climb_m: 0.0,
             descent_m: 0.0,

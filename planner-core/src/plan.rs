@@ -137,7 +137,8 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
-        let flight = Flight { id, goal, path, climb_m, descent_m, depart_s: 0.0, piece_m: PIECE_M };
+        let flight =
+            Flight { id, task: goal.into(), path, climb_m, descent_m, depart_s: 0.0, piece_m: PIECE_M };
         // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
@@ -147,7 +148,7 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
         schedule::merged_m(&request.schedule, &out.flights, index, request.gates_most, &mut ws.schedule)
             .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
-    out.crc = crc(&request.schedule, out);
+    out.seal(&request.schedule);
     Ok(())
 }
 
@@ -160,13 +161,20 @@ pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), ScheduleError> {
     let flight = plan.flights.get(index).ok_or(ScheduleError::BadIndex)?;
-    out.goal = flight.goal;
+    out.task = flight.task;
     out.path = flight.path.clone();
     out.climb_m = flight.climb_m;
     out.descent_m = flight.descent_m;
     out.depart_s = flight.depart_s;
     out.plan_crc = plan.crc;
     schedule::gates(cfg, &plan.flights, index, ws, &mut out.gates)
+}
+
+impl<const V: usize, const W: usize> SwarmPlan<V, W> {
+    /// Notes the CRC of what it holds.
+    pub(crate) fn seal(&mut self, cfg: &ScheduleConfig) {
+        self.crc = crc(cfg, self);
+    }
 }
 
 /// CRC-32 over all that gates follow from.
@@ -183,7 +191,7 @@ fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V,
     }
     for flight in &plan.flights {
         digest.update(&[flight.id]);
-        digest.update(&flight.goal.unwrap_or(u16::MAX).to_le_bytes());
+        digest.update(&flight.task.goal().unwrap_or(u16::MAX).to_le_bytes());
         digest.update(&(flight.path.waypoints().len() as u32).to_le_bytes());
     }
     digest.finalize()

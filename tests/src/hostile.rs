@@ -11,7 +11,7 @@ use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, Ro
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
-use planner_core::flight::Path;
+use planner_core::flight::{Path, Task};
 use planner_core::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
@@ -93,7 +93,7 @@ fn plan() -> Plan16 {
         path.push(point, 1.5).expect("a short path");
     }
     let gates = heapless::Vec::new();
-    Plan16 { goal: Some(0), path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
+    Plan16 { task: Task::Goto(0), path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
 type Plan16 = planner_core::flight::VehiclePlan<16, 8>;

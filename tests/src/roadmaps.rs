@@ -11,7 +11,7 @@ use std::collections::{BinaryHeap, VecDeque};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec as Few;
 use planner_core::Point;
-use planner_core::flight::{Flight, Path};
+use planner_core::flight::{Flight, Path, Task};
 use planner_core::frames::Geodetic;
 use planner_core::prm::squared_length;
 use planner_core::roadmap::{
@@ -123,7 +123,7 @@ impl Forger {
         let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
         let mut flight = Flight::<NODES> {
             id: 1,
-            goal: Some(0),
+            task: Task::Goto(0),
             path: Path::new(),
             climb_m: 1.5,
             descent_m: 1.5,

@@ -281,7 +281,7 @@ pub fn place(flight: &Flight<WAYPOINTS>, along_m: f32) -> Point {
 
 /// Where its flight ends, metres along its path.
 pub fn end_m(flight: &Flight<WAYPOINTS>) -> f32 {
-    if flight.goal.is_some() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
+    if flight.task.flies() { flight.path.length_m() + flight.descent_m } else { -flight.climb_m }
 }
 
 /// A number from the environment.

@@ -4,8 +4,8 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::shared_data;
 use host_sim::coverage::Planned;
 use host_sim::coverage::check::{Findings, check_plan};
-use host_sim::scenario::coverage::{Coverage, Method};
-use host_sim::scenario::parse_coverage;
+use host_sim::scenario::coverage::Method;
+use host_sim::scenario::{self, Scenario};
 use planner_core::coverage::Flat;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
@@ -16,7 +16,7 @@ fn areas() -> u64 {
     std::env::var("FLOCKMATE_AREAS").ok().and_then(|n| n.parse().ok()).unwrap_or(1000)
 }
 
-fn findings(scenario: &Coverage, method: Method) -> Result<Findings, String> {
+fn findings(scenario: &Scenario, method: Method) -> Result<Findings, String> {
     let planned = Planned::new(scenario, method).map_err(|error| format!("{error:#}"))?;
     Ok(check_plan(&planned))
 }
@@ -27,7 +27,7 @@ fn random_areas_are_covered() {
     let outcome = |seed: u64| -> Result<bool, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let text = areas::scenario(&mut random, Shape::Any, 1 + (seed % 10) as usize);
-        let Ok(scenario) = parse_coverage(&text, "random") else { return Ok(false) };
+        let Ok(scenario) = scenario::parse(&text, "random") else { return Ok(false) };
         let findings = match findings(&scenario, METHODS[(seed % 3) as usize]) {
             Ok(findings) => findings,
             Err(error) if error.contains("no-fly zone") => return Ok(false),
@@ -54,7 +54,7 @@ fn random_areas_are_covered() {
 fn costs(seed: u64) -> Option<[f32; 4]> {
     let mut random = Pcg32::seed_from_u64(seed);
     let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
-    let scenario = parse_coverage(&text, "random").ok()?;
+    let scenario = scenario::parse(&text, "random").ok()?;
     let cost = |method| Planned::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
     let bound_s = Planned::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
     let costs = [
@@ -102,7 +102,7 @@ fn brute_force(planned: &Planned<'_>, from: u32, vehicles: &[usize], layers: &[u
     }
     let distance = |a: &Flat, b: &Flat| f64::from(a.x - b.x).hypot(f64::from(a.y - b.y));
     let place = |number: u32| planned.tracks.waypoint(number).expect("a waypoint");
-    let heights = planned.scenario.area.heights;
+    let heights = planned.wanted.heights;
     let mut best = f64::INFINITY;
     for (i, &v) in vehicles.iter().enumerate() {
         for (j, &layer) in layers.iter().enumerate() {
@@ -140,7 +140,7 @@ fn exact_is_what_trying_everything_finds() {
             let extra = format!("id = {id}\nclimb_mps = {:.2}\ndescend_mps = {:.2}\n", speeds[0], speeds[1]);
             text = text.replace(&format!("id = {id}\n"), &extra);
         }
-        let Ok(scenario) = parse_coverage(&text, "random") else { continue };
+        let Ok(scenario) = scenario::parse(&text, "random") else { continue };
         let Ok(planned) = Planned::new(&scenario, Method::Exact) else { continue };
         if !(2..=12).contains(&planned.tracks.waypoint_count()) {
             continue;
@@ -180,7 +180,7 @@ fn real_areas_are_covered() {
             text +=
                 &format!("[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{}, 0.0, 0.0]\n", 3 * id);
         }
-        let scenario = parse_coverage(&text, name).unwrap_or_else(|error| panic!("{error}"));
+        let scenario = scenario::parse(&text, name).unwrap_or_else(|error| panic!("{error}"));
         for method in [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat, Method::Exact] {
             let planned = Planned::new(&scenario, method).unwrap_or_else(|error| panic!("{name}: {error:#}"));
             let found = check_plan(&planned);
@@ -208,7 +208,7 @@ fn files_without_an_area_are_refused_by_name() {
     ] {
         let Some(path) = shared_data(name) else { return };
         let text = real(&path, "lane_m = 10.0") + "[[vehicles]]\nid = 1\nstart = [0, 0, 0]\n";
-        let error = parse_coverage(&text, name).expect_err(name);
+        let error = scenario::parse(&text, name).expect_err(name);
         assert!(error.why.contains(why), "{name}: {error}");
     }
 }
@@ -263,7 +263,7 @@ fn bad_areas_are_refused_by_name_or_covered() {
             "[area]\npolygon = {polygon}\n{more}\nlane_m = 10.0\nwaypoint_m = 8.0\ncamera = {{ fov_deg = 73.7 }}\n\
              height_m = 15.0\n[[vehicles]]\nid = 1\nstart = [-30, -30, 0]\n[[vehicles]]\nid = 2\nstart = [-30, -40, 0]\n"
         );
-        let planned = parse_coverage(&text, "bad").map_err(anyhow::Error::new);
+        let planned = scenario::parse(&text, "bad").map_err(anyhow::Error::new);
         let found = match &planned {
             Ok(scenario) => findings(scenario, Method::PowellBinpat),
             Err(error) => Err(error.to_string()),

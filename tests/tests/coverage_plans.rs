@@ -7,8 +7,8 @@ use host_sim::autopilot::{Autopilot, Config, Personality, Photo};
 use host_sim::coverage::Planned;
 use host_sim::coverage::export::{self, Item};
 use host_sim::coverage::flight::{Act, Stop};
+use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
-use host_sim::scenario::parse_coverage;
 use planner_core::Point;
 
 /// A waypoint is passed within 2 m across, and by what is flown in a step.
@@ -110,7 +110,7 @@ impl Client {
 
 /// Flies one vehicle's plan and returns its pictures.
 fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Personality) -> Vec<Photo> {
-    let origin = planned.scenario.area.origin;
+    let origin = planned.wanted.origin;
     let start = stops[0].position;
     let config = Config {
         personality,
@@ -165,7 +165,7 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
 fn each_plan_is_flown_and_photographs_what_was_planned() {
     for (name, personality) in [("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)] {
         for trigger in ["waypoint", "distance", "none"] {
-            let scenario = parse_coverage(&scenario(name, trigger), "plans").expect("a scenario");
+            let scenario = scenario::parse(&scenario(name, trigger), "plans").expect("a scenario");
             let planned = Planned::new(&scenario, Method::Binpat).expect("a plan");
             let flights = planned.flights();
             assert_eq!(flights.len(), 2);

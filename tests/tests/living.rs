@@ -5,7 +5,7 @@ use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
 use host_sim::autopilot::{self, Autopilot, Mode, Personality, ardupilot};
 use planner_core::Point;
-use planner_core::flight::{Path, VehiclePlan};
+use planner_core::flight::{Path, Task, VehiclePlan};
 
 const STEP_US: u64 = 4_000;
 const START: Point = Point::new(0.0, 0.0, 2.0);
@@ -182,7 +182,7 @@ fn plan() -> VehiclePlan<16, 8> {
     path.push(START, 2.0).unwrap();
     path.push(GOAL, 2.0).unwrap();
     let gates = heapless::Vec::new();
-    VehiclePlan { goal: Some(0), path, climb_m: 1.7, descent_m: 1.7, depart_s: 0.0, gates, plan_crc: 5 }
+    VehiclePlan { task: Task::Goto(0), path, climb_m: 1.7, descent_m: 1.7, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
 #[test]

@@ -212,7 +212,15 @@ fn plan() -> VehiclePlan<16, 8> {
         path.push(point, 1.2).unwrap();
     }
     let gates = heapless::Vec::new();
-    VehiclePlan { goal: Some(0), path, climb_m: 1.7, descent_m: 2.7, depart_s: 0.0, gates, plan_crc: 5 }
+    VehiclePlan {
+        task: planner_core::flight::Task::Goto(0),
+        path,
+        climb_m: 1.7,
+        descent_m: 2.7,
+        depart_s: 0.0,
+        gates,
+        plan_crc: 5,
+    }
 }
 
 fn below(rng: &mut Pcg32, end: usize) -> usize {

@@ -129,7 +129,7 @@ fn fly(seed: u64) -> Errors {
             if telemetry.position_at == Some(Instant::from_micros(now_us)) {
                 errors.known_m = errors.known_m.max((telemetry.position - truth).norm());
             }
-            let goal = mission.goals[usize::from(plan.flights[i].goal.expect("a goal for each"))];
+            let goal = mission.goals[usize::from(plan.flights[i].task.goal().expect("a goal for each"))];
             nearest_m[i] = nearest_m[i].min((truth - goal).norm());
         }
         ground_station.step(now_us, &mut members, &mut radio, &places);

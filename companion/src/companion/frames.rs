@@ -64,6 +64,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let change = self.telemetry.handle(self.now, &self.config.origin, frame);
                 if let Some(ack) = self.telemetry.ack.take() {
                     self.requests.handle_ack(&ack, own, self.mission.state(), self.now, &mut self.links);
+                    self.mission.handle_ack(&ack, &mut self.links);
                 }
                 self.requests.watch(self.mission.state(), &self.telemetry);
                 if change == Change::OriginDoubted {

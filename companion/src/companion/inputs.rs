@@ -67,7 +67,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.failure().is_some(),
             roadmap_bad: self.mission.failure() == Some(PlanFailure::NoRoadmap),
-            has_goal: self.mission.plan().is_some_and(|plan| plan.goal.is_some()),
+            has_goal: self.mission.plan().is_some_and(|plan| plan.task.flies()),
             at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
             imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
             vague: self.mission.vague_for(now),

@@ -7,6 +7,7 @@ use crate::events::{Event, Link};
 use crate::guidance::Scene;
 use crate::link::Fresh;
 use crate::margins;
+use crate::mission::task::Along;
 use crate::mission::{self, Action, Row, State};
 use crate::storage::store::Erasing;
 use crate::swarm::detour::Aim;
@@ -38,6 +39,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.name_who_never_starts();
         self.look_around();
         self.run_table();
+        self.step_task();
         let situation = self.situation();
         if self.requests.poll(&self.telemetry, &situation, &mut self.timers, &mut self.links) {
             self.guidance.tune(&self.config, self.requests.limits());
@@ -46,6 +48,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
         let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
         self.timers.repeat(Timer::Step, now, every);
+    }
+
+    /// Lets the task command what it wants at this place.
+    fn step_task(&mut self) {
+        let state = self.mission.state();
+        let off_plan = self.guidance.returning || self.guidance.aside || self.detours.is_flying();
+        let along = Along {
+            progress_m: self.guidance.progress_m(state, &self.scene()),
+            follows: state == State::Follow && !off_plan,
+        };
+        self.mission.step_task(along, self.now, &mut self.links);
     }
 
     /// Names a vehicle that never starts while this one waits for it.

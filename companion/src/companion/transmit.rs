@@ -17,6 +17,9 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
+/// Bit of a setpoint's mask: it says nothing of the heading.
+const YAW_IGNORED: u16 = 0x400;
+
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
@@ -103,15 +106,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn setpoint(&self) -> Option<SET_POSITION_TARGET_LOCAL_NED_DATA> {
         let still = Point::zeros();
         let kind = self.kind();
-        let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, kind.stop_mask());
-        let (position, velocity, acceleration, mask) =
+        let stop = |velocity: &Point| (still, frames::swap_enu_ned(velocity), still, None, kind.stop_mask());
+        let (position, velocity, acceleration, heading, mask) =
             match self.guidance.setpoint(self.mission.state(), &self.scene()) {
                 Setpoint::None => return None,
                 Setpoint::Stop(velocity) => stop(&velocity),
-                Setpoint::Move(position, velocity, acceleration) => {
+                Setpoint::Move(position, velocity, acceleration, heading) => {
                     self.telemetry.to_ned(&self.config.origin, &position).map_or(stop(&still), |ned| {
                         let velocity = frames::swap_enu_ned(&velocity);
-                        (ned, velocity, frames::swap_enu_ned(&acceleration), kind.move_mask())
+                        (ned, velocity, frames::swap_enu_ned(&acceleration), heading, kind.move_mask())
                     })
                 }
             };
@@ -126,7 +129,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             afx: acceleration.x,
             afy: acceleration.y,
             afz: acceleration.z,
-            type_mask: PositionTargetTypemask::from_bits_truncate(mask),
+            // Clockwise from north.
+            yaw: heading.map_or(0.0, |heading| core::f32::consts::FRAC_PI_2 - heading),
+            type_mask: PositionTargetTypemask::from_bits_truncate(match heading {
+                Some(_) => mask & !YAW_IGNORED,
+                None => mask,
+            }),
             target_system: self.config.system_id,
             target_component: crate::AUTOPILOT,
             coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,

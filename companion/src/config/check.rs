@@ -20,6 +20,7 @@ impl<const V: usize> Config<V> {
         let positive = [
             self.cruise_mps,
             self.climb_mps,
+            self.descend_mps,
             self.accel_mps2,
             self.radius_m,
             self.required_clearance_m,

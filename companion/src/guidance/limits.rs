@@ -55,7 +55,7 @@ impl Limits {
         Self {
             speed_mps: fminf(config.cruise_mps, least(&[Limit::Speed])),
             climb_mps: fminf(config.climb_mps, least(&[Limit::Climb])),
-            descend_mps: fminf(config.climb_mps, least(&[Limit::Descend])),
+            descend_mps: fminf(config.descend_mps, least(&[Limit::Descend])),
             accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
             most_mps2: [across_mps2, vertical_mps2].map(|most| fminf(CORNER_SHARE * accel_mps2, most)),

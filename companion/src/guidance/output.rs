@@ -5,7 +5,7 @@ use planner_core::Point;
 use super::setpoint::Setpoint;
 use super::{Guidance, Scene};
 use crate::autopilot::Kind;
-use crate::mission::State;
+use crate::mission::{State, task};
 
 impl Guidance {
     /// The setpoint of this moment.
@@ -31,6 +31,7 @@ impl Guidance {
         let velocity = door.velocity() + door.acceleration() * lead_s;
         let most = door.velocity().norm().max(door.raw_speed_mps());
         let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
-        Setpoint::Move(door.position(), velocity, self.sent_acceleration)
+        let heading = scene.plan.and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_m));
+        Setpoint::Move(door.position(), velocity, self.sent_acceleration, heading)
     }
 }

@@ -17,8 +17,9 @@ const HOLD_MOST_MPS2: f32 = 1.5;
 pub enum Setpoint {
     /// Nothing: the state streams no setpoints.
     None,
-    /// Be there, with this velocity and acceleration: ENU metres, m/s, m/s².
-    Move(Point, Point, Point),
+    /// Be there, with this velocity and acceleration: ENU metres, m/s, m/s². And look there, radians from east to the left,
+    /// where the task says so.
+    Move(Point, Point, Point, Option<f32>),
     /// Brake with this velocity, wherever that is: no position is known to refer to.
     Stop(Point),
 }

@@ -63,6 +63,15 @@ pub enum Outgoing {
     },
     /// COMPONENT_ARM_DISARM.
     Arm(bool),
+    /// DO_SET_CAM_TRIGG_DIST: pictures so far apart, metres, 0 for none; and whether one is taken at once.
+    TriggerEvery {
+        /// From one to the next.
+        step_m: f32,
+        /// A picture now.
+        at_once: bool,
+    },
+    /// DO_DIGICAM_CONTROL: a picture now.
+    Picture,
     /// COMMAND_ACK.
     Ack {
         /// The command answered.
@@ -146,6 +155,13 @@ impl Outbox {
             Outgoing::TakeOff(height_m) => {
                 COMMAND_LONG_DATA { param7: height_m, ..command(MavCmd::MAV_CMD_NAV_TAKEOFF, 0.0, 0.0, 0.0) }
             }
+            Outgoing::TriggerEvery { step_m, at_once } => {
+                command(MavCmd::MAV_CMD_DO_SET_CAM_TRIGG_DIST, step_m, 0.0, f32::from(u8::from(at_once)))
+            }
+            Outgoing::Picture => COMMAND_LONG_DATA {
+                param5: 1.0,
+                ..command(MavCmd::MAV_CMD_DO_DIGICAM_CONTROL, 0.0, 0.0, 0.0)
+            },
             Outgoing::ReadParameter(name) => {
                 let read = PARAM_REQUEST_READ_DATA {
                     param_index: -1,

@@ -4,8 +4,11 @@ use planner_core::Point;
 use planner_core::flight::Path;
 use planner_core::flight::VehiclePlan;
 
+use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
+use crate::link::Links;
 use crate::link::commands::{self, Command, Pending};
+use crate::mission::task::{Along, Tasks};
 use crate::mission::waits::Waits;
 use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
 use crate::time::{Duration, Instant};
@@ -33,6 +36,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     /// Since when the estimate is worse than the margin leaves at a crawl.
     vague_since: Option<Instant>,
     waits: Waits,
+    tasks: Tasks,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
@@ -51,6 +55,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             failure: None,
             vague_since: None,
             waits: Waits::default(),
+            tasks: Tasks::default(),
         }
     }
 
@@ -174,6 +179,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// A plan is requested: there is none, and no failure.
     pub(crate) fn forget_plan(&mut self) {
         (self.plan, self.failure) = (None, None);
+        self.tasks.reset();
     }
 
     /// A way around is requested: the plan stays until it comes.
@@ -187,6 +193,18 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             true => self.plan = Some(plan.clone()),
             false => self.failure = Some(PlanFailure::Invalid),
         }
+    }
+
+    /// Commands what the task wants at this place of the path.
+    pub(crate) fn step_task(&mut self, along: Along, now: Instant, links: &mut Links) {
+        if let Some(plan) = &self.plan {
+            self.tasks.step(&plan.task, &plan.path, along, now, links);
+        }
+    }
+
+    /// Takes the autopilot's answer to a command of the task's.
+    pub(crate) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
+        self.tasks.handle_ack(ack, links);
     }
 
     /// What was requested did not come.
@@ -219,6 +237,6 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
         let begins = first.is_some_and(|w| (w.position - place).norm() < BEGINS_M);
-        finite && (begins || plan.goal.is_none())
+        finite && (begins || !plan.task.flies())
     }
 }

@@ -117,6 +117,7 @@ impl Parameters {
         config.accel_mps2 = self.values[ACCEL];
         config.battery_low_percent = self.values[BATT_LOW] as i8;
         config.climb_mps = libm::fminf(config.climb_mps, self.values[CLIMB_MAX]);
+        config.descend_mps = libm::fminf(config.descend_mps, self.values[CLIMB_MAX]);
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
         config.estimate_m = self.values[EST_M];
         config.start_tolerance_m = self.values[START_TOL];

@@ -17,33 +17,35 @@ use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
 use planner_core::schedule::ScheduleConfig;
 
+use self::coverage::{CoverageParts, CoverageView};
+use self::numbers::{MAX_SPEED_MPS, f32_at, in_range, point_at, positive, put, u16_at, u32_at};
 use crate::config::{Config, GROUND_STATIONS, RosterEntry, USUAL_GROUND_STATIONS, holds};
 
+pub mod coverage;
 mod error;
+mod numbers;
+mod records;
 pub use error::MissionError;
+pub use records::{GOAL_LEN, MissionGoal, MissionVehicle, NO_GOAL, VEHICLE_LEN};
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
-/// Version this code writes; it also reads version 1, which names no ground station and means 255.
-pub const VERSION: u16 = 2;
-/// The version before.
+/// Version this code writes. It also reads version 2, which has goals alone, and version 1, which names no ground station
+/// and means 255.
+pub const VERSION: u16 = 3;
+/// The version before: no kind.
+const WITHOUT_KIND: u16 = 2;
+/// The first one.
 const WITHOUT_GROUND_STATIONS: u16 = 1;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
-/// Bytes of a vehicle.
-pub const VEHICLE_LEN: usize = 32;
-/// Bytes of a goal.
-pub const GOAL_LEN: usize = 16;
-/// The vehicle's goal that means: none of its own.
-pub const NO_GOAL: u16 = u16::MAX;
-
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 const CRC_LEN: usize = 4;
 /// Flag: the six numbers of the geofence count.
-const FENCED: u16 = 1;
-/// Fastest speed a mission may name, m/s.
-const MAX_SPEED_MPS: f32 = 1000.0;
-
+const FENCED: u8 = 1;
+/// Kinds of mission, in the byte after the flags.
+const GOALS: u8 = 0;
+const COVERAGE: u8 = 1;
 /// What all vehicles of a mission share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionHeader {
@@ -65,37 +67,6 @@ pub struct MissionHeader {
     pub geofence: Option<(Point, Point)>,
     /// System ids whose commands count; 0 is no id.
     pub ground_stations: [u8; GROUND_STATIONS],
-}
-
-/// One vehicle; vehicle `i` starts at node `i` of the roadmap.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MissionVehicle {
-    /// System id, clearance needed, height of the start over its pad, own goal.
-    pub task: VehicleTask,
-    /// First point of its path.
-    pub start: Point,
-    /// Radius of its hull, metres.
-    pub radius_m: f32,
-    /// Fastest it can fly, m/s.
-    pub speed_max_mps: f32,
-}
-
-/// One goal; goal `i` is node `vehicles + i` of the roadmap.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MissionGoal {
-    /// Where it is.
-    pub position: Point,
-    /// Its height over where a vehicle stands on the ground below it, metres.
-    pub descent_m: f32,
-}
-
-/// Whether it is more than zero and at most `most`; false for NaN.
-fn positive(value: f32, most: f32) -> bool {
-    value > 0.0 && value <= most
-}
-
-fn in_range(point: &Point) -> bool {
-    point.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
 }
 
 impl MissionHeader {
@@ -136,68 +107,43 @@ impl MissionHeader {
     }
 }
 
-impl MissionVehicle {
-    fn is_sound(&self, goals: usize) -> bool {
-        let task = &self.task;
-        task.id != 0
-            && task.goal.is_none_or(|goal| usize::from(goal) < goals)
-            && in_range(&self.start)
-            && (0.0..=MAX_COORDINATE_M).contains(&task.climb_m)
-            && positive(task.required_clearance_m, MAX_COORDINATE_M)
-            && positive(self.radius_m, MAX_COORDINATE_M)
-            && positive(self.speed_max_mps, MAX_SPEED_MPS)
-    }
+/// What the vehicles of a mission do.
+#[derive(Clone, Copy, Debug)]
+pub enum Kind<'a> {
+    /// They fly to goals, on a roadmap.
+    Goals,
+    /// They photograph an area.
+    Coverage(CoverageView<'a>),
+}
 
-    fn from_bytes(b: &[u8; VEHICLE_LEN]) -> Self {
-        let goal = u16::from_le_bytes([b[2], b[3]]);
-        Self {
-            task: VehicleTask {
-                id: b[0],
-                required_clearance_m: f32_at(b, 20),
-                climb_m: f32_at(b, 24),
-                goal: (goal != NO_GOAL).then_some(goal),
-            },
-            start: point_at(b, 4),
-            radius_m: f32_at(b, 16),
-            speed_max_mps: f32_at(b, 28),
+/// The same, as it is written.
+#[derive(Clone, Copy, Debug)]
+pub enum Block<'a> {
+    /// They fly to goals.
+    Goals(&'a [MissionGoal]),
+    /// They photograph an area.
+    Coverage(CoverageParts<'a>),
+}
+
+impl Block<'_> {
+    fn goals(&self) -> &[MissionGoal] {
+        match self {
+            Self::Goals(goals) => goals,
+            Self::Coverage(_) => &[],
         }
     }
 
-    fn to_bytes(self) -> [u8; VEHICLE_LEN] {
-        let mut b = [0; VEHICLE_LEN];
-        b[0] = self.task.id;
-        b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
-        let numbers = [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
-        put(&mut b, 4, self.start.iter().copied().chain(numbers));
-        b
+    /// Bytes the mission file takes, CRC included, with so many vehicles.
+    pub fn file_len(&self, vehicles: usize) -> usize {
+        let block = match self {
+            Self::Goals(_) => 0,
+            Self::Coverage(parts) => parts.encoded_len(),
+        };
+        encoded_len(vehicles, self.goals().len()) + block
     }
 }
 
-impl MissionGoal {
-    fn is_sound(&self) -> bool {
-        in_range(&self.position) && (0.0..=MAX_COORDINATE_M).contains(&self.descent_m)
-    }
-
-    fn from_bytes(b: &[u8; GOAL_LEN]) -> Self {
-        Self { position: point_at(b, 0), descent_m: f32_at(b, 12) }
-    }
-}
-
-fn f32_at(b: &[u8], at: usize) -> f32 {
-    f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]])
-}
-
-fn point_at(b: &[u8], at: usize) -> Point {
-    Point::new(f32_at(b, at), f32_at(b, at + 4), f32_at(b, at + 8))
-}
-
-fn put(b: &mut [u8], at: usize, numbers: impl Iterator<Item = f32>) {
-    for (to, number) in b[at..].chunks_exact_mut(4).zip(numbers) {
-        to.copy_from_slice(&number.to_le_bytes());
-    }
-}
-
-/// Bytes the mission file takes, CRC included.
+/// Bytes the file of a mission with goals takes, CRC included.
 pub const fn encoded_len(vehicles: usize, goals: usize) -> usize {
     HEADER_LEN + vehicles * VEHICLE_LEN + goals * GOAL_LEN + CRC_LEN
 }
@@ -209,14 +155,15 @@ pub const fn encoded_len(vehicles: usize, goals: usize) -> usize {
 pub fn write(
     header: &MissionHeader,
     vehicles: &[MissionVehicle],
-    goals: &[MissionGoal],
+    block: &Block<'_>,
     out: &mut [u8],
 ) -> Result<usize, MissionError> {
+    let goals = block.goals();
     let (Ok(vehicle_count), Ok(goal_count)) = (u16::try_from(vehicles.len()), u16::try_from(goals.len()))
     else {
         return Err(FileError::Length.into());
     };
-    let needed = encoded_len(vehicles.len(), goals.len());
+    let needed = block.file_len(vehicles.len());
     let out = out.get_mut(..needed).ok_or(MissionError::MissionFull { needed })?;
     out[..8].copy_from_slice(&MAGIC);
     out[8..10].copy_from_slice(&VERSION.to_le_bytes());
@@ -233,8 +180,11 @@ pub fn write(
         Method::Algorithm2 => 1,
         Method::Priority => 2,
     };
-    let flags = if header.geofence.is_some() { FENCED } else { 0 };
-    out[22..24].copy_from_slice(&flags.to_le_bytes());
+    out[22] = if header.geofence.is_some() { FENCED } else { 0 };
+    out[23] = match block {
+        Block::Goals(_) => GOALS,
+        Block::Coverage(_) => COVERAGE,
+    };
     out[24..26].copy_from_slice(&vehicle_count.to_le_bytes());
     out[26..28].copy_from_slice(&goal_count.to_le_bytes());
     out[28..32].copy_from_slice(&header.ground_stations);
@@ -251,12 +201,16 @@ pub fn write(
         56,
         numbers.into_iter().chain(low.iter().copied()).chain(high.iter().copied()).chain([s.cruise_mps]),
     );
-    let (to_vehicles, to_goals) = out[HEADER_LEN..].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    let (to_vehicles, rest) = out[HEADER_LEN..needed - CRC_LEN].split_at_mut(vehicles.len() * VEHICLE_LEN);
+    let (to_goals, to_block) = rest.split_at_mut(goals.len() * GOAL_LEN);
     for (to, vehicle) in to_vehicles.chunks_exact_mut(VEHICLE_LEN).zip(vehicles) {
         to.copy_from_slice(&vehicle.to_bytes());
     }
     for (to, goal) in to_goals.chunks_exact_mut(GOAL_LEN).zip(goals) {
         put(to, 0, goal.position.iter().copied().chain([goal.descent_m]));
+    }
+    if let Block::Coverage(parts) = block {
+        parts.write(to_block);
     }
     let crc = CRC.checksum(&out[..needed - CRC_LEN]);
     out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
@@ -271,6 +225,7 @@ pub struct MissionView<'a> {
     crc: u32,
     vehicles: &'a [[u8; VEHICLE_LEN]],
     goals: &'a [[u8; GOAL_LEN]],
+    kind: Kind<'a>,
 }
 
 impl<'a> MissionView<'a> {
@@ -283,16 +238,18 @@ impl<'a> MissionView<'a> {
         if head[..8] != MAGIC {
             return Err(FileError::Magic.into());
         }
-        let u16_at = |at: usize| u16::from_le_bytes([head[at], head[at + 1]]);
-        let u32_at = |at: usize| u32::from_le_bytes([head[at], head[at + 1], head[at + 2], head[at + 3]]);
+        let (u16_at, u32_at) = (|at: usize| u16_at(head, at), |at: usize| u32_at(head, at));
         let ground_stations = match u16_at(8) {
             WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
-            VERSION => [head[28], head[29], head[30], head[31]],
+            WITHOUT_KIND | VERSION => [head[28], head[29], head[30], head[31]],
             other => return Err(FileError::Version(other).into()),
         };
         let total = u32_at(12) as usize;
         let (vehicle_count, goal_count) = (usize::from(u16_at(24)), usize::from(u16_at(26)));
-        if usize::from(u16_at(10)) != HEADER_LEN || encoded_len(vehicle_count, goal_count) != total {
+        let kind = if u16_at(8) == VERSION { head[23] } else { GOALS };
+        let least = encoded_len(vehicle_count, goal_count);
+        let fits = if kind == GOALS { total == least } else { total > least };
+        if usize::from(u16_at(10)) != HEADER_LEN || !fits {
             return Err(FileError::Length.into());
         }
         let body = bytes.get(..total).ok_or(FileError::Truncated)?;
@@ -325,18 +282,28 @@ impl<'a> MissionView<'a> {
                 parked_separation_m: f32_at(head, 72),
             },
             safety_distance_m: f32_at(head, 64),
-            geofence: match u16_at(22) {
-                0 => None,
-                FENCED => Some((point_at(head, 76), point_at(head, 88))),
+            geofence: match (head[22], head[23]) {
+                (_, other) if other != kind => return Err(FileError::Header("flags").into()),
+                (0, _) => None,
+                (FENCED, _) => Some((point_at(head, 76), point_at(head, 88))),
                 _ => return Err(FileError::Header("flags").into()),
             },
             ground_stations,
         };
         header.check()?;
-        let (vehicles, goals) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
-        let view = Self { header, crc, vehicles: vehicles.as_chunks().0, goals: goals.as_chunks().0 };
+        let (vehicles, rest) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
+        let (goals, block) = rest.split_at(goal_count * GOAL_LEN);
+        let kind = match kind {
+            GOALS => Kind::Goals,
+            COVERAGE => Kind::Coverage(CoverageView::parse(block, vehicle_count)?),
+            _ => return Err(FileError::Header("kind").into()),
+        };
+        let (vehicles, goals) = (vehicles.as_chunks().0, goals.as_chunks().0);
+        let view = Self { header, crc, vehicles, goals, kind };
         view.check_lists()?;
-        if u16_at(8) == VERSION && view.vehicles().any(|v| ground_stations.contains(&v.task.id)) {
+        if u16_at(8) != WITHOUT_GROUND_STATIONS
+            && view.vehicles().any(|v| ground_stations.contains(&v.task.id))
+        {
             return Err(FileError::Header("ground_stations").into());
         }
         Ok(view)
@@ -381,9 +348,18 @@ impl<'a> MissionView<'a> {
         self.crc
     }
 
+    /// What its vehicles do.
+    pub fn kind(&self) -> &Kind<'a> {
+        &self.kind
+    }
+
     /// Bytes the file takes.
     pub fn byte_len(&self) -> usize {
-        encoded_len(self.vehicles.len(), self.goals.len())
+        let block = match &self.kind {
+            Kind::Goals => 0,
+            Kind::Coverage(view) => view.byte_len(),
+        };
+        encoded_len(self.vehicles.len(), self.goals.len()) + block
     }
 
     /// The vehicles, in the order of the roadmap's starts.
@@ -451,6 +427,12 @@ impl<'a> MissionView<'a> {
         config.mission_crc = self.crc;
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
         config.climb_mps = header.schedule.vertical_mps;
+        config.descend_mps = header.schedule.vertical_mps;
+        if let Kind::Coverage(view) = &self.kind
+            && let Some(share) = view.shares().nth(index)
+        {
+            (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
+        }
         config.radius_m = own.radius_m;
         config.required_clearance_m = own.task.required_clearance_m;
         config.safety_distance_m = header.safety_distance_m;

@@ -409,7 +409,7 @@ impl Detours {
             here: plan.path.point_at(along_m)?,
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
-            goal: plan.goal?,
+            goal: plan.task.goal()?,
             descent_m: plan.descent_m,
             required_clearance_m: view.config.required_clearance_m,
         })
@@ -455,7 +455,7 @@ impl Detours {
         view: &View<'_, V, W, G>,
     ) -> bool {
         let retries = |at: Instant| view.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
-        view.mission.plan().is_some_and(|plan| plan.goal.is_some())
+        view.mission.plan().is_some_and(|plan| plan.task.flies())
             && (!view.neighbours.is_deaf(view.now)
                 || view.neighbours.all_rest()
                 || view.guidance.filter.column_blocked_for(view.now) >= DEAF_ASIDE)

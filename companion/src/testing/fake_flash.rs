@@ -15,7 +15,7 @@ use planner_core::schedule::ScheduleConfig;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use crate::storage::mission_file::{self, MissionHeader, MissionVehicle};
+use crate::storage::mission_file::{self, Block, MissionHeader, MissionVehicle};
 use crate::storage::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
 
 /// As the H743's bank, but smaller, so that many cuts are tried in little time.
@@ -206,7 +206,7 @@ pub fn mission(vehicles: u8) -> Vec<u8> {
         .map(|id| MissionVehicle { task: task(id), start, radius_m: 0.3, speed_max_mps: 5.0 })
         .collect();
     let mut bytes = vec![0; mission_file::encoded_len(roster.len(), 0)];
-    mission_file::write(&header, &roster, &[], &mut bytes).unwrap();
+    mission_file::write(&header, &roster, &Block::Goals(&[]), &mut bytes).unwrap();
     bytes
 }
 

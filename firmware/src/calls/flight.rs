@@ -7,7 +7,7 @@ use companion::link::frame::{self, Header, MAX_SENT};
 use companion::link::intent::{self, Intent};
 use companion::{Config, Duration, Event, Instant, Link, PlanFailure, RosterEntry};
 use heapless::Vec;
-use planner_core::flight::{Gate, Path, VehiclePlan};
+use planner_core::flight::{Gate, Path, Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
 use planner_core::{Point, frames::swap_enu_ned};
 use rand_core::SeedableRng;
@@ -121,7 +121,7 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
         .collect();
     gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
     VehiclePlan {
-        goal: Some(0),
+        task: Task::Goto(0),
         path,
         climb_m: 1.0,
         descent_m: 1.0,

@@ -14,8 +14,8 @@ use crate::output;
 use crate::report;
 use crate::result::{self, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
 use crate::say;
-use crate::scenario::coverage::{Coverage, Method};
-use crate::scenario::load_coverage;
+use crate::scenario::coverage::Method;
+use crate::scenario::{self, Scenario};
 
 /// Arguments of `host-sim cover`.
 #[derive(Debug, clap::Args)]
@@ -86,11 +86,13 @@ struct RouteResult {
 /// Bad input, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let scenario = load_coverage(&args.scenario)?;
+    let scenario = scenario::load(&args.scenario)?;
+    scenario.check_supported()?;
     let files = files(&scenario);
     let names: Vec<&str> = output::NAMES.into_iter().chain(files.iter().map(String::as_str)).collect();
     let mut results = Results::open(&args.out, &names)?;
-    let planned = Planned::new(&scenario, args.method.unwrap_or(scenario.area.method))?;
+    let usual = scenario.area.as_ref().map_or(Method::PowellBinpat, |area| area.method);
+    let planned = Planned::new(&scenario, args.method.unwrap_or(usual))?;
     let flights = planned.flights();
     let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
     let findings = check::check(&planned, &flown);
@@ -114,7 +116,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 /// Names of the files beside the usual ones.
-fn files(scenario: &Coverage) -> Vec<String> {
+fn files(scenario: &Scenario) -> Vec<String> {
     let own = |id: u8| [format!("vehicle-{id}.plan"), format!("vehicle-{id}.waypoints")];
     let shared = ["waypoints.csv", "area.geojson"].map(str::to_owned);
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
@@ -158,8 +160,8 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
             wall_contacts: 0,
             min_clearance_m: None,
             min_separation_m: least_m.is_finite().then(|| rounded(least_m)),
-            safety_distance_m: rounded(scenario.safety_distance_m),
-            violations: u32::from(least_m < scenario.safety_distance_m * 0.999),
+            safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),
+            violations: u32::from(least_m < scenario.deconfliction.safety_distance_m * 0.999),
             deadlocks: 0,
         },
         roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
@@ -167,8 +169,8 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
             covered_share: findings.covered_share,
             waypoints: planned.tracks.waypoint_count(),
             lanes: planned.tracks.lanes().len(),
-            lane_m: rounded(scenario.area.spacing.lane_m),
-            waypoint_m: rounded(scenario.area.spacing.waypoint_m),
+            lane_m: rounded(planned.wanted.spacing.lane_m),
+            waypoint_m: rounded(planned.wanted.spacing.waypoint_m),
             angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
             max_cost_s: rounded(max_cost_s),
             mean_cost_s: rounded(mean as f32),
@@ -203,7 +205,7 @@ fn vehicle_results(planned: &Planned<'_>) -> Vec<VehicleResult> {
 }
 
 fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
-    let heights = planned.scenario.area.heights;
+    let heights = planned.wanted.heights;
     let route = |(route, depart_s): (&Route, &f32)| RouteResult {
         depart_s: rounded(*depart_s),
         vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,

@@ -83,7 +83,7 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
     let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
     };
-    let flying = || plan.flights.iter().filter(|f| f.goal.is_some());
+    let flying = || plan.flights.iter().filter(|f| f.task.flies());
     let clearances = flying().flat_map(|f| f.path.waypoints()).map(|w| w.clearance_m);
     let min_clearance_m = clearances.fold(f32::INFINITY, f32::min);
     let vehicles: Vec<_> = plan
@@ -91,13 +91,13 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
         .iter()
         .map(|flight| VehicleResult {
             id: flight.id,
-            goal: flight.goal,
+            goal: flight.task.goal(),
             reached: false,
             landed: false,
             path_m: rounded(flight.path.length_m()),
             flown_m: 0.0,
-            flight_time_s: flight.goal.map_or(0.0, |_| rounded(nominal_s(flight))),
-            end: if flight.goal.is_some() { "planned" } else { "no goal" }.to_owned(),
+            flight_time_s: flight.task.goal().map_or(0.0, |_| rounded(nominal_s(flight))),
+            end: if flight.task.flies() { "planned" } else { "no goal" }.to_owned(),
         })
         .collect();
     let makespan_s = flying().map(|f| f.depart_s + nominal_s(f)).fold(0.0, f32::max);

@@ -95,7 +95,7 @@ fn count_waypoints(planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut 
 fn enters_zone(planned: &Planned<'_>, from: &Flat, to: &Flat) -> bool {
     let wide = |place: &Flat| [f64::from(place.x), f64::from(place.y)];
     let (a, b) = (wide(from), wide(to));
-    planned.scenario.area.rings_of(RingKind::NoFly).any(|ring| {
+    planned.wanted.rings_of(RingKind::NoFly).any(|ring| {
         let ring: Vec<[f64; 2]> = ring.iter().map(wide).collect();
         let mut shares = vec![0.0, 1.0];
         for (c, d) in ring.iter().zip(ring.iter().cycle().skip(1)) {
@@ -138,7 +138,7 @@ impl Cells {
         let along = [f64::from(along.x), f64::from(along.y)];
         let mut cells = Self { along, low: [f64::INFINITY; 2], side: 0.0, size: [0; 2] };
         let mut high = [f64::NEG_INFINITY; 2];
-        for vertex in planned.scenario.area.rings_of(RingKind::Outer).flatten() {
+        for vertex in planned.wanted.rings_of(RingKind::Outer).flatten() {
             let place = cells.rotated(vertex);
             for axis in 0..2 {
                 cells.low[axis] = cells.low[axis].min(place[axis]);
@@ -146,7 +146,7 @@ impl Cells {
             }
         }
         let [wide, tall] = [high[0] - cells.low[0], high[1] - cells.low[1]];
-        let lane_m = f64::from(planned.scenario.area.spacing.lane_m);
+        let lane_m = f64::from(planned.wanted.spacing.lane_m);
         cells.side = (lane_m / 10.0).max((wide * tall / MOST_CELLS).sqrt());
         cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
         cells
@@ -160,7 +160,7 @@ impl Cells {
     /// Whether the area holds each place of a grid, row by row: the middles of the cells, or their corners, half a cell
     /// before them and one more each way.
     fn held(&self, planned: &Planned<'_>, [columns, rows]: [usize; 2], offset: f64) -> Vec<bool> {
-        let area = &planned.scenario.area;
+        let area = planned.wanted;
         let rings = |kind| {
             let turned = |ring: &[Flat]| ring.iter().map(|v| self.rotated(v)).collect::<Vec<_>>();
             area.rings_of(kind).map(turned).collect::<Vec<_>>()
@@ -198,7 +198,7 @@ impl Cells {
     }
 
     fn judge(&self, planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
-        let spacing = planned.scenario.area.spacing;
+        let spacing = planned.wanted.spacing;
         let counted = self.held(planned, self.size, 0.5);
         // Where pictures overlap by a cell, one of them must show all its corners.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)

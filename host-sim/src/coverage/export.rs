@@ -49,7 +49,7 @@ impl Item {
 /// The place where a vehicle stands.
 fn home(planned: &Planned<'_>, route: &Route) -> Geodetic {
     let start = planned.scenario.vehicles[usize::from(route.vehicle)].start;
-    Geodetic { alt_m: planned.scenario.area.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
+    Geodetic { alt_m: planned.wanted.origin.alt_m + f64::from(start.z), ..planned.geodetic(&start) }
 }
 
 /// Which lane is flown at a stop and which way a vehicle looks there, degrees from north.
@@ -63,7 +63,7 @@ fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
         (own.is_some() && from.lane == own && to.lane == own)
             .then(|| heading_deg(&from.position, &to.position))
     });
-    let yaw = match planned.scenario.area.heading {
+    let yaw = match planned.wanted.heading {
         Heading::Sweep => sweep,
         Heading::Lane => step.unwrap_or(sweep),
     };
@@ -106,7 +106,7 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
         let lane_at = |i: Option<usize>| i.and_then(|i| stops.get(i)).and_then(|stop| stop.lane);
         let begins = stop.lane.is_some() && lane_at(index.checked_sub(1)) != stop.lane;
         let ends = stop.lane.is_some() && lane_at(Some(index + 1)) != stop.lane;
-        match (stop.act, scenario.area.trigger) {
+        match (stop.act, planned.wanted.trigger) {
             (Act::Pad, _) => items.push(Item::command(NAV_RETURN_TO_LAUNCH, [0.0; 4])),
             (Act::Photo(_), Trigger::Waypoint) => {
                 items.push(waypoint(index));
@@ -122,7 +122,7 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
                 }
                 if trigger == Trigger::Distance && begins && !ends {
                     let next = stops.get(index + 1).filter(|next| next.lane == stop.lane);
-                    let step = next.map_or(planned.scenario.area.spacing.waypoint_m, |next| {
+                    let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
                         (next.position - stop.position).norm()
                     });
                     // The first picture at once, the others each so far from the last.
@@ -242,7 +242,7 @@ pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
     let kinds = [(RingKind::Outer, "area"), (RingKind::Hole, "hole"), (RingKind::NoFly, "no-fly")];
     let mut features = Vec::new();
     for (kind, name) in kinds {
-        for ring in planned.scenario.area.rings_of(kind) {
+        for ring in planned.wanted.rings_of(kind) {
             let mut places: Vec<Value> = ring.iter().map(|v| place(v.x, v.y)).collect();
             places.extend(places.first().cloned());
             features.push(json!({

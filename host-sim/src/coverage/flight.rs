@@ -39,7 +39,7 @@ pub fn stops(planned: &Planned<'_>, route: &Route) -> Vec<Stop> {
         let index = usize::from(route.vehicle);
         (&planned.vehicles[index], planned.scenario.vehicles[index].start)
     };
-    let heights = planned.scenario.area.heights;
+    let heights = planned.wanted.heights;
     let layer_m = heights.mission_m + f32::from(route.layer) * heights.layer_m;
     let at = |place: &Flat, height_m: f32| Point::new(place.x, place.y, height_m);
     let stop = |position: Point, act: Act| Stop { position, act, lane: None };

@@ -24,7 +24,8 @@ use planner_core::frames::{Geodetic, enu_to_geodetic};
 
 pub use self::planned::{CORNERS, LANES, Planned, VEHICLES};
 use crate::area::MOST_VERTICES;
-use crate::scenario::coverage::{Coverage, Method};
+use crate::scenario::Scenario;
+use crate::scenario::coverage::{self, Method};
 
 /// Changes of the lanes' order that the desk looks at.
 pub const LOOKS: u32 = 20_000_000;
@@ -41,9 +42,15 @@ impl<'a> Planned<'a> {
     ///
     /// # Errors
     /// There is no plan: why, and where in the scenario.
-    pub fn new(scenario: &'a Coverage, method: Method) -> anyhow::Result<Self> {
-        let area = Area::new(&scenario.area.vertices, &scenario.area.rings)
-            .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", scenario.area.place))?;
+    pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
+        let Some(wanted) = &scenario.area else {
+            bail!(
+                "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
+                scenario.path
+            );
+        };
+        let area = Area::new(&wanted.vertices, &wanted.rings)
+            .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
         let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| vehicle(v, scenario)).collect();
         if let Some(index) = vehicles.iter().position(|vehicle| area.forbids(&vehicle.place)) {
             let place = &scenario.vehicle_places[index];
@@ -52,16 +59,16 @@ impl<'a> Planned<'a> {
                 scenario.vehicles[index].id
             );
         }
-        let failed = |error: CoverageError| explained(error, scenario);
+        let failed = |error: CoverageError| explained(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
         let mut transit = Box::new(Transit::empty());
         transit.learn(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
         let pattern = Pattern {
-            spacing: scenario.area.spacing,
-            angle_deg: scenario.area.angle_deg,
-            margin_m: scenario.area.margin_m,
+            spacing: wanted.spacing,
+            angle_deg: wanted.angle_deg,
+            margin_m: wanted.margin_m,
             looks: LOOKS,
         };
         let mut tracks = Box::new(Tracks::new());
@@ -73,16 +80,17 @@ impl<'a> Planned<'a> {
             tracks: &tracks,
             transit: &transit,
             vehicles: &vehicles,
-            heights: scenario.area.heights,
+            heights: wanted.heights,
             unit: if method == Method::SimpleBinpat { Unit::Lane } else { Unit::Waypoint },
         };
         let mut plan = Plan::new();
-        divide(&work, method, &mut plan).map_err(failed)?;
+        let shares = divide(&work, method, &mut plan).map_err(failed)?;
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
         let mut planned = Self {
             scenario,
+            wanted,
             area,
             method,
             vehicles,
@@ -91,6 +99,7 @@ impl<'a> Planned<'a> {
             departures_s: vec![0.0; plan.routes.len()],
             least_separation_m: f32::INFINITY,
             plan,
+            shares,
             lower_bound_s,
             seconds,
         };
@@ -102,7 +111,7 @@ impl<'a> Planned<'a> {
     /// Latitude and longitude of a place of the plan. Heights are above the ground there, not above the plane that touches
     /// the earth at the origin: 100 km away that plane is 780 m up.
     pub fn geodetic(&self, place: &Point) -> Geodetic {
-        let origin = &self.scenario.area.origin;
+        let origin = &self.wanted.origin;
         let mut up_m = 0.0;
         let mut found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
         for _ in 0..3 {
@@ -128,12 +137,12 @@ impl<'a> Planned<'a> {
         let flights = self.flights();
         let timed: Vec<_> =
             flights.iter().map(|(_, stops, times_s)| separation::Timed { stops, times_s }).collect();
-        let separation_m = self.scenario.separation_m;
+        let separation_m = self.scenario.deconfliction.separation_m;
         let Some(found) = separation::departures(&timed, separation_m) else {
             bail!(
                 "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: fewer \
                  vehicles, or places further apart",
-                self.scenario.area.place
+                self.wanted.place
             );
         };
         (self.departures_s, self.least_separation_m) = found;
@@ -159,19 +168,19 @@ impl<'a> Planned<'a> {
 }
 
 /// A vehicle as the planner sees it.
-fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Coverage) -> Vehicle {
+fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
     Vehicle {
         place,
         home: place,
-        cruise_mps: scenario.cruise_mps.min(vehicle.speed_max_mps),
+        cruise_mps: scenario.mission.cruise_mps.min(vehicle.speed_max_mps),
         climb_mps: vehicle.climb_mps.unwrap_or(CLIMB_MPS),
         descend_mps: vehicle.descend_mps.unwrap_or(DESCEND_MPS),
         weight: vehicle.weight.unwrap_or(1.0),
     }
 }
 
-/// Divides the path by a method.
+/// Divides the path by a method. Returns the shares that it found, if it looks for some.
 ///
 /// # Errors
 /// As the method.
@@ -179,11 +188,16 @@ pub fn divide<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     method: Method,
     plan: &mut Plan<K>,
-) -> Result<(), CoverageError> {
+) -> Result<Option<Vec<f32>>, CoverageError> {
+    let own = || Some(work.vehicles.iter().map(|vehicle| vehicle.weight).collect());
     match method {
-        Method::SimpleBinpat | Method::Binpat => binpat(work, &mut PackWorkspace::<K>::new(), plan),
+        Method::SimpleBinpat | Method::Binpat => {
+            binpat(work, &mut PackWorkspace::<K>::new(), plan).map(|()| own())
+        }
         Method::PowellBinpat => {
-            powell::powell(work, &powell::Config::USUAL, &mut powell::Workspace::<K>::new(), plan)
+            let mut ws = powell::Workspace::<K>::new();
+            powell::powell(work, &powell::Config::USUAL, &mut ws, plan)?;
+            Ok(Some(ws.pack.shares()[..work.vehicles.len()].to_vec()))
         }
         Method::Exact => {
             let count = work.tracks.waypoint_count() as usize;
@@ -191,14 +205,15 @@ pub fn divide<const L: usize, const N: usize, const K: usize>(
             let (mut ways_m, mut reaches) = (vec![0.0; ways], vec![0; reaches]);
             let mut states = vec![(0, 0); states];
             let mut ws = exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
-            exact::exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)
+            exact::exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
+            Ok(None)
         }
     }
 }
 
 /// Why there is no plan, for a person.
-fn explained(error: CoverageError, scenario: &Coverage) -> anyhow::Error {
-    let place = &scenario.area.place;
+fn explained(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> anyhow::Error {
+    let place = &wanted.place;
     let why = match error {
         CoverageError::Area(area) => format!("{area:?}"),
         CoverageError::Setting(name) => format!("{name} is out of its range"),
@@ -213,8 +228,8 @@ fn explained(error: CoverageError, scenario: &Coverage) -> anyhow::Error {
         CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),
         CoverageError::Unreachable => "no-fly zones leave no way to a part of it".to_owned(),
         CoverageError::Vehicles => {
-            let most = if scenario.vehicles.len() > VEHICLES { VEHICLES } else { exact::MOST_VEHICLES };
-            format!("it takes 1 to {most} vehicles, not {}", scenario.vehicles.len())
+            let most = if vehicles > VEHICLES { VEHICLES } else { exact::MOST_VEHICLES };
+            format!("it takes 1 to {most} vehicles, not {vehicles}")
         }
         CoverageError::WorkspaceTooSmall => "the planner's memory is too small for it".to_owned(),
     };

@@ -40,7 +40,7 @@ pub fn page(
         points: ring.iter().map(|v| Point::new(v.x, v.y, 0.0)).collect(),
     };
     let outlines = kinds.iter().flat_map(|&(kind, shown)| {
-        scenario.area.rings_of(kind).map(move |ring| outline(ring, shown)).collect::<Vec<_>>()
+        planned.wanted.rings_of(kind).map(move |ring| outline(ring, shown)).collect::<Vec<_>>()
     });
     ReportData {
         title: scenario.path.clone(),

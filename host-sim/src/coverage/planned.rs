@@ -5,7 +5,8 @@ use planner_core::coverage::pack::{Plan, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
 
-use crate::scenario::coverage::{Coverage, Method};
+use crate::scenario::Scenario;
+use crate::scenario::coverage::{self, Method};
 
 /// Most vehicles of a coverage mission.
 pub const VEHICLES: usize = 32;
@@ -17,7 +18,9 @@ pub const CORNERS: usize = 256;
 /// A planned coverage mission.
 pub struct Planned<'a> {
     /// What was asked for.
-    pub scenario: &'a Coverage,
+    pub scenario: &'a Scenario,
+    /// Its `[area]`.
+    pub wanted: &'a coverage::Area,
     /// Its area.
     pub area: Area<'a>,
     /// How work was divided.
@@ -30,6 +33,8 @@ pub struct Planned<'a> {
     pub transit: Box<Transit<'a, CORNERS>>,
     /// The routes.
     pub plan: Plan<VEHICLES>,
+    /// The shares W that they are packed by, one a vehicle; none where they follow from nothing of the kind.
+    pub shares: Option<Vec<f32>>,
     /// No division can end before, seconds.
     pub lower_bound_s: f32,
     /// When each route's vehicle leaves its pad, seconds.

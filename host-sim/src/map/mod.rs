@@ -7,6 +7,7 @@ pub mod column;
 pub mod command;
 pub mod edt;
 mod error;
+mod ground;
 pub mod occupancy;
 pub mod octree;
 #[cfg(test)]
@@ -17,6 +18,7 @@ use std::path::Path;
 pub use boxes::BoxTree;
 pub use edt::ClearanceField;
 pub use error::MapError;
+pub use ground::level;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 

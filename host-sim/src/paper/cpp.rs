@@ -17,8 +17,8 @@ use crate::coverage::{Planned, page};
 use crate::files::Results;
 use crate::result::{self, Timing, rounded};
 use crate::say;
-use crate::scenario::coverage::{Coverage, Method};
-use crate::scenario::parse_coverage;
+use crate::scenario::coverage::Method;
+use crate::scenario::{self, Scenario};
 use crate::{output, report};
 
 /// Lanes to 150 m.
@@ -69,7 +69,7 @@ impl Summary {
 }
 
 /// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
-fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Coverage> {
+fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Scenario> {
     let mut text = format!(
         "[area]\npolygon = {polygon}\nlane_m = {lane_m:?}\nwaypoint_m = {lane_m:?}\nheight_m = {height_m:?}\n\
          layer_m = 5.0\n[mission]\ncruise_mps = 5.0\n"
@@ -80,7 +80,7 @@ fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> a
             i + 1
         );
     }
-    Ok(parse_coverage(&text, "paper cpp")?)
+    Ok(scenario::parse(&text, "paper cpp")?)
 }
 
 fn in_a_row(count: usize) -> Vec<[f64; 2]> {
@@ -97,7 +97,7 @@ struct Tables {
 
 impl Tables {
     /// Plans, checks, and gives each vehicle's cost: 0 for one that stays on the ground.
-    fn costs(&mut self, scenario: &Coverage, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
+    fn costs(&mut self, scenario: &Scenario, method: Method, unit: &str) -> anyhow::Result<Vec<f64>> {
         let planned = Planned::new(scenario, method)?;
         let findings = check_plan(&planned);
         let result = cover::described(&planned, &findings);

@@ -1,34 +1,11 @@
-//! The scenario of a coverage mission: what `[area]` and the tables beside it say.
+//! What `[area]` says: the scenario of a coverage mission.
 
+pub use companion::storage::mission_file::coverage::Heading;
 use planner_core::coverage::area::{Ring, RingKind};
 use planner_core::coverage::footprint::{Camera, Spacing};
 use planner_core::coverage::{Flat, pack::Heights};
+pub use planner_core::flight::Trigger;
 use planner_core::frames::Geodetic;
-
-use super::Vehicle;
-
-/// A coverage mission, checked.
-#[derive(Clone, Debug)]
-pub struct Coverage {
-    /// Its name: the path it was read from.
-    pub path: String,
-    /// Its text, as read.
-    pub text: String,
-    /// Of everything random.
-    pub seed: u64,
-    /// `[area]`
-    pub area: Area,
-    /// `[mission] cruise_mps`
-    pub cruise_mps: f32,
-    /// `[deconfliction] separation_m`: what is planned between two vehicles, centre to centre.
-    pub separation_m: f32,
-    /// `[deconfliction] safety_distance_m`
-    pub safety_distance_m: f32,
-    /// `[[vehicles]]`, as they stand in the file.
-    pub vehicles: Vec<Vehicle>,
-    /// Where the start of each stands, as `FILE:LINE`.
-    pub vehicle_places: Vec<String>,
-}
 
 /// `[area]`
 #[derive(Clone, Debug)]
@@ -107,24 +84,4 @@ impl Method {
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|(_, method)| *method == self).map_or("", |(name, _)| name)
     }
-}
-
-/// Where vehicles look along the lanes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Heading {
-    /// One way on all lanes.
-    Sweep,
-    /// The way they fly.
-    Lane,
-}
-
-/// What takes the pictures.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Trigger {
-    /// The autopilot by distance, switched at both ends of a lane.
-    Distance,
-    /// A command at each waypoint.
-    Waypoint,
-    /// Something else.
-    None,
 }

@@ -32,17 +32,6 @@ pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
     sections::parse(&text, &name, &folder)
 }
 
-/// Reads the scenario file of a coverage mission; paths in it are relative to its folder.
-pub fn load_coverage(path: &Path) -> Result<coverage::Coverage, ScenarioError> {
-    let (text, name, folder) = text(path)?;
-    sections::area::coverage(&text, &name, &folder)
-}
-
-/// The same of a text; `name` names it in errors, and paths in it are relative to the working directory.
-pub fn parse_coverage(text: &str, name: &str) -> Result<coverage::Coverage, ScenarioError> {
-    sections::area::coverage(text, name, Path::new(""))
-}
-
 /// A scenario file's text, its name in errors, and its folder.
 fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
     let name = quoted_path(path);

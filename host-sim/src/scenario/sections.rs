@@ -20,7 +20,8 @@ use self::values::{MAX_ID, point};
 use super::error::ScenarioError;
 use super::reader::{Result, Span, Table, Text, Value};
 use super::types::{
-    Companion, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Terminals, Unbuilt, Vehicle,
+    Companion, Deconfliction, Fault, Geofence, Map, Mission, Mode, Objective, Roadmap, Scenario, Simulation,
+    Terminals, Unbuilt, Vehicle,
 };
 use crate::capacity::VEHICLES;
 use crate::files;
@@ -36,7 +37,10 @@ const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 7
 
 pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
     let text = Text { file, text };
-    root(text, |root| goals_mission(text, root, folder))
+    root(text, |root| match (root.get("map"), root.get("area")) {
+        (None, Some(_)) => area::coverage(text, root, folder),
+        _ => goals_mission(text, root, folder),
+    })
 }
 
 /// What a scenario's root table says, if it is TOML and all its keys are known.
@@ -68,11 +72,7 @@ fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result
 /// The scenario of a mission with goals.
 fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
-    let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
-    if let (None, Some(area)) = (root.get("map"), root.get("area")) {
-        let hint = "`host-sim cover` plans it";
-        return Err(text.with_hint(&area.span, "not available yet: flying an [area]", hint));
-    }
+    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
     let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -87,22 +87,10 @@ fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scen
     let mission_table = mission_value.as_ref().map(Value::table).transpose()?;
     let mission_table = mission_table.unwrap_or_else(|| empty(text, "mission"));
     let (mission, mode_span) = mission(&mission_table, folder, origin.as_ref(), &vehicles)?;
-    let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
-    let deconfliction = self::deconfliction(&deconfliction.unwrap_or_else(|| empty(text, "deconfliction")))?;
-    let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
-    let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
-    let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")))?;
-    let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
-    let faults_value = root.get("faults");
-    let faults = match &faults_value {
-        Some(value) => {
-            let items = value.items()?;
-            at_most(value, items.len(), MAX_FAULTS, "faults")?;
-            items.iter().map(|v| fault(&v.table()?, &ids)).collect::<Result<Vec<_>>>()?
-        }
-        None => Vec::new(),
-    };
-    let area = unbuilt(root, "area", &mut unsupported)?;
+    let faults = faults(root, &vehicles)?;
+    if let Some(area) = root.get("area") {
+        unsupported.push(not_yet(text, &area.span, "[area] beside [map]"));
+    }
     let formation = unbuilt(root, "formation", &mut unsupported)?;
     if let (Mode::Coverage | Mode::Formation, Some(span)) = (mission.mode, &mode_span) {
         unsupported.push(not_yet(text, span, "this mission.mode"));
@@ -128,10 +116,38 @@ fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scen
         deconfliction,
         simulation,
         faults,
-        area,
+        area: None,
         formation,
         unsupported,
     })
+}
+
+/// What the scenarios of all kinds of mission say.
+struct Common {
+    seed: u64,
+    deconfliction: Deconfliction,
+    simulation: Simulation,
+    /// Where the estimator is chosen.
+    estimator_span: Option<Span>,
+}
+
+fn common(text: Text<'_>, root: &Table<'_>) -> Result<Common> {
+    let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
+    let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
+    let deconfliction = self::deconfliction(&deconfliction.unwrap_or_else(|| empty(text, "deconfliction")))?;
+    let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
+    let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
+    let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")))?;
+    Ok(Common { seed, deconfliction, simulation, estimator_span })
+}
+
+/// What strikes the vehicles.
+fn faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
+    let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
+    let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
+    let items = value.items()?;
+    at_most(&value, items.len(), MAX_FAULTS, "faults")?;
+    items.iter().map(|v| fault(&v.table()?, &ids)).collect()
 }
 
 /// What usually is behind text that is no TOML.
@@ -293,12 +309,21 @@ fn mission(
         let why = format!("mission.mode \"single-goal\" takes one goal, not {}", goals.len());
         return Err(table.text.error(&span, why));
     }
-    let geofence = table.get("geofence").map(|v| geofence(&v)).transpose()?;
-    let ground_stations = table.get("ground_stations").map(|v| ground_stations(&v, vehicles)).transpose()?;
-    let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
+    let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
     table.finish()?;
     let mission = Mission { mode, objective, cruise_mps, goals, goal_places, geofence, ground_stations };
     Ok((mission, mode_span))
+}
+
+/// The geofence, and whose commands count.
+fn fence_and_ground_stations(
+    table: &Table<'_>,
+    vehicles: &[(Vehicle, VehicleSpans)],
+) -> Result<(Option<Geofence>, [u8; GROUND_STATIONS])> {
+    let geofence = table.get("geofence").map(|v| geofence(&v)).transpose()?;
+    let ground_stations = table.get("ground_stations").map(|v| ground_stations(&v, vehicles)).transpose()?;
+    let ground_stations = ground_stations.unwrap_or(USUAL_GROUND_STATIONS);
+    Ok((geofence, ground_stations))
 }
 
 /// Refuses a list that is longer than any mission's.

@@ -8,6 +8,7 @@ use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
 
+use super::coverage::Area;
 use super::error::ScenarioError;
 use crate::kinds::{Estimator, Personality};
 use crate::link::LinkUrl;
@@ -38,8 +39,8 @@ pub struct Scenario {
     pub simulation: Simulation,
     /// `[[faults]]`
     pub faults: Vec<Fault>,
-    /// `[area]`: coverage.
-    pub area: Option<Unbuilt>,
+    /// `[area]`: what a coverage mission photographs.
+    pub area: Option<Area>,
     /// `[formation]`
     pub formation: Option<Unbuilt>,
     /// What is asked for and not built yet, in the file's order.
@@ -56,7 +57,8 @@ pub struct Unbuilt {
 /// `[map]`
 #[derive(Clone, Debug, PartialEq)]
 pub struct Map {
-    /// A builtin's name, or a path that is relative to the working directory (resolved against the scenario's folder).
+    /// A builtin's name, or a path that is relative to the working directory (resolved against the scenario's folder). Empty where
+    /// a coverage mission has no map: level ground at height 0.
     pub file: String,
     /// Edge of a planning cell.
     pub resolution_m: f32,

@@ -215,9 +215,9 @@ impl<'a> Run<'a> {
                 member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.truth().position;
-            if let Some(goal) = plan.flights[i].goal {
-                let goal = mission.goals[usize::from(goal)];
-                self.nearest_goal_m[i] = self.nearest_goal_m[i].min((places[i] - goal).norm());
+            if let (true, Some(end)) = (plan.flights[i].task.flies(), plan.flights[i].path.waypoints().last())
+            {
+                self.nearest_goal_m[i] = self.nearest_goal_m[i].min((places[i] - end.position).norm());
             }
         }
         self.ground_station.step(now_us, members, radio, places);
@@ -235,7 +235,7 @@ impl<'a> Run<'a> {
         let started = self.ground_station.started();
         let done = |i: usize| {
             let at_rest = is_finished(members[i].state()) || members[i].killed();
-            at_rest || (plan.flights[i].goal.is_none() && started) || left_to_pilot(&members[i])
+            at_rest || (!plan.flights[i].task.flies() && started) || left_to_pilot(&members[i])
         };
         let still = |m: &Member| !m.autopilot.truth().armed || left_to_pilot(m);
         if !(self.script.is_over() && started && members.iter().all(still)) {
@@ -262,7 +262,7 @@ impl<'a> Run<'a> {
             seed: scenario.seed,
             complete: clean
                 && all_served
-                && vehicles.iter().enumerate().all(|(i, v)| did_its_task(v) || self.is_taken_out(i)),
+                && vehicles.iter().enumerate().all(|(i, v)| self.did_its_task(i, v) || self.is_taken_out(i)),
             vehicles,
             totals: Totals {
                 path_m: rounded(plan.total_m() as f32),
@@ -290,6 +290,11 @@ impl<'a> Run<'a> {
         vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
     }
 
+    /// Whether a vehicle flew to the end of its path and landed, if it flies.
+    fn did_its_task(&self, i: usize, vehicle: &VehicleResult) -> bool {
+        !self.plan.flights[i].task.flies() || (vehicle.reached && vehicle.landed)
+    }
+
     /// Whether a fault took a vehicle out and it has done what it can: it stayed, or ended in a row of the table.
     fn is_taken_out(&self, i: usize) -> bool {
         let member = &self.members[i];
@@ -303,8 +308,8 @@ impl<'a> Run<'a> {
     /// Logs why links failed, and what the referee saw.
     fn log_losses(&mut self, result: &MissionResult) {
         let scenario = &self.mission.scenario;
-        for (member, vehicle) in self.members.iter().zip(&result.vehicles) {
-            if let (false, Some(text)) = (did_its_task(vehicle), member.link_trouble(self.t_s)) {
+        for (i, (member, vehicle)) in self.members.iter().zip(&result.vehicles).enumerate() {
+            if let (false, Some(text)) = (self.did_its_task(i, vehicle), member.link_trouble(self.t_s)) {
                 let (t_s, level) = (self.t_s as f32, Level::Error);
                 self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
             }
@@ -316,11 +321,6 @@ impl<'a> Run<'a> {
             text: text.clone(),
         }));
     }
-}
-
-/// Whether a vehicle flew to its goal and landed, if it has one.
-fn did_its_task(vehicle: &VehicleResult) -> bool {
-    vehicle.goal.is_none() || (vehicle.reached && vehicle.landed)
 }
 
 /// Whether a pilot has the vehicle: nobody knows for how long.
@@ -348,8 +348,8 @@ fn vehicle_result(
     now_s: f64,
 ) -> VehicleResult {
     let reached = nearest_goal_m <= REACHED_M;
-    let end = match (flight.goal, member.state()) {
-        (None, _) => "no goal".to_owned(),
+    let end = match (flight.task.flies(), member.state()) {
+        (false, _) => "no goal".to_owned(),
         // By its estimate it was there.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.end(),
@@ -357,7 +357,7 @@ fn vehicle_result(
     let flight_time_s = member.took_off_s.map_or(0.0, |from| member.landed_s.unwrap_or(now_s) - from);
     VehicleResult {
         id: flight.id,
-        goal: flight.goal,
+        goal: flight.task.goal(),
         reached,
         landed: member.landed_s.is_some(),
         path_m: rounded(flight.path.length_m()),

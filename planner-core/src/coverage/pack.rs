@@ -144,6 +144,13 @@ impl<const K: usize> PackWorkspace<K> {
     }
 }
 
+impl<const K: usize> PackWorkspace<K> {
+    /// The shares by which the bins were filled last.
+    pub fn shares(&self) -> &[f32; K] {
+        &self.shares
+    }
+}
+
 impl<const K: usize> Default for PackWorkspace<K> {
     fn default() -> Self {
         Self::new()
@@ -245,6 +252,26 @@ pub fn binpat<const L: usize, const N: usize, const K: usize>(
     }
     let alike = work.vehicles.iter().all(|vehicle| vehicle.weight == work.vehicles[0].weight);
     pack(work, if alike { Bins::Anyone } else { Bins::SameWeight }, ws, out)
+}
+
+/// BINPAT by shares that were found before (POWELL's W): any vehicle may take any bin.
+///
+/// # Errors
+/// See [`Work::check`]; [`CoverageError::Setting`] for shares that are not one a vehicle, finite, at least 0 and not all 0.
+pub fn by_shares<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    shares: &[f32],
+    ws: &mut PackWorkspace<K>,
+    out: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    work.check::<K>()?;
+    let sound = |share: &f32| *share >= 0.0 && share.is_finite();
+    let some = shares.iter().any(|share| *share > 0.0);
+    if shares.len() != work.vehicles.len() || !shares.iter().all(sound) || !some {
+        return Err(CoverageError::Setting("shares"));
+    }
+    ws.shares[..shares.len()].copy_from_slice(shares);
+    pack(work, Bins::Anyone, ws, out)
 }
 
 /// Which vehicles a bin may go to.

@@ -79,7 +79,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     let mut lasts_s: Vec<f32, V> = Vec::new();
     let mut found_s: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
-        if flight.goal.is_some() {
+        if flight.task.flies() {
             // Cannot overflow: one entry a flight, as below.
             let _ = order.push(i as u16);
         }
@@ -143,7 +143,7 @@ fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
             .flights
             .iter()
             .enumerate()
-            .filter(|&(j, flight)| flight.goal.is_none() || order[..place].contains(&(j as u16)));
+            .filter(|&(j, flight)| !flight.task.flies() || order[..place].contains(&(j as u16)));
         let (flight, scheduled) = (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
         let departure =
             schedule::earliest_departure(&request.schedule, flight, 0.0, scheduled, &mut ws.schedule);

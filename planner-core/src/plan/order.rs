@@ -27,7 +27,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     let mut straight: Vec<f32, V> = Vec::new();
     for (i, flight) in out.flights.iter().enumerate() {
         let mut nodes: Vec<u16, W> = Vec::new();
-        let length = match flight.goal {
+        let length = match flight.task.goal() {
             Some(goal) => {
                 let parked = Parked::<V>::new(view, Avoid::Nothing, &out.flights, &[], i);
                 let ends = Ends::new(request, i, goal);
@@ -44,7 +44,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
         order.sort_unstable_by(|&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) =
-                ([a, b].map(|i| out.flights[i].goal.is_some()), (out.flights[b].id, out.flights[a].id));
+                ([a, b].map(|i| out.flights[i].task.flies()), (out.flights[b].id, out.flights[a].id));
             let longer = straight[b].total_cmp(&straight[a]);
             let longer = if first == First::Longest { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
@@ -83,7 +83,7 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
         let blocked = order.remove(place);
         // Cannot overflow: one was just removed.
         if round < reorderings {
-            let front = order.iter().take_while(|&&i| out.flights[usize::from(i)].goal.is_none()).count();
+            let front = order.iter().take_while(|&&i| !out.flights[usize::from(i)].task.flies()).count();
             let _ = order.insert(front, blocked);
         } else {
             rush.count = rush.count.max(order.len() + 1 - place);
@@ -130,7 +130,7 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
 ) -> Result<(), (usize, PlanError)> {
     for (place, &index) in order.iter().enumerate() {
         let index = usize::from(index);
-        if out.flights[index].goal.is_none() {
+        if !out.flights[index].task.flies() {
             continue;
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
@@ -157,7 +157,7 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
 ) -> Result<Option<Flight<W>>, PlanError> {
     let &Turn { index, before, waiting, not_before_s } = turn;
     let flight = &out.flights[index];
-    let Some(goal) = flight.goal else { return Ok(None) };
+    let Some(goal) = flight.task.goal() else { return Ok(None) };
     let ends = Ends::new(request, index, goal);
     for avoid in [Avoid::WaitingPads, Avoid::AllPlaces, Avoid::Nothing] {
         let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
@@ -191,7 +191,7 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
 ) -> Result<Flight<W>, ScheduleError> {
     let &Turn { index, before, waiting, not_before_s } = turn;
     let mut flight = out.flights[index].clone();
-    let Some(goal) = flight.goal else { return Ok(flight) };
+    let Some(goal) = flight.task.goal() else { return Ok(flight) };
     let Ends { from, to, vehicle } = Ends::new(request, index, goal);
     let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
@@ -268,10 +268,10 @@ impl<const V: usize> Parked<V> {
         for (j, flight) in flights.iter().enumerate().filter(|&(j, _)| j != index && avoid != Avoid::Nothing)
         {
             // Cannot overflow: at most one entry of each kind per flight.
-            if avoid == Avoid::AllPlaces || flight.goal.is_none() || waiting.contains(&(j as u16)) {
+            if avoid == Avoid::AllPlaces || !flight.task.flies() || waiting.contains(&(j as u16)) {
                 let _ = parked.pads.push(below(j, flight.climb_m));
             }
-            if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.goal) {
+            if let (Avoid::AllPlaces, Some(goal)) = (avoid, flight.task.goal()) {
                 let _ = parked.landed.push(below(flights.len() + usize::from(goal), flight.descent_m));
             }
         }

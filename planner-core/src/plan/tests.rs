@@ -103,7 +103,7 @@ proptest! {
         prop_assume!((0..20).all(|terminal| view.half_edges(terminal).len() > 0));
         let mode = if labelled { Mode::Labelled } else { Mode::Unlabelled(Objective::TotalDistance) };
         let plan = plan(&bytes, &tasks(10, labelled), 10, mode).unwrap();
-        prop_assert!(plan.flights.iter().all(|f| f.goal.is_some()));
+        prop_assert!(plan.flights.iter().all(|f| f.task.flies()));
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 40_000);
         prop_assert!(apart.as_ref().is_ok_and(|&d| d >= SCHEDULE.parked_separation_m - 1e-3), "{apart:?}");
     }
@@ -200,7 +200,7 @@ fn a_vehicle_without_a_goal_stays_and_a_goal_without_a_way_is_left() {
     terminals.push(Point::new(500.0, 500.0, HEIGHT_M)); // out of reach
     let bytes = open_roadmap(&terminals, 4, 300, 3);
     let plan = plan(&bytes, &tasks(4, false), 2, Mode::Unlabelled(Objective::TotalDistance)).unwrap();
-    let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.goal).collect();
+    let flying: StdVec<_> = plan.flights.iter().filter_map(|f| f.task.goal()).collect();
     assert_eq!(flying, [0], "one goal in reach, one vehicle flies to it");
     checker::fly(&SCHEDULE, &plan.flights, &[1.0; 4], 10_000).unwrap();
 }

@@ -49,7 +49,7 @@ impl<const W: usize> Flight<W> {
     /// From take-off to landing, seconds; nothing for a vehicle that stays on its pad.
     pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
         let landed_s = |w: &Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
-        self.path.waypoints().last().filter(|_| self.goal.is_some()).map_or(0.0, landed_s)
+        self.path.waypoints().last().filter(|_| self.task.flies()).map_or(0.0, landed_s)
     }
 
     /// Timed segments that [`cut`] makes of it.
@@ -87,7 +87,7 @@ pub(super) fn cut<const W: usize>(
         parked: true,
     };
     let mut push = |piece| out.push(piece).map_err(|_| ScheduleError::PiecesFull);
-    if flight.goal.is_none() {
+    if !flight.task.flies() {
         return push(stay(pad, -flight.climb_m, f32::NEG_INFINITY, f32::INFINITY));
     }
     let climb = Leg::climb(pad, first.position, first.at_s);

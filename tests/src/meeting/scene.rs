@@ -114,7 +114,7 @@ fn vehicle(
 ) -> Vehicle {
     let flight = &flights[i];
     let mut plan = Plan {
-        goal: flight.goal,
+        task: flight.task,
         path: flight.path.clone(),
         climb_m: flight.climb_m,
         descent_m: flight.descent_m,

@@ -44,7 +44,7 @@ fn file() -> List<u8> {
     let vehicles = [vehicle(7, None), vehicle(2, Some(1)), vehicle(250, Some(0))];
     let goals = [goal(0), goal(1)];
     let mut out = vec![0xAA; encoded_len(3, 2)];
-    assert_eq!(write(&header(), &vehicles, &goals, &mut out), Ok(out.len()));
+    assert_eq!(write(&header(), &vehicles, &Block::Goals(&goals), &mut out), Ok(out.len()));
     out
 }
 
@@ -131,8 +131,14 @@ fn what_is_not_sound_is_refused_by_name() {
     let mut small = [0; 100];
     let needed = encoded_len(1, 0);
     let one = [vehicle(1, None)];
-    assert_eq!(write(&header(), &one, &[], &mut small), Err(MissionError::MissionFull { needed }));
-    assert_eq!(write(&header(), &[vehicle(1, Some(0))], &[], &mut [0; 200]), Err(MissionError::Vehicle(0)));
+    assert_eq!(
+        write(&header(), &one, &Block::Goals(&[]), &mut small),
+        Err(MissionError::MissionFull { needed })
+    );
+    assert_eq!(
+        write(&header(), &[vehicle(1, Some(0))], &Block::Goals(&[]), &mut [0; 200]),
+        Err(MissionError::Vehicle(0))
+    );
 }
 
 #[test]
@@ -140,7 +146,8 @@ fn labelled_no_two_vehicles_have_one_goal() {
     let goals = [goal(0), goal(1)];
     let written = |mode: Mode, goal: Option<u16>| {
         let vehicles = [vehicle(7, goal), vehicle(2, Some(1)), vehicle(250, goal)];
-        write(&MissionHeader { mode, ..header() }, &vehicles, &goals, &mut [0; 300]).map(|_| ())
+        write(&MissionHeader { mode, ..header() }, &vehicles, &Block::Goals(&goals), &mut [0; 300])
+            .map(|_| ())
     };
     assert_eq!(written(Mode::Labelled, Some(0)), Err(MissionError::SameGoal(250)));
     assert_eq!(written(Mode::Labelled, Some(1)), Err(MissionError::SameGoal(2)));

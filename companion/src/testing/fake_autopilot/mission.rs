@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::flight::{Path, VehiclePlan};
+use planner_core::flight::{Path, Task, VehiclePlan};
 use planner_core::frames::Geodetic;
 
 use crate::{Config, RosterEntry};
@@ -33,5 +33,5 @@ pub(crate) fn plan() -> VehiclePlan<16, 8> {
         path.push(point, 1.2).unwrap();
     }
     let gates = heapless::Vec::new();
-    VehiclePlan { goal: Some(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
+    VehiclePlan { task: Task::Goto(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
 }

@@ -5,7 +5,9 @@ use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_SENT};
 use companion::link::intent::{self, Intent};
 use companion::services::parameters::{self, Parameters};
-use companion::storage::mission_file::{self, MissionGoal, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{
+    self, Block, MissionGoal, MissionHeader, MissionVehicle, MissionView,
+};
 use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash, Store};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
@@ -120,7 +122,9 @@ fn missions(meter: &mut impl Meter) {
     let goals = [MissionGoal { position: Point::new(1.0, 2.0, 3.0), descent_m: 1.0 }; VEHICLES];
     let mut file = [0; mission_file::encoded_len(VEHICLES, VEHICLES)];
     meter
-        .call("mission_file::write, 32", 0, || mission_file::write(&header, &vehicles, &goals, &mut file))
+        .call("mission_file::write, 32", 0, || {
+            mission_file::write(&header, &vehicles, &Block::Goals(&goals), &mut file)
+        })
         .expect("a good mission");
     let view = meter
         .call("mission_file::MissionView::parse, 32", size_of::<MissionView<'_>>(), || {

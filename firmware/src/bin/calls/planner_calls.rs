@@ -10,7 +10,7 @@ use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{Advice, Method};
 use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
-use planner_core::flight::{Flight, Path, VehiclePlan};
+use planner_core::flight::{Flight, Path, Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::plan::{self, Goals, SwarmPlan};
 use planner_core::prm::{self, Config};
@@ -180,7 +180,7 @@ fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
     meter.call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan)).expect(good);
     let bytes = size_of::<SippWorkspace<ROADMAP_NODES, PIECES>>();
     for (index, flight) in plan.flights.iter().enumerate() {
-        let Some(goal) = flight.goal else { continue };
+        let Some(goal) = flight.task.goal() else { continue };
         let (from, to) = (index as u16, view.header().starts + goal);
         let route = Route { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[] };
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
@@ -211,7 +211,7 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
         meter.call("flight::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
         let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::PIECE_M);
-        let flight = Flight { id, goal: Some(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
+        let flight = Flight { id, task: Task::Goto(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
         plan.flights.push(flight).expect("there is room");
     }
     let bytes = size_of::<ScheduleWorkspace>();

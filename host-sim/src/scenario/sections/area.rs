@@ -8,15 +8,18 @@ use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{CoverageError, Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
-use super::checks::check_apart;
-use super::{ORIGIN, empty, geodetic, root, vehicles};
+use super::checks::{VehicleSpans, check_apart};
+use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
+use crate::map::Unknown;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, Coverage, Heading, Method, Trigger};
+use crate::scenario::coverage::{Area, Heading, Method, Trigger};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
-use crate::scenario::{Mode, Vehicle};
+use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
+/// Cell of the level ground where there is no map, metres.
+const GROUND_CELL_M: f32 = 1.0;
 /// Metres that are no more than this across are taken for degrees.
 const DEGREES_M: f64 = 0.5;
 
@@ -27,43 +30,60 @@ enum Coordinates {
     Metres,
 }
 
-/// Reads the scenario of a coverage mission.
-pub(in crate::scenario) fn coverage(text: &str, file: &str, folder: &Path) -> Result<Coverage> {
-    let text = Text { file, text };
-    root(text, |root| {
-        let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
-        let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-        let area_table = root.need("area", hint)?.table()?;
-        let area = self::area(&area_table, folder)?;
-        let mission = root.get("mission").map(|v| v.table()).transpose()?;
-        let mission = mission.unwrap_or_else(|| empty(text, "mission"));
-        let cruise_mps = mission.f32("cruise_mps", 2.0, 0.01..=100.0)?;
-        if let Some(mode) = mission.get("mode") {
-            mode.word(&[("coverage", Mode::Coverage)])?;
-        }
-        mission.expect(&["objective", "goals", "goals_file", "geofence", "ground_stations"]);
-        mission.finish()?;
-        let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
-        let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
-        let deconfliction = super::deconfliction(&deconfliction)?;
-        let mut unsupported = Vec::new();
-        let hint = "add a `[[vehicles]]` with `id` and `start` for each";
-        let vehicles_value = root.need("vehicles", hint)?;
-        let vehicles = vehicles(&vehicles_value, Some(&area.origin), &mut unsupported)?;
-        check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
-        let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
-        Ok(Coverage {
-            path: file.to_owned(),
-            text: text.text.to_owned(),
-            seed,
-            area,
-            cruise_mps,
-            separation_m: deconfliction.separation_m,
-            safety_distance_m: deconfliction.safety_distance_m,
-            vehicles: vehicles.into_iter().map(|(vehicle, _): (Vehicle, _)| vehicle).collect(),
-            vehicle_places,
-        })
+/// The scenario of a coverage mission.
+pub(super) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
+    let Common { seed, deconfliction, simulation, .. } = common(text, root)?;
+    let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
+    let area = area(&root.need("area", hint)?.table()?, folder)?;
+    let hint = "add a `[[vehicles]]` with `id` and `start` for each";
+    // What goals missions leave to coverage.
+    let mut unsupported = Vec::new();
+    let vehicles = vehicles(&root.need("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    let mission = root.get("mission").map(|v| v.table()).transpose()?;
+    let mission = self::mission(&mission.unwrap_or_else(|| empty(text, "mission")), &vehicles)?;
+    let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
+    let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
+    let faults = faults(root, &vehicles)?;
+    check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+    Ok(Scenario {
+        path: text.file.to_owned(),
+        text: text.text.to_owned(),
+        seed,
+        map: Map {
+            file: String::new(),
+            resolution_m: GROUND_CELL_M,
+            unknown: Unknown::Free,
+            origin: area.origin,
+        },
+        roadmap,
+        mission,
+        vehicle_places: vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect(),
+        vehicles: vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(),
+        deconfliction,
+        simulation,
+        faults,
+        area: Some(area),
+        formation: None,
+        unsupported: Vec::new(),
     })
+}
+
+/// `[mission]` of a coverage mission: it has no goals.
+fn mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mission> {
+    table.word("mode", Mode::Coverage, &[("coverage", Mode::Coverage)])?;
+    table.expect(&["objective", "goals", "goals_file"]);
+    let (geofence, ground_stations) = fence_and_ground_stations(table, vehicles)?;
+    let mission = Mission {
+        mode: Mode::Coverage,
+        objective: Objective::Makespan,
+        cruise_mps: table.f32("cruise_mps", 2.0, 0.01..=100.0)?,
+        goals: Vec::new(),
+        goal_places: Vec::new(),
+        geofence,
+        ground_stations,
+    };
+    table.finish()?;
+    Ok(mission)
 }
 
 fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {

@@ -18,7 +18,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, ensure};
 use flockmate_tests::{shared_data, workspace};
 use host_sim::coverage::{CORNERS, LANES, LOOKS};
-use host_sim::scenario::parse_coverage;
+use host_sim::scenario;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
@@ -110,7 +110,8 @@ fn fields(path: &Path, lane_m: f32, coordinates: &str) -> Result<Vec<Field>> {
         "[area]\nfile = {path:?}\ncoordinates = \"{coordinates}\"\nlane_m = {lane_m}\nwaypoint_m = {lane_m}\n\
          [mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0.0, 0.0, 0.0]\n"
     );
-    let area = parse_coverage(&text, "a field").map_err(|error| anyhow::anyhow!("{error}"))?.area;
+    let scenario = scenario::parse(&text, "a field").map_err(|error| anyhow::anyhow!("{error}"))?;
+    let area = scenario.area.context("the scenario has an area")?;
     let mut fields: Vec<Field> = Vec::new();
     let mut from = 0;
     for ring in &area.rings {

@@ -1,7 +1,7 @@
 //! Ways of a meeting's vehicles: the geometries in which they come close.
 
 use planner_core::Point;
-use planner_core::flight::{Flight, Path};
+use planner_core::flight::{Flight, Path, Task};
 use planner_core::schedule;
 
 use super::types::{SAFETY_M, SCHEDULE, WAYPOINTS};
@@ -144,7 +144,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
     let length_s = path.length_m() / SCHEDULE.cruise_mps + climb_m + descent_m;
     (path.length_m() > 2.0 && climb_m > 0.5 && descent_m > 0.5 && length_s < LONGEST_S).then_some(Flight {
         id,
-        goal: Some(u16::from(id)),
+        task: Task::Goto(u16::from(id)),
         path,
         climb_m,
         descent_m,

@@ -1,6 +1,6 @@
 //! From the plan to the lift-off.
 
-use planner_core::flight::Gate;
+use planner_core::flight::{Gate, Task};
 
 use super::State::*;
 use super::*;
@@ -56,7 +56,7 @@ pub(super) fn planned(scenes: &mut Scenes) {
         b.until(Ready, 6.0);
         b.start();
     };
-    let idle = VehiclePlan { goal: None, path: Default::default(), ..plan() };
+    let idle = VehiclePlan { task: Task::Stay, path: Default::default(), ..plan() };
     scenes.play(answered(Some(Ok(idle))), start, Done, 1.0);
     for failure in [PlanFailure::NoRoadmap, PlanFailure::Unreachable] {
         scenes.play(answered(Some(Err(failure))), |b| b.run(6.0), Aborted, 1.0);

@@ -1,0 +1,199 @@
+//! The camera: the autopilot is commanded to trigger it along the stretches that are photographed.
+//!
+//! By distance, `MAV_CMD_DO_SET_CAM_TRIGG_DIST` switches the trigger on at a stretch's first place, with a picture at once,
+//! and off at its last, with another. By waypoint, `MAV_CMD_DO_DIGICAM_CONTROL` takes each picture. Commands go one after the
+//! other and are repeated until they are acknowledged. A vehicle that leaves its path switches the trigger off; where it comes
+//! back it goes on with a picture at once, so that no gap is wider than the spacing.
+
+use heapless::Deque;
+use libm::atan2f;
+use planner_core::flight::{Look, Path, Photographs, Shots, Trigger};
+
+use super::along::Along;
+use crate::autopilot::telemetry::Ack;
+use crate::events::Link;
+use crate::link::Links;
+use crate::link::outbox::Outgoing;
+use crate::time::{Duration, Instant};
+
+/// Commands that wait.
+const ORDERS: usize = 4;
+/// A command that was not acknowledged is repeated after this long.
+const REPEAT_EVERY: Duration = Duration::from_millis(300);
+/// So often a command is sent; then it is given up and reported.
+const TRIES: u8 = 5;
+/// `MAV_RESULT` ACCEPTED.
+const ACCEPTED: u8 = 0;
+/// A leg that leads less far across looks no way, metres.
+const LEG_LEAST_M: f32 = 0.1;
+
+const DO_DIGICAM_CONTROL: u16 = 203;
+const DO_SET_CAM_TRIGG_DIST: u16 = 206;
+
+/// What the autopilot is commanded.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Order {
+    /// A picture now, and one after each distance in metres; 0 ends that.
+    Every(f32),
+    /// No more pictures.
+    Off,
+    /// A picture now.
+    Picture,
+}
+
+impl Order {
+    fn command(self) -> u16 {
+        match self {
+            Self::Every(_) | Self::Off => DO_SET_CAM_TRIGG_DIST,
+            Self::Picture => DO_DIGICAM_CONTROL,
+        }
+    }
+
+    fn message(self) -> Outgoing {
+        match self {
+            Self::Every(step_m) => Outgoing::TriggerEvery { step_m, at_once: true },
+            Self::Off => Outgoing::TriggerEvery { step_m: 0.0, at_once: false },
+            Self::Picture => Outgoing::Picture,
+        }
+    }
+}
+
+/// How far the pictures have come.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Camera {
+    /// The stretch at hand, and the next picture on it.
+    stretch: usize,
+    picture: u32,
+    /// Whether the autopilot was commanded to trigger by distance.
+    on: bool,
+    orders: Deque<Order, ORDERS>,
+    /// How often the first of them was sent, and when last.
+    tries: u8,
+    sent_at: Option<Instant>,
+    /// Commands given up, or refused; none was reported yet.
+    failed: bool,
+}
+
+impl Camera {
+    /// Commands what is due.
+    pub(super) fn step<const W: usize>(
+        &mut self,
+        photographs: &Photographs,
+        path: &Path<W>,
+        along: Along,
+        now: Instant,
+        links: &mut Links,
+    ) {
+        if photographs.trigger != Trigger::None {
+            if !along.follows {
+                if core::mem::take(&mut self.on) {
+                    self.order(Order::Off);
+                }
+            } else if let Some(shots) = photographs.stretches(path).nth(self.stretch) {
+                self.photograph(photographs.trigger, &shots, along.progress_m);
+            }
+        }
+        self.send(now, links);
+    }
+
+    fn photograph(&mut self, trigger: Trigger, shots: &Shots, progress_m: f32) {
+        if progress_m < shots.from_m {
+            return;
+        }
+        let distance = trigger == Trigger::Distance;
+        match trigger {
+            Trigger::Distance if progress_m < shots.to_m => {
+                if !core::mem::replace(&mut self.on, true) {
+                    self.order(Order::Every(shots.step_m));
+                }
+                return;
+            }
+            Trigger::Distance => self.order(Order::Every(0.0)),
+            _ => {
+                // Of several that were passed at once one is enough: all would show the same.
+                let before = self.picture;
+                while self.picture < shots.count && shots.place_m(self.picture) <= progress_m {
+                    self.picture += 1;
+                }
+                if self.picture > before {
+                    self.order(Order::Picture);
+                }
+            }
+        }
+        if distance || self.picture == shots.count {
+            (self.stretch, self.picture, self.on) = (self.stretch + 1, 0, false);
+        }
+    }
+
+    fn order(&mut self, order: Order) {
+        // Full where the autopilot is silent: the one that waits longest is worth least.
+        if self.orders.is_full() {
+            self.orders.pop_front();
+            (self.tries, self.sent_at, self.failed) = (0, None, true);
+        }
+        let _ = self.orders.push_back(order);
+    }
+
+    /// Sends the first that waits, again where it was not acknowledged.
+    fn send(&mut self, now: Instant, links: &mut Links) {
+        let Some(&order) = self.orders.front() else { return };
+        if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
+            return;
+        }
+        if self.tries == TRIES {
+            self.next();
+            if !core::mem::replace(&mut self.failed, true) {
+                links.say(true, "Camera trigger is not acknowledged");
+            }
+            return;
+        }
+        links.push(Link::Autopilot, order.message());
+        self.tries += 1;
+        self.sent_at = Some(now);
+    }
+
+    fn next(&mut self) {
+        self.orders.pop_front();
+        (self.tries, self.sent_at) = (0, None);
+    }
+
+    pub(super) fn handle_ack(&mut self, ack: &Ack, links: &mut Links) {
+        let waits = self.sent_at.is_some() && self.orders.front().is_some_and(|o| o.command() == ack.command);
+        if !waits {
+            return;
+        }
+        self.next();
+        if ack.result != ACCEPTED && !core::mem::replace(&mut self.failed, true) {
+            links.say_count(
+                true,
+                "Autopilot refuses the camera: # (result #)",
+                [u32::from(ack.command), u32::from(ack.result)],
+            );
+        }
+    }
+}
+
+/// Where the vehicle looks `along_m` metres along its path: on a leg that leads straight up or down as on the one before.
+pub(super) fn heading<const W: usize>(
+    photographs: &Photographs,
+    path: &Path<W>,
+    along_m: f32,
+) -> Option<f32> {
+    match photographs.look {
+        Look::Fixed(heading) => Some(heading),
+        Look::Ahead => {
+            let legs = path.waypoints().windows(2).filter_map(|leg| {
+                let way = leg[1].position - leg[0].position;
+                (way.xy().norm() > LEG_LEAST_M).then(|| (leg[0].along_m, atan2f(way.y, way.x)))
+            });
+            let mut found = None;
+            for (from_m, heading) in legs {
+                if from_m > along_m && found.is_some() {
+                    break;
+                }
+                found = Some(heading);
+            }
+            found
+        }
+    }
+}

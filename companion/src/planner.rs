@@ -1,0 +1,49 @@
+//! The plan that a mission file asks for, on a desk and on a board alike: the desk only lends more memory.
+//!
+//! Every companion plans the whole swarm from the same file, so all agree; the CRC of the plan is what they compare.
+
+pub mod coverage;
+
+use heapless::Vec;
+use planner_core::plan::{self, PlanError, PlanWorkspace, SwarmPlan};
+use planner_core::roadmap::RoadmapView;
+use planner_core::schedule::ScheduleError;
+use planner_core::search::SearchError;
+
+use crate::config::PlanFailure;
+use crate::storage::mission_file::MissionView;
+
+/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`.
+///
+/// # Errors
+/// Why there is no plan.
+pub fn goals<const N: usize, const V: usize, const W: usize, const P: usize>(
+    mission: &MissionView<'_>,
+    roadmap: &RoadmapView<'_>,
+    gates_most: usize,
+    ws: &mut PlanWorkspace<N, V, P>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanFailure> {
+    let (mut tasks, mut descents_m) = (Vec::<_, V>::new(), Vec::<_, V>::new());
+    let request =
+        mission.request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanFailure::Capacity)?;
+    plan::plan_swarm(roadmap, &request, ws, out).map_err(|error| failure(&error))
+}
+
+/// What an error of the planner is to a companion.
+fn failure(error: &PlanError) -> PlanFailure {
+    match error {
+        PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
+        PlanError::Config(_) | PlanError::BadTask(_) | PlanError::BadDescent(_) | PlanError::SameGoal(_) => {
+            PlanFailure::Invalid
+        }
+        PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
+        | PlanError::SwarmFull
+        | PlanError::Path(..)
+        | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
+            PlanFailure::Capacity
+        }
+        PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => PlanFailure::Blocked,
+        PlanError::Search(..) | PlanError::Assignment(_) => PlanFailure::Unreachable,
+    }
+}

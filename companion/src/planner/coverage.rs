@@ -1,0 +1,203 @@
+//! A coverage mission: from the area in the mission file to the flights of all vehicles (CPP §3).
+
+use core::fmt;
+
+use heapless::Vec;
+use planner_core::coverage::area::{Area, AreaError, Ring};
+use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
+use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
+use planner_core::coverage::tracks::{self, Pattern, Tracks};
+use planner_core::coverage::transit::Transit;
+use planner_core::coverage::{CoverageError, Flat};
+use planner_core::flight::Look;
+use planner_core::plan::{PlanError, SwarmPlan};
+use planner_core::schedule::ScheduleWorkspace;
+
+use super::failure;
+use crate::config::PlanFailure;
+use crate::storage::mission_file::coverage::{CoverageView, Heading, Parts};
+use crate::storage::mission_file::{MissionVehicle, MissionView};
+
+/// Most rings of an area.
+pub const RINGS: usize = 128;
+/// Clearance that every leg is taken to have, metres: over the fields there are no walls.
+const CLEARANCE_M: f32 = 10.0;
+
+/// Memory for areas of at most `X` vertices, `L` lanes and `K` vehicles.
+pub struct Workspace<const X: usize, const L: usize, const K: usize> {
+    vertices: Vec<Flat, X>,
+    rings: Vec<Ring, RINGS>,
+    strips: tracks::Workspace<X>,
+    tracks: Tracks<L>,
+    pack: PackWorkspace<K>,
+    routes: Plan<K>,
+}
+
+impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self {
+            vertices: Vec::new(),
+            rings: Vec::new(),
+            strips: tracks::Workspace::new(),
+            tracks: Tracks::new(),
+            pack: PackWorkspace::new(),
+            routes: Plan::new(),
+        }
+    }
+
+    /// The lanes planned last.
+    pub fn tracks(&self) -> &Tracks<L> {
+        &self.tracks
+    }
+
+    /// The routes planned last.
+    pub fn routes(&self) -> &Plan<K> {
+        &self.routes
+    }
+}
+
+impl<const X: usize, const L: usize, const K: usize> Default for Workspace<X, L, K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// Why there is no coverage plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Error {
+    /// The area, or how it is to be photographed.
+    Coverage(CoverageError),
+    /// The flights.
+    Plan(PlanError),
+}
+
+impl From<CoverageError> for Error {
+    fn from(error: CoverageError) -> Self {
+        Self::Coverage(error)
+    }
+}
+
+impl From<PlanError> for Error {
+    fn from(error: PlanError) -> Self {
+        Self::Plan(error)
+    }
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Coverage(error) => write!(f, "{error:?}"),
+            Self::Plan(error) => write!(f, "{error:?}"),
+        }
+    }
+}
+
+impl From<Error> for PlanFailure {
+    fn from(error: Error) -> Self {
+        match error {
+            Error::Plan(error) => failure(&error),
+            Error::Coverage(
+                CoverageError::Area(AreaError::AreaFull)
+                | CoverageError::LanesFull
+                | CoverageError::NoFlyFull
+                | CoverageError::Vehicles
+                | CoverageError::WorkspaceTooSmall,
+            ) => Self::Capacity,
+            Error::Coverage(CoverageError::Unreachable) => Self::Unreachable,
+            Error::Coverage(_) => Self::Invalid,
+        }
+    }
+}
+
+/// A vehicle as the packing sees it: it takes off and lands on the same pad.
+fn vehicle(
+    mission: &MissionView<'_>,
+    vehicle: &MissionVehicle,
+    view: &CoverageView<'_>,
+    i: usize,
+) -> Vehicle {
+    let place = vehicle.start.xy();
+    let share = view.shares().nth(i);
+    Vehicle {
+        place,
+        home: place,
+        cruise_mps: libm::fminf(mission.header().cruise_mps, vehicle.speed_max_mps),
+        climb_mps: share.map_or(0.0, |s| s.climb_mps),
+        descend_mps: share.map_or(0.0, |s| s.descend_mps),
+        weight: share.map_or(0.0, |s| s.weight),
+    }
+}
+
+/// Plans the flights of all vehicles, for companions with room for `gates_most`; no-fly zones may have `C` corners.
+///
+/// # Errors
+/// Why there is no plan.
+pub fn plan<
+    const X: usize,
+    const L: usize,
+    const K: usize,
+    const C: usize,
+    const V: usize,
+    const W: usize,
+>(
+    mission: &MissionView<'_>,
+    view: &CoverageView<'_>,
+    gates_most: usize,
+    ws: &mut Workspace<X, L, K>,
+    schedule: &mut ScheduleWorkspace,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), Error> {
+    let header = view.header();
+    ws.vertices.clear();
+    ws.rings.clear();
+    for vertex in view.vertices() {
+        ws.vertices.push(vertex).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
+    }
+    for ring in view.rings() {
+        ws.rings.push(ring).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
+    }
+    let area = Area::new(&ws.vertices, &ws.rings).map_err(CoverageError::Area)?;
+    let mut transit = Transit::<C>::empty();
+    transit.learn(area)?;
+    let pattern = Pattern {
+        spacing: header.spacing,
+        angle_deg: header.angle_deg,
+        margin_m: header.margin_m,
+        looks: header.looks,
+    };
+    tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
+    let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
+    for (i, own) in mission.vehicles().enumerate() {
+        let pad = Pad { id: own.task.id, start: own.start, climb_m: own.task.climb_m };
+        vehicles.push(vehicle(mission, &own, view, i)).map_err(|_| CoverageError::Vehicles)?;
+        pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
+        if area.forbids(&own.start.xy()) {
+            return Err(CoverageError::InsideNoFly(i as u8).into());
+        }
+    }
+    let (tracks, transit) = (&ws.tracks, &transit);
+    let work = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
+    match header.parts {
+        Parts::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
+        Parts::Anyone => {
+            let shares: Vec<f32, K> = view.shares().map(|share| share.weight).collect();
+            // The weights are parts of the work here, not the vehicles' own.
+            pack::by_shares(&work, &shares, &mut ws.pack, &mut ws.routes)?;
+        }
+    }
+    let along = tracks.along();
+    let look = match header.heading {
+        Heading::Sweep => Look::Fixed(libm::atan2f(along.y, along.x)),
+        Heading::Lane => Look::Ahead,
+    };
+    let swarm = Swarm {
+        pads: &pads,
+        manner: Manner { waypoint_m: header.spacing.waypoint_m, look, trigger: header.trigger },
+        clearance_m: CLEARANCE_M,
+        schedule: mission.header().schedule,
+        gates_most,
+    };
+    flights::plan(&work, &ws.routes, &swarm, schedule, out)?;
+    Ok(())
+}

@@ -1,0 +1,286 @@
+//! The block of a coverage mission: the area, how it is photographed, and each vehicle's share (CPP §3; byte by byte in
+//! `companion/README.md`).
+//!
+//! What follows from these numbers is computed: lanes, routes, flights. POWELL's shares W are planned on the desk.
+
+use planner_core::coverage::Flat;
+use planner_core::coverage::area::{MAX_COORDINATE_M, Ring, RingKind};
+use planner_core::coverage::footprint::{Footprint, Spacing};
+use planner_core::coverage::pack::{Heights, Unit};
+use planner_core::file::FileError;
+use planner_core::flight::Trigger;
+
+use super::error::MissionError;
+use super::numbers::{MAX_SPEED_MPS, f32_at, positive, put, u16_at, u32_at};
+
+/// Bytes before the first vehicle's share.
+const HEAD_LEN: usize = 44;
+/// Bytes of a vehicle's share.
+const SHARE_LEN: usize = 12;
+/// Bytes of a ring.
+const RING_LEN: usize = 4;
+/// Bytes of a vertex.
+const VERTEX_LEN: usize = 8;
+/// Most changes of the lanes' order that a file asks for: a board looks at each.
+pub const MAX_LOOKS: u32 = 20_000_000;
+
+/// Where vehicles look along the lanes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Heading {
+    /// One way on all lanes.
+    Sweep,
+    /// The way they fly.
+    Lane,
+}
+
+/// Which vehicles a part of the work may go to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Parts {
+    /// Any: the shares are those that POWELL found, or all alike.
+    Anyone,
+    /// Those with its share: the shares are the vehicles' weights.
+    SameWeight,
+}
+
+/// What all vehicles of a coverage mission share.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CoverageHeader {
+    /// The smallest part of the work.
+    pub unit: Unit,
+    /// Which vehicles it may go to.
+    pub parts: Parts,
+    /// Where vehicles look.
+    pub heading: Heading,
+    /// What takes the pictures.
+    pub trigger: Trigger,
+    /// Changes of the lanes' order that are looked at, at most.
+    pub looks: u32,
+    /// Height of the pictures and of the layers.
+    pub heights: Heights,
+    /// Footprint and spacings.
+    pub spacing: Spacing,
+    /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
+    pub angle_deg: Option<f32>,
+    /// Lanes begin and end so far beyond the edge, metres.
+    pub margin_m: f32,
+}
+
+/// What one vehicle brings to the work.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Share {
+    /// Its weight, or the size of the part that comes at its place: at least 0.
+    pub weight: f32,
+    /// Speed upwards, m/s.
+    pub climb_mps: f32,
+    /// Speed downwards, m/s.
+    pub descend_mps: f32,
+}
+
+/// The block as it is written.
+#[derive(Clone, Copy, Debug)]
+pub struct CoverageParts<'a> {
+    /// What all share.
+    pub header: CoverageHeader,
+    /// One a vehicle, in the order of the mission's.
+    pub shares: &'a [Share],
+    /// The rings.
+    pub rings: &'a [Ring],
+    /// Their vertices, metres east and north of the mission origin.
+    pub vertices: &'a [Flat],
+}
+
+impl CoverageParts<'_> {
+    /// Bytes of the block.
+    pub fn encoded_len(&self) -> usize {
+        encoded_len(self.shares.len(), self.rings.len(), self.vertices.len())
+    }
+
+    /// Writes the block, which has its length.
+    pub(super) fn write(&self, out: &mut [u8]) {
+        let h = &self.header;
+        out[..2].copy_from_slice(&(self.vertices.len() as u16).to_le_bytes());
+        out[2..4].copy_from_slice(&(self.rings.len() as u16).to_le_bytes());
+        out[4] = u8::from(h.unit == Unit::Waypoint);
+        out[5] = u8::from(h.parts == Parts::SameWeight);
+        out[6] = u8::from(h.heading == Heading::Lane);
+        out[7] = match h.trigger {
+            Trigger::Distance => 0,
+            Trigger::Waypoint => 1,
+            Trigger::None => 2,
+        };
+        out[8..12].copy_from_slice(&h.looks.to_le_bytes());
+        let Spacing { footprint, lane_m, waypoint_m } = h.spacing;
+        let angle_deg = h.angle_deg.unwrap_or(f32::NAN);
+        let numbers = [
+            h.heights.mission_m,
+            h.heights.layer_m,
+            footprint.along_m,
+            footprint.across_m,
+            lane_m,
+            waypoint_m,
+            angle_deg,
+            h.margin_m,
+        ];
+        let (head, rest) = out.split_at_mut(HEAD_LEN);
+        put(head, 12, numbers.into_iter());
+        let (shares, rest) = rest.split_at_mut(self.shares.len() * SHARE_LEN);
+        put(shares, 0, self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]));
+        let (rings, vertices) = rest.split_at_mut(self.rings.len() * RING_LEN);
+        for (to, ring) in rings.chunks_exact_mut(RING_LEN).zip(self.rings) {
+            to[..2].copy_from_slice(&ring.end.to_le_bytes());
+            to[2] = match ring.kind {
+                RingKind::Outer => 0,
+                RingKind::Hole => 1,
+                RingKind::NoFly => 2,
+            };
+            to[3] = 0;
+        }
+        put(vertices, 0, self.vertices.iter().flat_map(|v| [v.x, v.y]));
+    }
+}
+
+/// Bytes of a block.
+pub const fn encoded_len(vehicles: usize, rings: usize, vertices: usize) -> usize {
+    HEAD_LEN + vehicles * SHARE_LEN + rings * RING_LEN + vertices * VERTEX_LEN
+}
+
+/// A checked block over borrowed bytes. Whether its rings are an area, [`planner_core::coverage::area::Area::new`] says.
+#[derive(Clone, Copy, Debug)]
+pub struct CoverageView<'a> {
+    header: CoverageHeader,
+    shares: &'a [[u8; SHARE_LEN]],
+    rings: &'a [[u8; RING_LEN]],
+    vertices: &'a [[u8; VERTEX_LEN]],
+}
+
+impl<'a> CoverageView<'a> {
+    /// Checks the block of a mission of so many vehicles.
+    pub(super) fn parse(b: &'a [u8], vehicles: usize) -> Result<Self, MissionError> {
+        let refuse = |name| Err(FileError::Header(name).into());
+        let Some(head) = b.first_chunk::<HEAD_LEN>() else { return Err(FileError::Length.into()) };
+        let (vertex_count, ring_count) = (usize::from(u16_at(head, 0)), usize::from(u16_at(head, 2)));
+        if b.len() != encoded_len(vehicles, ring_count, vertex_count) {
+            return Err(FileError::Length.into());
+        }
+        let angle_deg = f32_at(head, 36);
+        let header = CoverageHeader {
+            unit: match head[4] {
+                0 => Unit::Lane,
+                1 => Unit::Waypoint,
+                _ => return refuse("unit"),
+            },
+            parts: match head[5] {
+                0 => Parts::Anyone,
+                1 => Parts::SameWeight,
+                _ => return refuse("parts"),
+            },
+            heading: match head[6] {
+                0 => Heading::Sweep,
+                1 => Heading::Lane,
+                _ => return refuse("heading"),
+            },
+            trigger: match head[7] {
+                0 => Trigger::Distance,
+                1 => Trigger::Waypoint,
+                2 => Trigger::None,
+                _ => return refuse("trigger"),
+            },
+            looks: u32_at(head, 8),
+            heights: Heights { mission_m: f32_at(head, 12), layer_m: f32_at(head, 16) },
+            spacing: Spacing {
+                footprint: Footprint { along_m: f32_at(head, 20), across_m: f32_at(head, 24) },
+                lane_m: f32_at(head, 28),
+                waypoint_m: f32_at(head, 32),
+            },
+            angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
+            margin_m: f32_at(head, 40),
+        };
+        header.check()?;
+        let (shares, rest) = b[HEAD_LEN..].split_at(vehicles * SHARE_LEN);
+        let (rings, vertices) = rest.split_at(ring_count * RING_LEN);
+        let view = Self {
+            header,
+            shares: shares.as_chunks().0,
+            rings: rings.as_chunks().0,
+            vertices: vertices.as_chunks().0,
+        };
+        if let Some(i) = view.shares().position(|share| !share.is_sound()) {
+            return Err(MissionError::Vehicle(i as u16));
+        }
+        if view.rings.iter().any(|ring| ring[2] > 2 || ring[3] != 0) {
+            return refuse("rings");
+        }
+        if view.vertices().any(|v| !v.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)) {
+            return refuse("vertices");
+        }
+        Ok(view)
+    }
+
+    /// What all vehicles share.
+    pub fn header(&self) -> &CoverageHeader {
+        &self.header
+    }
+
+    /// What each vehicle brings, in the order of the mission's vehicles.
+    pub fn shares(&self) -> impl ExactSizeIterator<Item = Share> + '_ {
+        self.shares.iter().map(|b| Share {
+            weight: f32_at(b, 0),
+            climb_mps: f32_at(b, 4),
+            descend_mps: f32_at(b, 8),
+        })
+    }
+
+    /// The rings.
+    pub fn rings(&self) -> impl ExactSizeIterator<Item = Ring> + '_ {
+        self.rings.iter().map(|b| Ring {
+            end: u16_at(b, 0),
+            kind: match b[2] {
+                0 => RingKind::Outer,
+                1 => RingKind::Hole,
+                _ => RingKind::NoFly,
+            },
+        })
+    }
+
+    /// Their vertices, metres east and north of the mission origin.
+    pub fn vertices(&self) -> impl ExactSizeIterator<Item = Flat> + '_ {
+        self.vertices.iter().map(|b| Flat::new(f32_at(b, 0), f32_at(b, 4)))
+    }
+
+    /// Bytes it takes.
+    pub(super) fn byte_len(&self) -> usize {
+        encoded_len(self.shares.len(), self.rings.len(), self.vertices.len())
+    }
+}
+
+impl Share {
+    fn is_sound(&self) -> bool {
+        self.weight >= 0.0
+            && self.weight.is_finite()
+            && positive(self.climb_mps, MAX_SPEED_MPS)
+            && positive(self.descend_mps, MAX_SPEED_MPS)
+    }
+}
+
+impl CoverageHeader {
+    fn check(&self) -> Result<(), MissionError> {
+        let refuse = |name| Err(FileError::Header(name).into());
+        if self.spacing.check().is_err() {
+            return refuse("spacing");
+        }
+        let heights = [self.heights.mission_m, self.heights.layer_m];
+        if !heights.iter().all(|h| positive(*h, MAX_COORDINATE_M)) {
+            return refuse("heights");
+        }
+        if self.looks > MAX_LOOKS {
+            return refuse("looks");
+        }
+        if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {
+            return refuse("angle_deg");
+        }
+        if !(0.0..=MAX_COORDINATE_M).contains(&self.margin_m) {
+            return refuse("margin_m");
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,44 @@
+//! Numbers of a file, little-endian, and their ranges.
+
+use planner_core::Point;
+use planner_core::roadmap::MAX_COORDINATE_M;
+
+/// Fastest speed a mission may name, m/s.
+pub(super) const MAX_SPEED_MPS: f32 = 1000.0;
+
+/// The f32 at a place.
+pub(super) fn f32_at(b: &[u8], at: usize) -> f32 {
+    f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]])
+}
+
+/// The u16 at a place.
+pub(super) fn u16_at(b: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes([b[at], b[at + 1]])
+}
+
+/// The u32 at a place.
+pub(super) fn u32_at(b: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]])
+}
+
+/// Three f32.
+pub(super) fn point_at(b: &[u8], at: usize) -> Point {
+    Point::new(f32_at(b, at), f32_at(b, at + 4), f32_at(b, at + 8))
+}
+
+/// Writes numbers one after the other.
+pub(super) fn put(b: &mut [u8], at: usize, numbers: impl Iterator<Item = f32>) {
+    for (to, number) in b[at..].chunks_exact_mut(4).zip(numbers) {
+        to.copy_from_slice(&number.to_le_bytes());
+    }
+}
+
+/// Whether it is more than zero and at most `most`; false for NaN.
+pub(super) fn positive(value: f32, most: f32) -> bool {
+    value > 0.0 && value <= most
+}
+
+/// Whether every coordinate may be named.
+pub(super) fn in_range(point: &Point) -> bool {
+    point.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)
+}

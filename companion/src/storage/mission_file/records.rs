@@ -1,0 +1,83 @@
+//! One vehicle, one goal.
+
+use planner_core::Point;
+use planner_core::plan::VehicleTask;
+use planner_core::roadmap::MAX_COORDINATE_M;
+
+use super::numbers::{MAX_SPEED_MPS, f32_at, in_range, point_at, positive, put, u16_at};
+
+/// Bytes of a vehicle.
+pub const VEHICLE_LEN: usize = 32;
+/// Bytes of a goal.
+pub const GOAL_LEN: usize = 16;
+/// The vehicle's goal that means: none of its own.
+pub const NO_GOAL: u16 = u16::MAX;
+
+/// One vehicle; vehicle `i` starts at node `i` of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissionVehicle {
+    /// System id, clearance needed, height of the start over its pad, own goal.
+    pub task: VehicleTask,
+    /// First point of its path.
+    pub start: Point,
+    /// Radius of its hull, metres.
+    pub radius_m: f32,
+    /// Fastest it can fly, m/s.
+    pub speed_max_mps: f32,
+}
+
+/// One goal; goal `i` is node `vehicles + i` of the roadmap.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MissionGoal {
+    /// Where it is.
+    pub position: Point,
+    /// Its height over where a vehicle stands on the ground below it, metres.
+    pub descent_m: f32,
+}
+
+impl MissionVehicle {
+    pub(super) fn is_sound(&self, goals: usize) -> bool {
+        let task = &self.task;
+        task.id != 0
+            && task.goal.is_none_or(|goal| usize::from(goal) < goals)
+            && in_range(&self.start)
+            && (0.0..=MAX_COORDINATE_M).contains(&task.climb_m)
+            && positive(task.required_clearance_m, MAX_COORDINATE_M)
+            && positive(self.radius_m, MAX_COORDINATE_M)
+            && positive(self.speed_max_mps, MAX_SPEED_MPS)
+    }
+
+    pub(super) fn from_bytes(b: &[u8; VEHICLE_LEN]) -> Self {
+        let goal = u16_at(b, 2);
+        Self {
+            task: VehicleTask {
+                id: b[0],
+                required_clearance_m: f32_at(b, 20),
+                climb_m: f32_at(b, 24),
+                goal: (goal != NO_GOAL).then_some(goal),
+            },
+            start: point_at(b, 4),
+            radius_m: f32_at(b, 16),
+            speed_max_mps: f32_at(b, 28),
+        }
+    }
+
+    pub(super) fn to_bytes(self) -> [u8; VEHICLE_LEN] {
+        let mut b = [0; VEHICLE_LEN];
+        b[0] = self.task.id;
+        b[2..4].copy_from_slice(&self.task.goal.unwrap_or(NO_GOAL).to_le_bytes());
+        let numbers = [self.radius_m, self.task.required_clearance_m, self.task.climb_m, self.speed_max_mps];
+        put(&mut b, 4, self.start.iter().copied().chain(numbers));
+        b
+    }
+}
+
+impl MissionGoal {
+    pub(super) fn is_sound(&self) -> bool {
+        in_range(&self.position) && (0.0..=MAX_COORDINATE_M).contains(&self.descent_m)
+    }
+
+    pub(super) fn from_bytes(b: &[u8; GOAL_LEN]) -> Self {
+        Self { position: point_at(b, 0), descent_m: f32_at(b, 12) }
+    }
+}

@@ -1,0 +1,168 @@
+//! A coverage mission as it is flown: the ground, the mission file, and what all companions plan from it.
+
+use anyhow::{anyhow, bail};
+use companion::planner::coverage::{self, Error, Workspace};
+use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, Parts, Share};
+use companion::storage::mission_file::{Block, Kind};
+use planner_core::Point;
+use planner_core::coverage::pack::Unit;
+use planner_core::flight::PathError;
+use planner_core::plan::{PlanError, VehicleTask};
+use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
+
+use super::{Mission, SwarmPlan};
+use crate::area::MOST_VERTICES;
+use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS, on_heap};
+use crate::coverage::{CORNERS, LANES, LOOKS, Planned, VEHICLES as COVERAGE_VEHICLES};
+use crate::map;
+use crate::scenario::Scenario;
+use crate::scenario::coverage::Method;
+
+/// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
+const OVER_PAD_M: f32 = 3.0;
+/// The ground reaches so far beyond area and pads, and the air so far over the highest layer, metres.
+const AROUND_M: f32 = 30.0;
+/// What vehicles keep to walls beyond their hulls where there are none, metres.
+const MARGIN_M: f32 = 0.5;
+
+type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
+
+/// The mission up to its files.
+pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
+    let planned = Planned::new(&scenario, method(&scenario))?;
+    let Some(shares) = planned.shares.clone() else {
+        bail!(
+            "cannot be flown: {}: method \"exact\" has no shares that companions could plan with\nhint: \"powell-binpat\" does",
+            scenario.path
+        );
+    };
+    let map = ground(&planned)?;
+    let routes = planned.plan.clone();
+    let climbs: Vec<Share> = planned
+        .vehicles
+        .iter()
+        .zip(&shares)
+        .map(|(v, &weight)| Share { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
+        .collect();
+    let top_m = OVER_PAD_M.min(planned.wanted.heights.mission_m);
+    drop(planned);
+    for vehicle in &mut scenario.vehicles {
+        vehicle.start.z += vehicle.radius_m + top_m;
+    }
+    let tasks = scenario
+        .vehicles
+        .iter()
+        .map(|v| VehicleTask {
+            id: v.id,
+            required_clearance_m: v.radius_m + MARGIN_M,
+            climb_m: top_m,
+            goal: None,
+        })
+        .collect();
+    let mut schedule = super::schedule_config(&scenario);
+    schedule.vertical_mps = climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
+    let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
+    mission.encode_area(&climbs)?;
+    let mut ws = on_heap(DeskWorkspace::new);
+    mission.plan_area(&mut ws)?;
+    if ws.routes() != &routes {
+        bail!(
+            "cannot be flown: {}: companions would divide the area in another way\nhint: please report it, with the scenario",
+            mission.scenario.path
+        );
+    }
+    Ok(mission)
+}
+
+/// How its work is divided.
+pub fn method(scenario: &Scenario) -> Method {
+    scenario.area.as_ref().map_or(Method::PowellBinpat, |area| area.method)
+}
+
+/// Level ground below area and pads.
+fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
+    let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
+    let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
+    for place in places {
+        let place = Point::new(place.x, place.y, 0.0);
+        (low, high) = (low.inf(&place), high.sup(&place));
+    }
+    let heights = planned.wanted.heights;
+    high.z = heights.mission_m + heights.layer_m * (planned.vehicles.len() + 1) as f32;
+    let around = Point::repeat(AROUND_M);
+    let cell_m = planned.scenario.map.resolution_m;
+    Ok(map::level(&(low - around), &(high + around), cell_m)?)
+}
+
+impl Mission {
+    /// Writes the mission file.
+    fn encode_area(&mut self, shares: &[Share]) -> anyhow::Result<()> {
+        let Some(area) = &self.scenario.area else { return Ok(()) };
+        let parts = match method(&self.scenario) {
+            Method::PowellBinpat | Method::Exact => Parts::Anyone,
+            Method::SimpleBinpat | Method::Binpat => {
+                let alike = shares.iter().all(|share| share.weight == shares[0].weight);
+                if alike { Parts::Anyone } else { Parts::SameWeight }
+            }
+        };
+        let header = CoverageHeader {
+            unit: match area.method {
+                Method::SimpleBinpat => Unit::Lane,
+                _ => Unit::Waypoint,
+            },
+            parts,
+            heading: area.heading,
+            trigger: area.trigger,
+            looks: LOOKS,
+            heights: area.heights,
+            spacing: area.spacing,
+            angle_deg: area.angle_deg,
+            margin_m: area.margin_m,
+        };
+        let (rings, vertices) = (&area.rings[..], &area.vertices[..]);
+        let block = Block::Coverage(CoverageParts { header, shares, rings, vertices });
+        self.mission_file = self.encode(&block)?;
+        Ok(())
+    }
+
+    /// Plans as every companion does.
+    fn plan_area(&self, ws: &mut DeskWorkspace) -> anyhow::Result<Box<SwarmPlan>> {
+        let mission = self.mission_view();
+        let Kind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
+        let mut schedule = on_heap(ScheduleWorkspace::new);
+        let mut plan = on_heap(SwarmPlan::new);
+        coverage::plan::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, VEHICLES, WAYPOINTS>(
+            &mission,
+            view,
+            self.board.map_or(GATES, |board| board.gates),
+            ws,
+            &mut schedule,
+            &mut plan,
+        )
+        .map_err(|error| self.explained(&error))?;
+        Ok(plan)
+    }
+
+    /// The plan of a coverage mission.
+    pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
+        self.plan_area(&mut on_heap(DeskWorkspace::new))
+    }
+
+    fn explained(&self, error: &Error) -> anyhow::Error {
+        let path = &self.scenario.path;
+        match error {
+            Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
+                "the route of vehicle {id} has too many corners: {path}: a path holds at most {WAYPOINTS} waypoints, two \
+                 a lane\nhint: more vehicles, or wider lanes"
+            ),
+            Error::Plan(PlanError::Schedule(id, ScheduleError::Blocked)) => anyhow!(
+                "vehicle {id} cannot pass the others: {path}: no departure keeps it apart from them\nhint: pads further \
+                 apart, or a smaller deconfliction.separation_m"
+            ),
+            Error::Plan(PlanError::Schedule(id, ScheduleError::GatesFull)) => {
+                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates")
+            }
+            other => anyhow!("no plan: {path}: {other}"),
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! Routes as flights: each vehicle's path, and the order of the vehicles where two of them meet.
+//!
+//! Source: CPP §3.2: up to the own layer, over to the first waypoint, down, along the lanes, up, home in the layer, down.
+//! The take-off ends and the landing begins close above the pad: all between is path, on which a vehicle can wait.
+//! A flight is one path like any other mission's, so [`crate::schedule`] keeps it apart from the others: the vehicle that
+//! flies longest leaves first, each other one as early as those before it allow, and gates hold that order in the air.
+
+use heapless::Vec;
+
+use super::Flat;
+use super::pack::{Plan, Route, Work};
+use super::transit::Transit;
+use crate::Point;
+use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
+use crate::plan::{PlanError, SwarmPlan};
+use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+
+/// A vehicle of the mission, beside what it is packed by.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pad {
+    /// Id of the vehicle, unique in the swarm.
+    pub id: u8,
+    /// First point of its path, above the pad. Its place is the vehicle's in [`Work::vehicles`].
+    pub start: Point,
+    /// Height of that over where the vehicle stands, metres.
+    pub climb_m: f32,
+}
+
+/// How pictures are taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Manner {
+    /// From one picture to the next, metres: at most.
+    pub waypoint_m: f32,
+    /// Where vehicles look.
+    pub look: Look,
+    /// What takes the pictures.
+    pub trigger: Trigger,
+}
+
+/// What flights follow from, beside the routes.
+#[derive(Clone, Copy, Debug)]
+pub struct Swarm<'a> {
+    /// The vehicles, in the order of [`Work::vehicles`].
+    pub pads: &'a [Pad],
+    /// How pictures are taken.
+    pub manner: Manner,
+    /// Clearance that every leg is taken to have, metres: there are no walls.
+    pub clearance_m: f32,
+    /// Separation and nominal speeds; each vehicle's own are those of [`Work::vehicles`].
+    pub schedule: ScheduleConfig,
+    /// Most gates of one vehicle.
+    pub gates_most: usize,
+}
+
+/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there.
+///
+/// # Errors
+/// [`PlanError::Path`] for a route with more than `W` corners, [`PlanError::Schedule`] for a vehicle that cannot be kept
+/// apart from the others, [`PlanError::Terminals`] where pads and vehicles do not belong together.
+pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+    work: &Work<'_, L, N>,
+    routes: &Plan<K>,
+    swarm: &Swarm<'_>,
+    ws: &mut ScheduleWorkspace,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    swarm.schedule.check().map_err(PlanError::Config)?;
+    if swarm.pads.len() != work.vehicles.len() {
+        return Err(PlanError::Terminals);
+    }
+    out.flights.clear();
+    for (index, pad) in swarm.pads.iter().enumerate() {
+        let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
+            Some(route) => flight(work, route, swarm, pad).map_err(|e| PlanError::Path(pad.id, e))?,
+            None => grounded(pad).map_err(|e| PlanError::Path(pad.id, e))?,
+        };
+        out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
+    }
+    depart(swarm, ws, out)?;
+    for (index, flight) in out.flights.iter().enumerate() {
+        schedule::merged_m(&swarm.schedule, &out.flights, index, swarm.gates_most, ws)
+            .map_err(|e| PlanError::Schedule(flight.id, e))?;
+    }
+    out.seal(&swarm.schedule);
+    Ok(())
+}
+
+/// The vehicle that flies longest leaves first, each other one as early as those before it allow.
+fn depart<const V: usize, const W: usize>(
+    swarm: &Swarm<'_>,
+    ws: &mut ScheduleWorkspace,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), PlanError> {
+    let cfg = &swarm.schedule;
+    let mut order: Vec<(bool, f32, u16), V> = Vec::new();
+    for (flight, i) in out.flights.iter().zip(0..) {
+        // Cannot overflow: one entry a flight.
+        let _ = order.push((flight.task.flies(), flight.lasts_s(cfg), i));
+    }
+    // Whoever stays on its pad is there before all others.
+    order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+    for (place, &(flies, _, i)) in order.iter().enumerate() {
+        if !flies {
+            continue;
+        }
+        let before = order[..place].iter().map(|&(_, _, j)| &out.flights[usize::from(j)]);
+        let flight = &out.flights[usize::from(i)];
+        let departure = schedule::earliest_departure(cfg, flight, 0.0, before, ws);
+        let depart_s = departure.map_err(|e: ScheduleError| PlanError::Schedule(flight.id, e))?;
+        out.flights[usize::from(i)].depart_s = depart_s;
+    }
+    Ok(())
+}
+
+fn at(place: &Flat, height_m: f32) -> Point {
+    Point::new(place.x, place.y, height_m)
+}
+
+/// A vehicle that stays on its pad.
+fn grounded<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
+    let mut path = Path::new();
+    path.push(pad.start, 0.0)?;
+    let Pad { id, climb_m, .. } = *pad;
+    Ok(Flight { id, task: Task::Stay, path, climb_m, descent_m: 0.0, depart_s: 0.0, piece_m: PIECE_M })
+}
+
+/// A path under construction.
+struct Draft<'a, const N: usize, const W: usize> {
+    path: Path<W>,
+    transit: &'a Transit<'a, N>,
+    clearance_m: f32,
+}
+
+impl<const N: usize, const W: usize> Draft<'_, N, W> {
+    /// Flies straight to a place; the index of its waypoint.
+    fn to(&mut self, place: Point) -> Result<usize, PathError> {
+        self.path.push(place, self.clearance_m)?;
+        self.path.last().ok_or(PathError::NotFinite)
+    }
+
+    /// Flies there around no-fly zones, all at one height.
+    fn around(&mut self, from: &Flat, to: &Flat, height_m: f32) -> Result<usize, PathError> {
+        let mut corners: Vec<Flat, N> = Vec::new();
+        // The plan has a finite length, so there is a way between all that it joins.
+        if self.transit.way(from, to, &mut corners).is_ok() {
+            for corner in &corners {
+                self.to(at(corner, height_m))?;
+            }
+        }
+        self.to(at(to, height_m))
+    }
+}
+
+/// The flight of one route.
+fn flight<const L: usize, const N: usize, const W: usize>(
+    work: &Work<'_, L, N>,
+    route: &Route,
+    swarm: &Swarm<'_>,
+    pad: &Pad,
+) -> Result<Flight<W>, PathError> {
+    let vehicle = &work.vehicles[usize::from(route.vehicle)];
+    let Manner { waypoint_m, look, trigger } = swarm.manner;
+    let mut photographs = Photographs::new(waypoint_m, look, trigger);
+    let mission_m = work.heights.mission_m;
+    let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
+    let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
+    let (first, last) = route.ends();
+    let (first, last) = (place(first)?, place(last)?);
+    let mut draft = Draft { path: Path::new(), transit: work.transit, clearance_m: swarm.clearance_m };
+    draft.to(pad.start)?;
+    draft.to(at(&vehicle.place, layer_m))?;
+    draft.around(&vehicle.place, &first, layer_m)?;
+    let mut here = first;
+    let mut numbers = route.waypoints().peekable();
+    while let Some(number) = numbers.next() {
+        let lane = work.tracks.lane_of(number);
+        let begin = place(number)?;
+        let from = draft.around(&here, &begin, mission_m)?;
+        let mut end = begin;
+        while let Some(next) = numbers.next_if(|next| work.tracks.lane_of(*next) == lane) {
+            end = place(next)?;
+        }
+        let to = draft.to(at(&end, mission_m))?;
+        photographs.mark(from, to)?;
+        here = end;
+    }
+    draft.to(at(&last, layer_m))?;
+    draft.around(&last, &vehicle.home, layer_m)?;
+    draft.to(at(&vehicle.home, pad.start.z))?;
+    let mut path = draft.path;
+    let seconds = |from: &Point, to: &Point| {
+        let up = to.z - from.z;
+        (to - from).xy().norm() / vehicle.cruise_mps
+            + if up > 0.0 { up / vehicle.climb_mps } else { -up / vehicle.descend_mps }
+    };
+    path.label_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
+    let mut flight = Flight {
+        id: pad.id,
+        task: Task::Photograph(photographs),
+        path,
+        climb_m: pad.climb_m,
+        descent_m: pad.climb_m,
+        depart_s: 0.0,
+        piece_m: PIECE_M,
+    };
+    flight.fit_pieces();
+    Ok(flight)
+}

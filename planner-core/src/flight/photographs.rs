@@ -1,0 +1,146 @@
+//! What a vehicle photographs along its path.
+
+use libm::{ceilf, fmaxf};
+
+use super::{Path, PathError};
+
+/// Where a vehicle looks while it photographs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Look {
+    /// One way on the whole flight: radians from east to the left.
+    Fixed(f32),
+    /// The way it flies.
+    Ahead,
+}
+
+/// What takes the pictures.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Trigger {
+    /// The autopilot by distance, switched at both ends of a lane.
+    Distance,
+    /// A command for each picture.
+    Waypoint,
+    /// Something else.
+    None,
+}
+
+/// A stretch of a path on which pictures are taken, metres along it: one picture at each end, others in between. Both
+/// ends are the same where one picture is enough.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shots {
+    /// Where the first is taken.
+    pub from_m: f32,
+    /// Where the last is.
+    pub to_m: f32,
+    /// From one to the next; the whole stretch is a multiple of it. 0 for a single picture.
+    pub step_m: f32,
+    /// How many there are, at least one.
+    pub count: u32,
+}
+
+impl Shots {
+    /// Where picture `k` is taken, metres along the path.
+    pub fn place_m(&self, k: u32) -> f32 {
+        self.from_m + self.step_m * k as f32
+    }
+}
+
+/// Which parts of a path of at most [`Photographs::WAYPOINTS`] waypoints are photographed, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photographs {
+    /// Bit `i`: a stretch begins at waypoint `i`.
+    begins: u64,
+    /// Bit `i`: it ends at waypoint `i`.
+    ends: u64,
+    /// From one picture to the next, metres: at most.
+    spacing_m: f32,
+    /// Where the vehicle looks.
+    pub look: Look,
+    /// What takes the pictures.
+    pub trigger: Trigger,
+}
+
+impl Photographs {
+    /// Most waypoints of a path that is photographed along.
+    pub const WAYPOINTS: usize = 64;
+
+    /// None yet; pictures are to be `spacing_m` apart at most (positive).
+    pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
+        Self { begins: 0, ends: 0, spacing_m, look, trigger }
+    }
+
+    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before.
+    ///
+    /// # Errors
+    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`].
+    pub fn mark(&mut self, from: usize, to: usize) -> Result<(), PathError> {
+        if from > to || to >= Self::WAYPOINTS {
+            return Err(PathError::PathFull);
+        }
+        self.begins |= 1 << from;
+        self.ends |= 1 << to;
+        Ok(())
+    }
+
+    /// The stretches, in their order along the path they were marked on.
+    pub fn stretches<const W: usize>(&self, path: &Path<W>) -> impl Iterator<Item = Shots> {
+        let (mut begins, mut ends, spacing_m) = (self.begins, self.ends, self.spacing_m);
+        let waypoints = path.waypoints();
+        core::iter::from_fn(move || {
+            let (from, to) = (begins.trailing_zeros() as usize, ends.trailing_zeros() as usize);
+            let (from_m, to_m) = (waypoints.get(from)?.along_m, waypoints.get(to)?.along_m);
+            begins &= begins - 1;
+            ends &= ends - 1;
+            let length_m = fmaxf(to_m - from_m, 0.0);
+            // A stretch that is cut from a longer one is a multiple of its spacing, but for a rounding.
+            let steps = if from < to { fmaxf(ceilf(length_m / spacing_m - 1e-3), 1.0) } else { 0.0 };
+            let step_m = if steps > 0.0 { length_m / steps } else { 0.0 };
+            Some(Shots { from_m, to_m, step_m, count: steps as u32 + 1 })
+        })
+    }
+
+    /// Pictures of the whole path.
+    pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
+        self.stretches(path).map(|shots| shots.count).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Point;
+
+    fn path() -> Path<8> {
+        let mut path = Path::new();
+        for (x, y) in [(0.0, 0.0), (30.0, 0.0), (30.0, 10.0), (0.0, 10.0), (0.0, 20.0)] {
+            path.push(Point::new(x, y, 30.0), 1.0).unwrap();
+        }
+        path
+    }
+
+    #[test]
+    fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
+        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
+        photographs.mark(0, 1).unwrap();
+        photographs.mark(2, 3).unwrap();
+        photographs.mark(4, 4).unwrap();
+        let path = path();
+        let mut stretches = photographs.stretches(&path);
+        assert_eq!(stretches.next(), Some(Shots { from_m: 0.0, to_m: 30.0, step_m: 7.5, count: 5 }));
+        let second = stretches.next().unwrap();
+        assert_eq!((second.from_m, second.to_m, second.place_m(4)), (40.0, 70.0, 70.0));
+        assert_eq!(stretches.next(), Some(Shots { from_m: 80.0, to_m: 80.0, step_m: 0.0, count: 1 }));
+        assert_eq!(stretches.next(), None);
+        assert_eq!(photographs.count(&path), 11);
+    }
+
+    #[test]
+    fn waypoints_beyond_the_bits_are_refused() {
+        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
+        assert_eq!(photographs.mark(63, 64), Err(PathError::PathFull));
+        assert_eq!(photographs.mark(3, 2), Err(PathError::PathFull));
+        // On a path that is shorter than what was marked there is nothing to photograph.
+        photographs.mark(62, 63).unwrap();
+        assert_eq!(photographs.stretches(&path()).next(), None);
+    }
+}
