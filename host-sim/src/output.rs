@@ -140,12 +140,22 @@ pub fn print_summary(result: &MissionResult, dir: &Path) {
         metres(safety.min_separation_m),
         safety.deadlocks
     );
-    say!(
-        "roadmap    {} nodes, {} edges, {} bytes",
-        result.roadmap.nodes,
-        result.roadmap.edges,
-        result.roadmap.bytes
-    );
+    match &result.coverage {
+        Some(coverage) => say!(
+            "area       {:.2} % photographed by {} pictures of {} waypoints ({} twice, {} left)",
+            100.0 * (coverage.covered_share * 1e4).floor() / 1e4,
+            coverage.photos,
+            coverage.waypoints,
+            coverage.twice,
+            coverage.left
+        ),
+        None => say!(
+            "roadmap    {} nodes, {} edges, {} bytes",
+            result.roadmap.nodes,
+            result.roadmap.edges,
+            result.roadmap.bytes
+        ),
+    }
     say!("total      {:.1} m, makespan {:.1} s", result.totals.path_m, result.totals.makespan_s);
     say!("report     {}", dir.join("report.html").display());
 }

@@ -27,6 +27,67 @@ pub struct MissionResult {
     pub roadmap: RoadmapSize,
     /// What the assignment could not serve.
     pub left: Left,
+    /// What became of the area, in a coverage mission.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub coverage: Option<CoverageResult>,
+}
+
+/// What became of an area.
+#[derive(Clone, Debug, Serialize)]
+pub struct CoverageResult {
+    /// Share of the area that pictures show.
+    pub covered_share: f64,
+    /// Waypoints of all routes.
+    pub waypoints: u32,
+    /// Lanes.
+    pub lanes: usize,
+    /// From one lane to the next, metres: at most.
+    pub lane_m: f64,
+    /// From one waypoint to the next, metres: at most.
+    pub waypoint_m: f64,
+    /// Direction of the lanes, degrees from east to the left.
+    pub angle_deg: f64,
+    /// The greatest cost, seconds.
+    pub max_cost_s: f64,
+    /// Mean of the costs, seconds.
+    pub mean_cost_s: f64,
+    /// Their standard deviation, seconds.
+    pub sd_cost_s: f64,
+    /// The greatest cost, metres.
+    pub max_cost_m: f64,
+    /// No division can cost less, seconds.
+    pub lower_bound_s: f64,
+    /// How far the greatest cost is above that, as a share.
+    pub gap: f64,
+    /// Pictures.
+    pub photos: u64,
+    /// Waypoints photographed more than once.
+    pub twice: u64,
+    /// Waypoints photographed by nobody.
+    pub left: u64,
+    /// One for each vehicle that flies.
+    pub routes: Vec<RouteResult>,
+}
+
+/// One route.
+#[derive(Clone, Debug, Serialize)]
+pub struct RouteResult {
+    /// MAVLink system id.
+    pub vehicle: u8,
+    /// Its waypoint with the lowest number.
+    pub first: u32,
+    /// Its waypoint with the highest number.
+    pub last: u32,
+    /// Whether it is flown from the last to the first.
+    pub backward: bool,
+    /// Height of its transit, metres.
+    pub layer_m: f64,
+    /// When it leaves its pad, seconds.
+    pub depart_s: f64,
+    /// C_k, seconds.
+    pub cost_s: f64,
+    /// The same, metres.
+    pub cost_m: f64,
 }
 
 /// What the assignment could not serve: more of one than of the other, or no way between them.

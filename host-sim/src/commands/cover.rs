@@ -4,15 +4,14 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use planner_core::coverage::pack::Route;
 use serde::Serialize;
 
 use crate::coverage::check::{self, Findings, Flown};
-use crate::coverage::{Flight, Planned, export, page};
+use crate::coverage::{self, Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
 use crate::report;
-use crate::result::{self, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
+use crate::result::{self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
 use crate::say;
 use crate::scenario::coverage::Method;
 use crate::scenario::{self, Scenario};
@@ -46,40 +45,6 @@ pub(crate) struct CoverResult {
     coverage: CoverageResult,
 }
 
-/// Its `coverage`.
-#[derive(Debug, Serialize)]
-struct CoverageResult {
-    covered_share: f64,
-    waypoints: u32,
-    lanes: usize,
-    lane_m: f64,
-    waypoint_m: f64,
-    angle_deg: f64,
-    max_cost_s: f64,
-    mean_cost_s: f64,
-    sd_cost_s: f64,
-    max_cost_m: f64,
-    lower_bound_s: f64,
-    gap: f64,
-    photos: u64,
-    twice: u64,
-    left: u64,
-    routes: Vec<RouteResult>,
-}
-
-/// One route.
-#[derive(Debug, Serialize)]
-struct RouteResult {
-    vehicle: u8,
-    first: u32,
-    last: u32,
-    backward: bool,
-    layer_m: f64,
-    depart_s: f64,
-    cost_s: f64,
-    cost_m: f64,
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -91,7 +56,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let files = files(&scenario);
     let names: Vec<&str> = output::NAMES.into_iter().chain(files.iter().map(String::as_str)).collect();
     let mut results = Results::open(&args.out, &names)?;
-    let usual = scenario.area.as_ref().map_or(Method::PowellBinpat, |area| area.method);
+    let usual = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
     let planned = Planned::new(&scenario, args.method.unwrap_or(usual))?;
     let flights = planned.flights();
     let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
@@ -139,13 +104,9 @@ fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results)
 pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
-    let max_cost_s = planned.plan.max_cost_s();
     let ends_s = routes.iter().zip(&planned.departures_s).map(|(route, depart_s)| route.cost_s + depart_s);
     let makespan_s = ends_s.fold(0.0, f32::max);
     let least_m = planned.least_separation_m;
-    let costs: Vec<f64> = routes.iter().map(|route| f64::from(route.cost_s)).collect();
-    let (mean, sd) = mean_and_sd(&costs);
-    let along = planned.tracks.along();
     CoverResult {
         command: "cover",
         scenario: scenario.path.clone(),
@@ -165,24 +126,7 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
             deadlocks: 0,
         },
         roadmap: RoadmapSize { nodes: 0, edges: 0, bytes: 0 },
-        coverage: CoverageResult {
-            covered_share: findings.covered_share,
-            waypoints: planned.tracks.waypoint_count(),
-            lanes: planned.tracks.lanes().len(),
-            lane_m: rounded(planned.wanted.spacing.lane_m),
-            waypoint_m: rounded(planned.wanted.spacing.waypoint_m),
-            angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
-            max_cost_s: rounded(max_cost_s),
-            mean_cost_s: rounded(mean as f32),
-            sd_cost_s: rounded(sd as f32),
-            max_cost_m: rounded(routes.iter().map(|route| route.cost_m).fold(0.0, f32::max)),
-            lower_bound_s: rounded(planned.lower_bound_s),
-            gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
-            photos: findings.photos,
-            twice: findings.twice,
-            left: findings.left,
-            routes: route_results(planned),
-        },
+        coverage: coverage::result::of(planned, findings),
         vehicles: vehicle_results(planned),
     }
 }
@@ -202,29 +146,6 @@ fn vehicle_results(planned: &Planned<'_>) -> Vec<VehicleResult> {
         }
     });
     vehicles.collect()
-}
-
-fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
-    let heights = planned.wanted.heights;
-    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
-        depart_s: rounded(*depart_s),
-        vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
-        first: route.first,
-        last: route.end - 1,
-        backward: route.ends().0 != route.first,
-        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
-        cost_s: rounded(route.cost_s),
-        cost_m: rounded(route.cost_m),
-    };
-    planned.plan.routes.iter().zip(&planned.departures_s).map(route).collect()
-}
-
-/// Mean, and the sample's standard deviation: 0 for one value.
-fn mean_and_sd(values: &[f64]) -> (f64, f64) {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count.max(1.0);
-    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-    (mean, if values.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 })
 }
 
 fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {

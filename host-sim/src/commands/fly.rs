@@ -7,6 +7,7 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 
 use super::load;
+use crate::coverage::flown;
 use crate::files::Results;
 use crate::link::LinkUrl;
 use crate::mission::Mission;
@@ -127,11 +128,23 @@ fn plan_and_fly(
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;
     let plan = mission.plan()?;
-    let flight = match gateway {
+    let mut flight = match gateway {
         Some(gateway) => swarm::fly_shown(&mission, &plan, command, gateway, &progress)?,
         None => swarm::fly(&mission, &plan, command, realtime, &progress)?,
     };
-    let page = output::flown_page(&mission, &plan, &flight)?;
+    let judged = match &mission.scenario.area {
+        Some(_) => Some(flown::judge(&mission.scenario, &plan, std::mem::take(&mut flight.pictures))?),
+        None => None,
+    };
+    if let Some(judged) = &judged {
+        flight.result.complete &= judged.complete;
+        flight.result.coverage = Some(judged.result.clone());
+    }
+    let mut page = output::flown_page(&mission, &plan, &flight)?;
+    if let Some(judged) = judged {
+        page.outlines = judged.outlines;
+        page.plots.insert(0, judged.plot);
+    }
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();
     output::add(&mut results, &flight.result, &mission.timing, page)?;

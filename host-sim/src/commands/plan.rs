@@ -118,5 +118,6 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
         },
         roadmap: mission.roadmap_size(),
         left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
+        coverage: None,
     }
 }

@@ -1,11 +1,12 @@
 //! The one checker of coverage plans: is everything photographed, every waypoint once, on routes without a break, outside
 //! no-fly zones?
 //!
-//! It looks at the flights as they are written, in f64, and shares no code with the planner. Cells are a tenth of the lane
+//! It looks at flights as they are written, or at pictures as they were taken, in f64, and shares no code with the planner. Cells are a tenth of the lane
 //! spacing. A cell counts if its middle is in the area and outside no-fly zones; it is photographed if one picture shows
 //! all its corners. Where overlaps are less than a cell, pictures must show its middle and each corner that is in the
 //! area.
 
+use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
@@ -55,6 +56,17 @@ pub struct Flown<'a> {
     pub times_s: &'a [f32],
 }
 
+/// A picture: when, where, and how.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Picture {
+    /// Seconds.
+    pub t_s: f32,
+    /// Where the camera is, which looks straight down.
+    pub position: Point,
+    /// Where its upper edge points, radians from east to the left.
+    pub heading: f32,
+}
+
 /// Checks what a plan flies.
 pub fn check_plan(planned: &Planned<'_>) -> Findings {
     let flights: Vec<_> = planned.flights();
@@ -70,7 +82,31 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
         let enters = |pair: &&[Stop]| enters_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
-    Cells::new(planned).judge(planned, flights, &mut findings);
+    let mut pictures = Vec::new();
+    let along = planned.tracks.along();
+    let heading = along.y.atan2(along.x);
+    for flight in flights {
+        let taken =
+            flight.stops.iter().zip(flight.times_s).filter(|(stop, _)| matches!(stop.act, Act::Photo(_)));
+        pictures.extend(taken.map(|(stop, &t_s)| Picture { t_s, position: stop.position, heading }));
+    }
+    Cells::new(planned).judge(planned, pictures, &mut findings);
+    findings
+}
+
+/// Judges pictures that were taken in a flight, by where the camera truly was. A waypoint is left out if no picture was
+/// taken within half a spacing of it, and photographed twice if two were.
+pub fn check_pictures(planned: &Planned<'_>, pictures: Vec<Picture>) -> Findings {
+    let spacing = planned.wanted.spacing;
+    let near_m = spacing.waypoint_m.min(spacing.lane_m) / 2.0;
+    let mut findings = Findings { photos: pictures.len() as u64, ..Findings::default() };
+    for number in 0..planned.tracks.waypoint_count() {
+        let Some(place) = planned.tracks.waypoint(number) else { continue };
+        let taken = pictures.iter().filter(|p| (p.position.xy() - place).norm() <= near_m).count();
+        findings.left += u64::from(taken == 0);
+        findings.twice += u64::from(taken > 1);
+    }
+    Cells::new(planned).judge(planned, pictures, &mut findings);
     findings
 }
 
@@ -197,23 +233,26 @@ impl Cells {
         }
     }
 
-    fn judge(&self, planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
+    /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as large a rectangle of the same
+    /// sides' ratio as lies within it.
+    fn half(&self, planned: &Planned<'_>, picture: &Picture) -> [f64; 2] {
+        let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.heights.mission_m);
+        let half = [f64::from(footprint.along_m) / 2.0, f64::from(footprint.across_m) / 2.0];
+        let askew = f64::from(picture.heading) - self.along[1].atan2(self.along[0]);
+        let (cos, sin) = (askew.cos().abs(), askew.sin().abs());
+        let fits = |own: f64, other: f64| own / (own * cos + other * sin);
+        let share = fits(half[0], half[1]).min(fits(half[1], half[0])).min(1.0);
+        half.map(|side| side * share * f64::from(picture.position.z) / f64::from(height_m))
+    }
+
+    fn judge(&self, planned: &Planned<'_>, mut pictures: Vec<Picture>, findings: &mut Findings) {
         let spacing = planned.wanted.spacing;
         let counted = self.held(planned, self.size, 0.5);
         // Where pictures overlap by a cell, one of them must show all its corners.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
             >= self.side;
-        let mut photos: Vec<(f32, [f64; 2])> = Vec::new();
-        for flight in flights {
-            for (stop, time) in flight.stops.iter().zip(flight.times_s) {
-                if matches!(stop.act, Act::Photo(_)) {
-                    photos.push((*time, self.rotated(&stop.position.xy())));
-                }
-            }
-        }
-        photos.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let half = [f64::from(spacing.footprint.along_m) / 2.0, f64::from(spacing.footprint.across_m) / 2.0];
+        pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         let [columns, rows] = self.size;
         // Elsewhere each corner that is in the area must be in a picture, and the middle.
         let mut corners: Vec<bool> = match whole {
@@ -222,7 +261,9 @@ impl Cells {
         };
         let mut middles = vec![whole; counted.len()];
         let mut shown = vec![false; counted.len()];
-        for (time, place) in photos {
+        for picture in pictures {
+            let (time, place) = (picture.t_s, self.rotated(&picture.position.xy()));
+            let half = self.half(planned, &picture);
             // Corners in the picture; a rounding beyond it is in it.
             let range = |axis: usize, most: usize| {
                 let from = (place[axis] - half[axis] - self.low[axis]) / self.side;

@@ -6,8 +6,10 @@
 pub mod check;
 pub mod export;
 pub mod flight;
+pub mod flown;
 pub mod page;
 mod planned;
+pub mod result;
 pub mod separation;
 
 use std::time::Instant;

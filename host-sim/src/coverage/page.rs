@@ -1,6 +1,7 @@
 //! The report of a coverage plan: area and routes in the scene, cells photographed over time.
 
 use planner_core::Point;
+use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
 use super::check::Findings;
@@ -30,33 +31,36 @@ pub fn page(
             track: own.map_or(Vec::new(), |(_, stops, times)| stops.iter().zip(times).map(at).collect()),
         }
     });
-    let kinds = [
-        (RingKind::Outer, OutlineKind::Area),
-        (RingKind::Hole, OutlineKind::Hole),
-        (RingKind::NoFly, OutlineKind::NoFly),
-    ];
-    let outline = |ring: &[planner_core::coverage::Flat], kind| Outline {
-        kind,
-        points: ring.iter().map(|v| Point::new(v.x, v.y, 0.0)).collect(),
-    };
-    let outlines = kinds.iter().flat_map(|&(kind, shown)| {
-        planned.wanted.rings_of(kind).map(move |ring| outline(ring, shown)).collect::<Vec<_>>()
-    });
     ReportData {
         title: scenario.path.clone(),
         command: "cover".to_owned(),
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
         vehicles: vehicles.collect(),
-        outlines: outlines.collect(),
+        outlines: outlines(planned),
         plots: vec![photographed(findings)],
         result,
         ..ReportData::default()
     }
 }
 
+/// Borders of the area.
+pub(super) fn outlines(planned: &Planned<'_>) -> Vec<Outline> {
+    let kinds = [
+        (RingKind::Outer, OutlineKind::Area),
+        (RingKind::Hole, OutlineKind::Hole),
+        (RingKind::NoFly, OutlineKind::NoFly),
+    ];
+    let outline = |ring: &[Flat], kind| Outline {
+        kind,
+        points: ring.iter().map(|v| Point::new(v.x, v.y, 0.0)).collect(),
+    };
+    let shown = |(kind, shown)| planned.wanted.rings_of(kind).map(move |ring| outline(ring, shown));
+    kinds.into_iter().flat_map(shown).collect()
+}
+
 /// Share of the area that pictures show, over time.
-fn photographed(findings: &Findings) -> Plot {
+pub(super) fn photographed(findings: &Findings) -> Plot {
     let mut cells = 0;
     let mut curve = Curve { name: "photographed".to_owned(), ..Curve::default() };
     for (time, new) in &findings.over_time {

@@ -76,7 +76,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
 
 /// How its work is divided.
 pub fn method(scenario: &Scenario) -> Method {
-    scenario.area.as_ref().map_or(Method::PowellBinpat, |area| area.method)
+    scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
 /// Level ground below area and pads.

@@ -46,13 +46,14 @@ impl Area {
 }
 
 /// How work is divided.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Method {
     /// Whole lanes.
     SimpleBinpat,
     /// Waypoints.
     Binpat,
     /// Waypoints, by the best shares.
+    #[default]
     PowellBinpat,
     /// The best contiguous division there is.
     Exact,

@@ -9,9 +9,10 @@ use super::monitor::{Observation, Phase};
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
-use crate::autopilot::{self, Autopilot};
+use crate::autopilot::{self, Autopilot, Photo};
 use crate::boards::STACK_LEN;
 use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
+use crate::coverage::check::Picture;
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
 use crate::report::{self, Level};
@@ -374,6 +375,16 @@ impl Member {
             }
             radio.broadcast(now_us, Some(station), places, &buffer[..length]);
         }
+    }
+
+    /// The pictures that its autopilot took.
+    pub fn take_pictures(&mut self) -> Vec<Picture> {
+        let picture = |photo: Photo| Picture {
+            t_s: photo.time_us as f32 * 1e-6,
+            position: photo.position,
+            heading: std::f32::consts::FRAC_PI_2 - photo.heading_rad,
+        };
+        self.autopilot.take_photos().into_iter().map(picture).collect()
     }
 
     /// What the referee sees.

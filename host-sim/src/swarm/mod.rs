@@ -33,6 +33,7 @@ use self::serial::SerialConfig;
 use self::step::STEP_US;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
+use crate::coverage::check::Picture;
 use crate::margins;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
@@ -60,6 +61,8 @@ pub struct Flight {
     pub tracks: Vec<Vec<(f32, Point)>>,
     /// Smallest distances over time.
     pub samples: Vec<Sample>,
+    /// Pictures taken, vehicle by vehicle.
+    pub pictures: Vec<Picture>,
     /// What the companions reported.
     pub log: Vec<report::Event>,
     /// Simulated seconds.
@@ -151,8 +154,9 @@ fn simulate(
     let result = run.result(command);
     run.log_losses(&result);
     let tracks = (0..run.members.len()).map(|i| run.monitor.track(i).to_vec()).collect();
+    let pictures = run.members.iter_mut().flat_map(Member::take_pictures).collect();
     let Run { monitor, log, t_s, .. } = run;
-    Ok(Flight { result, tracks, samples: monitor.samples, log, simulated_s: t_s, took_s })
+    Ok(Flight { result, tracks, samples: monitor.samples, pictures, log, simulated_s: t_s, took_s })
 }
 
 impl<'a> Run<'a> {
@@ -278,6 +282,7 @@ impl<'a> Run<'a> {
             },
             roadmap: mission.roadmap_size(),
             left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
+            coverage: None,
         }
     }
 

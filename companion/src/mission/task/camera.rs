@@ -197,3 +197,6 @@ pub(super) fn heading<const W: usize>(
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

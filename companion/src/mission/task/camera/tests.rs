@@ -1,0 +1,170 @@
+//! Whatever is lost and however the flight is interrupted, no gap between two pictures is wider than it may be.
+
+extern crate std;
+
+use std::vec::Vec;
+
+use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
+use planner_core::Point;
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::*;
+use crate::link::frame::Framer;
+
+const STEP_S: f32 = 0.05;
+const MPS: f32 = 5.0;
+/// What is flown between a place and the look that finds it passed, and until the command is there.
+const LATE_M: f32 = 3.0 * STEP_S * MPS;
+/// The same where every try but the last is lost.
+const LOST_M: f32 = LATE_M + MPS * 0.3 * (TRIES as f32 - 1.0);
+
+fn path() -> Path<16> {
+    let mut path = Path::new();
+    for (x, y) in [(0.0, 0.0), (10.0, 0.0), (70.0, 0.0), (70.0, 9.0), (10.0, 9.0), (10.0, 18.0), (0.0, 18.0)]
+    {
+        path.push(Point::new(x, y, 30.0), 1.0).unwrap();
+    }
+    path
+}
+
+fn photographs(trigger: Trigger) -> Photographs {
+    let mut photographs = Photographs::new(8.0, Look::Ahead, trigger);
+    photographs.mark(1, 2).unwrap();
+    photographs.mark(3, 4).unwrap();
+    photographs.mark(5, 5).unwrap();
+    photographs
+}
+
+/// An autopilot with a camera, on a path.
+#[derive(Default)]
+struct Fake {
+    step_m: f32,
+    last_m: f32,
+    pictures_m: Vec<f32>,
+}
+
+impl Fake {
+    fn take(&mut self, at_m: f32) {
+        self.pictures_m.push(at_m);
+        self.last_m = at_m;
+    }
+
+    fn command(&mut self, command: &COMMAND_LONG_DATA, at_m: f32) {
+        let number = command.command as u32 as u16;
+        if number == DO_SET_CAM_TRIGG_DIST {
+            (self.step_m, self.last_m) = (command.param1, at_m);
+        }
+        let at_once = command.param3 == 1.0;
+        if (number == DO_SET_CAM_TRIGG_DIST && at_once)
+            || (number == DO_DIGICAM_CONTROL && command.param5 == 1.0)
+        {
+            self.take(at_m);
+        }
+    }
+
+    fn fly(&mut self, at_m: f32) {
+        if self.step_m > 0.0 && (at_m - self.last_m).abs() >= self.step_m {
+            self.take(at_m);
+        }
+    }
+}
+
+/// Flies the path. Returns where pictures were taken, and whether a trigger was left on.
+fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32>, bool) {
+    let path = path();
+    let mut rng = Pcg32::seed_from_u64(seed);
+    let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
+    let (mut camera, mut links, mut fake) = (Camera::default(), Links::default(), Fake::default());
+    let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
+    let mut settle = 0;
+    while settle < 60 {
+        now = now + Duration::from_millis(50);
+        // A pause holds the vehicle where it is.
+        if stops && held == 0 && chance(0.01) {
+            held = 40;
+        }
+        held = if held > 0 { held - 1 } else { 0 };
+        if held == 0 {
+            at_m += MPS * STEP_S;
+        }
+        settle += i32::from(at_m > path.length_m());
+        let along = Along { progress_m: at_m.min(path.length_m()), follows: held == 0 };
+        camera.step(photographs, &path, along, now, &mut links);
+        fake.fly(at_m);
+        let mut out = [0; 512];
+        let length = links.transmit(Link::Autopilot, 1, &mut out);
+        let mut bytes = &out[..length];
+        while let Some(frame) = framer.next(now, &mut bytes) {
+            let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
+            if chance(loss) {
+                continue;
+            }
+            fake.command(&command, at_m);
+            if !chance(loss) {
+                let ack = Ack { command: command.command as u32 as u16, result: ACCEPTED, to: (1, 191) };
+                camera.handle_ack(&ack, &mut links);
+            }
+        }
+    }
+    (fake.pictures_m, fake.step_m > 0.0)
+}
+
+/// Each stretch is photographed from end to end; the gap that is too wide, if one is.
+fn widest(photographs: &Photographs, pictures_m: &[f32], late_m: f32) -> Result<(), (f32, f32)> {
+    for shots in photographs.stretches(&path()) {
+        let mut before_m = shots.from_m - shots.step_m;
+        let inside = pictures_m.iter().filter(|m| **m >= shots.from_m - 0.1 && **m <= shots.to_m + late_m);
+        for &at_m in inside.chain([&(shots.to_m + shots.step_m)]) {
+            if at_m - before_m > shots.step_m + late_m {
+                return Err((before_m, at_m));
+            }
+            before_m = at_m;
+        }
+    }
+    Ok(())
+}
+
+proptest! {
+    #[test]
+    fn nothing_is_left_out(seed in any::<u64>(), stops in any::<bool>(), distance in any::<bool>()) {
+        let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
+        let (pictures_m, on) = fly(&photographs, 0.0, stops, seed);
+        prop_assert_eq!(widest(&photographs, &pictures_m, LATE_M), Ok(()), "{:?}", pictures_m);
+        prop_assert!(!on);
+        if !stops {
+            // By distance the last of a stretch may be taken twice.
+            let least = photographs.count(&path());
+            prop_assert!((least..=least + 3).contains(&(pictures_m.len() as u32)), "{:?}", pictures_m);
+        }
+    }
+
+    #[test]
+    fn lost_commands_and_answers_are_repeated(seed in any::<u64>(), distance in any::<bool>()) {
+        let photographs = photographs(if distance { Trigger::Distance } else { Trigger::Waypoint });
+        let (pictures_m, on) = fly(&photographs, 0.1, false, seed);
+        prop_assert_eq!(widest(&photographs, &pictures_m, LOST_M), Ok(()), "{:?}", pictures_m);
+        prop_assert!(!on);
+    }
+}
+
+#[test]
+fn without_a_trigger_nothing_is_commanded() {
+    assert_eq!(fly(&photographs(Trigger::None), 0.0, true, 1), (Vec::new(), false));
+}
+
+#[test]
+fn a_vehicle_looks_the_way_it_flies_or_one_way() {
+    let path = path();
+    let ahead = photographs(Trigger::Distance);
+    let at = |m: f32| heading(&ahead, &path, m).unwrap().to_degrees();
+    assert_eq!((at(0.0), at(30.0), at(75.0), at(100.0)), (0.0, 0.0, 90.0, 180.0));
+    let fixed = Photographs::new(8.0, Look::Fixed(1.0), Trigger::Distance);
+    assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
+    let mut up = Path::<4>::new();
+    for z in [0.0, 9.0] {
+        up.push(Point::new(0.0, 0.0, z), 1.0).unwrap();
+    }
+    assert_eq!(heading(&ahead, &up, 3.0), None, "straight up it leads no way");
+}

@@ -1,0 +1,57 @@
+//! What `result.json` says of an area.
+
+use planner_core::coverage::pack::Route;
+
+use super::Planned;
+use super::check::Findings;
+use crate::result::{CoverageResult, RouteResult, rounded};
+
+/// The plan, and what was found of its pictures.
+pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
+    let routes = &planned.plan.routes;
+    let max_cost_s = planned.plan.max_cost_s();
+    let costs: Vec<f64> = routes.iter().map(|route| f64::from(route.cost_s)).collect();
+    let (mean, sd) = mean_and_sd(&costs);
+    let along = planned.tracks.along();
+    CoverageResult {
+        covered_share: findings.covered_share,
+        waypoints: planned.tracks.waypoint_count(),
+        lanes: planned.tracks.lanes().len(),
+        lane_m: rounded(planned.wanted.spacing.lane_m),
+        waypoint_m: rounded(planned.wanted.spacing.waypoint_m),
+        angle_deg: rounded(along.y.atan2(along.x).to_degrees()),
+        max_cost_s: rounded(max_cost_s),
+        mean_cost_s: rounded(mean as f32),
+        sd_cost_s: rounded(sd as f32),
+        max_cost_m: rounded(routes.iter().map(|route| route.cost_m).fold(0.0, f32::max)),
+        lower_bound_s: rounded(planned.lower_bound_s),
+        gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
+        photos: findings.photos,
+        twice: findings.twice,
+        left: findings.left,
+        routes: route_results(planned),
+    }
+}
+
+fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
+    let heights = planned.wanted.heights;
+    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
+        depart_s: rounded(*depart_s),
+        vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
+        first: route.first,
+        last: route.end - 1,
+        backward: route.ends().0 != route.first,
+        layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
+        cost_s: rounded(route.cost_s),
+        cost_m: rounded(route.cost_m),
+    };
+    planned.plan.routes.iter().zip(&planned.departures_s).map(route).collect()
+}
+
+/// Mean, and the sample's standard deviation: 0 for one value.
+fn mean_and_sd(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count.max(1.0);
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (mean, if values.len() > 1 { (squares / (count - 1.0)).sqrt() } else { 0.0 })
+}
