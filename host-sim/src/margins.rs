@@ -9,9 +9,12 @@
 //! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`STRAY_M`] are measured with it |
 //! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, seldom and not beside an error of tracking |
 //! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
+//! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_S`] at cruise is along the lanes | the camera is not where the waypoint is |
+//! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m | a lower camera shows less |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |
 
 use companion::margins::TRACKING_M;
+use planner_core::coverage::footprint::{Footprint, Spacing};
 
 use crate::scenario::{Estimator, Personality, Simulation, Vehicle};
 
@@ -51,6 +54,37 @@ pub fn needed(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
         margin_m: worst(0) + STRAY_PER_GUST_S * simulation.gust_mps,
         separation_m: safety_distance_m + worst(0) + worst(1),
     }
+}
+
+/// From a waypoint that is passed to the picture, seconds: a step of the companion, a command, a look of the autopilot's.
+pub const TRIGGER_S: f32 = 0.15;
+
+/// How much lower than it believes a vehicle may be, metres.
+fn lower_m(estimator: Estimator, autopilot: Personality) -> f32 {
+    match (estimator, autopilot) {
+        (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
+        (Estimator::Recorded, Personality::Px4) => 1.1,
+        (Estimator::Recorded, Personality::Ardupilot) => 0.3,
+    }
+}
+
+/// What of a picture taken at `height_m` is planned with: it is taken beside its waypoint, lower and late. No less than the
+/// spacings: where these leave no overlap there is none to plan with.
+pub fn usable(
+    spacing: &Spacing,
+    height_m: f32,
+    cruise_mps: f32,
+    simulation: &Simulation,
+    vehicles: &[Vehicle],
+) -> Spacing {
+    let stray_m = needed(simulation, 0.0, vehicles).margin_m;
+    let lower_m = vehicles.iter().map(|v| lower_m(simulation.estimator, v.personality)).fold(0.0, f32::max);
+    let share = (1.0 - lower_m / height_m).max(0.0);
+    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_S * cruise_mps);
+    let across_m = spacing.footprint.across_m * share - 2.0 * stray_m;
+    let footprint =
+        Footprint { along_m: along_m.max(spacing.waypoint_m), across_m: across_m.max(spacing.lane_m) };
+    Spacing { footprint, ..*spacing }
 }
 
 /// What a path keeps from a vehicle that stands on the ground, metres.

@@ -272,6 +272,10 @@ impl Mission {
 
     /// Goals that no vehicle flies to, and vehicles that no goal is left for.
     pub fn left(&self, plan: &SwarmPlan) -> Left {
+        if self.scenario.area.is_some() {
+            // Whoever stays on the ground would finish no sooner.
+            return Left::default();
+        }
         let flown = |goal: &u16| plan.flights.iter().any(|f| f.task == Task::Goto(*goal));
         Left {
             goals: (0..self.goals.len() as u16).filter(|goal| !flown(goal)).collect(),

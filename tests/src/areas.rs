@@ -55,6 +55,34 @@ fn list(rings: &[Vec<Corner>]) -> String {
     rings.iter().map(ring).collect::<Vec<_>>().join(", ")
 }
 
+/// The same to be flown: pictures overlap enough for vehicles that stray, and autopilots, wind, estimates and radio vary.
+pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let text = scenario(random, shape, vehicles);
+    let overlaps = text.lines().filter(|line| line.starts_with("overlap_"));
+    let plain: String = overlaps.fold(text.clone(), |text, line| text.replacen(&format!("{line}\n"), "", 1));
+    let (front, side) = (between(random, 0.5, 0.8), between(random, 0.4, 0.7));
+    let cruise = between(random, 2.0, 8.0);
+    let place = format!(
+        "overlap_front = {front:.2}\noverlap_side = {side:.2}\n[mission]\ncruise_mps = {cruise:.1}\n"
+    );
+    let mut text = plain.replace("[mission]\ncruise_mps = 5.0\n", &place);
+    let trigger = ["distance", "waypoint"][(random.next_u32() % 2) as usize];
+    let heading = ["sweep", "lane"][(random.next_u32() % 2) as usize];
+    text = text.replace("camera = ", &format!("trigger = \"{trigger}\"\nheading = \"{heading}\"\ncamera = "));
+    let autopilot = ["px4", "ardupilot"][(random.next_u32() % 2) as usize];
+    text = text.replace(
+        "speed_max_mps",
+        &format!("personality = \"{autopilot}\"\nendurance_s = 7200.0\nspeed_max_mps"),
+    );
+    let recorded = random.next_u32().is_multiple_of(2);
+    let (estimator, separation) = if recorded { ("recorded", 3.6) } else { ("rtk", 2.0) };
+    let (gust, loss) = (between(random, 0.0, 3.0), between(random, 0.0, 0.3));
+    text + &format!(
+        "[deconfliction]\nseparation_m = {separation}\n[simulation]\nestimator = \"{estimator}\"\ngust_mps = {gust:.1}\n\
+         radio_loss = {loss:.2}\nradio_range_m = 2000.0\ntime_limit_s = 7200.0\n"
+    )
+}
+
 /// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a hole outside.
 pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let radius = between(random, 40.0, 250.0);

@@ -68,7 +68,7 @@ impl<'a> Planned<'a> {
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
         let pattern = Pattern {
-            spacing: wanted.spacing,
+            spacing: wanted.usable,
             angle_deg: wanted.angle_deg,
             margin_m: wanted.margin_m,
             looks: LOOKS,

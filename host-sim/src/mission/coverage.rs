@@ -12,6 +12,7 @@ use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
 use super::{Mission, SwarmPlan};
 use crate::area::MOST_VERTICES;
+use crate::autopilot::VehicleLimits;
 use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::{CORNERS, LANES, LOOKS, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::map;
@@ -22,8 +23,11 @@ use crate::scenario::coverage::Method;
 const OVER_PAD_M: f32 = 3.0;
 /// The ground reaches so far beyond area and pads, and the air so far over the highest layer, metres.
 const AROUND_M: f32 = 30.0;
-/// What vehicles keep to walls beyond their hulls where there are none, metres.
-const MARGIN_M: f32 = 0.5;
+/// Clearance beyond their hulls that vehicles are taken to have, metres: over fields there is room for the worst estimate.
+const MARGIN_M: f32 = 1.2;
+
+/// Share of its charge that a vehicle flies with: then it lands (`FLK_BATT_LOW`).
+const USABLE_CHARGE: f32 = 0.85;
 
 type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
@@ -44,6 +48,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
         .zip(&shares)
         .map(|(v, &weight)| Share { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
         .collect();
+    check_batteries(&planned)?;
     let top_m = OVER_PAD_M.min(planned.wanted.heights.mission_m);
     drop(planned);
     for vehicle in &mut scenario.vehicles {
@@ -72,6 +77,27 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
         );
     }
     Ok(mission)
+}
+
+/// Nobody is sent out for longer than its simulated battery lasts until it has to land.
+fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
+    for route in &planned.plan.routes {
+        let index = usize::from(route.vehicle);
+        let vehicle = &planned.scenario.vehicles[index];
+        let lasts_s = vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s);
+        if route.cost_s > USABLE_CHARGE * lasts_s {
+            bail!(
+                "area too large: {}: vehicle {} would fly {:.0} s; its battery lasts {lasts_s:.0} s, and {:.0} % of that are \
+                 for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; endurance_s says \
+                 how long a battery lasts",
+                planned.scenario.vehicle_places[index],
+                vehicle.id,
+                route.cost_s,
+                100.0 * (1.0 - USABLE_CHARGE)
+            );
+        }
+    }
+    Ok(())
 }
 
 /// How its work is divided.
@@ -115,7 +141,7 @@ impl Mission {
             trigger: area.trigger,
             looks: LOOKS,
             heights: area.heights,
-            spacing: area.spacing,
+            spacing: area.usable,
             angle_deg: area.angle_deg,
             margin_m: area.margin_m,
         };

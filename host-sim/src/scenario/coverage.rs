@@ -22,6 +22,8 @@ pub struct Area {
     pub camera: Option<Camera>,
     /// Footprint and spacings.
     pub spacing: Spacing,
+    /// The same with what of a picture is planned with.
+    pub usable: Spacing,
     /// Height of the pictures, and of the layers.
     pub heights: Heights,
     /// Direction of the lanes, where it is given: degrees from east to the left.

@@ -92,8 +92,13 @@ fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scen
         unsupported.push(not_yet(text, &area.span, "[area] beside [map]"));
     }
     let formation = unbuilt(root, "formation", &mut unsupported)?;
-    if let (Mode::Coverage | Mode::Formation, Some(span)) = (mission.mode, &mode_span) {
-        unsupported.push(not_yet(text, span, "this mission.mode"));
+    match (mission.mode, &mode_span) {
+        (Mode::Coverage, Some(span)) if root.get("area").is_none() => {
+            let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`, and leave out [map]";
+            return Err(text.with_hint(span, "mission.mode \"coverage\" needs an [area]", hint));
+        }
+        (Mode::Formation, Some(span)) => unsupported.push(not_yet(text, span, "this mission.mode")),
+        _ => {}
     }
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     check_goals(text, &vehicles, &mission)?;
@@ -102,7 +107,7 @@ fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scen
     let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
     check_goals_apart(&mission_table, &mission, deconfliction.safety_distance_m, &simulation, &vehicles)?;
     if let Some(span) = &estimator_span {
-        check_margins(text, span, &roadmap, &deconfliction, &simulation, &vehicles)?;
+        check_margins(text, span, Some(&roadmap), &deconfliction, &simulation, &vehicles)?;
     }
     Ok(Scenario {
         path: text.file.to_owned(),

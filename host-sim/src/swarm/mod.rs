@@ -394,6 +394,7 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
             let limits = autopilot::VehicleLimits {
                 radius_m: vehicle.radius_m,
                 speed_max_mps: vehicle.speed_max_mps,
+                endurance_s: vehicle.endurance_s.unwrap_or(autopilot::VehicleLimits::default().endurance_s),
                 ..autopilot::VehicleLimits::default()
             };
             let mut config = autopilot::Config {

@@ -24,7 +24,7 @@ const REPEAT_EVERY: Duration = Duration::from_millis(300);
 const TRIES: u8 = 5;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
-/// A leg that leads less far across looks no way, metres.
+/// A stretch that leads less far leads no way, metres.
 const LEG_LEAST_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
@@ -173,29 +173,27 @@ impl Camera {
     }
 }
 
-/// Where the vehicle looks `along_m` metres along its path: on a leg that leads straight up or down as on the one before.
+/// Where the vehicle looks `along_m` metres along its path: along the stretch at hand, on the way to one along that one, so that
+/// it has turned before the first picture.
 pub(super) fn heading<const W: usize>(
     photographs: &Photographs,
     path: &Path<W>,
     along_m: f32,
 ) -> Option<f32> {
-    match photographs.look {
-        Look::Fixed(heading) => Some(heading),
-        Look::Ahead => {
-            let legs = path.waypoints().windows(2).filter_map(|leg| {
-                let way = leg[1].position - leg[0].position;
-                (way.xy().norm() > LEG_LEAST_M).then(|| (leg[0].along_m, atan2f(way.y, way.x)))
-            });
-            let mut found = None;
-            for (from_m, heading) in legs {
-                if from_m > along_m && found.is_some() {
-                    break;
-                }
-                found = Some(heading);
-            }
-            found
+    if let Look::Fixed(heading) = photographs.look {
+        return Some(heading);
+    }
+    let mut found = None;
+    for shots in photographs.stretches(path) {
+        let way = path.point_at(shots.to_m)? - path.point_at(shots.from_m)?;
+        if way.xy().norm() > LEG_LEAST_M {
+            found = Some(atan2f(way.y, way.x));
+        }
+        if shots.to_m >= along_m && found.is_some() {
+            break;
         }
     }
+    found
 }
 
 #[cfg(test)]

@@ -72,13 +72,16 @@ proptest! {
             rest = later;
         }
         found.extend(all(&mut framer, PARTIAL_US + 1, &[]));
-        for (_, frame) in &frames {
-            let whole = written(frame);
-            let there = found.iter().any(|found| {
-                let mut again = Vec::new();
-                found.write(&mut again);
-                again == whole
-            });
+        let again = |found: &Frame| {
+            let mut again = Vec::new();
+            found.write(&mut again);
+            again
+        };
+        let wholes: Vec<Vec<u8>> = frames.iter().map(|(_, frame)| written(frame)).collect();
+        // Of 65 536 false starts one has a right checksum by chance, and nobody can tell.
+        prop_assume!(found.iter().all(|found| wholes.contains(&again(found))));
+        for (whole, (_, frame)) in wholes.iter().zip(&frames) {
+            let there = found.iter().any(|found| again(found) == *whole);
             prop_assert!(whole.is_empty() || there, "{:?}", frame);
         }
     }

@@ -8,10 +8,11 @@ use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{CoverageError, Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
-use super::checks::{VehicleSpans, check_apart};
+use super::checks::{VehicleSpans, check_apart, check_margins};
 use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
+use crate::margins;
 use crate::quote::quoted_path;
 use crate::scenario::coverage::{Area, Heading, Method, Trigger};
 use crate::scenario::error::ScenarioError;
@@ -32,9 +33,9 @@ enum Coordinates {
 
 /// The scenario of a coverage mission.
 pub(super) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
-    let Common { seed, deconfliction, simulation, .. } = common(text, root)?;
+    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-    let area = area(&root.need("area", hint)?.table()?, folder)?;
+    let mut area = area(&root.need("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     // What goals missions leave to coverage.
     let mut unsupported = Vec::new();
@@ -45,6 +46,13 @@ pub(super) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Resul
     let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
     let faults = faults(root, &vehicles)?;
     check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
+    let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
+    let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    if let Some(span) = &estimator_span {
+        check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
+    }
+    let height_m = area.heights.mission_m;
+    area.usable = margins::usable(&area.spacing, height_m, mission.cruise_mps, &simulation, &vehicles);
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
@@ -57,8 +65,8 @@ pub(super) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Resul
         },
         roadmap,
         mission,
-        vehicle_places: vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect(),
-        vehicles: vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(),
+        vehicle_places,
+        vehicles,
         deconfliction,
         simulation,
         faults,
@@ -106,6 +114,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
         origin,
         camera,
         spacing,
+        usable: spacing,
         heights: Heights { mission_m: height_m, layer_m },
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,

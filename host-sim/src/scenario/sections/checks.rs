@@ -13,11 +13,11 @@ pub(super) struct VehicleSpans {
     pub(super) table: Span,
 }
 
-/// Where estimates err as recorded, margin and separation must leave room for it.
+/// Where estimates err as recorded, separation and, with a roadmap, its margin must leave room for it.
 pub(super) fn check_margins(
     text: Text<'_>,
     span: &Span,
-    roadmap: &Roadmap,
+    roadmap: Option<&Roadmap>,
     deconfliction: &Deconfliction,
     simulation: &Simulation,
     vehicles: &[Vehicle],
@@ -26,11 +26,10 @@ pub(super) fn check_margins(
         return Ok(());
     }
     let need = margins::needed(simulation, deconfliction.safety_distance_m, vehicles);
-    let missing = [
-        ("roadmap.safety_margin_m", roadmap.safety_margin_m, need.margin_m),
-        ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m),
-    ];
-    let short = missing.iter().filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
+    let margin = roadmap.map(|r| ("roadmap.safety_margin_m", r.safety_margin_m, need.margin_m));
+    let separation = ("deconfliction.separation_m", deconfliction.separation_m, need.separation_m);
+    let missing = margin.into_iter().chain([separation]);
+    let short = missing.filter(|(_, has_m, need_m)| *has_m < need_m - 1e-3);
     let lacks: Vec<String> = short
         .map(|(key, has_m, need_m)| {
             format!("{key} is {has_m:.2} m, {:.2} m less than the {need_m:.2} m it takes", need_m - has_m)

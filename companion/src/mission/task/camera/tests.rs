@@ -155,16 +155,15 @@ fn without_a_trigger_nothing_is_commanded() {
 }
 
 #[test]
-fn a_vehicle_looks_the_way_it_flies_or_one_way() {
+fn a_vehicle_looks_along_the_next_lane_or_one_way() {
     let path = path();
     let ahead = photographs(Trigger::Distance);
     let at = |m: f32| heading(&ahead, &path, m).unwrap().to_degrees();
-    assert_eq!((at(0.0), at(30.0), at(75.0), at(100.0)), (0.0, 0.0, 90.0, 180.0));
+    assert_eq!((at(0.0), at(30.0)), (0.0, 0.0), "before and on the first lane");
+    assert_eq!((at(75.0), at(100.0), at(160.0)), (180.0, 180.0, 180.0), "it turns on the way to the second");
     let fixed = Photographs::new(8.0, Look::Fixed(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
-    let mut up = Path::<4>::new();
-    for z in [0.0, 9.0] {
-        up.push(Point::new(0.0, 0.0, z), 1.0).unwrap();
-    }
-    assert_eq!(heading(&ahead, &up, 3.0), None, "straight up it leads no way");
+    let mut point = Photographs::new(8.0, Look::Ahead, Trigger::Distance);
+    point.mark(5, 5).unwrap();
+    assert_eq!(heading(&point, &path, 3.0), None, "one picture leads no way");
 }

@@ -1,0 +1,74 @@
+//! Coverage missions flown whole: companions plan from the mission file, the autopilots trigger their cameras, and the
+//! pictures are judged by where they were truly taken.
+
+use flockmate_tests::areas::{self, Shape};
+use host_sim::coverage::flown;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::result::MissionResult;
+use host_sim::{scenario, swarm};
+use rand_core::SeedableRng as _;
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+/// Flies a scenario.
+fn fly(text: &str) -> Result<MissionResult, String> {
+    let said = |error: anyhow::Error| format!("{error:#}");
+    let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let plan = mission.plan().map_err(said)?;
+    let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).map_err(said)?;
+    let judged = flown::judge(&mission.scenario, &plan, flight.pictures).map_err(said)?;
+    let mut result = flight.result;
+    result.complete &= judged.complete;
+    result.coverage = Some(judged.result);
+    if !result.complete {
+        let warnings =
+            flight.log.iter().filter(|event| event.text.contains("arning") || event.text.contains(":"));
+        for event in warnings {
+            println!("{:8.2} {:?} {}", event.t_s, event.vehicle, event.text);
+        }
+    }
+    Ok(result)
+}
+
+/// What is wrong with a flight.
+fn faults(result: &MissionResult) -> Option<String> {
+    let safety = &result.safety;
+    let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
+    (!(clean && result.complete))
+        .then(|| format!("{:?}\n{:?}\n{:?}", result.vehicles, safety, result.coverage))
+}
+
+/// Why a random area is not flown.
+const NO_FLIGHT: [&str; 5] =
+    ["too many corners", "bad area", "bad scenario", "no-fly zone", "cannot keep vehicles apart"];
+
+/// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
+#[test]
+fn random_areas_are_photographed_whole() {
+    let number =
+        |name: &str, usual: u64| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(usual);
+    let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
+    let outcome = |seed: u64| -> Result<bool, String> {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
+        let text = areas::flown(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
+        match fly(&text) {
+            Ok(result) => match faults(&result) {
+                None => Ok(true),
+                Some(faults) => Err(format!("seed {seed}: {faults}\n{text}")),
+            },
+            Err(error) if NO_FLIGHT.iter().any(|known| error.contains(known)) => Ok(false),
+            Err(error) => Err(format!("seed {seed}: {error}\n{text}")),
+        }
+    };
+    let all: Vec<_> = (from..from + count).into_par_iter().map(outcome).collect();
+    let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
+    for wrong in &wrong {
+        println!("{}\n", wrong.chars().take(3000).collect::<String>());
+    }
+    let flown = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count() as u64;
+    println!("{flown} of {count} areas flown, {} wrong", wrong.len());
+    assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
+}
