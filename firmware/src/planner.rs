@@ -1,15 +1,13 @@
 //! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
 //! way around what is in its way.
 
-use companion::PlanFailure;
 use companion::storage::mission_file::MissionView;
+use companion::{PlanFailure, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
 use planner_core::flight::VehiclePlan;
-use planner_core::plan::{self, PlanError, SwarmPlan};
+use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
-use planner_core::schedule::ScheduleError;
-use planner_core::search::SearchError;
 
 use crate::boards;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
@@ -120,29 +118,9 @@ impl Planner<'_> {
             return Ok(&own.plan);
         }
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
-        let (mut tasks, mut descents_m) = (Vec::<_, VEHICLES>::new(), Vec::<_, VEHICLES>::new());
-        let request =
-            mission.request(&mut tasks, &mut descents_m, GATES).map_err(|_| PlanFailure::Capacity)?;
-        plan::plan_swarm(roadmap, &request, ws, swarm).map_err(|error| failure(&error))?;
-        plan::vehicle_plan(swarm, index, &request.schedule, &mut ws.schedule, &mut own.plan)
+        planner::goals(mission, roadmap, GATES, ws, swarm)?;
+        plan::vehicle_plan(swarm, index, &mission.header().schedule, &mut ws.schedule, &mut own.plan)
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)
-    }
-}
-
-fn failure(error: &PlanError) -> PlanFailure {
-    match error {
-        PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,
-        PlanError::Config(_) | PlanError::BadTask(_) | PlanError::BadDescent(_) | PlanError::SameGoal(_) => {
-            PlanFailure::Invalid
-        }
-        PlanError::Search(_, SearchError::PathTooLong | SearchError::WorkspaceTooSmall)
-        | PlanError::SwarmFull
-        | PlanError::Path(..)
-        | PlanError::Schedule(_, ScheduleError::PiecesFull | ScheduleError::GatesFull) => {
-            PlanFailure::Capacity
-        }
-        PlanError::Schedule(_, ScheduleError::Blocked | ScheduleError::BadIndex) => PlanFailure::Blocked,
-        PlanError::Search(..) | PlanError::Assignment(_) => PlanFailure::Unreachable,
     }
 }

@@ -54,13 +54,7 @@ impl<'a> Planned<'a> {
         let area = Area::new(&wanted.vertices, &wanted.rings)
             .map_err(|error| anyhow::anyhow!("bad area: {}: {error:?}", wanted.place))?;
         let vehicles: Vec<Vehicle> = scenario.vehicles.iter().map(|v| vehicle(v, scenario)).collect();
-        if let Some(index) = vehicles.iter().position(|vehicle| area.forbids(&vehicle.place)) {
-            let place = &scenario.vehicle_places[index];
-            bail!(
-                "bad vehicle: {place}: vehicle {} starts inside a no-fly zone",
-                scenario.vehicles[index].id
-            );
-        }
+        check_places(scenario, &area, &vehicles)?;
         let failed = |error: CoverageError| explained(error, wanted, scenario.vehicles.len());
         let began = Instant::now();
         let mut transit = Box::new(Transit::empty());
@@ -167,6 +161,15 @@ impl<'a> Planned<'a> {
         }
         Ok(())
     }
+}
+
+/// No vehicle starts inside a no-fly zone.
+fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> anyhow::Result<()> {
+    if let Some(index) = vehicles.iter().position(|vehicle| area.forbids(&vehicle.place)) {
+        let place = &scenario.vehicle_places[index];
+        bail!("bad vehicle: {place}: vehicle {} starts inside a no-fly zone", scenario.vehicles[index].id);
+    }
+    Ok(())
 }
 
 /// A vehicle as the planner sees it.

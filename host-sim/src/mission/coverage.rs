@@ -10,7 +10,7 @@ use planner_core::flight::PathError;
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
-use super::{Mission, SwarmPlan};
+use super::ready::{Mission, SwarmPlan, schedule_config};
 use crate::area::MOST_VERTICES;
 use crate::autopilot::VehicleLimits;
 use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS, on_heap};
@@ -64,7 +64,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
             goal: None,
         })
         .collect();
-    let mut schedule = super::schedule_config(&scenario);
+    let mut schedule = schedule_config(&scenario);
     schedule.vertical_mps = climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
     let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     mission.encode_area(&climbs)?;

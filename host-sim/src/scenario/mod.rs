@@ -29,7 +29,7 @@ pub use types::{
 /// Reads a scenario file; paths in it are relative to its folder.
 pub fn load(path: &Path) -> Result<Scenario, ScenarioError> {
     let (text, name, folder) = text(path)?;
-    sections::parse(&text, &name, &folder)
+    read(&text, &name, &folder)
 }
 
 /// A scenario file's text, its name in errors, and its folder.
@@ -48,5 +48,14 @@ fn text(path: &Path) -> Result<(String, String, PathBuf), ScenarioError> {
 
 /// Parses a scenario's text; `name` names it in errors, and paths in it are relative to the working directory.
 pub fn parse(text: &str, name: &str) -> Result<Scenario, ScenarioError> {
-    sections::parse(text, name, Path::new(""))
+    read(text, name, Path::new(""))
+}
+
+/// Reads a text, by the kind of mission that it is for.
+fn read(text: &str, file: &str, folder: &Path) -> Result<Scenario, ScenarioError> {
+    let text = reader::Text { file, text };
+    sections::root(text, |root| match (root.get("map"), root.get("area")) {
+        (None, Some(_)) => sections::area::coverage(text, root, folder),
+        _ => sections::goals_mission(text, root, folder),
+    })
 }

@@ -35,16 +35,8 @@ const MAX_FAULTS: usize = 1000;
 /// Mission origin where none is given: a test field.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
-pub(super) fn parse(text: &str, file: &str, folder: &Path) -> Result<Scenario> {
-    let text = Text { file, text };
-    root(text, |root| match (root.get("map"), root.get("area")) {
-        (None, Some(_)) => area::coverage(text, root, folder),
-        _ => goals_mission(text, root, folder),
-    })
-}
-
 /// What a scenario's root table says, if it is TOML and all its keys are known.
-fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
+pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
         let what = quoted(error.message().lines().next().unwrap_or_default());
@@ -70,7 +62,7 @@ fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result
 }
 
 /// The scenario of a mission with goals.
-fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
+pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
     let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;

@@ -32,7 +32,7 @@ enum Coordinates {
 }
 
 /// The scenario of a coverage mission.
-pub(super) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
+pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let mut area = area(&root.need("area", hint)?.table()?, folder)?;
