@@ -59,6 +59,12 @@ pub fn needed(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
 /// From a waypoint that is passed to the picture, seconds: a step of the companion, a command, a look of the autopilot's.
 pub const TRIGGER_S: f32 = 0.15;
 
+/// How far apart pads have to be, metres: a vehicle comes down beside one that came down, and both err.
+pub fn pads_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
+    let estimates = vehicles.iter().map(|v| estimate_m(simulation.estimator, v.personality));
+    parked_separation_m(simulation, safety_distance_m, vehicles) + estimates.fold(0.0, f32::max)
+}
+
 /// How much lower than it believes a vehicle may be, metres.
 fn lower_m(estimator: Estimator, autopilot: Personality) -> f32 {
     match (estimator, autopilot) {

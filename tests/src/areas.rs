@@ -122,7 +122,7 @@ pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String 
     for id in 1..=vehicles {
         let place = match scattered {
             true => [0, 1].map(|_| between(random, -1.3, 1.3) * radius),
-            false => [base[0] + 3.0 * id as f64, base[1]],
+            false => [base[0] + 4.0 * id as f64, base[1]],
         };
         text += &format!(
             "[[vehicles]]\nid = {id}\nspeed_max_mps = 20.0\nstart = [{:.2}, {:.2}, 0.0]\n",

@@ -6,7 +6,7 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
-use planner_core::flight::Path;
+use planner_core::flight::{Look, Path, Photographs, Task, Trigger};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{Bounds, Braking, Heard, Set, conflicts};
@@ -306,6 +306,7 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
             let other = HARD[(i * 5 + round) % HARD.len()];
             to.call("flight::Path::label", || path.label(hard, other));
             to.call("flight::Path::label_last", || path.label_last(hard, other));
+            to.call("flight::Path::label_by", || path.label_by(hard, |from, to| (to - from).norm() * other));
             let at =
                 to.call("flight::Path::point_at", || path.point_at(hard)).expect("a path with waypoints");
             let count =
@@ -331,11 +332,36 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
             assert_eq!(checked.is_ok(), good(hard) && good(other));
             track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
         }
+        tasks(to, &path);
         to.count(to_len(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
     }
     assert!(!to.call("flight::Path::waypoints", || path.waypoints().is_empty()));
+}
+
+/// Pictures along a path, whatever their spacing.
+fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
+    let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
+    for spacing_m in HARD {
+        let new = || Photographs::new(spacing_m, Look::Ahead, Trigger::Distance);
+        let mut photographs = to.call("photographs::Photographs::new", new);
+        for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::WAYPOINTS), (62, 63)] {
+            let marked = to.call("photographs::Photographs::mark", || photographs.mark(from, until));
+            assert_eq!(marked.is_ok(), from <= until && until < Photographs::WAYPOINTS);
+        }
+        let all = to.call("photographs::Photographs::count", || photographs.count(path));
+        let stretches =
+            to.call("photographs::Photographs::stretches", || photographs.stretches(path).count());
+        assert!(all as usize >= stretches && stretches <= 4, "{spacing_m}: {all} in {stretches}");
+        for shots in photographs.stretches(path) {
+            let place_m = to.call("photographs::Shots::place_m", || shots.place_m(shots.count));
+            to.add(place_m);
+        }
+        let task = Task::Photograph(photographs);
+        assert!(to.call("flight::Task::flies", || task.flies()));
+        assert_eq!(to.call("flight::Task::goal", || task.goal()), None);
+    }
 }
 
 fn to_len<const W: usize>(path: &Path<W>) -> usize {

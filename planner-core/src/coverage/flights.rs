@@ -15,6 +15,9 @@ use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 
+/// Braking and accelerating that is planned with, m/s².
+const ACCEL_MPS2: f32 = 1.5;
+
 /// A vehicle of the mission, beside what it is packed by.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pad {
@@ -151,6 +154,16 @@ impl<const N: usize, const W: usize> Draft<'_, N, W> {
     }
 }
 
+/// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its corners a vehicle nearly
+/// stops. Seconds.
+fn leg_s(length_m: f32, most_mps: f32) -> f32 {
+    if length_m * ACCEL_MPS2 > most_mps * most_mps {
+        length_m / most_mps + most_mps / ACCEL_MPS2
+    } else {
+        2.0 * libm::sqrtf(length_m / ACCEL_MPS2)
+    }
+}
+
 /// The flight of one route.
 fn flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
@@ -189,9 +202,9 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     draft.to(at(&vehicle.home, pad.start.z))?;
     let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {
-        let up = to.z - from.z;
-        (to - from).xy().norm() / vehicle.cruise_mps
-            + if up > 0.0 { up / vehicle.climb_mps } else { -up / vehicle.descend_mps }
+        let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
+        let z_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
+        leg_s(way_m, vehicle.cruise_mps) + leg_s(libm::fabsf(up_m), z_mps)
     };
     path.label_by(pad.climb_m / swarm.schedule.vertical_mps, seconds);
     let mut flight = Flight {

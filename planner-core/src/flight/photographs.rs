@@ -95,13 +95,13 @@ impl Photographs {
             // A stretch that is cut from a longer one is a multiple of its spacing, but for a rounding.
             let steps = if from < to { fmaxf(ceilf(length_m / spacing_m - 1e-3), 1.0) } else { 0.0 };
             let step_m = if steps > 0.0 { length_m / steps } else { 0.0 };
-            Some(Shots { from_m, to_m, step_m, count: steps as u32 + 1 })
+            Some(Shots { from_m, to_m, step_m, count: (steps as u32).saturating_add(1) })
         })
     }
 
     /// Pictures of the whole path.
     pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
-        self.stretches(path).map(|shots| shots.count).sum()
+        self.stretches(path).map(|shots| shots.count).fold(0, u32::saturating_add)
     }
 }
 

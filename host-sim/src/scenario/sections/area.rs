@@ -8,7 +8,7 @@ use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{CoverageError, Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
-use super::checks::{VehicleSpans, check_apart, check_margins};
+use super::checks::{VehicleSpans, check_margins};
 use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
@@ -45,9 +45,10 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
     let faults = faults(root, &vehicles)?;
-    check_apart(text, &vehicles, deconfliction.safety_distance_m)?;
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
-    let vehicles: Vec<Vehicle> = vehicles.into_iter().map(|(vehicle, _)| vehicle).collect();
+    let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
+    let apart_m = margins::pads_m(&simulation, deconfliction.safety_distance_m, &vehicles);
+    check_pads(text, &vehicles, &spans, apart_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
@@ -74,6 +75,23 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
         formation: None,
         unsupported: Vec::new(),
     })
+}
+
+/// Pads have to be so far apart.
+fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apart_m: f32) -> Result<()> {
+    for (index, (vehicle, spans)) in vehicles.iter().zip(spans).enumerate() {
+        let near = |other: &&Vehicle| (vehicle.start - other.start).norm() < apart_m;
+        if let Some(other) = vehicles[..index].iter().find(near) {
+            let why = format!(
+                "vehicles {} and {} start {:.2} m apart: to land beside each other they need {apart_m:.2} m",
+                other.id,
+                vehicle.id,
+                (vehicle.start - other.start).norm()
+            );
+            return Err(text.error(&spans.start, why));
+        }
+    }
+    Ok(())
 }
 
 /// `[mission]` of a coverage mission: it has no goals.
