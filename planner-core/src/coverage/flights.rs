@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use super::Flat;
-use super::pack::{Plan, Route, Work};
+use super::pack::{Heading, Plan, Route, Work};
 use super::transit::Transit;
 use crate::Point;
 use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
@@ -184,18 +184,17 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     draft.to(at(&vehicle.place, layer_m))?;
     draft.around(&vehicle.place, &first, layer_m)?;
     let mut here = first;
-    let mut numbers = route.waypoints().peekable();
-    while let Some(number) = numbers.next() {
-        let lane = work.tracks.lane_of(number);
-        let begin = place(number)?;
-        let from = draft.around(&here, &begin, mission_m)?;
-        let mut end = begin;
-        while let Some(next) = numbers.next_if(|next| work.tracks.lane_of(*next) == lane) {
-            end = place(next)?;
-        }
-        let to = draft.to(at(&end, mission_m))?;
+    let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+    let (low, high) = (*lanes.start(), *lanes.end());
+    for lane in lanes {
+        let lane = if route.heading == Heading::Forward { lane } else { high - (lane - low) };
+        let Some(lane) = work.tracks.lanes().get(lane) else { continue };
+        let (begin, end) = (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1);
+        let (begin, end) = if route.heading == Heading::Forward { (begin, end) } else { (end, begin) };
+        let from = draft.around(&here, &place(begin)?, mission_m)?;
+        here = place(end)?;
+        let to = draft.to(at(&here, mission_m))?;
         photographs.mark(from, to)?;
-        here = end;
     }
     draft.to(at(&last, layer_m))?;
     draft.around(&last, &vehicle.home, layer_m)?;

@@ -7,6 +7,9 @@ use super::footprint::Spacing;
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 
+/// Most waypoints: an f32 counts them.
+const WAYPOINTS: f32 = (1 << 24) as f32;
+
 /// What lanes follow from, besides the area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattern {
@@ -117,6 +120,9 @@ impl<const L: usize> Tracks<L> {
     ) -> Result<(), CoverageError> {
         for lane in &mut self.lanes {
             let steps = ceilf(lane.length_m() / spacing.waypoint_m - 1e-3);
+            if steps > WAYPOINTS {
+                return Err(CoverageError::Setting("waypoint_m"));
+            }
             lane.count = if lane.length_m() < super::area::SAME_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
         }
         self.measure(transit)
@@ -132,6 +138,9 @@ impl<const L: usize> Tracks<L> {
             }
             (lane.first, lane.start_m) = (first, start_m);
             first += lane.count;
+            if first as f32 > WAYPOINTS {
+                return Err(CoverageError::Setting("waypoint_m"));
+            }
             start_m += lane.length_m();
             before = Some(lane.to);
         }

@@ -284,3 +284,6 @@ impl CoverageHeader {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests;

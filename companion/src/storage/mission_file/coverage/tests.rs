@@ -1,0 +1,178 @@
+//! A coverage mission's file: what is written comes back and can be planned, what is not sound is refused by name.
+
+extern crate std;
+use std::boxed::Box;
+use std::vec;
+use std::vec::Vec as List;
+
+use planner_core::Point;
+use planner_core::deconflict::Method;
+use planner_core::frames::Geodetic;
+use planner_core::plan::{Mode, SwarmPlan, VehicleTask};
+use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
+use proptest::prelude::*;
+
+use super::*;
+use crate::planner::coverage::{self, Workspace};
+use crate::storage::mission_file::{self, Block, Kind, MissionHeader, MissionVehicle, MissionView};
+
+/// Bytes before the block of two vehicles.
+const BEFORE: usize = mission_file::HEADER_LEN + 2 * mission_file::VEHICLE_LEN;
+
+fn mission() -> MissionHeader {
+    MissionHeader {
+        roadmap_crc: 0,
+        mode: Mode::Labelled,
+        method: Method::Priority,
+        origin: Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 },
+        cruise_mps: 5.0,
+        schedule: ScheduleConfig {
+            separation_m: 2.0,
+            parked_separation_m: 1.75,
+            cruise_mps: 4.5,
+            vertical_mps: 1.0,
+        },
+        safety_distance_m: 1.5,
+        geofence: None,
+        ground_stations: [255, 0, 0, 0],
+    }
+}
+
+fn header() -> CoverageHeader {
+    CoverageHeader {
+        unit: Unit::Waypoint,
+        parts: Parts::Anyone,
+        heading: Heading::Sweep,
+        trigger: Trigger::Distance,
+        looks: 2000,
+        heights: Heights { mission_m: 25.0, layer_m: 5.0 },
+        spacing: Spacing {
+            footprint: Footprint { along_m: 20.0, across_m: 30.0 },
+            lane_m: 12.0,
+            waypoint_m: 8.0,
+        },
+        angle_deg: None,
+        margin_m: 0.0,
+    }
+}
+
+const RINGS: [Ring; 2] = [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 7, kind: RingKind::NoFly }];
+
+fn vertices() -> [Flat; 7] {
+    [(0.0, 0.0), (90.0, 0.0), (100.0, 60.0), (0.0, 70.0), (40.0, 30.0), (50.0, 30.0), (45.0, 40.0)]
+        .map(|(x, y)| Flat::new(x, y))
+}
+
+fn shares() -> [Share; 2] {
+    [0.75, 1.0].map(|weight| Share { weight, climb_mps: 3.0, descend_mps: 1.0 })
+}
+
+fn file() -> List<u8> {
+    let vehicle = |id: u8| MissionVehicle {
+        task: VehicleTask { id, required_clearance_m: 1.5, climb_m: 3.0, goal: None },
+        start: Point::new(5.0 * f32::from(id), -10.0, 3.3),
+        radius_m: 0.3,
+        speed_max_mps: 5.0,
+    };
+    let (shares, vertices) = (shares(), vertices());
+    let parts = CoverageParts { header: header(), shares: &shares, rings: &RINGS, vertices: &vertices };
+    let block = Block::Coverage(parts);
+    let mut out = vec![0xAA; block.file_len(2)];
+    assert_eq!(mission_file::write(&mission(), &[vehicle(1), vehicle(2)], &block, &mut out), Ok(out.len()));
+    out
+}
+
+/// The CRC made right again.
+fn sealed(mut file: List<u8>) -> List<u8> {
+    let end = file.len() - 4;
+    let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(&file[..end]);
+    file[end..].copy_from_slice(&crc.to_le_bytes());
+    file
+}
+
+fn forged(at: usize, bytes: &[u8]) -> List<u8> {
+    let mut file = file();
+    file[BEFORE + at..BEFORE + at + bytes.len()].copy_from_slice(bytes);
+    sealed(file)
+}
+
+type Memory = (Workspace<64, 128, 8>, ScheduleWorkspace, SwarmPlan<4, 64>);
+
+fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Error>> {
+    let view = MissionView::parse(file).ok()?;
+    let Kind::Coverage(area) = view.kind() else { return None };
+    let (ws, schedule, plan) = memory;
+    Some(coverage::plan::<64, 128, 8, 16, 4, 64>(&view, area, 128, ws, schedule, plan))
+}
+
+#[test]
+fn comes_back_as_written_and_is_planned() {
+    let file = file();
+    let view = MissionView::parse(&file).unwrap();
+    let Kind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+    assert_eq!(area.header(), &header());
+    assert_eq!(area.shares().collect::<List<_>>(), shares());
+    assert_eq!(area.rings().collect::<List<_>>(), RINGS);
+    assert_eq!(area.vertices().collect::<List<_>>(), vertices());
+    assert_eq!(view.byte_len(), file.len());
+    let config = view.config::<2>(2).unwrap();
+    assert_eq!((config.check(), config.climb_mps, config.descend_mps), (Ok(()), 3.0, 1.0));
+    let mut memory = Box::<Memory>::default();
+    assert_eq!(planned(&file, &mut memory), Some(Ok(())));
+    let (ws, _, plan) = &*memory;
+    assert!(plan.flights.iter().all(|flight| flight.task.flies()));
+    // Every waypoint of the lanes is photographed once.
+    let pictures = plan.flights.iter().map(|flight| match &flight.task {
+        planner_core::flight::Task::Photograph(photographs) => photographs.count(&flight.path),
+        _ => 0,
+    });
+    assert_eq!(pictures.sum::<u32>(), ws.tracks().waypoint_count());
+}
+
+#[test]
+fn what_is_not_sound_is_refused_by_name() {
+    let nan = f32::NAN.to_le_bytes();
+    for (file, why) in [
+        (forged(0, &[8]), FileError::Length.into()),
+        (forged(2, &[3]), FileError::Length.into()),
+        (forged(4, &[2]), FileError::Header("unit").into()),
+        (forged(5, &[2]), FileError::Header("parts").into()),
+        (forged(6, &[2]), FileError::Header("heading").into()),
+        (forged(7, &[3]), FileError::Header("trigger").into()),
+        (forged(8, &[0xFF; 4]), FileError::Header("looks").into()),
+        (forged(12, &nan), FileError::Header("heights").into()),
+        (forged(28, &31.0f32.to_le_bytes()), FileError::Header("spacing").into()),
+        (forged(36, &f32::INFINITY.to_le_bytes()), FileError::Header("angle_deg").into()),
+        (forged(40, &(-1.0f32).to_le_bytes()), FileError::Header("margin_m").into()),
+        (forged(44, &nan), MissionError::Vehicle(0)),
+        (forged(56 + 4, &0.0f32.to_le_bytes()), MissionError::Vehicle(1)),
+        (forged(68 + 2, &[3]), FileError::Header("rings").into()),
+        (forged(76, &1e9f32.to_le_bytes()), FileError::Header("vertices").into()),
+    ] {
+        assert_eq!(MissionView::parse(&file).err(), Some(why));
+    }
+    let mut other = file();
+    other[23] = 2;
+    assert_eq!(MissionView::parse(&sealed(other)).err(), Some(FileError::Header("kind").into()));
+    let mut old = file();
+    old[8] = 2;
+    assert_eq!(MissionView::parse(&sealed(old)).err(), Some(FileError::Length.into()), "it had no kinds");
+}
+
+proptest! {
+    /// Whatever a file with the right CRC says, it is refused or planned, soon and without a panic.
+    #[test]
+    fn any_bytes_are_survived(patches in proptest::collection::vec((20usize..300, any::<u8>()), 0..8)) {
+        let mut bytes = file();
+        let end = bytes.len() - 4;
+        for (at, byte) in patches {
+            bytes[at.min(end - 1)] = byte;
+        }
+        let mut memory = Box::<Memory>::default();
+        if let Some(Ok(())) = planned(&sealed(bytes), &mut memory) {
+            for flight in &memory.2.flights {
+                prop_assert!(flight.path.waypoints().iter().all(|w| w.position.iter().all(|c| c.is_finite())));
+            }
+        }
+    }
+}
