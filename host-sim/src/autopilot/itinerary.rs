@@ -11,7 +11,7 @@ use planner_core::frames::Geodetic;
 
 use super::body::{Body, Sense};
 use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
-use super::mission::Item;
+use super::mission::{Item, Progress};
 use super::vehicle::wrap_pi;
 use crate::kinds::Personality;
 
@@ -43,27 +43,6 @@ pub(super) enum Leg {
     Land { at: Option<[f32; 2]> },
     /// Return and land.
     Return,
-}
-
-/// How far a mission is flown.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Progress {
-    /// The item under way; the number of items when all are done.
-    pub current: u16,
-    since_us: Option<u64>,
-    inside_us: Option<u64>,
-}
-
-impl Progress {
-    /// From an item on.
-    pub(super) fn at(current: u16) -> Self {
-        Self { current, ..Self::default() }
-    }
-
-    /// The item is begun again when the mission goes on.
-    pub(super) fn interrupt(&mut self) {
-        (self.since_us, self.inside_us) = (None, None);
-    }
 }
 
 fn real(item: &Item, at: usize) -> f32 {

@@ -3,7 +3,6 @@
 //! Upload: COUNT → the items are asked for one by one, again after a quarter of a second → ACK. Download: REQUEST_LIST →
 //! COUNT, then each item as it is asked for. Source: MAVLink guide, "Mission Protocol".
 
-use super::itinerary::Progress;
 use super::port::{Port, Sender};
 use super::wire::Fields;
 
@@ -44,6 +43,27 @@ struct Upload {
     items: Vec<Item>,
     asked_us: u64,
     retries: u32,
+}
+
+/// How far a mission is flown.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Progress {
+    /// The item under way; the number of items when all are done.
+    pub current: u16,
+    pub(super) since_us: Option<u64>,
+    pub(super) inside_us: Option<u64>,
+}
+
+impl Progress {
+    /// From an item on.
+    pub(super) fn at(current: u16) -> Self {
+        Self { current, ..Self::default() }
+    }
+
+    /// The item is begun again when the mission goes on.
+    pub(super) fn interrupt(&mut self) {
+        (self.since_us, self.inside_us) = (None, None);
+    }
 }
 
 /// What is stored.

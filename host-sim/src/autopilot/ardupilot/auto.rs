@@ -6,6 +6,7 @@
 
 use planner_core::Point;
 
+use super::auto_state::Auto;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, TakeOff};
 use crate::autopilot::body::{Body, Sense};
@@ -15,17 +16,6 @@ use crate::autopilot::itinerary::Leg;
 const ARRIVED_M: f32 = 0.5;
 /// Nearer than this it does not turn to where it flies, metres.
 const LOOKS_M: f32 = 2.0;
-
-/// What AUTO is about.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Auto {
-    /// It may leave the ground (`auto_armed`).
-    pub may_lift: bool,
-    leg: Option<Leg>,
-    /// Where it stays when nothing is asked for.
-    stay: Option<Point>,
-    heading: Option<f32>,
-}
 
 impl Copter {
     /// Whether AUTO can be entered; says why not.

@@ -12,6 +12,7 @@
 //! boot and arguments; nothing here reads a clock.
 
 mod auto;
+mod auto_state;
 mod commands;
 mod flight;
 mod modes;
@@ -25,7 +26,7 @@ pub use self::modes::Mode;
 
 use planner_core::Point;
 
-use self::auto::Auto;
+use self::auto_state::Auto;
 use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
