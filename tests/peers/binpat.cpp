@@ -12,6 +12,9 @@
 
 #include "plan.hpp"
 
+/// Of each route before the loss: nine steps of 10 m, from its first waypoint to its tenth.
+const float FLOWN_M = 90.f;
+
 template <typename Run>
 double median_us(int runs, Run &&run) {
     std::vector<double> times;
@@ -53,11 +56,29 @@ int main(int argc, char **argv) {
     });
     double update_us = median_us(runs, [&] {
         auto plan = pln::generate_plan(regionset, homeset, parameters);
+        // Each has flown FLOWN_M of its route and stands there; the first is lost. A path begins where its vehicle is.
         auto lose = [](auto &&path) {
             auto index = path.getindex() == 0 ? idx::null : path.getindex();
-            return idx::make_chain(index, std::forward<decltype(path)>(path).getchain());
+            using Point = typename std::decay_t<decltype(path)>::value_type;
+            auto points = seq::accumulate<std::vector<Point>>(path.getchain());
+            auto next = std::find_if(points.begin(), points.end(), [](auto &point) { return point.getlabel(); });
+            float left_m = FLOWN_M;
+            auto here = next->getpoint();
+            while (++next != points.end() && next->getlabel()) {
+                auto step = next->getpoint() - here;
+                float step_m = gmt::pnt::separation(here, next->getpoint());
+                if (step_m >= left_m) {
+                    here = here + step * (left_m / step_m);
+                    break;
+                }
+                left_m -= step_m;
+                here = next->getpoint();
+            }
+            std::vector<Point> rest{lbl::make_point(true, here)};
+            rest.insert(rest.end(), next, points.end());
+            return idx::make_chain(index, gmt::make_chain(seq::make_container_sequence(std::move(rest))));
         };
-        auto lost = gmt::make_scrawl(seq::transform(lose, std::move(plan)));
+        auto lost = gmt::make_scrawl(seq::make_container_sequence_(seq::transform(lose, std::move(plan))));
         return time_us([&] {
             auto updated = pln::update_plan(std::move(lost), parameters, .9f);
             points += updated.has_value();

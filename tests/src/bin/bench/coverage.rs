@@ -1,8 +1,12 @@
 //! Coverage beside the public C++ BINPAT, on its kind of area: five vertices, 300 by 150 m, lanes of 10 m.
 //!
 //! `--binpat DIR` is a checkout of cvar-upm/multi_uav_planning_binpat; `tests/peers/binpat.cpp` times it. Both are run
-//! alternately. Ours is everything from the vertices to the routes. After the loss of the first vehicle, ours divides what
-//! each vehicle has not flown among the rest; theirs, which knows no progress, the whole path.
+//! alternately. Both do the same work: from the vertices to the flights, written out as points with heights (place, layer,
+//! both ends of every lane, home). For the loss, each vehicle has flown ten waypoints of its route, 90 m, and stands there;
+//! the first one is lost. What each has not flown is divided among the rest from where they stand, and written out.
+//!
+//! What differs: theirs cuts the path anywhere, ours between waypoints. Theirs layers flights by the way to and from their
+//! part, ours by the time of all. Theirs also compares the new longest flight with the old one.
 
 use std::hint::black_box;
 use std::path::Path;
@@ -15,7 +19,7 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::divide::{self, Range};
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use planner_core::coverage::pack::{Heights, PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
@@ -99,6 +103,7 @@ struct Desk {
     workspace: Box<tracks::Workspace<64>>,
     pack: Box<PackWorkspace<VEHICLES>>,
     plan: Plan<VEHICLES>,
+    points: Vec<[f32; 3]>,
 }
 
 impl Desk {
@@ -116,6 +121,7 @@ impl Desk {
             workspace: Box::default(),
             pack: Box::default(),
             plan: Plan::new(),
+            points: Vec::new(),
         }
     }
 
@@ -130,7 +136,33 @@ impl Desk {
         tracks::build(&area, &pattern, &transit, &mut self.workspace, &mut self.tracks).expect("lanes");
         let work = work(&self.tracks, &transit, &self.vehicles);
         binpat(&work, &mut self.pack, &mut self.plan).expect("routes");
-        black_box(&self.plan);
+        write_out(&work, &self.plan, &mut self.points);
+        black_box(&self.points);
+    }
+}
+
+/// Every flight as points: place, its layer, the lanes, its layer, home.
+fn write_out(work: &Work<'_, LANES, 8>, plan: &Plan<VEHICLES>, points: &mut Vec<[f32; 3]>) {
+    points.clear();
+    let Heights { mission_m, layer_m } = work.heights;
+    for route in &plan.routes {
+        let vehicle = &work.vehicles[usize::from(route.vehicle)];
+        let up_m = mission_m + layer_m * f32::from(route.layer);
+        let at = |place: &Flat, height_m: f32| [place.x, place.y, height_m];
+        points.extend([at(&vehicle.place, mission_m), at(&vehicle.place, up_m)]);
+        let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+        let begins = points.len();
+        for lane in &work.tracks.lanes()[lanes] {
+            let from = route.first.max(lane.first) - lane.first;
+            let to = route.end.min(lane.first + lane.count) - 1 - lane.first;
+            points.extend([from, to].map(|k| at(&lane.waypoint(k), mission_m)));
+        }
+        if route.heading == Heading::Backward {
+            points[begins..].reverse();
+        }
+        let [first, last] = [points[begins], points[points.len() - 1]];
+        points.insert(begins, [first[0], first[1], up_m]);
+        points.extend([[last[0], last[1], up_m], at(&vehicle.home, up_m), at(&vehicle.home, 0.0)]);
     }
 }
 
@@ -159,8 +191,10 @@ fn ours_us(vehicles: usize) -> [f64; 2] {
     let update_us = median_us(|| {
         divide::left(&desk.tracks, black_box(&done), &transit, &mut left).expect("something is left");
         let rest = &desk.vehicles[1..];
-        binpat(&work(&left, &transit, rest), &mut desk.pack, &mut desk.plan).expect("routes");
-        black_box(&desk.plan);
+        let work = work(&left, &transit, rest);
+        binpat(&work, &mut desk.pack, &mut desk.plan).expect("routes");
+        write_out(&work, &desk.plan, &mut desk.points);
+        black_box(&desk.points);
     });
     let last = left.waypoint_count() - 1;
     assert_eq!(divide::original(&done, last), desk.tracks.waypoint_count() - 1);
