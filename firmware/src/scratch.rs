@@ -7,13 +7,15 @@
 use core::mem::{ManuallyDrop, MaybeUninit};
 
 use planner_core::Point;
+use planner_core::coverage::pack::Plan;
+use planner_core::coverage::powell;
+use planner_core::coverage::tracks::{self, Tracks};
 use planner_core::plan::PlanWorkspace;
 use planner_core::prm::{self, Config, PrmError};
 use planner_core::roadmap::Edge;
 use planner_core::voxel::VoxelGrid;
 
-use crate::calls::coverage;
-use crate::capacity::{HALF_EDGES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
+use crate::capacity::{AREA_VERTICES, HALF_EDGES, LANES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
 
 /// Scratch of planning a swarm.
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
@@ -34,13 +36,13 @@ enum Use {
 union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<Builder>,
-    coverage: ManuallyDrop<coverage::Lent>,
+    coverage: ManuallyDrop<Coverage>,
 }
 
 /// All zeros are a value of each use: the compiler refuses a constant that is no value of its
 /// type.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ZEROS: (Planner, Builder, coverage::Lent) = {
+const ZEROS: (Planner, Builder, Coverage) = {
     // SAFETY: the compiler checks it.
     unsafe {
         let zeroed = (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
@@ -69,7 +71,7 @@ impl Scratch {
     }
 
     /// For a coverage mission from here on; empty.
-    pub fn coverage(&mut self) -> &mut coverage::Lent {
+    pub fn coverage(&mut self) -> &mut Coverage {
         self.turn(Use::Coverage);
         // SAFETY: as above; all zeros is nothing lent yet.
         unsafe { &mut self.memory.coverage }
@@ -86,6 +88,39 @@ impl Scratch {
 }
 
 impl Default for Scratch {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// What a coverage mission is planned with.
+pub struct Coverage {
+    /// The whole path.
+    pub tracks: Tracks<LANES>,
+    /// What is left of it after a loss.
+    pub left: Tracks<LANES>,
+    /// For making lanes.
+    pub build: tracks::Workspace<AREA_VERTICES>,
+    /// For dividing them.
+    pub powell: powell::Workspace<VEHICLES>,
+    /// The routes.
+    pub plan: Plan<VEHICLES>,
+}
+
+impl Coverage {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self {
+            tracks: Tracks::new(),
+            left: Tracks::new(),
+            build: tracks::Workspace::new(),
+            powell: powell::Workspace::new(),
+            plan: Plan::new(),
+        }
+    }
+}
+
+impl Default for Coverage {
     fn default() -> Self {
         Self::new()
     }

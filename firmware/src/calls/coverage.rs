@@ -12,15 +12,9 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{Flat, powell, sweep};
 
 use super::Meter;
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES, VEHICLES};
+use crate::scratch::Coverage;
 
-/// Lanes of a coverage mission.
-pub const LANES: usize = 512;
-/// Vertices of its area.
-pub const VERTICES: usize = 256;
-/// Outward corners of its no-fly zones.
-pub const CORNERS: usize = 32;
-/// Vehicles that divide it.
-pub const VEHICLES: usize = 32;
 /// Changes of the lanes' order that are looked at.
 pub const LOOKS: u32 = 2000;
 /// Vehicles of the plans that have a limit.
@@ -28,34 +22,6 @@ const FEW: usize = 3;
 /// Packings that POWELL looks at.
 const SEARCH: powell::Config = powell::Config::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
-
-/// What the calls are lent.
-pub struct Lent {
-    tracks: Tracks<LANES>,
-    left: Tracks<LANES>,
-    build: tracks::Workspace<VERTICES>,
-    powell: powell::Workspace<VEHICLES>,
-    plan: Plan<VEHICLES>,
-}
-
-impl Lent {
-    /// Empty.
-    pub const fn new() -> Self {
-        Self {
-            tracks: Tracks::new(),
-            left: Tracks::new(),
-            build: tracks::Workspace::new(),
-            powell: powell::Workspace::new(),
-            plan: Plan::new(),
-        }
-    }
-}
-
-impl Default for Lent {
-    fn default() -> Self {
-        Self::new()
-    }
-}
 
 /// A sum of bits in which order counts.
 struct Sum(u32);
@@ -88,7 +54,7 @@ impl Sum {
 
 /// Makes all of them; the sum of the answers.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter, lent: &mut Lent) -> u32 {
+pub fn run(meter: &mut impl Meter, lent: &mut Coverage) -> u32 {
     let mut sum = Sum(1);
     cameras(meter, &mut sum);
     // Five vertices, 300 by 150 m, lanes of 10 m.
@@ -134,10 +100,10 @@ fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
 }
 
 /// The whole plan of three vehicles, and its parts.
-fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Lent, sum: &mut Sum) {
+fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
     let few = vehicles(FEW);
-    let Lent { tracks, left, build, powell, plan } = lent;
+    let Coverage { tracks, left, build, powell, plan } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
@@ -180,10 +146,10 @@ fn flown(plan: &Plan<VEHICLES>, count: u32) -> Vec<Range, VEHICLES> {
 }
 
 /// What is left after a loss, of 512 lanes among 32 vehicles.
-fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Lent, sum: &mut Sum) {
+fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
-    let Lent { tracks, left, build, powell, plan } = lent;
+    let Coverage { tracks, left, build, powell, plan } = lent;
     let pack = &mut powell.pack;
     // Nothing was changed in the order yet, and each look is at all lanes.
     let pattern = pattern(Some(90.0), 5.0);
@@ -227,10 +193,10 @@ fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Lent, sum: &mut S
 }
 
 /// An area with as many vertices as there may be, some of them of no-fly zones with as many corners.
-fn edges(meter: &mut impl Meter, lent: &mut Lent, sum: &mut Sum) {
-    const ZONES: usize = CORNERS / 4;
-    const OUTER: usize = VERTICES - CORNERS;
-    let mut vertices: Vec<Flat, VERTICES> = Vec::new();
+fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
+    const ZONES: usize = AREA_CORNERS / 4;
+    const OUTER: usize = AREA_VERTICES - AREA_CORNERS;
+    let mut vertices: Vec<Flat, AREA_VERTICES> = Vec::new();
     for k in 0..OUTER {
         let (sin, cos) = libm::sincosf(core::f32::consts::TAU * k as f32 / OUTER as f32);
         let radius_m = if k % 2 == 0 { 200.0 } else { 190.0 };
@@ -247,20 +213,20 @@ fn edges(meter: &mut impl Meter, lent: &mut Lent, sum: &mut Sum) {
         rings.push(Ring { end, kind: RingKind::NoFly }).expect("there is room");
     }
     let area = meter.call("area::Area::new, 256", 0, || Area::new(&vertices, &rings)).expect("an area");
-    let mut transit = Transit::<CORNERS>::empty();
+    let mut transit = Transit::<AREA_CORNERS>::empty();
     let bytes = size_of_val(&transit);
     meter.call("transit::Transit::learn, 32 corners", bytes, || transit.learn(area)).expect("they fit");
     for k in 0..16 {
         let (from, to) = (Flat::new(-150.0, 10.0 * k as f32 - 80.0), Flat::new(150.0, 70.0 - 9.0 * k as f32));
         let clear = meter.call("transit::Transit::is_clear", 0, || transit.is_clear(&from, &to));
         let far_m = meter.call("transit::Transit::distance_m", 0, || transit.distance_m(&from, &to));
-        let mut corners: Vec<Flat, CORNERS> = Vec::new();
+        let mut corners: Vec<Flat, AREA_CORNERS> = Vec::new();
         meter.call("transit::Transit::way", 0, || transit.way(&from, &to, &mut corners)).expect("a way");
         let inside = meter.call("area::Area::forbids", 0, || area.forbids(&from));
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
-    let Lent { tracks, build, powell, plan, .. } = lent;
-    let mut hull: Vec<Flat, VERTICES> = Vec::new();
+    let Coverage { tracks, build, powell, plan, .. } = lent;
+    let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
     let direction =
         meter.call("sweep::least_width, 256", size_of_val(&hull), || sweep::least_width(&area, &mut hull));
     sum.add(direction.expect("a direction").along.x.to_bits());
@@ -300,9 +266,9 @@ mod tests {
 
     #[test]
     fn all_calls_are_made_and_the_sum_is_the_same_again() {
-        let mut lent = Box::<Lent>::default();
+        let mut lent = Box::<Coverage>::default();
         let first = run(&mut Desk, &mut lent);
         assert_eq!(run(&mut Desk, &mut lent), first);
-        std::println!("lent {} bytes", size_of::<Lent>());
+        std::println!("lent {} bytes", size_of::<Coverage>());
     }
 }

@@ -25,7 +25,6 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("host-sim/src/autopilot/px4/params.rs", "Tuning", SETTINGS),
     ("host-sim/src/commands/companion.rs", "run", "the loop of a shell, in the order of the drain contract"),
     ("host-sim/src/autopilot/ardupilot/mod.rs", "Copter", FIRMWARE),
-    ("host-sim/src/autopilot/px4/mod.rs", "Commander", FIRMWARE),
     (
         "host-sim/src/coverage/check.rs",
         "judge",

@@ -61,7 +61,7 @@ impl Px4 {
     /// What the mission asks for, while AUTO.MISSION flies it. Its return is AUTO.RTL.
     fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
         if !self.commander.armed() {
-            if let Some(leg) = self.commander.mission_leg.take() {
+            if let Some(leg) = self.commander.mission.leg.take() {
                 if matches!(leg, Leg::Land { .. }) {
                     body.pass_item();
                 }
@@ -70,17 +70,17 @@ impl Px4 {
             return;
         }
         if self.commander.mode() != Mode::Mission {
-            if self.commander.mission_leg.take().is_some() {
+            if self.commander.mission.leg.take().is_some() {
                 body.missions.progress.interrupt();
             }
             return;
         }
-        self.commander.mission_leg = body.fly_mission(sense, self.commander.landed());
+        self.commander.mission.leg = body.fly_mission(sense, self.commander.landed());
         if let Some(speed) = body.missions.speed.take() {
             self.commander.set_cruise(speed);
         }
-        if self.commander.mission_leg == Some(Leg::Return) {
-            self.commander.mission_leg = None;
+        if self.commander.mission.leg == Some(Leg::Return) {
+            self.commander.mission.leg = None;
             body.pass_item();
             body.rewind_mission();
             self.commander.force_mode(Mode::Return, sense);

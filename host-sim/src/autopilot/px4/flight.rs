@@ -99,7 +99,7 @@ impl Commander {
 
     /// What an item of the mission asks for. Without a heading it looks where it flies (`MPC_YAW_MODE` 0).
     fn mission_demand(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
-        match self.mission_leg {
+        match self.mission.leg {
             Some(Leg::TakeOff { up }) => {
                 self.hold.z = up;
                 let climb_max = tuning.takeoff_speed.min(held.climb_max);

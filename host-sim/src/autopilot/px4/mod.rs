@@ -12,6 +12,7 @@
 //! ends it. Times are microseconds since boot and arguments; nothing here reads a clock.
 
 mod flight;
+mod modes;
 pub mod params;
 pub mod setpoint;
 
@@ -21,6 +22,7 @@ mod firmware;
 use planner_core::Point;
 
 pub use self::firmware::Px4;
+pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
 use super::body::{Integral, Order, Sense};
@@ -40,80 +42,6 @@ const LAND_FILTER_S: f32 = 0.5;
 /// Disarmed 2.2 to 2.4 s after ON_GROUND with `COM_DISARM_LAND` 2.0.
 const DISARM_REACTION_S: f32 = 0.25;
 
-/// PX4's flight modes, as far as the simulation flies them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Mode {
-    /// Stick to motors; with nobody at the sticks it only holds.
-    Manual,
-    /// Altitude control by sticks; likewise.
-    Altitude,
-    /// Position control by sticks; likewise.
-    Position,
-    /// AUTO.MISSION.
-    Mission,
-    /// AUTO.LOITER.
-    Hold,
-    /// AUTO.RTL.
-    Return,
-    /// AUTO.TAKEOFF.
-    Takeoff,
-    /// AUTO.LAND.
-    Land,
-    /// OFFBOARD.
-    Offboard,
-}
-
-const MODES: [(Mode, u8, u8); 9] = [
-    (Mode::Manual, 1, 0),
-    (Mode::Altitude, 2, 0),
-    (Mode::Position, 3, 0),
-    (Mode::Mission, 4, 4),
-    (Mode::Hold, 4, 3),
-    (Mode::Return, 4, 5),
-    (Mode::Takeoff, 4, 2),
-    (Mode::Land, 4, 6),
-    (Mode::Offboard, 6, 0),
-];
-
-impl Mode {
-    /// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
-    pub fn custom_mode(self) -> u32 {
-        MODES
-            .iter()
-            .find(|(mode, ..)| *mode == self)
-            .map_or(0, |&(_, main, sub)| u32::from(main) << 16 | u32::from(sub) << 24)
-    }
-
-    /// The mode of a `custom_mode`.
-    pub fn from_custom_mode(custom_mode: u32) -> Option<Self> {
-        Self::from_main_sub((custom_mode >> 16) as u8, (custom_mode >> 24) as u8)
-    }
-
-    /// The mode of a main and a sub mode.
-    pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
-        MODES.iter().find(|&&(_, m, s)| m == main && (s == sub || main != 4)).map(|&(mode, ..)| mode)
-    }
-
-    /// Whether a disarmed vehicle leaves the mode for the one before.
-    fn ends_with_flight(self) -> bool {
-        matches!(self, Self::Return | Self::Takeoff | Self::Land)
-    }
-
-    fn is_auto(self) -> bool {
-        matches!(self, Self::Mission | Self::Hold | Self::Return | Self::Takeoff | Self::Land)
-    }
-
-    fn needs_sticks(self) -> bool {
-        matches!(self, Self::Manual | Self::Altitude | Self::Position)
-    }
-}
-
-impl From<Mode> for u32 {
-    fn from(mode: Mode) -> Self {
-        mode.custom_mode()
-    }
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Phase {
     Ground,
@@ -127,6 +55,15 @@ enum ReturnLeg {
     Cross { up: f32 },
     Descend,
     Land,
+}
+
+/// Of AUTO.MISSION.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mission {
+    /// One is stored.
+    ready: bool,
+    /// What it asks for, while it is flown.
+    leg: Option<Leg>,
 }
 
 /// The state of the state machine.
@@ -152,9 +89,7 @@ pub struct Commander {
     /// Rate of sinking in Land, as of when.
     descent: Option<(u64, Ramp)>,
     position_ok: bool,
-    mission_ready: bool,
-    /// What the mission asks for, while it is flown.
-    mission_leg: Option<Leg>,
+    mission: Mission,
 }
 
 impl Default for Commander {
@@ -186,8 +121,7 @@ impl Commander {
             leg: ReturnLeg::Descend,
             descent: None,
             position_ok: true,
-            mission_ready: false,
-            mission_leg: None,
+            mission: Mission::default(),
         }
     }
 
@@ -221,8 +155,8 @@ impl Commander {
         match self.mode() {
             _ if self.landed => 1,
             Mode::Takeoff => 3,
-            Mode::Mission if matches!(self.mission_leg, Some(Leg::TakeOff { .. })) => 3,
-            Mode::Mission if matches!(self.mission_leg, Some(Leg::Land { .. })) => 4,
+            Mode::Mission if matches!(self.mission.leg, Some(Leg::TakeOff { .. })) => 3,
+            Mode::Mission if matches!(self.mission.leg, Some(Leg::Land { .. })) => 4,
             Mode::Land => 4,
             Mode::Return if self.leg == ReturnLeg::Land => 4,
             _ => 2,
@@ -258,7 +192,7 @@ impl Commander {
 
     /// Whether a mission is stored that AUTO.MISSION can fly.
     pub fn set_mission_ready(&mut self, ready: bool) {
-        self.mission_ready = ready;
+        self.mission.ready = ready;
     }
 
     /// Takes a setpoint that counts.
@@ -293,7 +227,7 @@ impl Commander {
         let runs = match self.intention {
             Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
             Mode::Hold | Mode::Takeoff => true,
-            Mode::Mission => self.mission_ready,
+            Mode::Mission => self.mission.ready,
             Mode::Land | Mode::Return => false,
             Mode::Manual | Mode::Altitude | Mode::Position => false,
         };
@@ -319,7 +253,7 @@ impl Commander {
     pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
         let runs = match mode {
             Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
-            Mode::Mission => self.mission_ready,
+            Mode::Mission => self.mission.ready,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {

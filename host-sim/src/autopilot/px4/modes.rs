@@ -1,0 +1,75 @@
+//! PX4's flight modes, and what each needs.
+
+/// PX4's flight modes, as far as the simulation flies them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Mode {
+    /// Stick to motors; with nobody at the sticks it only holds.
+    Manual,
+    /// Altitude control by sticks; likewise.
+    Altitude,
+    /// Position control by sticks; likewise.
+    Position,
+    /// AUTO.MISSION.
+    Mission,
+    /// AUTO.LOITER.
+    Hold,
+    /// AUTO.RTL.
+    Return,
+    /// AUTO.TAKEOFF.
+    Takeoff,
+    /// AUTO.LAND.
+    Land,
+    /// OFFBOARD.
+    Offboard,
+}
+
+const MODES: [(Mode, u8, u8); 9] = [
+    (Mode::Manual, 1, 0),
+    (Mode::Altitude, 2, 0),
+    (Mode::Position, 3, 0),
+    (Mode::Mission, 4, 4),
+    (Mode::Hold, 4, 3),
+    (Mode::Return, 4, 5),
+    (Mode::Takeoff, 4, 2),
+    (Mode::Land, 4, 6),
+    (Mode::Offboard, 6, 0),
+];
+
+impl Mode {
+    /// `custom_mode` of HEARTBEAT: main mode << 16 | sub mode << 24.
+    pub fn custom_mode(self) -> u32 {
+        MODES
+            .iter()
+            .find(|(mode, ..)| *mode == self)
+            .map_or(0, |&(_, main, sub)| u32::from(main) << 16 | u32::from(sub) << 24)
+    }
+
+    /// The mode of a `custom_mode`.
+    pub fn from_custom_mode(custom_mode: u32) -> Option<Self> {
+        Self::from_main_sub((custom_mode >> 16) as u8, (custom_mode >> 24) as u8)
+    }
+
+    /// The mode of a main and a sub mode.
+    pub fn from_main_sub(main: u8, sub: u8) -> Option<Self> {
+        MODES.iter().find(|&&(_, m, s)| m == main && (s == sub || main != 4)).map(|&(mode, ..)| mode)
+    }
+
+    /// Whether a disarmed vehicle leaves the mode for the one before.
+    pub(super) fn ends_with_flight(self) -> bool {
+        matches!(self, Self::Return | Self::Takeoff | Self::Land)
+    }
+
+    pub(super) fn is_auto(self) -> bool {
+        matches!(self, Self::Mission | Self::Hold | Self::Return | Self::Takeoff | Self::Land)
+    }
+
+    pub(super) fn needs_sticks(self) -> bool {
+        matches!(self, Self::Manual | Self::Altitude | Self::Position)
+    }
+}
+
+impl From<Mode> for u32 {
+    fn from(mode: Mode) -> Self {
+        mode.custom_mode()
+    }
+}
