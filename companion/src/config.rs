@@ -52,6 +52,9 @@ pub struct Config<const V: usize> {
     pub method: Method,
     /// The least error of the position estimate that is reckoned with, by which the operator vouches for the receiver, metres.
     pub estimate_m: f32,
+    /// How far the swarm's radio reaches for sure, metres: who falls silent further away than most of that is out of range.
+    /// [`REACHES_ALL_M`]: it reaches everybody, so any silence is a failure.
+    pub radio_range_m: f32,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.
     pub start_tolerance_m: f32,
     /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
@@ -64,6 +67,9 @@ pub struct Config<const V: usize> {
     /// System ids whose commands, parameters and files count; 0 is no id.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
+
+/// A radio range that reaches everybody, metres.
+pub const REACHES_ALL_M: f32 = 10_000.0;
 
 /// Why a configuration was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -109,6 +115,7 @@ impl<const V: usize> Config<V> {
             safety_distance_m: 1.5,
             method: Method::Priority,
             estimate_m: margins::ESTIMATE_M,
+            radio_range_m: REACHES_ALL_M,
             start_tolerance_m: 2.0,
             battery_low_percent: 15,
             swarm_hz: 5,
@@ -157,7 +164,7 @@ mod tests {
 
     type Number = fn(&mut Config<4>) -> &mut f32;
     /// Every number that must be positive.
-    const POSITIVE: [Number; 9] = [
+    const POSITIVE: [Number; 10] = [
         |c| &mut c.cruise_mps,
         |c| &mut c.climb_mps,
         |c| &mut c.descend_mps,
@@ -167,6 +174,7 @@ mod tests {
         |c| &mut c.safety_distance_m,
         |c| &mut c.start_tolerance_m,
         |c| &mut c.estimate_m,
+        |c| &mut c.radio_range_m,
     ];
 
     #[test]

@@ -78,6 +78,8 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
+/// A gate that opens within this time is waited for unheard, seconds: less than the row `Alone` waits.
+const OPENS_IN_S: f32 = 14.0;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -112,6 +114,8 @@ pub struct Guidance {
     unsent_s: f32,
     /// Last advice of the neighbours.
     pub advice: Advice,
+    /// So many gates, from the first on, are open for good.
+    opened: usize,
     on_path: bool,
     lead_m: f32,
     /// Where along the path the setpoint is, metres.
@@ -201,6 +205,7 @@ impl Guidance {
             taken: false,
             unsent_s: 0.0,
             advice: NOT_ASKED,
+            opened: 0,
             on_path: false,
             lead_m: LEG_LEAD_M,
             setpoint_m: 0.0,
@@ -245,6 +250,7 @@ impl Guidance {
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
         self.advice = NOT_ASKED;
+        self.opened = 0;
         self.filter.reset();
     }
 
@@ -278,6 +284,36 @@ impl Guidance {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
 
+    /// How far along the plan's path every gate is open, or will be within [`OPENS_IN_S`], metres, and
+    /// after how many seconds that is for sure.
+    pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
+        &self,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) -> (f32, u8) {
+        let mut in_s = 0.0;
+        let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
+        let closed = gates.iter().skip(self.opened).find(|gate| {
+            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= OPENS_IN_S) {
+                Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
+                None => return true,
+            }
+            false
+        });
+        let length_m = scene.plan.map_or(f32::NEG_INFINITY, |plan| plan.path.length_m());
+        (closed.map_or(length_m, |gate| gate.at_m.min(length_m)), libm::ceilf(in_s) as u8)
+    }
+
+    /// How far along the plan's path every gate is open, metres; −∞ where it does not follow that.
+    pub(crate) fn clear_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
+        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
+            return f32::NEG_INFINITY;
+        };
+        let gate_m = plan.gates.get(self.opened).map_or(f32::INFINITY, |gate| gate.at_m);
+        gate_m.min(plan.path.length_m())
+    }
+
     /// Whether the setpoint stands, and is not on its way down.
     pub fn stands(&self) -> bool {
         let limit = STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS;
@@ -309,6 +345,10 @@ impl Guidance {
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
         }
         if let Some(plan) = scene.plan {
+            let next = plan.gates.get(self.opened);
+            if next.is_some_and(|gate| neighbours.has_passed(gate, now)) {
+                self.opened += 1;
+            }
             let place = self.door.position();
             let along_m = self.tracker.along_m;
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);

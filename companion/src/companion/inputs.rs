@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::battery_reported;
-use crate::config::PlanFailure;
+use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};
 use crate::swarm::neighbours::STANDING_MPS;
@@ -17,6 +17,8 @@ const STANDING_DRIFT_M: f32 = 0.3;
 /// A vehicle whose estimate is higher or lower than its pad by more than this does not take off, metres: real estimates on
 /// the ground were seen up to 1.1 m off.
 const START_HEIGHT_M: f32 = 1.5;
+/// A gate this little ahead is no way to fly on, metres.
+const FLIES_ON_M: f32 = 0.2;
 /// A vehicle on the ground moves up or down more slowly, m/s.
 const RESTING_MPS: f32 = 0.5;
 
@@ -47,6 +49,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
+        let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
         Inputs {
             in_state: self.mission.in_state(now),
             heartbeat_age: t.heartbeat_age(now),
@@ -59,10 +62,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
-            neighbour_age: match self.guidance.returning || self.detours.lands() {
+            neighbour_age: match self.guidance.returning || self.detours.lands() || self.flies_on() {
                 true => Duration::default(),
                 false => self.neighbours.silence(now, self.mission.entered_at()),
             },
+            way_free: self.flies_on(),
+            out_of_range: self.neighbours.all_beyond(),
             neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.failure().is_some(),
@@ -133,7 +138,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && standing,
             yielded: self.guidance.filter.yielded_for(now),
             hindered: self.guidance.filter.hindered_for(now),
-            room_below: !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m),
+            room_below,
             outside: self.guidance.stands_at_fence()
                 || fence.is_some_and(|fence| t.position_at.is_some() && !inside(fence)),
             blocked: self.detours.is_blocked(),
@@ -142,6 +147,33 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             no_way_around: self.detours.gives_up(),
             underneath: self.detours.underneath(&view),
             standing,
+        }
+    }
+
+    /// Whether it may fly on its plan though nobody hears it.
+    fn follows_plan(&self) -> bool {
+        let follows =
+            matches!(self.mission.state(), State::TakeOff | State::Climb | State::Follow | State::Alone);
+        let left = self.detours.is_blocked() || self.detours.has_left() || self.detours.is_flying();
+        let ranged = self.config.radio_range_m < REACHES_ALL_M;
+        ranged && follows && !left && !self.guidance.returning && self.mission.plan().is_some()
+    }
+
+    /// Whether it does: its next gate is open, or none is left.
+    fn flies_on(&self) -> bool {
+        let length_m = self.mission.plan().map_or(0.0, |plan| plan.path.length_m());
+        let clear_m = self.guidance.clear_m(&self.view().scene);
+        self.follows_plan()
+            && self.neighbours.all_beyond()
+            && (clear_m > self.guidance.along_m() + FLIES_ON_M || clear_m >= length_m)
+    }
+
+    /// How far it flies on its plan unheard, metres along its path, and after how many seconds all gates up to there are open
+    /// for sure; −1e6 where it does not.
+    pub(super) fn clears_m(&self) -> (f32, u8) {
+        match self.follows_plan() {
+            true => self.guidance.clears_m(&self.view().scene, &self.neighbours, self.now),
+            false => (-1e6, 0),
         }
     }
 

@@ -21,6 +21,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.tune();
         }
         self.watch_estimate();
+        self.neighbours.set_place(self.telemetry.position, self.config.radio_range_m);
         let dt_s = self.timers.step_s(now).clamp(0.0, 0.2);
         let scene = Scene::new(
             self.mission.plan(),

@@ -216,6 +216,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
         let (points, column) = self.way_ahead();
+        let (clear_m, clear_in_s) = self.clears_m();
         Intent {
             system_id: self.config.system_id,
             flags,
@@ -223,7 +224,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan_crc: plan.map_or(0, |plan| plan.plan_crc),
             progress_m: if self.detours.is_flying() { self.detours.left_at_m() } else { along_m },
             heard: self.neighbours.heard_bits(self.now),
-            speed_mps: self.telemetry.velocity.norm(),
+            clear_m,
+            clear_in_s,
             floor_m: plan.map_or(self.mission.start().z, |plan| self.guidance.ground_m(plan)),
             column,
             echo: self.neighbours.echo(self.links.intents_sent(), self.now),

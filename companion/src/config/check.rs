@@ -27,6 +27,7 @@ impl<const V: usize> Config<V> {
             self.safety_distance_m,
             self.start_tolerance_m,
             self.estimate_m,
+            self.radio_range_m,
         ];
         let starts = self.roster.iter().flat_map(|e| e.start.iter());
         let bad = positive.iter().any(|v| !(v.is_finite() && *v > 0.0)) || self.swarm_hz == 0;

@@ -4,17 +4,17 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 3 |
+//! | 0 | u8 | version, 4 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
 //! | 3 | u8 | number of path points, 0…8 |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
-//! | 16 | f32 | speed, m/s |
+//! | 16 | f32 | how far along the own path its gates are open, or will be, metres: so far it flies on though it hears nobody; −1e6 where it may stop at once |
 //! | 20 | u32 | vehicles that it heard lately: bit i for the vehicle of rank i in the roster sorted by system id, up to 32 |
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
-//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is |
+//! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
 //! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it; the setpoint alone while it holds its place |
 //!
@@ -30,7 +30,7 @@ pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points reported.
 pub const POINTS: usize = 8;
 /// Version of the layout.
-pub const VERSION: u8 = 3;
+pub const VERSION: u8 = 4;
 const HEAD: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
@@ -64,8 +64,10 @@ pub struct Intent {
     pub plan_crc: u32,
     /// Progress along the own path, metres.
     pub progress_m: f32,
-    /// Speed, m/s.
-    pub speed_mps: f32,
+    /// How far along the own path its gates are open, metres: so far it flies on though it hears nobody.
+    pub clear_m: f32,
+    /// Seconds until the last of those gates is open for sure, at most 127.
+    pub clear_in_s: u8,
     /// Whom it heard lately, a bit for each rank.
     pub heard: u32,
     /// Height of the ground below it, as far as it knows, metres.
@@ -89,12 +91,17 @@ impl Intent {
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
-        body[16..20].copy_from_slice(&self.speed_mps.to_le_bytes());
+        body[16..20].copy_from_slice(&self.clear_m.to_le_bytes());
         body[20..24].copy_from_slice(&self.heard.to_le_bytes());
         body[24..28].copy_from_slice(&self.floor_m.to_le_bytes());
         let [rank, sequence, held] =
             self.echo.map_or([0; 3], |e| [e.rank.saturating_add(1), e.sequence, e.held]);
-        body[28..32].copy_from_slice(&[u8::from(self.column), rank, sequence, held]);
+        body[28..32].copy_from_slice(&[
+            u8::from(self.column) | self.clear_in_s.min(127) << 1,
+            rank,
+            sequence,
+            held,
+        ]);
         for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
             to.copy_from_slice(&value.to_le_bytes());
         }
@@ -126,10 +133,11 @@ impl Intent {
             mission_crc: u32::from_le_bytes(word(4)),
             plan_crc: u32::from_le_bytes(word(8)),
             progress_m: float(12)?,
-            speed_mps: float(16)?,
+            clear_m: float(16)?,
             heard: u32::from_le_bytes(word(20)),
             floor_m: float(24)?,
             column: body[28] & 1 != 0,
+            clear_in_s: body[28] >> 1,
             echo: body[29].checked_sub(1).map(|rank| Echo { rank, sequence: body[30], held: body[31] }),
             points,
         })
@@ -149,10 +157,11 @@ mod tests {
             mission_crc: 0xDEAD_BEEF,
             plan_crc: 7,
             progress_m: -1.25,
-            speed_mps: 2.0,
+            clear_m: 17.5,
             heard: 0x8000_0005,
             floor_m: -0.5,
             column: count == 3,
+            clear_in_s: 15 * count as u8,
             echo: (count > 2).then_some(Echo { rank: 254, sequence: 9, held: count as u8 }),
             points,
         }

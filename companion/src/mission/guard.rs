@@ -140,6 +140,10 @@ pub enum Guard {
     OutsideGeofence,
     /// Of the neighbours that fly, none was heard for the limit.
     NeighboursSilent,
+    /// Its next gate is open, or none is left.
+    WayFree,
+    /// All others are out of radio range, and the state has lasted for the limit.
+    OutOfRange,
     /// A neighbour was heard within the last second.
     NeighbourHeard,
     /// On the ground after a flight or in the mode that lands, and at rest.
@@ -179,6 +183,10 @@ pub struct Inputs {
     pub stalled: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
     pub neighbour_age: Duration,
+    /// Whether its next gate is open, so that it flies on unheard.
+    pub way_free: bool,
+    /// All others are out of radio range.
+    pub out_of_range: bool,
     /// A neighbour was heard within the last second.
     pub neighbour_heard: bool,
     /// A plan is held.
@@ -377,6 +385,8 @@ impl Guard {
             Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
+            Self::WayFree => i.way_free,
+            Self::OutOfRange => i.out_of_range && i.in_state >= limit,
             Self::NeighbourHeard => i.neighbour_heard,
             Self::OnGround => i.on_ground && !i.vertical && (i.flown || i.landing),
             Self::PathBlocked => i.blocked,

@@ -199,6 +199,8 @@ pub static TABLE: &[Row] = &[
     back(&[Paused],           G::ResumeCommanded,  NOW,                     A::Rejoin,      "Resumed"),
     warn(&[Paused],           G::Elapsed,          s(600), Land,            A::AskLand,     "Paused for 10 min: landing"),
     info(&[Alone],            G::NeighbourHeard,   NOW,    Follow,          A::RunPath,     "Neighbours heard again"),
+    info(&[Alone],            G::WayFree,          NOW,    Follow,          A::RunPath,     "Gates open: flying on unheard"),
+    warn(&[Alone],            G::OutOfRange,       s(16),  Land,            A::AskLand,     "Still out of range: landing"),
     warn(&[Alone],            G::Elapsed,          s(20),  Land,            A::AskLand,     "Neighbours still silent: landing"),
     info(&[AutopilotSilent],  G::AutopilotHeard,   NOW,    PositionLost,    A::BrakeOnPath, "Autopilot heard again"),
     warn(&[AutopilotSilent],  G::Elapsed,          s(60),  Land,            A::AskLand,     "Autopilot still silent: landing"),

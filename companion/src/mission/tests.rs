@@ -215,6 +215,8 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::AsideReached => i.aside_reached = true,
         G::ColumnBlocked => (i.column_blocked, i.in_state) = (long, long),
         G::Yielded => (i.yielded, i.hindered) = (long, long),
+        G::WayFree => i.way_free = true,
+        G::OutOfRange => (i.out_of_range, i.in_state) = (true, long),
         G::Hindered => i.hindered = long,
         G::BatteryCritical => (i.battery_low, i.battery_critical) = (true, true),
         G::BatteryLow => (i.battery_low, i.room_below) = (true, true),

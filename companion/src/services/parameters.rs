@@ -4,7 +4,7 @@
 //! in the mission file instead. A changed value counts as soon as the vehicle stands
 //! disarmed and idle, but for the system id: that counts from the next start.
 
-use crate::config::Config;
+use crate::config::{Config, REACHES_ALL_M};
 
 /// Longest name, bytes.
 pub const NAME_LEN: usize = 16;
@@ -35,7 +35,7 @@ const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Param
 }
 
 /// How many there are.
-pub const COUNT: usize = 8;
+pub const COUNT: usize = 9;
 /// Bytes they take in flash.
 pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
 
@@ -45,6 +45,7 @@ pub const TABLE: [Parameter; COUNT] = [
     whole("FLK_BATT_LOW", 0.0, 100.0, 15.0),
     real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
     real("FLK_EST_M", 0.05, 10.0, 0.1),
+    real("FLK_RADIO_M", 1.0, REACHES_ALL_M, REACHES_ALL_M),
     real("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
     real("FLK_START_TOL", 0.2, 20.0, 2.0),
     whole("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
@@ -55,10 +56,11 @@ const ACCEL: usize = 0;
 const BATT_LOW: usize = 1;
 const CLIMB_MAX: usize = 2;
 const EST_M: usize = 3;
-const SPEED_MAX: usize = 4;
-const START_TOL: usize = 5;
-const SWARM_HZ: usize = 6;
-const SYS_ID: usize = 7;
+const RADIO_M: usize = 4;
+const SPEED_MAX: usize = 5;
+const START_TOL: usize = 6;
+const SWARM_HZ: usize = 7;
+const SYS_ID: usize = 8;
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -120,6 +122,7 @@ impl Parameters {
         config.descend_mps = libm::fminf(config.descend_mps, self.values[CLIMB_MAX]);
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
         config.estimate_m = self.values[EST_M];
+        config.radio_range_m = self.values[RADIO_M];
         config.start_tolerance_m = self.values[START_TOL];
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }

@@ -15,6 +15,7 @@ use mavlink::dialects::ardupilotmega::GLOBAL_POSITION_INT_DATA;
 use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
+use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
 
 pub(crate) use self::bounds::STANDING_MPS;
@@ -22,7 +23,7 @@ use self::bounds::*;
 use self::contact::Contact;
 pub(crate) use self::met::{Met, Reach};
 use crate::autopilot::telemetry::SequenceFilter;
-use crate::config::RosterEntry;
+use crate::config::{REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{Echo, Lateness};
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, WAITING};
 use crate::time::{Duration, Instant};
@@ -40,6 +41,12 @@ pub struct Neighbours<const V: usize> {
     clear_at: Instant,
     /// No vehicle's progress grows faster, m/s.
     fastest_mps: f32,
+    /// An unheard one makes this much at least, m/s.
+    reckoned_mps: f32,
+    /// From here on the radio may not reach, metres.
+    edge_m: f32,
+    /// Where the own vehicle is.
+    place: Point,
     /// With the vehicle of this rank the next relay begins.
     relay_next: u16,
     /// The own place in the roster.
@@ -57,6 +64,9 @@ impl<const V: usize> Neighbours<V> {
             dropped: 0,
             clear_at: Instant::ZERO,
             fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
+            reckoned_mps: nominal_mps * RECKONED_SHARE,
+            edge_m: f32::INFINITY,
+            place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
         };
@@ -70,6 +80,20 @@ impl<const V: usize> Neighbours<V> {
         }
         table.roster = table.contacts.len();
         table
+    }
+
+    /// The own place now, and how far the radio reaches, metres.
+    pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
+        let all = radio_range_m >= REACHES_ALL_M;
+        self.edge_m = if all { f32::INFINITY } else { EDGE_SHARE * radio_range_m };
+        self.place = place;
+    }
+
+    /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the radio may not reach: no
+    /// radio has failed.
+    pub(crate) fn all_beyond(&self) -> bool {
+        let beyond = |c: &Contact| c.at_edge || c.position_at.is_none() || c.tells(LANDED | OUT);
+        self.edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
 
     /// The own place in the roster.
@@ -113,6 +137,10 @@ impl<const V: usize> Neighbours<V> {
             points: Vec::new(),
             extent_m: 0.0,
             column: false,
+            clear_m: f32::NEG_INFINITY,
+            clear_in_s: 0,
+            at_edge: false,
+            reckoned_mps: self.reckoned_mps,
             floor_m: f32::NAN,
             speed_mps: 0.0,
             shares_plan: false,
@@ -194,6 +222,7 @@ impl<const V: usize> Neighbours<V> {
             lon_deg: f64::from(data.lon) * 1e-7,
             alt_m: f64::from(data.alt) * 1e-3,
         };
+        let (own, edge_m) = (self.place, self.edge_m);
         let Some(contact) = self.placed(id, now) else { return };
         let behind = contact.boot_ms.wrapping_sub(data.time_boot_ms);
         if !place.is_valid() || (contact.position_at.is_some() && behind < RESTART_MS) {
@@ -203,6 +232,7 @@ impl<const V: usize> Neighbours<V> {
         contact.heard_at = Some(now);
         contact.position_at = Some(now);
         contact.state.position = frames::geodetic_to_enu(origin, &place);
+        contact.at_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
         contact.speed_mps = contact.state.velocity.norm();
@@ -243,6 +273,8 @@ impl<const V: usize> Neighbours<V> {
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
         contact.extent_m = libm::sqrtf(intent.points.iter().fold(0.0, most));
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
+        contact.clear_m = if shared { intent.clear_m } else { f32::NEG_INFINITY };
+        contact.clear_in_s = intent.clear_in_s;
         contact.state.grounded = intent.flags & (GROUNDED | LANDED) != 0;
         contact.state.progress_m =
             shared.then(|| contact.believed_m(intent.progress_m, self.fastest_mps, now));
@@ -254,7 +286,7 @@ impl<const V: usize> Neighbours<V> {
         self.heard.clear();
         self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
         for contact in &self.contacts {
-            let progress_m = contact.progress_m(now);
+            let progress_m = contact.passed_m(now);
             let placed_at = contact.position_at;
             if placed_at.is_none() && progress_m.is_none() {
                 continue;
@@ -275,6 +307,23 @@ impl<const V: usize> Neighbours<V> {
             let _ = self.heard.push(state);
         }
         &self.heard
+    }
+
+    /// Whether `gate` is open for good: its vehicle has come past it, or is out of the plan.
+    pub(crate) fn has_passed(&self, gate: &Gate, now: Instant) -> bool {
+        let contact = self.in_roster(gate.id).map(|at| &self.contacts[at]);
+        contact.is_some_and(|c| {
+            let passed = c.passed_m(now).is_some_and(|progress_m| progress_m >= gate.until_m);
+            passed || c.out_at.is_some_and(|since| since <= self.clear_at) || c.is_dead(self.clear_at)
+        })
+    }
+
+    /// Seconds until `gate` is open for sure, whoever is heard until then; none where that is not known.
+    pub(crate) fn passes_in_s(&self, gate: &Gate, now: Instant) -> Option<f32> {
+        if self.has_passed(gate, now) {
+            return Some(0.0);
+        }
+        self.contacts[self.in_roster(gate.id)?].passes_in_s(gate.until_m, now)
     }
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
@@ -364,6 +413,7 @@ impl<const V: usize> Neighbours<V> {
         for contact in &mut self.contacts {
             (contact.avoided, contact.furthest) = (None, None);
             (contact.relayed_m, contact.relayed_at) = (None, None);
+            contact.clear_m = f32::NEG_INFINITY;
         }
     }
 

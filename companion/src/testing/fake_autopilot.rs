@@ -93,6 +93,8 @@ pub struct Bench {
     pub neighbour: Option<(Point, u8, f32, u32)>,
     /// When it last knew where it is; none: always.
     pub neighbour_clock: Option<Instant>,
+    /// How far its gates are open, metres along its path.
+    pub neighbour_clear_m: f32,
     neighbour_sequence: u8,
 }
 
@@ -144,6 +146,7 @@ impl Bench {
             answer_detour: Some(Ok(())),
             neighbour: None,
             neighbour_clock: None,
+            neighbour_clear_m: -1e6,
             neighbour_sequence: 0,
         }
     }

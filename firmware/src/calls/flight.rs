@@ -365,7 +365,7 @@ impl<'a, M: Meter> Flight<'a, M> {
             mission_crc: MISSION_CRC,
             plan_crc: PLAN_CRC,
             progress_m,
-            speed_mps: 1.0,
+            clear_m: -1e6,
             heard: u32::MAX,
             points,
             ..Intent::default()

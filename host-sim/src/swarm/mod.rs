@@ -17,6 +17,7 @@ pub mod step;
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
+use companion::config::REACHES_ALL_M;
 use companion::{Config, PlanFailure, State};
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
@@ -46,6 +47,10 @@ use crate::shortage;
 const REACHED_M: f32 = 0.5;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
+/// A simulated radio of this range, the default, reaches everybody, metres.
+const DEFAULT_RANGE_M: f32 = 500.0;
+/// The least range that a companion may be given, metres.
+const RANGE_LEAST_M: f32 = 1.0;
 /// When all have stood still for this long after a fault, no one will fly any more, seconds: longer than from a gate's
 /// opening to the take-off.
 const STILL_S: f64 = 30.0;
@@ -443,5 +448,11 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     // One plan may be flown by other rules and inside another fence than its mission file says.
     let scenario = &mission.scenario;
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
-    Ok(Config { accel_mps2: ACCEL_MPS2, method: scenario.deconfliction.method, geofence, ..config })
+    // The operator knows how far the radio reaches.
+    let radio_range_m = match scenario.simulation.radio_range_m {
+        range_m if range_m < DEFAULT_RANGE_M => range_m.max(RANGE_LEAST_M),
+        _ => REACHES_ALL_M,
+    };
+    let method = scenario.deconfliction.method;
+    Ok(Config { accel_mps2: ACCEL_MPS2, method, geofence, radio_range_m, ..config })
 }

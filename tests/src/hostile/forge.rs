@@ -75,7 +75,7 @@ impl Flight {
         intent.floor_m = number(bits >> 32, 10.0);
         intent.column = how & 64 != 0;
         intent.progress_m = number(bits >> 40, 30.0);
-        intent.speed_mps = number(bits >> 48, 5.0);
+        intent.clear_m = number(bits >> 48, 5.0);
         for _ in 0..(bits >> 56) as usize % (POINTS + 1) {
             let bits = entropy.bits();
             let here = self.autopilot.position;

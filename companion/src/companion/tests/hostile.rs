@@ -149,7 +149,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
                 mission_crc: 7,
                 plan_crc: 5,
                 progress_m: 1e6,
-                speed_mps: 0.0,
+                clear_m: -1e6,
                 heard: u32::MAX,
                 points: heapless::Vec::from_slice(&[GOAL]).unwrap(),
                 ..Intent::default()

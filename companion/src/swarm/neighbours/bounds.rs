@@ -12,7 +12,18 @@ pub(super) const RESTART_MS: u32 = 10_000;
 pub(super) const LATELY: Duration = Duration::from_millis(800);
 /// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
 /// 20 s later; this leaves it 20 s to come down.
-pub(super) const DEAD: Duration = Duration::from_secs(45);
+pub(super) const DEAD: Duration = Duration::from_millis(DEAD_MS);
+pub(super) const DEAD_MS: u64 = 45_000;
+/// Last heard further away than this share of the radio's range, a vehicle that falls silent is out of range.
+pub(super) const EDGE_SHARE: f32 = 0.7;
+/// An unheard vehicle makes progress at this share of its nominal speed at least: it slows in corners and where it lags.
+pub(super) const RECKONED_SHARE: f32 = 0.4;
+/// That counts once it has been unheard for so long, seconds.
+pub(super) const RECKONED_AFTER_S: f32 = 2.0;
+/// For so long at most a vehicle flies on unheard, seconds.
+pub(super) const FLIES_ON_S: f32 = 75.0;
+/// An unheard vehicle stands on its path for so long before it lands.
+pub(super) const STANDS_UNHEARD: Duration = Duration::from_secs(15);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 pub(super) const DOWN: Duration = Duration::from_secs(75);
 /// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.

@@ -4,6 +4,7 @@ use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOff, Nature};
+use planner_core::flight::PROGRESS_ERROR_M;
 
 use super::bounds::*;
 use crate::autopilot::telemetry::SequenceFilter;
@@ -40,6 +41,14 @@ pub(super) struct Contact {
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
     pub(super) column: bool,
     pub(super) floor_m: f32,
+    /// How far along its path its gates were open, or would be, metres: so far it flies on unheard.
+    pub(super) clear_m: f32,
+    /// Seconds until the last of those is open.
+    pub(super) clear_in_s: u8,
+    /// Whether it was last heard where the radio may not reach.
+    pub(super) at_edge: bool,
+    /// Progress that an unheard vehicle makes at least, m/s.
+    pub(super) reckoned_mps: f32,
     /// How fast it was when its position was heard, m/s.
     pub(super) speed_mps: f32,
     /// Whether its plan is ours, whether it follows it or not.
@@ -60,7 +69,8 @@ impl Contact {
 
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most are heard.
-        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= DEAD);
+        let dead = Duration::from_millis(DEAD_MS + (1000.0 * self.flies_on_s()) as u64);
+        let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= dead);
         self.rank != STRANGER && silent(self.heard_at) && silent(self.known_at())
     }
 
@@ -72,6 +82,47 @@ impl Contact {
     /// Whether it follows the shared plan, as last heard.
     pub(super) fn on_plan(&self) -> bool {
         self.state.progress_m.is_some() && !self.tells(DETOURS | OUT)
+    }
+
+    /// Time that an unheard vehicle may take for what its gates left it, seconds.
+    pub(super) fn flies_on_s(&self) -> f32 {
+        match self.state.progress_m.filter(|_| self.flies_on()) {
+            Some(progress_m) => {
+                let fly_s = (self.clear_m - progress_m) / self.reckoned_mps + f32::from(self.clear_in_s);
+                fly_s.clamp(0.0, FLIES_ON_S)
+            }
+            None => 0.0,
+        }
+    }
+
+    /// Whether it flies its plan unheard, or did.
+    pub(super) fn flies_on(&self) -> bool {
+        self.state
+            .progress_m
+            .is_some_and(|progress_m| self.at_edge && self.on_plan() && self.clear_m > progress_m + 0.5)
+    }
+
+    /// How far it has come along the shared plan for sure, metres: unheard it flies on as far as its gates were open.
+    pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
+        let known_m = self.progress_m(now)?;
+        let Some(known_at) = self.belongs_at.max(self.relayed_at) else { return Some(known_m) };
+        let after_s = RECKONED_AFTER_S + f32::from(self.clear_in_s);
+        let silent_s = (now - known_at).secs_f32() - after_s;
+        let beyond = self.at_edge || self.position_at.is_none();
+        if silent_s <= 0.0 || !beyond || self.tells(DETOURS | OUT) {
+            return Some(known_m);
+        }
+        let reckoned_m = known_m + self.reckoned_mps * silent_s;
+        Some(libm::fmaxf(known_m, libm::fminf(reckoned_m, self.clear_m - PROGRESS_ERROR_M)))
+    }
+
+    /// Seconds until it has come past `until_m` for sure; none where that is open.
+    pub(super) fn passes_in_s(&self, until_m: f32, now: Instant) -> Option<f32> {
+        let known_m = self.progress_m(now).filter(|_| !self.tells(DETOURS | OUT))?;
+        let known_at = self.belongs_at.max(self.relayed_at)?;
+        let fly_s = (until_m - known_m) / self.reckoned_mps;
+        let after_s = RECKONED_AFTER_S + f32::from(self.clear_in_s) - (now - known_at).secs_f32();
+        (until_m <= self.clear_m - PROGRESS_ERROR_M).then(|| libm::fmaxf(fly_s + after_s, 0.0))
     }
 
     pub(super) fn tells(&self, flag: u8) -> bool {
@@ -120,7 +171,7 @@ impl Contact {
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
     pub(super) fn comes_down(&self, now: Instant) -> bool {
-        let silent = !self.heard_within(now, SILENT) && !self.is_far(now);
+        let silent = !self.heard_within(now, SILENT) && !self.is_far(now) && !self.flies_on();
         self.rank != STRANGER
             && !self.tells(GROUNDED | LANDED)
             && !self.is_out(now)
@@ -198,6 +249,8 @@ impl Contact {
             tell(column(here, Nature::Solid));
             // Where it is it may not be come near from above or the side, whatever its column leaves.
             tell(place(apart_m + SWAY_M));
+        } else if self.is_dead(now) && self.flies_on() {
+            // Where the plan has it.
         } else if self.is_dead(now) {
             let down = !self.heard_within(now, DOWN);
             let nature = if down { Nature::Lying } else { Nature::Solid };

@@ -131,7 +131,12 @@ impl<const V: usize> Neighbours<V> {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.on_plan(),
-            far: contact.is_far(now),
+            far: contact.is_far(now)
+                || (contact.at_edge
+                    && contact.on_plan()
+                    && !contact.tells(GROUNDED)
+                    && !contact.heard_within(now, FRESHLY)
+                    && (contact.flies_on() || contact.heard_within(now, STANDS_UNHEARD))),
             shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),

@@ -10,15 +10,17 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 1 |
+//! | 0 | u8 | version, 2 |
 //! | 1 | u8 | system id, the sender's |
-//! | 2 | u8 | number n of vehicles, 0…19 |
+//! | 2 | u8 | number n of vehicles, 0…14 |
 //! | 3 | u8 | 0 |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
-//! | 12 + 6 i | u8 | rank in the roster sorted by system id |
-//! | 13 + 6 i | u8 | how old that is, 0.1 s; 255: so old or older |
-//! | 14 + 6 i | f32 | its progress on the plan, metres |
+//! | 12 + 8 i | u8 | rank in the roster sorted by system id |
+//! | 13 + 8 i | u8 | how old that is, 0.1 s; 255: so old or older |
+//! | 14 + 8 i | f32 | its progress on the plan, metres |
+//! | 18 + 8 i | u8 | how much further its gates are open, or will be, metres rounded down; 255: so far or further |
+//! | 19 + 8 i | u8 | seconds until the last of those is open for sure |
 
 use heapless::Vec;
 
@@ -29,11 +31,11 @@ use crate::time::{Duration, Instant};
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
 /// Most vehicles reported at once.
-const MOST: usize = 19;
-const VERSION: u8 = 1;
+const MOST: usize = 14;
+const VERSION: u8 = 2;
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 12;
-const ITEM: usize = 6;
+const ITEM: usize = 8;
 /// Longest payload with its head.
 pub(crate) const LENGTH: usize = TUNNEL_HEAD + HEAD + MOST * ITEM;
 /// Heard within this time a vehicle speaks for itself.
@@ -52,6 +54,8 @@ struct Item {
     rank: u8,
     age: u8,
     progress_m: f32,
+    clear: u8,
+    clear_in_s: u8,
 }
 
 /// What a vehicle passes on.
@@ -78,7 +82,8 @@ impl Relay {
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         for (to, item) in body[HEAD..].chunks_exact_mut(ITEM).zip(&self.items) {
             (to[0], to[1]) = (item.rank, item.age);
-            to[2..].copy_from_slice(&item.progress_m.to_le_bytes());
+            to[2..6].copy_from_slice(&item.progress_m.to_le_bytes());
+            (to[6], to[7]) = (item.clear, item.clear_in_s);
         }
         TUNNEL_HEAD + len
     }
@@ -94,7 +99,8 @@ impl Relay {
         let mut relay = Self { mission_crc: word(4), plan_crc: word(8), items: Vec::new() };
         for item in body[HEAD..].get(..ITEM * usize::from(body[2]))?.chunks_exact(ITEM) {
             let progress_m = f32::from_le_bytes([item[2], item[3], item[4], item[5]]);
-            let item = Item { rank: item[0], age: item[1], progress_m };
+            let [rank, age, .., clear, clear_in_s] = *item else { return None };
+            let item = Item { rank, age, progress_m, clear, clear_in_s };
             // Room for all that fits into a payload.
             relay.items.push(item).ok().filter(|()| progress_m.is_finite())?;
         }
@@ -132,7 +138,10 @@ impl Contact {
     fn item(&self, now: Instant) -> Option<Item> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(TICK_US);
-        Some(Item { rank: self.rank as u8, age: age.min(u64::from(u8::MAX)) as u8, progress_m })
+        // Not below zero, and 0 where it is no number.
+        let clear = (self.clear_m - progress_m) as u8;
+        let age = age.min(u64::from(u8::MAX)) as u8;
+        Some(Item { rank: self.rank as u8, age, progress_m, clear, clear_in_s: self.clear_in_s })
     }
 }
 
@@ -174,6 +183,11 @@ impl<const V: usize> Neighbours<V> {
                 // What others say of it is believed no faster than what it says itself.
                 let believed_m = contact.believed_m(item.progress_m, fastest_mps, now);
                 contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
+                // Gates that are open stay open.
+                let clear_m = believed_m + f32::from(item.clear);
+                if clear_m > contact.clear_m {
+                    (contact.clear_m, contact.clear_in_s) = (clear_m, item.clear_in_s);
+                }
             }
             let age_us = u64::from(item.age) * TICK_US + HOP_US;
             let then = Instant::from_micros(now.micros().saturating_sub(age_us));

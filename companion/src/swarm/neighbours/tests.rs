@@ -33,7 +33,7 @@ fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
         mission_crc,
         plan_crc,
         progress_m: 4.0,
-        speed_mps: 1.0,
+        clear_m: -1e6,
         heard: 2,
         ..Intent::default()
     }

@@ -25,7 +25,7 @@ impl Bench {
             mission_crc: 0xC0FFEE,
             plan_crc,
             progress_m,
-            speed_mps: 0.0,
+            clear_m: self.neighbour_clear_m,
             heard: u32::MAX,
             ..Intent::default()
         };

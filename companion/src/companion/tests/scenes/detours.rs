@@ -1,5 +1,7 @@
 //! Another vehicle is not heard, lies below the path, or flies where this one is to fly.
 
+use planner_core::flight::Gate;
+
 use super::State::*;
 use super::*;
 
@@ -21,6 +23,25 @@ pub(super) fn others_are_not_heard(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
+    // It is out of radio range, and flies on past the gate that waits for it, or may not have.
+    let mut far = two_vehicles();
+    far.radio_range_m = 5.0;
+    let mut gated = plan();
+    gated.gates.push(Gate { at_m: 0.5, id: 77, until_m: 6.0 }).unwrap();
+    for (clear_m, end) in [(50.0, Done), (5.0, Aborted)] {
+        let mut bench = Bench::new(far.clone());
+        bench.answer_plan = Some(Ok(gated.clone()));
+        bench.neighbour = Some((Point::new(8.0, 60.0, 10.0), FLYING | ON_PLAN, 5.0, 5));
+        bench.neighbour_clear_m = clear_m;
+        bench.until(Ready, 6.0);
+        bench.start();
+        bench.until(Follow, 30.0);
+        let out_of_range = |b: &mut Bench| {
+            b.neighbour = None;
+            b.until(Alone, 10.0);
+        };
+        scenes.play(bench, out_of_range, end, 60.0);
+    }
     // A third vehicle is never heard: nobody knows that it stands.
     let mut three = two_vehicles();
     three.roster.push(RosterEntry { system_id: 78, ..three.roster[1] }).unwrap();

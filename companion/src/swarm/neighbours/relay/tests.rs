@@ -27,7 +27,13 @@ fn padded(relay: &Relay) -> [u8; 255] {
 #[test]
 fn comes_back_as_sent_and_refuses_the_unsound() {
     for count in 0..=MOST as u8 {
-        let item = |rank: u8| Item { rank, age: 9 * rank, progress_m: 0.5 * f32::from(rank) - 3.0 };
+        let item = |rank: u8| Item {
+            rank,
+            age: 9 * rank,
+            progress_m: 0.5 * f32::from(rank) - 3.0,
+            clear: 5 * rank,
+            clear_in_s: rank,
+        };
         let items = (0..count).map(item).collect();
         let relay = Relay { mission_crc: 1, plan_crc: 2, items };
         assert_eq!(Relay::decode(&padded(&relay), 5), Some(relay.clone()));
@@ -38,7 +44,7 @@ fn comes_back_as_sent_and_refuses_the_unsound() {
             assert_eq!(Relay::decode(&bad, 5), None, "byte {at}");
         }
     }
-    let nan = Item { rank: 0, age: 0, progress_m: f32::NAN };
+    let nan = Item { rank: 0, age: 0, progress_m: f32::NAN, clear: 0, clear_in_s: 0 };
     let relay = Relay { mission_crc: 1, plan_crc: 2, items: [nan].into_iter().collect() };
     assert_eq!(Relay::decode(&padded(&relay), 5), None);
 }
