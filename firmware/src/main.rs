@@ -8,7 +8,7 @@
 
 use core::fmt::Write as _;
 
-use companion::storage::mission_file::{self, MissionError, MissionView};
+use companion::storage::mission_file::{self, Kind, MissionError, MissionView};
 use companion::storage::store::{ReadFlash, Store};
 use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
@@ -31,7 +31,7 @@ use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Longest mission file.
-const MISSION: usize = mission_file::encoded_len(VEHICLES, VEHICLES);
+const MISSION: usize = mission_file::MOST_BYTES;
 /// Where a board without a mission believes to be.
 const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
 /// What a board says to which its mission gives nothing to do.
@@ -174,7 +174,7 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
 /// What was found of a mission.
 #[derive(Default)]
 struct FoundMission {
-    /// It, if it is one on this roadmap.
+    /// It, if it is one on this roadmap, or needs none.
     mission: Option<MissionView<'static>>,
     /// A checksum of both.
     files: u32,
@@ -187,15 +187,14 @@ struct FoundMission {
 /// Looks for the mission on this roadmap. It is copied: the journal it lies in moves.
 fn find_mission(store: &Store, flash: &mut Flash, roadmap: Option<&RoadmapView<'_>>) -> FoundMission {
     let bytes = MISSION_BYTES.take();
-    let lies = store.mission().zip(roadmap);
-    let found = lies.and_then(|(r, roadmap)| {
+    let found = store.mission().and_then(|r| {
         let bytes = bytes.get_mut(..(r.end - r.start) as usize)?;
         flash.read(r.start, bytes).ok()?;
-        Some((&*bytes, roadmap))
+        Some(&*bytes)
     });
-    let Some((bytes, roadmap)) = found else { return FoundMission::default() };
+    let Some(bytes) = found else { return FoundMission::default() };
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
-    let files = roadmap.crc() ^ sum.rotate_left(1);
+    let files = roadmap.map_or(0, RoadmapView::crc) ^ sum.rotate_left(1);
     // What it crashed may be its reading, or a plan.
     if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
         return FoundMission { files, aside: true, ..FoundMission::default() };
@@ -203,7 +202,11 @@ fn find_mission(store: &Store, flash: &mut Flash, roadmap: Option<&RoadmapView<'
     let read = MissionView::parse(bytes);
     crash::finish();
     let refused = read.err();
-    FoundMission { mission: read.ok().filter(|mission| mission.fits(roadmap)), files, refused, aside: false }
+    let fits = |mission: &MissionView<'_>| match mission.kind() {
+        Kind::Goals => roadmap.is_some_and(|roadmap| mission.fits(roadmap)),
+        Kind::Coverage(_) => true,
+    };
+    FoundMission { mission: read.ok().filter(fits), files, refused, aside: false }
 }
 
 fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {

@@ -1,7 +1,7 @@
 //! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
 //! way around what is in its way.
 
-use companion::storage::mission_file::MissionView;
+use companion::storage::mission_file::{Kind, MissionView};
 use companion::{PlanFailure, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
@@ -10,7 +10,7 @@ use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::kept::Work;
 use crate::scratch::Scratch;
 use crate::shell::BoardCompanion;
@@ -97,10 +97,29 @@ impl Planner<'_> {
         &mut self,
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-        let (Some(roadmap), Some(mission)) = (&self.roadmap, &self.mission) else {
-            return Err(PlanFailure::NoRoadmap);
-        };
+        let Some(mission) = &self.mission else { return Err(PlanFailure::NoRoadmap) };
         let Memory { scratch, swarm, own } = &mut self.memory;
+        let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
+        let schedule = &mission.header().schedule;
+        if let Kind::Coverage(area) = mission.kind() {
+            if detour.is_some() {
+                // Where nobody knows the ground, nobody flies around.
+                return Err(PlanFailure::Unreachable);
+            }
+            let ws = scratch.area();
+            planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+                mission,
+                area,
+                GATES,
+                &mut ws.area,
+                &mut ws.schedule,
+                swarm,
+            )?;
+            plan::vehicle_plan(swarm, index, schedule, &mut ws.schedule, &mut own.plan)
+                .map_err(|_| PlanFailure::Capacity)?;
+            return Ok(&own.plan);
+        }
+        let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
         let ws = scratch.planner();
         if let Some(request) = detour {
             if own.crowded {
@@ -117,9 +136,8 @@ impl Planner<'_> {
             .map_err(|_| PlanFailure::Unreachable)?;
             return Ok(&own.plan);
         }
-        let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         planner::goals(mission, roadmap, GATES, ws, swarm)?;
-        plan::vehicle_plan(swarm, index, &mission.header().schedule, &mut ws.schedule, &mut own.plan)
+        plan::vehicle_plan(swarm, index, schedule, &mut ws.schedule, &mut own.plan)
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)
     }

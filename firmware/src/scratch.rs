@@ -2,10 +2,11 @@
 //!
 //! An enum would do but for its change from one use to the other, which the compiler makes on the stack, where there is no
 //! room for it.
-#![expect(unsafe_code, reason = "three uses of one piece of memory")]
+#![expect(unsafe_code, reason = "four uses of one piece of memory")]
 
 use core::mem::{ManuallyDrop, MaybeUninit};
 
+use companion::planner::coverage;
 use planner_core::Point;
 use planner_core::coverage::pack::Plan;
 use planner_core::coverage::powell;
@@ -13,12 +14,21 @@ use planner_core::coverage::tracks::{self, Tracks};
 use planner_core::plan::PlanWorkspace;
 use planner_core::prm::{self, Config, PrmError};
 use planner_core::roadmap::Edge;
+use planner_core::schedule::ScheduleWorkspace;
 use planner_core::voxel::VoxelGrid;
 
 use crate::capacity::{AREA_VERTICES, HALF_EDGES, LANES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
 
 /// Scratch of planning a swarm.
 pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
+
+/// Scratch of planning a coverage mission.
+pub struct Area {
+    /// Lanes and routes.
+    pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
+    /// Flights.
+    pub schedule: ScheduleWorkspace,
+}
 
 /// The memory; a board has one. The smaller uses lie in the memory of the largest.
 pub struct Scratch {
@@ -31,22 +41,25 @@ enum Use {
     Plan,
     Build,
     Coverage,
+    Area,
 }
 
 union Memory {
     plan: ManuallyDrop<Planner>,
     build: ManuallyDrop<Builder>,
     coverage: ManuallyDrop<Coverage>,
+    area: ManuallyDrop<Area>,
 }
 
 /// All zeros are a value of each use: the compiler refuses a constant that is no value of its
 /// type.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ZEROS: (Planner, Builder, Coverage) = {
+const ZEROS: (Planner, Builder, Coverage, Area) = {
     // SAFETY: the compiler checks it.
     unsafe {
-        let zeroed = (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
-        (zeroed.0.assume_init(), zeroed.1.assume_init(), zeroed.2.assume_init())
+        let zeroed =
+            (MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed(), MaybeUninit::zeroed());
+        (zeroed.0.assume_init(), zeroed.1.assume_init(), zeroed.2.assume_init(), zeroed.3.assume_init())
     }
 };
 
@@ -75,6 +88,13 @@ impl Scratch {
         self.turn(Use::Coverage);
         // SAFETY: as above; all zeros is nothing lent yet.
         unsafe { &mut self.memory.coverage }
+    }
+
+    /// For planning a coverage mission from here on; empty.
+    pub fn area(&mut self) -> &mut Area {
+        self.turn(Use::Area);
+        // SAFETY: as above; all zeros is an area without vertices.
+        unsafe { &mut self.memory.area }
     }
 
     /// Zeros where the use changes.

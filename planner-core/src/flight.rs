@@ -178,6 +178,8 @@ pub const PROGRESS_ERROR_M: f32 = 0.25;
 /// What a vehicle does on its flight.
 ///
 /// Every task's flight is one path: what differs is what happens along it, which the task says by arc length.
+// A tag of its own, so that one that stays is all zeros and a static of plans costs .bss alone.
+#[repr(u8)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Task {
     /// It stays on its pad.

@@ -18,6 +18,8 @@ use crate::config::PlanFailure;
 use crate::storage::mission_file::coverage::{CoverageView, Heading, Parts};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
 
+/// Changes of the lanes' order that companions look at: on a board a few million instructions.
+pub const LOOKS: u32 = 2000;
 /// Most rings of an area.
 pub const RINGS: usize = 128;
 /// Clearance that every leg is taken to have, metres: over the fields there are no walls.

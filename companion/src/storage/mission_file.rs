@@ -37,6 +37,8 @@ pub const VERSION: u16 = 3;
 const WITHOUT_KIND: u16 = 2;
 /// The first one.
 const WITHOUT_GROUND_STATIONS: u16 = 1;
+/// Most bytes that a board keeps.
+pub const MOST_BYTES: usize = 4096;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
 static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);

@@ -16,7 +16,7 @@ use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES, VEHICLES};
 use crate::scratch::Coverage;
 
 /// Changes of the lanes' order that are looked at.
-pub const LOOKS: u32 = 2000;
+pub const LOOKS: u32 = companion::planner::coverage::LOOKS;
 /// Vehicles of the plans that have a limit.
 const FEW: usize = 3;
 /// Packings that POWELL looks at.

@@ -29,8 +29,7 @@ pub fn judge<const V: usize, const W: usize>(
     plan: &SwarmPlan<V, W>,
     pictures: Vec<Picture>,
 ) -> anyhow::Result<Judged> {
-    let method = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
-    let mut planned = Planned::new(scenario, method)?;
+    let mut planned = Planned::flown(scenario)?;
     for (route, depart_s) in planned.plan.routes.iter().zip(&mut planned.departures_s) {
         *depart_s = plan.flights[usize::from(route.vehicle)].depart_s;
     }

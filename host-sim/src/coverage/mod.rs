@@ -45,6 +45,19 @@ impl<'a> Planned<'a> {
     /// # Errors
     /// There is no plan: why, and where in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
+        Self::searched(scenario, method, LOOKS)
+    }
+
+    /// The same as companions plan it, who look for a shorter order of the lanes no longer than a board can.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn flown(scenario: &'a Scenario) -> anyhow::Result<Self> {
+        let method = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
+        Self::searched(scenario, method, companion::planner::coverage::LOOKS)
+    }
+
+    fn searched(scenario: &'a Scenario, method: Method, looks: u32) -> anyhow::Result<Self> {
         let Some(wanted) = &scenario.area else {
             bail!(
                 "area is missing: {}\nhint: add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`",
@@ -61,12 +74,8 @@ impl<'a> Planned<'a> {
         transit.learn(area).map_err(failed)?;
         let ways = began.elapsed().as_secs_f64();
         let began = Instant::now();
-        let pattern = Pattern {
-            spacing: wanted.usable,
-            angle_deg: wanted.angle_deg,
-            margin_m: wanted.margin_m,
-            looks: LOOKS,
-        };
+        let pattern =
+            Pattern { spacing: wanted.usable, angle_deg: wanted.angle_deg, margin_m: wanted.margin_m, looks };
         let mut tracks = Box::new(Tracks::new());
         let mut workspace = Box::new(tracks::Workspace::<MOST_VERTICES>::new());
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;

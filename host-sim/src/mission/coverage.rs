@@ -14,7 +14,7 @@ use super::ready::{Mission, SwarmPlan, schedule_config};
 use crate::area::MOST_VERTICES;
 use crate::autopilot::VehicleLimits;
 use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS, on_heap};
-use crate::coverage::{CORNERS, LANES, LOOKS, Planned, VEHICLES as COVERAGE_VEHICLES};
+use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::map;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::Method;
@@ -33,7 +33,7 @@ type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
 /// The mission up to its files.
 pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
-    let planned = Planned::new(&scenario, method(&scenario))?;
+    let planned = Planned::flown(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(
             "cannot be flown: {}: method \"exact\" has no shares that companions could plan with\nhint: \"powell-binpat\" does",
@@ -139,7 +139,7 @@ impl Mission {
             parts,
             heading: area.heading,
             trigger: area.trigger,
-            looks: LOOKS,
+            looks: coverage::LOOKS,
             heights: area.heights,
             spacing: area.usable,
             angle_deg: area.angle_deg,
