@@ -83,7 +83,7 @@ fn bytes(meter: &mut impl Meter) {
         mission_crc: 1,
         plan_crc: 2,
         progress_m: 3.0,
-        speed_mps: 1.0,
+        clear_m: 9.0,
         heard: 7,
         points,
         ..Intent::default()
