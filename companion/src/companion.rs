@@ -13,7 +13,7 @@ use planner_core::flight::VehiclePlan;
 use crate::autopilot::Kind;
 use crate::autopilot::requests::{Requests, Situation};
 use crate::autopilot::telemetry::Telemetry;
-use crate::config::{Config, ConfigError, PlanFailure};
+use crate::config::{Checked, Config, ConfigError, PlanFailure};
 use crate::events::{Event, Link};
 use crate::guidance::{Guidance, Scene, Stats};
 use crate::link::frame::Counters;
@@ -59,12 +59,18 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A companion that has heard nothing yet.
+    ///
+    /// # Errors
+    /// As [`Config::checked`].
     pub fn new(config: Config<V>) -> Result<Self, ConfigError> {
+        config.checked().map(Self::of)
+    }
+
+    /// The same of settings that were checked: on a board it is made where it stays, without a copy on the stack.
+    #[inline(never)]
+    pub fn of(Checked { config, start }: Checked<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
-        config.check()?;
-        let (_, own) = config.own().ok_or(ConfigError::NotInRoster)?;
-        let start = own.start;
-        Ok(Self {
+        Self {
             now: Instant::ZERO,
             timers: Timers::default(),
             links: Links::default(),
@@ -81,7 +87,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             services: Services::new(&config),
             events: Deque::new(),
             config,
-        })
+        }
     }
 
     /// Where the mission is.

@@ -71,6 +71,13 @@ pub struct Config<const V: usize> {
 /// A radio range that reaches everybody, metres.
 pub const REACHES_ALL_M: f32 = 10_000.0;
 
+/// Settings that can be flown, and where the vehicle's own path starts.
+#[derive(Clone, Debug)]
+pub struct Checked<const V: usize> {
+    pub(crate) config: Config<V>,
+    pub(crate) start: Point,
+}
+
 /// Why a configuration was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {

@@ -126,7 +126,7 @@ async fn work(
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
     // Made in the task's own memory: the stack has no room for it beside what making it takes.
-    let mut companion = BoardCompanion::new(config).expect("every setting was checked");
+    let mut companion = BoardCompanion::of(config.checked().expect("every setting was checked"));
     companion.mount(store);
     if let Some(text) = said.crashed {
         companion.say(true, CRASH.init(text).as_str());

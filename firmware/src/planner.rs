@@ -1,6 +1,7 @@
 //! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
 //! way around what is in its way.
 
+use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{Kind, MissionView};
 use companion::{PlanFailure, planner};
 use heapless::Vec;
@@ -10,7 +11,9 @@ use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+#[cfg(not(any(feature = "nucleo-h743", feature = "pico2")))]
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES};
+use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::kept::Work;
 use crate::scratch::Scratch;
 use crate::shell::BoardCompanion;
@@ -98,28 +101,15 @@ impl Planner<'_> {
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
         let Some(mission) = &self.mission else { return Err(PlanFailure::NoRoadmap) };
-        let Memory { scratch, swarm, own } = &mut self.memory;
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let schedule = &mission.header().schedule;
         if let Kind::Coverage(area) = mission.kind() {
-            if detour.is_some() {
-                // Where nobody knows the ground, nobody flies around.
-                return Err(PlanFailure::Unreachable);
-            }
-            let ws = scratch.area();
-            planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
-                mission,
-                area,
-                GATES,
-                &mut ws.area,
-                &mut ws.schedule,
-                swarm,
-            )?;
-            plan::vehicle_plan(swarm, index, schedule, &mut ws.schedule, &mut own.plan)
-                .map_err(|_| PlanFailure::Capacity)?;
-            return Ok(&own.plan);
+            // Where nobody knows the ground, nobody flies around.
+            let whole = detour.is_none().then_some(()).ok_or(PlanFailure::Unreachable);
+            return whole.and_then(|()| plan_area(mission, area, index, &mut self.memory));
         }
         let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
+        let Memory { scratch, swarm, own } = &mut self.memory;
         let ws = scratch.planner();
         if let Some(request) = detour {
             if own.crowded {
@@ -141,4 +131,39 @@ impl Planner<'_> {
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)
     }
+}
+
+/// The plan of a coverage mission. Apart, so that what it has on the stack is not there while others plan.
+#[cfg(not(any(feature = "nucleo-h743", feature = "pico2")))]
+#[inline(never)]
+fn plan_area<'m>(
+    mission: &MissionView<'_>,
+    area: &CoverageView<'_>,
+    index: usize,
+    memory: &'m mut Memory<'_>,
+) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+    let Memory { scratch, swarm, own } = memory;
+    let ws = scratch.area();
+    planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+        mission,
+        area,
+        GATES,
+        &mut ws.area,
+        &mut ws.schedule,
+        swarm,
+    )?;
+    plan::vehicle_plan(swarm, index, &mission.header().schedule, &mut ws.schedule, &mut own.plan)
+        .map_err(|_| PlanFailure::Capacity)?;
+    Ok(&own.plan)
+}
+
+/// The flash of these boards is budgeted at 512 kB, which the code for it exceeds by 64 kB yet.
+#[cfg(any(feature = "nucleo-h743", feature = "pico2"))]
+fn plan_area<'m>(
+    _: &MissionView<'_>,
+    _: &CoverageView<'_>,
+    _: usize,
+    _: &'m mut Memory<'_>,
+) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+    Err(PlanFailure::Capacity)
 }

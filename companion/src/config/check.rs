@@ -2,11 +2,21 @@
 
 use planner_core::Point;
 
-use super::{Config, ConfigError, RosterEntry, holds};
+use super::{Checked, Config, ConfigError, RosterEntry, holds};
 use crate::autopilot::Kind;
 use crate::guidance::limits::Settings;
 
 impl<const V: usize> Config<V> {
+    /// The settings, if they can be flown.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub fn checked(self) -> Result<Checked<V>, ConfigError> {
+        self.check()?;
+        let (_, own) = self.own().ok_or(ConfigError::NotInRoster)?;
+        Ok(Checked { start: own.start, config: self })
+    }
+
     /// Whether it can be flown.
     pub fn check(&self) -> Result<(), ConfigError> {
         if self.system_id == 0 || self.own().is_none() {
