@@ -77,10 +77,10 @@ def main():
 def use(proxy, roadmap, mission, back):
     holds = lambda name, answer: check(name, answer, proxy.said)  # noqa: E731
     holds("the companion is found", proxy.until(f"Detected vehicle {SYSTEM}:{COMPANION}"))
-    holds("parameters are fetched", proxy.until("Received 8 parameters"))
+    holds("parameters are fetched", proxy.until("Received 9 parameters"))
     holds("and listed", proxy.does("param show FLK*", "FLK_ACCEL        1.5", "FLK_SPEED_MAX    20.0", "FLK_SYS_ID       0.0"))
     proxy.does("param set FLK_ACCEL 2.25")
-    holds("one is set", proxy.does("param fetch", "Received 8 parameters"))
+    holds("one is set", proxy.does("param fetch", "Received 9 parameters"))
     holds("and read back", proxy.does("param show FLK_ACCEL", "2.25"))
     holds("nothing there yet", proxy.does("ftp list /", "Total size 0.00"))
     for path in (roadmap, mission):
