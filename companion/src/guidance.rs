@@ -78,8 +78,6 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
-/// A gate that opens within this time is waited for unheard, seconds: less than the row `Alone` waits.
-const OPENS_IN_S: f32 = 14.0;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -282,36 +280,6 @@ impl Guidance {
     /// Where on the path the reference is; −∞ before it runs.
     pub fn along_m(&self) -> f32 {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
-    }
-
-    /// How far along the plan's path every gate is open, or will be within [`OPENS_IN_S`], metres, and
-    /// after how many seconds that is for sure.
-    pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
-        &self,
-        scene: &Scene<'_, W, G>,
-        neighbours: &Neighbours<V>,
-        now: Instant,
-    ) -> (f32, u8) {
-        let mut in_s = 0.0;
-        let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
-        let closed = gates.iter().skip(self.opened).find(|gate| {
-            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= OPENS_IN_S) {
-                Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
-                None => return true,
-            }
-            false
-        });
-        let length_m = scene.plan.map_or(f32::NEG_INFINITY, |plan| plan.path.length_m());
-        (closed.map_or(length_m, |gate| gate.at_m.min(length_m)), libm::ceilf(in_s) as u8)
-    }
-
-    /// How far along the plan's path every gate is open, metres; −∞ where it does not follow that.
-    pub(crate) fn clear_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
-        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
-            return f32::NEG_INFINITY;
-        };
-        let gate_m = plan.gates.get(self.opened).map_or(f32::INFINITY, |gate| gate.at_m);
-        gate_m.min(plan.path.length_m())
     }
 
     /// Whether the setpoint stands, and is not on its way down.

@@ -243,7 +243,7 @@ fn an_unsound_plan_is_refused() {
         bench.start();
         bench.until(State::Ready, 6.0);
         bench.run(10.0);
-        assert_eq!(bench.state(), State::Ready, "start is to be commanded anew");
+        assert_eq!(bench.state(), State::Ready, "start must be commanded again");
     }
 }
 

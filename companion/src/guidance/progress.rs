@@ -6,8 +6,43 @@ use super::{
     ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene, WINDOW_EDGE_M,
 };
 use crate::mission::State;
+use crate::swarm::neighbours::Neighbours;
+use crate::time::Instant;
+
+/// A gate that opens within this time is waited for unheard, seconds: less than the row `Alone` waits.
+const OPENS_IN_S: f32 = 14.0;
 
 impl Guidance {
+    /// How far along the plan's path every gate is open, or will be within [`OPENS_IN_S`], metres, and
+    /// after how many seconds that is for sure.
+    pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
+        &self,
+        scene: &Scene<'_, W, G>,
+        neighbours: &Neighbours<V>,
+        now: Instant,
+    ) -> (f32, u8) {
+        let mut in_s = 0.0;
+        let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
+        let closed = gates.iter().skip(self.opened).find(|gate| {
+            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= OPENS_IN_S) {
+                Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
+                None => return true,
+            }
+            false
+        });
+        let length_m = scene.plan.map_or(f32::NEG_INFINITY, |plan| plan.path.length_m());
+        (closed.map_or(length_m, |gate| gate.at_m.min(length_m)), libm::ceilf(in_s) as u8)
+    }
+
+    /// How far along the plan's path every gate is open, metres; −∞ where it does not follow that.
+    pub(crate) fn clear_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
+        let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
+            return f32::NEG_INFINITY;
+        };
+        let gate_m = plan.gates.get(self.opened).map_or(f32::INFINITY, |gate| gate.at_m);
+        gate_m.min(plan.path.length_m())
+    }
+
     /// Arc length reported to neighbours and gates: negative before and in the climb, beyond the path's length in the
     /// descent. It never falls on one path.
     pub fn progress_m<const W: usize, const G: usize>(&self, state: State, scene: &Scene<'_, W, G>) -> f32 {

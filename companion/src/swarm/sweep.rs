@@ -121,7 +121,7 @@ mod tests {
     }
 
     #[test]
-    fn where_sources_come_or_go_all_are_asked_anew() {
+    fn where_sources_come_or_go_all_are_asked_again() {
         let mut sweep = Sweep::default();
         assert_eq!(sweep.go_on(7, &mut 12, 1, tell, |_| false), None);
         assert_eq!(sweep.go_on(2, &mut 12, 1, tell, |_| false), Some(false));

@@ -75,7 +75,8 @@ impl Body {
         legs.next() == Some(NAV_TAKEOFF)
     }
 
-    /// Does what is to be done at once and says what is to be flown; `None` once all is done, from which on it begins anew.
+    /// Does what is to be done at once and says what is to be flown; `None` once all is done. The next
+    /// call begins with the first item again.
     pub(super) fn fly_mission(&mut self, sense: &Sense, landed: bool) -> Option<Leg> {
         let first = self.first_item();
         let progress = &mut self.missions.progress;
@@ -106,7 +107,7 @@ impl Body {
         self.announce(MISSION_CURRENT);
     }
 
-    /// The mission begins anew when it is flown again.
+    /// The next flight begins with the first item.
     pub(super) fn rewind_mission(&mut self) {
         self.missions.progress = Progress::default();
     }

@@ -32,8 +32,7 @@ pub(super) fn lay<const L: usize, const V: usize>(
             for part in 0..parts {
                 let from = low + part as f32 * wide;
                 let span = [from, from + wide];
-                strips.need(span, ws)?;
-                without_shown(strips, span, out, ws)?;
+                need_left(strips, span, out, ws)?;
                 strips.lay(strip as u16, strips.middle(span), ws, out)?;
             }
         }
@@ -56,8 +55,7 @@ fn lay_beside<const L: usize, const V: usize>(
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     for v in lines(strips, span, 1) {
-        strips.need(span, ws)?;
-        without_shown(strips, span, out, ws)?;
+        need_left(strips, span, out, ws)?;
         if ws.need.spans().is_empty() {
             break;
         }
@@ -75,8 +73,7 @@ fn lay_pictures<const L: usize, const V: usize>(
     out: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
     for v in lines(strips, span, 0) {
-        strips.need(span, ws)?;
-        without_shown(strips, span, out, ws)?;
+        need_left(strips, span, out, ws)?;
         let Some(&need) = ws.need.spans().first() else { break };
         strips.lay_picture(strip, v, need, ws, out)?;
     }
@@ -110,13 +107,14 @@ fn meets_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
     })
 }
 
-/// Takes from `ws.need` what lanes already show of the strip's part between two `v`, and what zones hold of it.
-fn without_shown<const L: usize, const V: usize>(
+/// `ws.need` becomes what no lane shows yet of the strip's part between two `v`, and no zone holds.
+fn need_left<const L: usize, const V: usize>(
     strips: &Strips<'_>,
     span: Span,
     tracks: &Tracks<L>,
     ws: &mut Workspace<V>,
 ) -> Result<(), CoverageError> {
+    strips.need(span, ws)?;
     strips.without_zones(span, ws)?;
     let along = strips.reach();
     for lane in tracks.lanes() {

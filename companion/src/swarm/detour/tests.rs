@@ -80,7 +80,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.run(4.0);
     assert!(
         bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked,
-        "it waits anew"
+        "it waits from the start again"
     );
     bench.until(State::Follow, 5.0);
 }

@@ -44,7 +44,7 @@ impl Copter {
             }
     }
 
-    /// Disarmed: what came down is done, and the mission begins anew.
+    /// Disarmed: what came down is done, and the mission is flown from its first item again.
     pub(super) fn end_auto(&mut self, body: &mut Body) {
         if self.lands_in_auto() {
             body.pass_item();

@@ -105,7 +105,7 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         let home = u16::from(personality == Personality::Ardupilot);
         let all: Vec<u16> = (0..SURVEY.len() as u16).map(|k| k + home).collect();
         assert_eq!(bench.reached(), all, "{personality:?}");
-        // Flown again, it begins anew.
+        // The next flight begins with the first item.
         bench.autopilot.take_photos();
         if personality == Personality::Ardupilot {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
