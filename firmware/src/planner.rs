@@ -11,9 +11,7 @@ use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
-#[cfg(not(any(feature = "nucleo-h743", feature = "pico2")))]
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES};
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::kept::Work;
 use crate::scratch::Scratch;
 use crate::shell::BoardCompanion;
@@ -134,7 +132,6 @@ impl Planner<'_> {
 }
 
 /// The plan of a coverage mission. Apart, so that what it has on the stack is not there while others plan.
-#[cfg(not(any(feature = "nucleo-h743", feature = "pico2")))]
 #[inline(never)]
 fn plan_area<'m>(
     mission: &MissionView<'_>,
@@ -155,15 +152,4 @@ fn plan_area<'m>(
     plan::vehicle_plan(swarm, index, &mission.header().schedule, &mut ws.schedule, &mut own.plan)
         .map_err(|_| PlanFailure::Capacity)?;
     Ok(&own.plan)
-}
-
-/// The flash of these boards is budgeted at 512 kB, which the code for it exceeds by 64 kB yet.
-#[cfg(any(feature = "nucleo-h743", feature = "pico2"))]
-fn plan_area<'m>(
-    _: &MissionView<'_>,
-    _: &CoverageView<'_>,
-    _: usize,
-    _: &'m mut Memory<'_>,
-) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
-    Err(PlanFailure::Capacity)
 }

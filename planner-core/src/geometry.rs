@@ -2,6 +2,13 @@
 
 use crate::Point;
 
+/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code
+/// that would print them: 25 kB.
+pub(crate) fn within(value: f32, low: f32, high: f32) -> f32 {
+    let value = if value < low { low } else { value };
+    if value > high { high } else { value }
+}
+
 /// Squared distance between two segments (Ericson, Real-Time Collision Detection, 5.1.9).
 pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> f32 {
     let (d1, d2, r) = (p.1 - p.0, q.1 - q.0, p.0 - q.0);

@@ -43,6 +43,7 @@ pub mod safety;
 pub mod schedule;
 pub mod search;
 pub mod segment;
+mod sort;
 pub mod track;
 pub mod voxel;
 

@@ -28,6 +28,7 @@ pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::pieces::{PIECE_M, PIECES};
 use self::pieces::{Piece, conflict, cut};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
+use crate::sort;
 
 /// Most forbidden intervals kept apart while a delay is sought; more are merged, which only forbids more.
 const INTERVALS: usize = 128;
@@ -173,7 +174,7 @@ pub fn gates<const W: usize, const G: usize>(
     out.clear();
     let mut full = false;
     each_gate(cfg, flights, index, merged_m, ws, |gate| full |= out.push(gate).is_err())?;
-    out.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
+    sort::by(out, |a, b| a.at_m.total_cmp(&b.at_m).then(a.id.cmp(&b.id)));
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 

@@ -102,7 +102,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("intent::Intent::decode", "constant"),
     ("mission_file::write, 32", "v, and the CRC of the file"),
     ("mission_file::MissionView::parse, 32", "v, and the CRC of the file"),
-    ("mission_file::MissionView::config, 32", "v · log v"),
+    ("mission_file::MissionView::config, 32", "v²"),
     ("mission_file::MissionView::request, 32", "v"),
     ("mission_file::MissionView::fits", "constant"),
     ("config::Config::check, 32", "v"),

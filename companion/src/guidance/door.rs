@@ -23,7 +23,7 @@ use planner_core::Point;
 
 use super::fence::Fence;
 use super::limits::{Limits, SMOOTH_MOST_S};
-use super::motion::{Motion, shortened};
+use super::motion::{Motion, shortened, within};
 
 /// Time between two raw points, seconds: the rate of the setpoints.
 pub const TICK_S: f32 = 0.05;
@@ -396,7 +396,8 @@ impl Door {
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
         // It speeds up only by what the curve itself leaves of the acceleration, which may change while it does.
-        let wanted = wanted.clamp(fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)) / speed;
+        let [least, most] = [fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)];
+        let wanted = within(wanted, least, most) / speed;
         // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the
         // curve alone takes all of it, the rate that adds the least.
         let ahead = bend + third * (clock * dt_s);
@@ -407,7 +408,7 @@ impl Door {
         let middle = -change.dot(&slope) / slope_sq;
         let left = most * most - change.norm_squared() + middle * middle * slope_sq;
         let half = sqrtf(fmaxf(left, 0.0) / slope_sq);
-        let rate = wanted.clamp(middle - half, middle + half);
+        let rate = within(wanted, middle - half, middle + half);
         let next = (clock + rate * dt_s).clamp(0.0, 1.0);
         let done = fabsf(lack) < 1e-3 * speed && fabsf(rate) < 0.02;
         self.clock = if done { pace.share.clamp(0.0, 1.0) } else { next };

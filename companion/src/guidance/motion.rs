@@ -26,3 +26,10 @@ impl Motion {
 pub(super) fn shortened(vector: Point, most: f32) -> Point {
     vector * (most / fmaxf(vector.norm(), fmaxf(most, 1e-6)))
 }
+
+/// A value, or the bound that it lies beyond. `f32::clamp` panics where the bounds are none, and a board carries the code
+/// that would print them: 25 kB.
+pub(super) fn within(value: f32, low: f32, high: f32) -> f32 {
+    let value = if value < low { low } else { value };
+    if value > high { high } else { value }
+}

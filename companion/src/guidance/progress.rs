@@ -2,6 +2,7 @@
 
 use planner_core::flight::{Path, VehiclePlan};
 
+use super::motion::within;
 use super::{
     ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene, WINDOW_EDGE_M,
 };
@@ -64,11 +65,11 @@ impl Guidance {
             return length_m + plan.descent_m + 1.0;
         }
         match self.phase {
-            Phase::Climb => -(start_z - z).clamp(0.0, plan.climb_m),
+            Phase::Climb => -within(start_z - z, 0.0, plan.climb_m),
             Phase::Path | Phase::Descent
                 if self.reached_end(path) && (state == State::Land || self.phase == Phase::Descent) =>
             {
-                length_m + (end_z - z).clamp(0.0, plan.descent_m)
+                length_m + within(end_z - z, 0.0, plan.descent_m)
             }
             _ if self.on_path => {
                 let behind = self.track.lead_max_m * 2.0;

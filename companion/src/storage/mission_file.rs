@@ -424,8 +424,11 @@ impl<'a> MissionView<'a> {
         let header = &self.header;
         let mut config = Config::new(system_id, own.start, header.origin);
         config.roster.clear();
-        config.roster.extend(self.vehicles().map(|v| RosterEntry { system_id: v.task.id, start: v.start }));
-        config.roster.sort_unstable_by_key(|entry| entry.system_id);
+        for vehicle in self.vehicles() {
+            let entry = RosterEntry { system_id: vehicle.task.id, start: vehicle.start };
+            let at = config.roster.partition_point(|other| other.system_id < entry.system_id);
+            config.roster.insert(at, entry).map_err(|_| MissionError::RosterFull)?;
+        }
         config.mission_crc = self.crc;
         config.cruise_mps = libm::fminf(header.cruise_mps, own.speed_max_mps);
         config.climb_mps = header.schedule.vertical_mps;

@@ -9,6 +9,7 @@ use libm::{fmaxf, fminf};
 
 use super::CoverageError;
 use super::pack::Work;
+use crate::sort;
 
 /// Most vehicles that are distinguished.
 const MOST: usize = 32;
@@ -49,7 +50,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
         longest.take(pair[1].start_m - pair[0].start_m - pair[0].length_m());
     }
     let nearest_m = &mut nearest_m[..work.vehicles.len()];
-    nearest_m.sort_unstable_by(f32::total_cmp);
+    sort::by(nearest_m, f32::total_cmp);
     let (mut ground_m, mut delay_s, mut least_s) = (work.tracks.length_m(), 0.0, f32::INFINITY);
     for (flying, near) in nearest_m.iter().enumerate() {
         ground_m += near - if flying > 0 { longest.values[flying - 1] } else { 0.0 };

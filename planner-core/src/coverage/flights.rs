@@ -14,6 +14,7 @@ use crate::Point;
 use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+use crate::sort;
 
 /// Braking and accelerating that is planned with, m/s².
 const ACCEL_MPS2: f32 = 1.5;
@@ -101,7 +102,7 @@ fn depart<const V: usize, const W: usize>(
         let _ = order.push((flight.task.flies(), flight.lasts_s(cfg), i));
     }
     // Whoever stays on its pad is there before all others.
-    order.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+    sort::by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
     for (place, &(flies, _, i)) in order.iter().enumerate() {
         if !flies {
             continue;

@@ -5,11 +5,12 @@ use libm::{ceilf, fmaxf, fminf};
 
 use super::area::{Area, RingKind, edges_of};
 use super::intervals::{Intervals, Span};
+use super::lanes::{Lane, Pattern, Tracks};
 use super::sweep::Direction;
 use super::transit::CLEARANCE_M;
 use super::{CoverageError, Flat};
-
-use super::lanes::{Lane, Pattern, Tracks};
+use crate::geometry::within;
+use crate::sort;
 
 /// Memory lent: `V` is at least the number of the area's vertices.
 pub struct Workspace<const V: usize> {
@@ -106,7 +107,7 @@ impl<'a> Strips<'a> {
                 out.push(u).map_err(|_| CoverageError::LanesFull)?;
             }
         }
-        out.sort_unstable_by(f32::total_cmp);
+        sort::by(out, f32::total_cmp);
         Ok(())
     }
 
@@ -245,7 +246,7 @@ impl<'a> Strips<'a> {
         ws.free.clear();
         ws.free.add([middle - room, middle + room])?;
         self.unblock(v, ws)?;
-        let near = ws.free.spans().iter().map(|[from, to]| middle.clamp(*from, *to));
+        let near = ws.free.spans().iter().map(|[from, to]| within(middle, *from, *to));
         let far = |u: &f32| libm::fabsf(u - middle);
         let nearest = near.min_by(|a, b| far(a).total_cmp(&far(b)));
         nearest.map_or(Ok(()), |u| self.push(strip, v, [u, u], out))

@@ -7,6 +7,7 @@ use heapless::Vec;
 
 use super::area::{Area, AreaError, RingKind};
 use super::{CoverageError, Flat};
+use crate::sort;
 
 /// Lanes run along `along`; they are counted along `across`, a quarter turn to the left of it. Both have length 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,7 +71,7 @@ fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Resu
     for (_, ring) in area.each().filter(|(kind, _)| *kind == RingKind::Outer) {
         sorted.extend_from_slice(ring).map_err(|_| AreaError::AreaFull)?;
     }
-    sorted.sort_unstable_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
+    sort::by(&mut sorted, |a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
     let count = sorted.len();
     // The lower side from left to right, then the upper one back.
     let mut side = 0;

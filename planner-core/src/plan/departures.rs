@@ -16,6 +16,7 @@ use super::request::{PlanError, PlanRequest};
 use super::workspace::{PlanWorkspace, SwarmPlan};
 use crate::flight::Flight;
 use crate::schedule::{self, ScheduleError};
+use crate::sort;
 
 /// Comparisons of a take-off time with a scheduled flight: a third of a second on a board.
 const LOOKS: u32 = 150_000;
@@ -99,7 +100,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     let differences = Differences { ends: &ws.costs.as_flattened()[..count * count], count };
     let by_departure =
         |a: &u16, b: &u16| found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b));
-    order.sort_unstable_by(by_departure);
+    sort::by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
     let mut looks = if count <= BOARD_VEHICLES { LOOKS } else { LOOKS.max(LOOKS_A_PAIR * pairs) };
     let mut departs_s = lasts_s.clone();

@@ -15,6 +15,7 @@ use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, Route};
 use crate::schedule::{self, PIECE_M, PIECES, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
+use crate::sort;
 
 /// Schedules the longest path first, and where that leads to no schedule the shortest.
 pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
@@ -41,7 +42,7 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
     let mut failed = Ok(());
     for first in [First::Longest, First::Shortest] {
         // A vehicle that stays on its pad comes first: it blocks all others. Ties go to the higher id (P3D §3.4).
-        order.sort_unstable_by(|&a, &b| {
+        sort::by(&mut order, |&a, &b| {
             let (a, b) = (usize::from(a), usize::from(b));
             let (goals, ids) =
                 ([a, b].map(|i| out.flights[i].task.flies()), (out.flights[b].id, out.flights[a].id));

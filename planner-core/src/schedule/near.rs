@@ -6,6 +6,7 @@
 use libm::{fmaxf, fminf};
 
 use super::pieces::Piece;
+use crate::sort;
 
 /// Cells along one side.
 const SIDE: usize = 32;
@@ -42,10 +43,12 @@ impl Cells {
         }
         let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
         (self.min, self.cell_m) = (min, fmaxf(extent_m / SIDE as f32, CELL_LEAST_M));
-        pieces.sort_unstable_by_key(|piece| {
+        let cell = |piece: &Piece| {
             let [x, y] = middle(piece);
             self.at(1, y) * SIDE + self.at(0, x)
-        });
+        };
+        // Any order within a cell will do, if it is the same on all boards.
+        sort::by(pieces, |a, b| cell(a).cmp(&cell(b)));
         self.starts.fill(0);
         for piece in &*pieces {
             let [x, y] = middle(piece);

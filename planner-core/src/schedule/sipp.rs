@@ -19,6 +19,7 @@ use crate::Point;
 use crate::flight::{Flight, Path};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::heap::{Heap, SETTLED};
+use crate::sort;
 
 /// One node in one of its safe intervals.
 #[derive(Clone, Copy)]
@@ -259,7 +260,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         for q in near(&self.cells, &self.pieces, cfg, &hover) {
             forbid(&mut self.forbidden, q.from_s, q.to_s);
         }
-        self.forbidden.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        sort::by(&mut self.forbidden, |a, b| a.0.total_cmp(&b.0));
         let mut from_s = f32::NEG_INFINITY;
         for i in 0..=self.forbidden.len() {
             let (low, high) = self.forbidden.get(i).copied().unwrap_or((f32::INFINITY, f32::INFINITY));

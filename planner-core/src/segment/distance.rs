@@ -13,6 +13,7 @@ use super::lanes::lane_mask;
 use super::lattice::snap;
 use super::walk::snapped_segment_touches;
 use crate::Point;
+use crate::geometry::within;
 use crate::voxel::{Outside, VoxelGrid};
 
 /// Half the diagonal of a cell.
@@ -117,8 +118,8 @@ impl Segment {
         for brick_u in first >> 2..=last >> 2 {
             let low = (brick_u * 4) as f32;
             // The part of the segment within reach of this layer of bricks.
-            let from = (low - reach).clamp(least, most) - self.a[axis_u];
-            let to = (low + 4.0 + reach).clamp(least, most) - self.a[axis_u];
+            let from = within(low - reach, least, most) - self.a[axis_u];
+            let to = within(low + 4.0 + reach, least, most) - self.a[axis_u];
             let span = |axis: usize| {
                 let at = |along: f32| self.a[axis] + slope[axis] * along;
                 cells(at(from), at(to), reach + slack, shape.dims[axis])

@@ -6,6 +6,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{REACTION_S, Set};
 
 use super::super::limits::bounds;
+use super::super::motion::within;
 use super::super::{Guidance, Scene};
 use super::{CLEAR, Filter, LOWER_M, RESUME_M, STRANGER, TURNS_M, TURNS_MPS, WAITS_M, Way};
 use crate::mission::State;
@@ -144,7 +145,7 @@ impl Guidance {
     fn flies_back<const W: usize>(&self, path: &Path<W>) -> bool {
         let along_m = self.tracker.along_m;
         let velocity = self.door.velocity();
-        let beside = |by_m: f32| path.point_at((self.setpoint_m + by_m).clamp(0.0, path.length_m()));
+        let beside = |by_m: f32| path.point_at(within(self.setpoint_m + by_m, 0.0, path.length_m()));
         let onward = match (beside(-TURNS_M), beside(TURNS_M)) {
             (Some(from), Some(to)) => velocity.dot(&(to - from)),
             _ => 0.0,

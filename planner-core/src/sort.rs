@@ -1,0 +1,51 @@
+//! Sorting in place, in little code: the standard library's sort takes some 9 kB of a board's flash for each type and order.
+//!
+//! Heapsort (Williams 1964). Not stable: where two elements may compare equal and still differ, the order says which is
+//! first, or it does not matter. n log n comparisons, and as many again to build the heap.
+
+use core::cmp::Ordering;
+
+/// Sorts by an order, the least first.
+// Apart: callers are large, and what is inlined into them is there as often as they are.
+#[inline(never)]
+pub(crate) fn by<T>(items: &mut [T], mut order: impl FnMut(&T, &T) -> Ordering) {
+    let mut len = items.len();
+    let mut root = len / 2;
+    while len > 1 {
+        if root > 0 {
+            // The heap grows from its end to the front.
+            root -= 1;
+        } else {
+            len -= 1;
+            items.swap(0, len);
+        }
+        let mut at = root;
+        loop {
+            let left = 2 * at + 1;
+            let Some(first) = items[..len].get(left) else { break };
+            let right = items[..len].get(left + 1);
+            let child = left + usize::from(right.is_some_and(|right| order(first, right).is_lt()));
+            if order(&items[at], &items[child]).is_ge() {
+                break;
+            }
+            items.swap(at, child);
+            at = child;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn sorts_as_the_standard_library_does(numbers in proptest::collection::vec(0u8..40, 0..120)) {
+            let (mut sorted, mut expected) = (numbers.clone(), numbers);
+            by(&mut sorted, Ord::cmp);
+            expected.sort_unstable();
+            prop_assert_eq!(sorted, expected);
+        }
+    }
+}
