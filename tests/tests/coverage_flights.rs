@@ -2,11 +2,11 @@
 //! pictures are judged by where they were truly taken.
 
 use flockmate_tests::areas::{self, Shape};
-use host_sim::coverage::flown;
+use flockmate_tests::covered;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::result::MissionResult;
-use host_sim::{scenario, swarm};
+use host_sim::scenario;
 use rand_core::SeedableRng as _;
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -16,28 +16,13 @@ fn fly(text: &str) -> Result<MissionResult, String> {
     let said = |error: anyhow::Error| format!("{error:#}");
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
-    let plan = mission.plan().map_err(said)?;
-    let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden()).map_err(said)?;
-    let judged = flown::judge(&mission.scenario, &plan, flight.pictures).map_err(said)?;
-    let mut result = flight.result;
-    result.complete &= judged.complete;
-    result.coverage = Some(judged.result);
+    let (result, log) = covered::fly(&mut mission).map_err(said)?;
     if !result.complete {
-        let warnings =
-            flight.log.iter().filter(|event| event.text.contains("arning") || event.text.contains(":"));
-        for event in warnings {
+        for event in log.iter().filter(|event| event.text.contains("arning") || event.text.contains(":")) {
             println!("{:8.2} {:?} {}", event.t_s, event.vehicle, event.text);
         }
     }
     Ok(result)
-}
-
-/// What is wrong with a flight.
-fn faults(result: &MissionResult) -> Option<String> {
-    let safety = &result.safety;
-    let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
-    (!(clean && result.complete))
-        .then(|| format!("{:?}\n{:?}\n{:?}", result.vehicles, safety, result.coverage))
 }
 
 /// Why a random area is not flown.
@@ -55,7 +40,7 @@ fn random_areas_are_photographed_whole() {
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
         let text = areas::flown(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
         match fly(&text) {
-            Ok(result) => match faults(&result) {
+            Ok(result) => match covered::faults(&result) {
                 None => Ok(true),
                 Some(faults) => Err(format!("seed {seed}: {faults}\n{text}")),
             },

@@ -1,0 +1,30 @@
+//! Coverage missions flown, and judged by where their pictures were truly taken.
+
+use host_sim::coverage::flown;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::report::Event;
+use host_sim::result::MissionResult;
+use host_sim::swarm;
+
+/// Flies a coverage mission: its result with what its pictures show, and what was said.
+///
+/// # Errors
+/// Why it cannot be planned, flown or judged.
+pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)> {
+    let plan = mission.plan()?;
+    let flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
+    let judged = flown::judge(&mission.scenario, &plan, flight.pictures)?;
+    let mut result = flight.result;
+    result.complete &= judged.complete;
+    result.coverage = Some(judged.result);
+    Ok((result, flight.log))
+}
+
+/// What is wrong with a flight.
+pub fn faults(result: &MissionResult) -> Option<String> {
+    let safety = &result.safety;
+    let clean = (safety.wall_contacts, safety.violations, safety.deadlocks) == (0, 0, 0);
+    (!(clean && result.complete))
+        .then(|| format!("{:?}\n{:?}\n{:?}", result.vehicles, safety, result.coverage))
+}
