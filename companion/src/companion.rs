@@ -7,6 +7,8 @@ mod replanning;
 mod steps;
 mod transmit;
 
+use core::mem::MaybeUninit;
+
 use heapless::Deque;
 use planner_core::flight::VehiclePlan;
 
@@ -66,9 +68,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         config.checked().map(Self::of)
     }
 
-    /// The same of settings that were checked: on a board it is made where it stays, without a copy on the stack.
+    /// The same of settings that were checked, made where it stays: on a board there is no room for a copy on the stack.
     #[inline(never)]
-    pub fn of(Checked { config, start }: Checked<V>) -> Self {
+    pub fn make_in(place: &mut MaybeUninit<Self>, settings: Checked<V>) -> &mut Self {
+        place.write(Self::of(settings))
+    }
+
+    #[inline(always)]
+    fn of(Checked { config, start }: Checked<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
         Self {
             now: Instant::ZERO,

@@ -125,8 +125,9 @@ async fn work(
     let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
-    // Made in the task's own memory: the stack has no room for it beside what making it takes.
-    let mut companion = BoardCompanion::of(config.checked().expect("every setting was checked"));
+    // Neither the stack nor the task's own memory has room for another.
+    let settings = config.checked().expect("every setting was checked");
+    let companion = BoardCompanion::make_in(COMPANION.uninit(), settings);
     companion.mount(store);
     if let Some(text) = said.crashed {
         companion.say(true, CRASH.init(text).as_str());
@@ -141,7 +142,7 @@ async fn work(
         let _ = write!(text, "Mission: {error}");
         companion.say(true, REFUSED.init(text).as_str());
     }
-    shell.start(COMPANION.init(companion));
+    shell.start(companion);
     start_links(links, shell, known.is_none(), autopilot, swarm);
     let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
     let mut planner = Planner { roadmap, mission, system_id, files, memory };

@@ -13,8 +13,11 @@ const STACK_END: u32 = 0x2008_A000;
 const SPARE: u32 = STACK_END + 0x100;
 /// Less than an interrupt takes of a stack.
 const STACK_LEFT: u32 = 8;
-/// In the name of a function of `core` that does nothing but panic, at a place of its own.
-const PANICS: &str = "smallsort22panic_on_ord_violation";
+/// In the name of a function of `core` that does nothing but panic, at the place that it is given.
+const PANICS: &str = "panic_const_div_by_zero";
+/// That place.
+const PLACE: &[u8] = b"downfall.rs";
+const LINE: u32 = 7;
 /// In the name of the function that makes a plan on a board.
 const PLANS: &str = "Planner4plan";
 /// An instruction that there is not.
@@ -57,7 +60,7 @@ impl Downfall {
         match self {
             Self::Reset | Self::Hang => "Restarted: watchdog, reset key or brown-out",
             Self::Fault => "Restarted: fault at 0xf0000000",
-            Self::Panic => "Restarted: panic at smallsort.rs:",
+            Self::Panic => "Restarted: panic at downfall.rs:7",
             Self::Overflow => "Restarted: stack overflow",
         }
     }
@@ -76,7 +79,7 @@ impl Downfall {
         let (address, argument) = match self {
             Self::Reset => (put(board, RESET), 0),
             Self::Fault => (NOWHERE, 0),
-            Self::Panic => (function(program, PANICS), 0),
+            Self::Panic => (function(program, PANICS), location(board)),
             Self::Hang => (put(board, SPIN), 0),
             Self::Overflow => (put(board, PUSH), STACK_END + STACK_LEFT),
         };
@@ -145,6 +148,15 @@ pub fn slow_planner(board: &mut Emulated, program: &Path, time: Duration) {
 /// Puts code where nothing uses the memory, and returns where.
 fn put(board: &mut Emulated, code: &[u16]) -> u32 {
     board.poke(SPARE, &bytes(code)).expect("a board");
+    SPARE
+}
+
+/// Puts a `core::panic::Location` there, and returns where: file, its length, line, column.
+fn location(board: &mut Emulated) -> u32 {
+    let words = [SPARE + 16, PLACE.len() as u32, LINE, 1];
+    let bytes: Vec<u8> =
+        words.iter().flat_map(|word| word.to_le_bytes()).chain(PLACE.iter().copied()).collect();
+    board.poke(SPARE, &bytes).expect("a board");
     SPARE
 }
 
