@@ -47,7 +47,14 @@ pub struct Board {
     pub gates: usize,
     /// Bytes of a roadmap file.
     pub roadmap_bytes: usize,
+    /// Vertices of an area.
+    pub vertices: usize,
+    /// Lanes over it.
+    pub lanes: usize,
 }
+
+/// Outward corners of an area's no-fly zones that a board holds.
+pub const BOARD_CORNERS: usize = 32;
 
 const fn roadmap_bytes(layout: &Layout) -> usize {
     (layout.slot_len - DATA_AT) as usize
@@ -60,6 +67,8 @@ const NUCLEO_H743: Board = Board {
     vehicles: 32,
     gates: 128,
     roadmap_bytes: roadmap_bytes(&Layout::H743),
+    vertices: 256,
+    lanes: 512,
 };
 
 /// All boards; the first holds the most.
@@ -72,6 +81,7 @@ pub const BOARDS: [Board; 3] = [
         half_edges: 32_768,
         vehicles: 16,
         roadmap_bytes: roadmap_bytes(&Layout::PICO2),
+        lanes: 256,
         ..NUCLEO_H743
     },
 ];
@@ -93,6 +103,11 @@ impl Board {
             ("half-edges", roadmap.half_edge_count(), self.half_edges),
             ("bytes of roadmap", roadmap.byte_len(), self.roadmap_bytes),
         ])
+    }
+
+    /// What of an area is more than it holds.
+    pub fn area_excess(&self, vertices: usize, lanes: usize) -> Option<String> {
+        self.excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
     }
 
     /// What of a mission file is more than it holds.

@@ -35,17 +35,19 @@ fn random_areas_are_photographed_whole() {
     let number =
         |name: &str, usual: u64| std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(usual);
     let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
-    let outcome = |seed: u64| -> Result<bool, String> {
+    let outcome = |seed: u64| -> Result<Option<&str>, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
         let text = areas::flown(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
         match fly(&text) {
             Ok(result) => match covered::faults(&result) {
-                None => Ok(true),
+                None => Ok(None),
                 Some(faults) => Err(format!("seed {seed}: {faults}\n{text}")),
             },
-            Err(error) if NO_FLIGHT.iter().any(|known| error.contains(known)) => Ok(false),
-            Err(error) => Err(format!("seed {seed}: {error}\n{text}")),
+            Err(error) => match NO_FLIGHT.iter().find(|known| error.contains(**known)) {
+                Some(known) => Ok(Some(known)),
+                None => Err(format!("seed {seed}: {error}\n{text}")),
+            },
         }
     };
     let all: Vec<_> = (from..from + count).into_par_iter().map(outcome).collect();
@@ -53,7 +55,11 @@ fn random_areas_are_photographed_whole() {
     for wrong in &wrong {
         println!("{}\n", wrong.chars().take(3000).collect::<String>());
     }
-    let flown = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count() as u64;
+    let ended = |how: Option<&str>| all.iter().filter(|outcome| outcome.as_ref() == Ok(&how)).count() as u64;
+    for known in NO_FLIGHT {
+        println!("{known}: {}", ended(Some(known)));
+    }
+    let flown = ended(None);
     println!("{flown} of {count} areas flown, {} wrong", wrong.len());
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }

@@ -48,7 +48,8 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let starts = output::points(mission.scenario.vehicles.iter().map(|v| v.start));
     let goals = output::points(mission.goals.iter().copied());
     let contents = [starts.as_bytes(), goals.as_bytes(), &mission.roadmap_file, &mission.mission_file];
-    for (name, bytes) in names.iter().zip(contents) {
+    // A coverage mission has no roadmap.
+    for (name, bytes) in names.iter().zip(contents).filter(|(_, bytes)| !bytes.is_empty()) {
         results.add(name, bytes)?;
     }
     results.keep()?;
@@ -96,7 +97,7 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
             landed: false,
             path_m: rounded(flight.path.length_m()),
             flown_m: 0.0,
-            flight_time_s: flight.task.goal().map_or(0.0, |_| rounded(nominal_s(flight))),
+            flight_time_s: if flight.task.flies() { rounded(nominal_s(flight)) } else { 0.0 },
             end: if flight.task.flies() { "planned" } else { "no goal" }.to_owned(),
         })
         .collect();
@@ -105,7 +106,9 @@ fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
         command: "plan",
         scenario: mission.scenario.path.clone(),
         seed: mission.scenario.seed,
-        complete: flying().count() == mission.goals.len().min(vehicles.len()),
+        // The lanes of an area are divided among those that fly, all of them.
+        complete: mission.scenario.area.is_some()
+            || flying().count() == mission.goals.len().min(vehicles.len()),
         vehicles,
         totals: Totals { path_m: rounded(plan.total_m() as f32), makespan_s: rounded(makespan_s) },
         safety: Safety {

@@ -2,10 +2,12 @@
 
 use anyhow::{anyhow, bail};
 use companion::planner::coverage::{self, Error, Workspace};
-use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, Parts, Share};
+use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, CoverageView, Parts, Share};
 use companion::storage::mission_file::{Block, Kind};
 use planner_core::Point;
+use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::Unit;
+use planner_core::coverage::transit::Transit;
 use planner_core::flight::PathError;
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
@@ -13,7 +15,7 @@ use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 use super::ready::{Mission, SwarmPlan, schedule_config};
 use crate::area::MOST_VERTICES;
 use crate::autopilot::VehicleLimits;
-use crate::capacity::{Board, GATES, VEHICLES, WAYPOINTS, on_heap};
+use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::map;
 use crate::scenario::Scenario;
@@ -172,6 +174,23 @@ impl Mission {
     /// The plan of a coverage mission.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
         self.plan_area(&mut on_heap(DeskWorkspace::new))
+    }
+
+    /// What of the area is more than a board holds.
+    pub(super) fn area_excess(&self, view: &CoverageView<'_>, board: &Board) -> Option<String> {
+        let (vertices, rings): (Vec<_>, Vec<_>) = (view.vertices().collect(), view.rings().collect());
+        let zones = Area::new(&vertices, &rings).map(|area| Transit::<BOARD_CORNERS>::empty().learn(area));
+        if matches!(zones, Ok(Err(_))) {
+            return Some(format!(
+                "more outward corners of no-fly zones, {} holds {BOARD_CORNERS}",
+                board.name
+            ));
+        }
+        let mut ws = on_heap(DeskWorkspace::new);
+        match self.plan_area(&mut ws) {
+            Ok(_) => board.area_excess(vertices.len(), ws.tracks().lanes().len()),
+            Err(error) => Some(format!("{error:#}")),
+        }
     }
 
     fn explained(&self, error: &Error) -> anyhow::Error {
