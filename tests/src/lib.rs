@@ -5,6 +5,7 @@ pub mod board;
 pub mod bounds;
 pub mod covered;
 pub mod downfall;
+pub mod edge;
 pub mod fidelity;
 pub mod hostile;
 pub mod logs;

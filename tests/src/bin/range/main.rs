@@ -5,6 +5,7 @@
 
 use anyhow::{Context, Result};
 use clap::Parser;
+use flockmate_tests::edge::{Edge, Outcome};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
@@ -24,6 +25,15 @@ struct Args {
     /// Only this range, metres.
     #[arg(long, value_name = "METRES")]
     range: Option<f32>,
+    /// Strike each seed so often: a vehicle fails near the place where the radio no longer reaches it.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    strikes: usize,
+    /// The first seed of the strikes.
+    #[arg(long, value_name = "SEED", default_value_t = 1)]
+    from: u64,
+    /// The same strikes, but everybody hears everybody.
+    #[arg(long)]
+    heard: bool,
     /// Only this seed, with what the companions said.
     #[arg(long, value_name = "SEED")]
     seed: Option<u64>,
@@ -31,6 +41,9 @@ struct Args {
 
 fn main() -> Result<()> {
     let args = Args::parse();
+    if args.strikes > 0 {
+        return strike(&args);
+    }
     let mut bad = false;
     for (range_m, complete_least) in RANGES {
         if args.range.is_some_and(|only| only != range_m) {
@@ -67,6 +80,44 @@ fn main() -> Result<()> {
         bad |= complete < least || safety != [0; 3] || left > 0;
     }
     if bad {
+        std::process::exit(1);
+    }
+    Ok(())
+}
+
+/// Vehicles that fail at the edge of the range, by the truth.
+fn strike(args: &Args) -> Result<()> {
+    let of_seed = |seed: u64| -> Result<Vec<Outcome>> {
+        let mut edge = Edge::new(seed)?;
+        if args.heard {
+            edge.hear_all();
+        }
+        (0..args.strikes).filter_map(|_| edge.strike().transpose()).collect()
+    };
+    let seeds = args.seed.map_or(args.from..args.from + args.seeds, |seed| seed..seed + 1);
+    let flown: Vec<(u64, Result<Vec<Outcome>>)> =
+        seeds.into_par_iter().map(|seed| (seed, of_seed(seed))).collect();
+    let (mut flights, mut counts) = (0, [0; 5]);
+    for (seed, outcomes) in flown {
+        for outcome in outcomes.with_context(|| format!("seed {seed}"))? {
+            flights += 1;
+            let found = [outcome.wrong.len(), outcome.near_struck.len(), outcome.aloft.len()];
+            let all = [found[0], found[1], found[2], outcome.deadlocks as usize, outcome.arrived];
+            counts.iter_mut().zip(all).for_each(|(sum, count)| *sum += count);
+            if found != [0; 3] {
+                println!("  seed {seed}, {}, {} deadlocks", outcome.what, outcome.deadlocks);
+                outcome.log.iter().filter(|_| args.seed.is_some()).for_each(|line| println!("  {line}"));
+                let lines = [outcome.wrong, outcome.near_struck, outcome.aloft];
+                lines.iter().flatten().for_each(|line| println!("    {line}"));
+            }
+        }
+    }
+    let [wrong, near, aloft, deadlocks, arrived] = counts;
+    println!(
+        "{flights} flights with a failure at the edge of the range: {wrong} wrong, {near} near the vehicle struck, \
+         {aloft} not landed, {deadlocks} deadlocks, {arrived} arrived"
+    );
+    if wrong + aloft > 0 {
         std::process::exit(1);
     }
     Ok(())

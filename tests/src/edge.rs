@@ -1,0 +1,153 @@
+//! Vehicles that fail where their radio no longer reaches the others.
+//!
+//! A flight of the demo with a short radio range, drawn by its seed, is flown once without a fault. Of that flight every moment
+//! is a candidate at which a vehicle on its path leaves the range of all others. Near one of them, from 3 s before to 12 s after, a
+//! fault strikes it, and the flight is flown again. Judged by the truth.
+
+use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::progress::Progress;
+use host_sim::scenario::{self, Fault};
+use host_sim::swarm::{self, Flight};
+
+use crate::swarms::Random;
+use crate::vehicle::ahead;
+
+const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
+/// All is over by then, seconds.
+const TIME_LIMIT_S: f32 = 600.0;
+/// The lines of a fault beside `at_s` and `vehicle`; AHEAD stands for a place on its path.
+pub const SCRIPTS: [&str; 9] = [
+    "kind = 'pilot-takeover'",
+    "kind = 'pilot-takeover'\nduration_s = 30",
+    "kind = 'companion-reset'",
+    "kind = 'battery-low'",
+    "kind = 'gps-loss'",
+    "kind = 'serial-stall'\nduration_s = 8",
+    "kind = 'radio-cut'",
+    "kind = 'kill'",
+    "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD",
+];
+
+/// A mission with a short radio range, its plan, and when who leaves the range of all others.
+pub struct Edge {
+    /// How far the radio reaches, metres.
+    pub range_m: f32,
+    mission: Mission,
+    plan: Box<SwarmPlan>,
+    /// When, seconds, and the index of the vehicle.
+    leaves: Vec<(f32, usize)>,
+    rng: Random,
+}
+
+/// What came of one flight.
+#[derive(Debug, Default)]
+pub struct Outcome {
+    /// What struck whom, and when.
+    pub what: String,
+    /// What the companions and the referee said, in order.
+    pub log: Vec<String>,
+    /// What must not be: contacts of vehicles, and vehicles too near of which none was struck.
+    pub wrong: Vec<String>,
+    /// Others nearer than the safety distance to the vehicle struck.
+    pub near_struck: Vec<String>,
+    /// Vehicles that nothing struck and that had not landed in the end.
+    pub aloft: Vec<String>,
+    /// Vehicles that stood for 20 s, as the referee counts them.
+    pub deadlocks: u32,
+    /// Vehicles that landed at their goals.
+    pub arrived: usize,
+}
+
+impl Edge {
+    /// The mission of a seed, flown once without a fault.
+    ///
+    /// # Errors
+    /// It cannot be planned or flown.
+    pub fn new(seed: u64) -> anyhow::Result<Self> {
+        let mut rng = Random::new(seed);
+        let mut scenario = scenario::parse(DEMO, "demo.toml")?;
+        let range_m = rng.uniform(4.0, 20.0);
+        (scenario.seed, scenario.simulation.radio_range_m) = (seed, range_m);
+        scenario.simulation.time_limit_s = TIME_LIMIT_S;
+        let mut mission = Mission::prepare(scenario, &Progress::hidden())?;
+        let plan = mission.plan()?;
+        let flight = swarm::fly(&mission, &plan, "fly", false, &Progress::hidden())?;
+        let leaves = leaves(&flight, range_m);
+        Ok(Self { range_m, mission, plan, leaves, rng })
+    }
+
+    /// From now on everybody hears everybody: what the failures alone do.
+    pub fn hear_all(&mut self) {
+        self.mission.scenario.simulation.radio_range_m = 500.0;
+    }
+
+    /// The next flight with a fault; none where nobody leaves the range of the others.
+    ///
+    /// # Errors
+    /// It cannot be flown.
+    pub fn strike(&mut self) -> anyhow::Result<Option<Outcome>> {
+        if self.leaves.is_empty() {
+            return Ok(None);
+        }
+        let (left_s, index) = self.leaves[self.rng.below(self.leaves.len())];
+        let script = SCRIPTS[self.rng.below(SCRIPTS.len())];
+        let at_s = (left_s + self.rng.uniform(-3.0, 12.0)).max(1.0);
+        let id = self.plan.flights[index].id;
+        self.mission.scenario.faults = self.faults(script, at_s, id, index)?;
+        let flight = swarm::fly(&self.mission, &self.plan, "fly", false, &Progress::hidden())?;
+        let what = format!("range {:.1} m, vehicle {id} at {at_s:.1} s, {script:?}", self.range_m);
+        Ok(Some(Outcome { what, ..judge(&flight, id) }))
+    }
+
+    fn faults(&self, script: &str, at_s: f32, id: u8, index: usize) -> anyhow::Result<Vec<Fault>> {
+        let [x, y, z] = ahead(&self.plan.flights[index].path).into();
+        let script = script.replace("AHEAD", &format!("[{x}, {y}, {z}]"));
+        let text = format!("{DEMO}\n[[faults]]\nat_s = {at_s}\nvehicle = {id}\n{script}\n");
+        Ok(scenario::parse(&text, "faults.toml")?.faults)
+    }
+}
+
+/// When who leaves the range of all others, in the air.
+fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
+    let tracks = &flight.tracks;
+    let mut leaves = Vec::new();
+    for (i, own) in tracks.iter().enumerate() {
+        let mut was_alone = true;
+        for (k, (t_s, place)) in own.iter().enumerate() {
+            let others = tracks.iter().enumerate().filter(|(j, _)| *j != i);
+            let mut others = others.filter_map(|(_, track)| track.get(k.min(track.len().saturating_sub(1))));
+            let alone = others.all(|(_, other)| (other - place).norm() > range_m);
+            let moves = own.get(k + 5).is_some_and(|(_, later)| (later - place).norm() > 0.5);
+            if alone && !was_alone && moves {
+                leaves.push((*t_s, i));
+            }
+            was_alone = alone;
+        }
+    }
+    leaves
+}
+
+fn judge(flight: &Flight, struck: u8) -> Outcome {
+    let mut outcome = Outcome { deadlocks: flight.result.safety.deadlocks, ..Outcome::default() };
+    for e in &flight.log {
+        let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
+        outcome.log.push(text.clone());
+        let by_struck = e.vehicle == Some(struck) || e.text.ends_with(&format!("vehicle no. {struck}"));
+        let own_wall = e.text.contains("touches an obstacle") && e.vehicle == Some(struck);
+        if e.text.contains("nearer than") && by_struck {
+            outcome.near_struck.push(text);
+        } else if e.text.contains("nearer than") || (e.text.contains("touches") && !own_wall) {
+            outcome.wrong.push(text);
+        } else if e.text.contains("is hit by falling") {
+            outcome.near_struck.push(text);
+        }
+    }
+    for v in &flight.result.vehicles {
+        outcome.arrived += usize::from(v.reached && v.landed);
+        let stays = v.landed || v.end.starts_with("Ready") || v.end.starts_with("Scheduled");
+        if !stays && v.id != struck {
+            outcome.aloft.push(format!("vehicle {} ends in {}", v.id, v.end));
+        }
+    }
+    outcome
+}
