@@ -43,9 +43,9 @@ fn main() {
 fn drain(companion: &mut Small, now: Instant) -> usize {
     while let Some(event) = companion.poll_event() {
         println!("{now:?} {event:?}");
-        if event == Event::PlanRequested {
+        if let Event::PlanRequested(wanted) = event {
             // The answer may come any time later: setpoints do not wait for it.
-            companion.handle_plan(now, Err(PlanFailure::NoRoadmap));
+            companion.handle_plan(now, wanted, Err(PlanFailure::NoRoadmap));
         }
     }
     let (mut sent, mut buffer) = (0, [0; MAX_SENT]);

@@ -1,6 +1,7 @@
 //! The companion itself: routes frames in, runs the mission table, makes frames out.
 
 mod board;
+mod division;
 mod frames;
 mod inputs;
 mod replanning;
@@ -16,7 +17,7 @@ use crate::autopilot::Kind;
 use crate::autopilot::requests::{Requests, Situation};
 use crate::autopilot::telemetry::Telemetry;
 use crate::config::{Checked, Config, ConfigError, PlanFailure};
-use crate::events::{Event, Link};
+use crate::events::{Event, Link, Wanted};
 use crate::guidance::{Guidance, Scene, Stats};
 use crate::link::frame::Counters;
 use crate::link::{Fresh, Links};
@@ -34,6 +35,10 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 const REPORT_EVERY: Duration = Duration::from_secs(5);
 /// On the ground the table is looked at five times a second.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
+/// What all agree on in a coverage mission is reported so often.
+const ROSTER_EVERY: Duration = Duration::from_millis(500);
+/// The same while a division is under way.
+const ROSTER_DIVIDING: Duration = Duration::from_millis(200);
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// After so long without setpoints Guided stops, seconds: between these, the time in which cruise speed flies the margin.
 /// ArduCopter's own 3 s would fly the last velocity on through walls while a link stalls; the shortest are four setpoints.
@@ -77,16 +82,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     #[inline(always)]
     fn of(Checked { config, start }: Checked<V>) -> Self {
         const { assert!(V >= 1 && W >= 2, "a swarm holds this vehicle, a path two points") };
+        let mut neighbours =
+            Neighbours::new(&config.roster, config.system_id, config.cruise_mps.max(config.climb_mps));
+        if let Some(down_s) = config.division {
+            neighbours.form_fleet(down_s);
+        }
         Self {
             now: Instant::ZERO,
             timers: Timers::default(),
             links: Links::default(),
             telemetry: Telemetry::new(config.mission_crc == 0),
-            neighbours: Neighbours::new(
-                &config.roster,
-                config.system_id,
-                config.cruise_mps.max(config.climb_mps),
-            ),
+            neighbours,
             detours: Detours::default(),
             requests: Requests::default(),
             mission: Mission::new(start),
@@ -201,18 +207,30 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if self.timers.take(Timer::Swarm, now, every) {
             self.links.set_due(Link::Swarm, Fresh::Position, self.telemetry.position_at.is_some());
             self.links.set_due(Link::Swarm, Fresh::Intent, true);
+            if let Some(fleet) = self.neighbours.fleet() {
+                let every = if fleet.is_dividing() { ROSTER_DIVIDING } else { ROSTER_EVERY };
+                let due = self.timers.take(Timer::Roster, now, every);
+                self.links.set_due(Link::Swarm, Fresh::Roster, due);
+            }
         }
     }
 
-    /// Takes the planner's answer in: the mission's plan, or the way around asked for by [`Self::detour`]. Ignored unless one
-    /// was asked for.
-    pub fn handle_plan(&mut self, now: Instant, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
+    /// Takes the planner's answer in. Ignored unless it was asked for.
+    pub fn handle_plan(
+        &mut self,
+        now: Instant,
+        wanted: Wanted,
+        outcome: Result<&VehiclePlan<W, G>, PlanFailure>,
+    ) {
         self.now = now;
-        match (self.mission.state(), outcome) {
-            (State::Planning, Ok(plan)) => self.mission.take_plan(plan),
-            (State::Planning, Err(failure)) => self.mission.fail(failure),
-            (State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
-            (State::Replanning | State::PadReplanning, Err(failure)) => self.miss_detour(failure),
+        match (wanted, self.mission.state(), outcome) {
+            (Wanted::Mission, State::Planning, Ok(plan)) => self.mission.take_plan(plan),
+            (Wanted::Mission, State::Planning, Err(failure)) => self.mission.fail(failure),
+            (Wanted::Detour, State::Replanning | State::PadReplanning, Ok(plan)) => self.take_detour(plan),
+            (Wanted::Detour, State::Replanning | State::PadReplanning, Err(failure)) => {
+                self.miss_detour(failure);
+            }
+            (Wanted::Division, _, outcome) => self.take_division(outcome),
             _ => return,
         }
         self.run_table();

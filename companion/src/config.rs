@@ -64,6 +64,9 @@ pub struct Config<const V: usize> {
     pub swarm_hz: u8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
+    /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a lost vehicle may take until
+    /// it is down, seconds.
+    pub division: Option<f32>,
     /// System ids whose commands, parameters and files count; 0 is no id.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
@@ -127,6 +130,7 @@ impl<const V: usize> Config<V> {
             battery_low_percent: 15,
             swarm_hz: 5,
             geofence: None,
+            division: None,
             ground_stations: USUAL_GROUND_STATIONS,
         }
     }

@@ -11,11 +11,22 @@ pub enum Link {
     Swarm,
 }
 
+/// What the shell is to plan.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wanted {
+    /// The mission's plan.
+    Mission,
+    /// A way around, or aside: [`crate::Companion::detour`] says from where and around what.
+    Detour,
+    /// The mission's plan after losses: [`crate::Companion::losses`] says which.
+    Division,
+}
+
 /// What the shell should know.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// Plan, and answer with [`crate::Companion::handle_plan`].
-    PlanRequested,
+    /// Plan this, and answer with [`crate::Companion::handle_plan`].
+    PlanRequested(Wanted),
     /// Send what waits, then start the companion again, from the newest roadmap, mission and parameters.
     RestartRequested,
     /// The mission moved on.

@@ -142,6 +142,8 @@ pub struct Guidance {
     pub retreating: bool,
     /// How far ahead it waits, for the neighbours' sake, metres.
     waits_m: f32,
+    /// It flies no further along its path for now, metres.
+    halt_m: f32,
     /// Where it goes back to.
     back_to_m: Option<f32>,
     /// No place along its path is better.
@@ -221,6 +223,7 @@ impl Guidance {
             shelter: Search::default(),
             retreating: false,
             waits_m: f32::INFINITY,
+            halt_m: f32::INFINITY,
             back_to_m: None,
             nowhere: false,
             trapped_since: None,
@@ -311,6 +314,9 @@ impl Guidance {
             let along_m = if self.on_path { self.tracker.along_m } else { -plan.climb_m };
             let own = Own { rank: scene.rank, position, along_m, path: &plan.path, detours: scene.detours };
             self.advice = deconflict::advise(&self.deconflict, &own, &plan.gates, neighbours.at(now));
+            if self.on_path {
+                self.advice.stop_within_m = self.advice.stop_within_m.min((self.halt_m - along_m).max(0.0));
+            }
         }
         if let Some(plan) = scene.plan {
             let next = plan.gates.get(self.opened);

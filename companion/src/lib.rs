@@ -62,7 +62,7 @@ mod timers;
 
 pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
-pub use events::{Event, Link};
+pub use events::{Event, Link, Wanted};
 pub use mission::State;
 pub use time::{Duration, Instant};
 

@@ -6,6 +6,7 @@ pub mod echo;
 pub mod frame;
 pub mod intent;
 pub mod outbox;
+pub mod roster;
 pub(crate) mod senders;
 
 use self::budget::Budget;
@@ -36,6 +37,8 @@ pub(crate) enum Fresh {
     Intent,
     /// What others do not hear of each other, passed on.
     Relay,
+    /// What all agree on in a coverage mission.
+    Roster,
 }
 
 /// Both links.

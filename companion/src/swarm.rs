@@ -1,6 +1,7 @@
 //! The other vehicles: what is heard of them, and ways around them.
 
 pub(crate) mod detour;
+pub mod fleet;
 pub mod neighbours;
 pub(crate) mod obstacles;
 pub(crate) mod sweep;

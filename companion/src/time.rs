@@ -3,11 +3,11 @@
 use core::ops::{Add, Sub};
 
 /// A point in time, microseconds since the shell's own start. Never goes back; 2⁶⁴ µs are 584 000 years.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Instant(u64);
 
 /// A span of time in microseconds, never negative.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Duration(u64);
 
 impl Instant {
@@ -59,6 +59,11 @@ impl Duration {
     /// In microseconds.
     pub const fn micros(self) -> u64 {
         self.0
+    }
+
+    /// What it is longer than `other`; nothing where it is shorter.
+    pub const fn beyond(self, other: Self) -> Self {
+        Self(self.0.saturating_sub(other.0))
     }
 
     /// In seconds.

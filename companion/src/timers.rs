@@ -14,6 +14,8 @@ pub(crate) enum Timer {
     Heartbeat,
     /// Position and intent to the swarm.
     Swarm,
+    /// What all agree on in a coverage mission, to the swarm.
+    Roster,
     /// The request that the state repeats: mode, take-off, landing, disarming.
     Request,
     /// A request for the EKF origin.
@@ -28,7 +30,7 @@ pub(crate) enum Timer {
     OriginReport,
 }
 
-const TIMERS: usize = 9;
+const TIMERS: usize = 10;
 /// Those that wake the shell.
 const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 

@@ -1,9 +1,11 @@
 //! What answers a companion on board that asks for a plan: the swarm's from roadmap and mission file as they lie in flash, or a
 //! way around what is in its way.
 
+use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{Kind, MissionView};
-use companion::{PlanFailure, planner};
+use companion::swarm::fleet::{DIVISIONS, Lots};
+use companion::{PlanFailure, Wanted, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
 use planner_core::flight::VehiclePlan;
@@ -36,13 +38,20 @@ pub struct Own {
     obstacles: Vec<KeepOff, OBSTACLES>,
     /// Whether there were more.
     crowded: bool,
+    losses: Vec<Lots<VEHICLES>, DIVISIONS>,
     nodes: Vec<u16, WAYPOINTS>,
 }
 
 impl Own {
     /// All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
-        Self { plan: VehiclePlan::new(), obstacles: Vec::new(), crowded: false, nodes: Vec::new() }
+        Self {
+            plan: VehiclePlan::new(),
+            obstacles: Vec::new(),
+            crowded: false,
+            losses: Vec::new(),
+            nodes: Vec::new(),
+        }
     }
 }
 
@@ -67,11 +76,19 @@ pub struct Planner<'a> {
 }
 
 impl Planner<'_> {
-    /// What the companion would have flown around; `None` if it asks for the mission's plan.
-    pub fn note_detour(&mut self, companion: &BoardCompanion) -> Option<DetourRequest> {
-        let Own { obstacles, crowded, .. } = &mut *self.memory.own;
+    /// What the plan that the companion wants follows from: what was lost, or what it would have flown around.
+    pub fn note(&mut self, wanted: Wanted, companion: &BoardCompanion) -> Option<DetourRequest> {
+        let Own { obstacles, crowded, losses, .. } = &mut *self.memory.own;
         obstacles.clear();
+        losses.clear();
         *crowded = false;
+        if wanted == Wanted::Division {
+            // As many as the companion keeps, and the one under way.
+            companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
+        }
+        if wanted != Wanted::Detour {
+            return None;
+        }
         companion.detour(|obstacle| *crowded |= obstacles.push(obstacle).is_err())
     }
 
@@ -82,8 +99,12 @@ impl Planner<'_> {
     /// Why there is none.
     pub fn answer(
         &mut self,
+        wanted: Wanted,
         detour: Option<&DetourRequest>,
     ) -> Result<&VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+        if wanted == Wanted::Detour && detour.is_none() {
+            return Err(PlanFailure::Unreachable);
+        }
         if !boards::begin(Work::Plan, self.files) {
             return Err(PlanFailure::Invalid);
         }
@@ -142,9 +163,8 @@ fn plan_area<'m>(
     let Memory { scratch, swarm, own } = memory;
     let ws = scratch.area();
     planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
-        mission,
-        area,
-        GATES,
+        &Request { mission, view: area, gates_most: GATES },
+        own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,
         &mut ws.schedule,
         swarm,

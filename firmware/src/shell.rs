@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_SENT};
 use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash};
-use companion::{Companion, Event, Link, PlanFailure, State};
+use companion::{Companion, Event, Link, PlanFailure, State, Wanted};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -50,7 +50,7 @@ pub struct Shell {
     /// The companion's next step may be due earlier than thought.
     steps: Shared<()>,
     /// The companion asks for a plan.
-    wants_plan: Shared<()>,
+    wants_plan: Shared<Wanted>,
     /// There may be something to do that takes long.
     works: Shared<()>,
     /// When a restart was asked for, milliseconds; 0 if none was.
@@ -199,7 +199,7 @@ impl Shell {
             let result = work(companion, now());
             while let Some(event) = companion.poll_event() {
                 match event {
-                    Event::PlanRequested => self.wants_plan.signal(()),
+                    Event::PlanRequested(wanted) => self.wants_plan.signal(wanted),
                     Event::RestartRequested => self.ask_restart(),
                     Event::StateChanged { to: State::Done | State::Aborted, .. } => {
                         if let Some(reported) = self.setpoints.take(now_ms()) {
@@ -310,10 +310,10 @@ impl Shell {
     /// a roadmap in it is planned on.
     pub async fn work(&'static self, planner: &mut Planner<'_>, flash: &mut impl Flash) -> ! {
         loop {
-            if self.wants_plan.try_take().is_some() {
-                let detour = self.hold(|companion| planner.note_detour(companion));
-                let answer: Result<_, PlanFailure> = planner.answer(detour.as_ref());
-                self.with(|companion, now| companion.handle_plan(now, answer));
+            if let Some(wanted) = self.wants_plan.try_take() {
+                let detour = self.hold(|companion| planner.note(wanted, companion));
+                let answer: Result<_, PlanFailure> = planner.answer(wanted, detour.as_ref());
+                self.with(|companion, now| companion.handle_plan(now, wanted, answer));
             }
             if !self.serve_flash(flash).await {
                 self.works.wait().await;

@@ -7,8 +7,8 @@ mod ready;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
-use companion::PlanFailure;
 use companion::storage::mission_file::{Block, MissionGoal};
+use companion::{PlanFailure, Wanted};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::flight::{PathError, Task};
@@ -200,17 +200,27 @@ impl Mission {
         }
     }
 
-    /// Answers a companion that asks for a plan: its part of the swarm's, or a way around what is in its way.
+    /// Answers a companion that asks for a plan: its part of the swarm's, the same after losses, or a way around.
     pub fn answer(
         &self,
         plan: &SwarmPlan,
         index: usize,
+        wanted: Wanted,
         companion: &DeskCompanion,
     ) -> Result<Box<OwnPlan>, PlanFailure> {
-        let mut obstacles = Vec::new();
-        match companion.detour(|obstacle| obstacles.push(obstacle)) {
-            Some(request) => self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
-            None => self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity),
+        let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
+        match wanted {
+            Wanted::Mission => own(plan),
+            Wanted::Division => {
+                let divided = self.plan_losses(companion.losses()).map_err(|_| PlanFailure::Unreachable)?;
+                own(&divided)
+            }
+            Wanted::Detour => {
+                let mut obstacles = Vec::new();
+                let request = companion.detour(|obstacle| obstacles.push(obstacle));
+                let request = request.ok_or(PlanFailure::Unreachable)?;
+                self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable)
+            }
         }
     }
 

@@ -16,7 +16,8 @@
 //! | `exact.rs` | the least largest cost of all contiguous divisions |
 //! | `bound.rs` | a lower bound on it |
 //! | `flights.rs` | routes as flights of the swarm: paths, pictures, order |
-//! | `divide.rs` | what is left after a loss, divided among the rest |
+//! | `divide.rs` | what is left after a loss, as a path of its own |
+//! | `losses.rs` | that divided among those that fly on, as flights from where they hold |
 //!
 //! Places are metres, east and north, in the mission frame: [`Flat`]. A lane is two points; its waypoints follow from
 //! lane and index and are not stored.
@@ -30,6 +31,7 @@ pub mod flights;
 pub mod footprint;
 mod intervals;
 mod lanes;
+pub mod losses;
 pub mod order;
 pub mod pack;
 mod patches;

@@ -83,6 +83,17 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
+/// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes of work for each.
+pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
+    let mut text = flown(random, Shape::Convex, vehicles);
+    let keep = |line: &&str| !line.starts_with("radio_loss") && !line.starts_with("cruise_mps");
+    text = text.lines().filter(keep).map(|line| format!("{line}\n")).collect();
+    text =
+        text.replace("[mission]\n", &format!("[mission]\ncruise_mps = {:.1}\n", between(random, 3.0, 6.0)));
+    text = text.replace("time_limit_s = 7200.0", "time_limit_s = 2400.0");
+    text + &format!("radio_loss = {loss}\n")
+}
+
 /// A random scenario with so many vehicles. Not each can be planned: corners may lie on one line, a hole outside.
 pub fn scenario(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let radius = between(random, 40.0, 250.0);

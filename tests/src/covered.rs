@@ -1,11 +1,13 @@
 //! Coverage missions flown, and judged by where their pictures were truly taken.
 
+use std::fmt::Write as _;
+
 use host_sim::coverage::flown;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::report::Event;
 use host_sim::result::MissionResult;
-use host_sim::swarm;
+use host_sim::{scenario, swarm};
 
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
 ///
@@ -19,6 +21,22 @@ pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)>
     result.complete &= judged.complete;
     result.coverage = Some(judged.result);
     Ok((result, flight.log))
+}
+
+/// The same from a scenario's text: its result, and what was said that matters.
+///
+/// # Errors
+/// Why it is not flown.
+pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
+    let said = |error: anyhow::Error| format!("{error:#}");
+    let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let (result, log) = fly(&mut mission).map_err(said)?;
+    let mut lines = String::new();
+    for event in log.iter().filter(|event| event.text.contains(':')) {
+        let _ = writeln!(lines, "{:8.2} {:?} {}", event.t_s, event.vehicle, event.text);
+    }
+    Ok((result, lines))
 }
 
 /// What is wrong with a flight.

@@ -262,13 +262,13 @@ impl Flight {
             }
         }
         while let Some(event) = self.companion.poll_event() {
-            if event == Event::PlanRequested {
+            if let Event::PlanRequested(wanted) = event {
                 let answer = if self.companion.detour(|_| {}).is_some() {
                     Err(companion::PlanFailure::Unreachable)
                 } else {
                     Ok(plan())
                 };
-                self.companion.handle_plan(self.now, answer.as_ref().map_err(|failure| *failure));
+                self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|failure| *failure));
             }
         }
     }

@@ -157,3 +157,8 @@ pub fn chromium() -> Option<PathBuf> {
     }
     found
 }
+
+/// A number from the environment, for tests that draw more instances where they are asked to.
+pub fn number(name: &str, usual: u64) -> u64 {
+    std::env::var(name).ok().and_then(|n| n.parse().ok()).unwrap_or(usual)
+}

@@ -106,7 +106,7 @@ impl Pair {
         while let Some(event) = self.companion.poll_event() {
             match event {
                 Event::RestartRequested | Event::WaitsForStart { .. } => {}
-                Event::PlanRequested => self.companion.handle_plan(self.now(), Ok(&plan())),
+                Event::PlanRequested(wanted) => self.companion.handle_plan(self.now(), wanted, Ok(&plan())),
                 Event::StateChanged { to, .. } => self.states.push((self.now_us, to)),
             }
         }

@@ -161,8 +161,8 @@ impl Victims {
 
     fn drain(&mut self) {
         while let Some(event) = self.companion.poll_event() {
-            if event == Event::PlanRequested {
-                self.companion.handle_plan(self.now, Ok(&plan()));
+            if let Event::PlanRequested(wanted) = event {
+                self.companion.handle_plan(self.now, wanted, Ok(&plan()));
             }
         }
         let mut out = [0; 512];

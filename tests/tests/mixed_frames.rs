@@ -118,7 +118,7 @@ fn fly(seed: u64) -> Errors {
         let now_us = (step + 1) * STEP_US;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission.map, &mut radio, &places, &mut log).expect("it has no board");
-            if member.wants_plan {
+            if member.wants_plan.is_some() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
                 member.answer_plan(now_us, Ok(&own));
             }

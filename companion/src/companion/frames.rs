@@ -14,6 +14,7 @@ use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTE
 use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
+use crate::link::roster::Roster;
 use crate::link::senders::{Kind as AnswerKind, Sender};
 use crate::link::{Fresh, budget};
 use crate::services::Heard;
@@ -106,6 +107,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
                 if ours && relay.mission_crc == self.config.mission_crc {
                     self.neighbours.handle_relay(self.now, id, &relay);
+                }
+                return;
+            }
+            if let Some(roster) = Roster::decode(frame.padded(), id) {
+                if roster.mission_crc == self.config.mission_crc {
+                    let waits = self.waits_on_ground();
+                    self.neighbours.handle_roster(id, &roster, waits);
                 }
                 return;
             }

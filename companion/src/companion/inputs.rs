@@ -7,6 +7,7 @@ use crate::autopilot::requests::battery_reported;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};
+use crate::swarm::fleet::Fleet;
 use crate::swarm::neighbours::STANDING_MPS;
 use crate::time::Duration;
 
@@ -17,6 +18,8 @@ const STANDING_DRIFT_M: f32 = 0.3;
 /// A vehicle whose estimate is higher or lower than its pad by more than this does not take off, metres: real estimates on
 /// the ground were seen up to 1.1 m off.
 const START_HEIGHT_M: f32 = 1.5;
+/// The row `NeighboursSilent` stops a vehicle a second after this: when its lease has run out.
+const LEASE_ENDS: Duration = Duration::from_secs(19);
 /// A gate this little ahead is no way to fly on, metres.
 const FLIES_ON_M: f32 = 0.2;
 /// A vehicle on the ground moves up or down more slowly, m/s.
@@ -62,13 +65,21 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             },
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
-            neighbour_age: match self.guidance.returning || self.detours.lands() || self.flies_on() {
-                true => Duration::default(),
-                false => self.neighbours.silence(now, self.mission.entered_at()),
+            neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
+                fleet.unheard_for(now).beyond(LEASE_ENDS)
+            } else {
+                match self.guidance.returning || self.detours.lands() || self.flies_on() {
+                    true => Duration::default(),
+                    false => self.neighbours.silence(now, self.mission.entered_at()),
+                }
             },
             way_free: self.flies_on(),
             out_of_range: self.neighbours.all_beyond(),
-            neighbour_heard: self.neighbours.linked_within(now, HEARTBEAT_EVERY),
+            neighbour_heard: self.is_linked(),
+            excluded: self.neighbours.fleet().is_some_and(Fleet::is_excluded),
+            holds_to_divide: self.holds_to_divide(),
+            division_ready: self.mission.has_division(),
+            undivided: self.is_undivided(),
             plan_ready: self.mission.plan().is_some(),
             plan_failed: self.mission.failure().is_some(),
             roadmap_bad: self.mission.failure() == Some(PlanFailure::NoRoadmap),
@@ -104,7 +115,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && battery_reported(t, self.config.battery_low_percent, now)
                 && !self.detours.is_blocked()
                 && self.neighbours.is_clear_since(self.mission.entered_at())
-                && (self.neighbours.linked_within(now, HEARTBEAT_EVERY) || self.neighbours.all_rest()),
+                && (self.is_linked() || self.neighbours.all_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
             path_done: follow && self.guidance.path_done(scene),
             at_goal: self.guidance.at_goal(scene),
@@ -147,6 +158,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             no_way_around: self.detours.gives_up(),
             underneath: self.detours.underneath(&view),
             standing,
+        }
+    }
+
+    /// Whether others are heard and hear it: in a coverage mission a majority of those that take part.
+    fn is_linked(&self) -> bool {
+        match self.neighbours.fleet() {
+            Some(fleet) => fleet.unheard_for(self.now) < HEARTBEAT_EVERY,
+            None => self.neighbours.linked_within(self.now, HEARTBEAT_EVERY),
         }
     }
 

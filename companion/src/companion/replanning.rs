@@ -5,7 +5,7 @@ use planner_core::flight::VehiclePlan;
 
 use super::Companion;
 use crate::config::PlanFailure;
-use crate::events::Event;
+use crate::events::{Event, Wanted};
 use crate::guidance::Scene;
 use crate::mission::State;
 use crate::swarm::detour::Aim;
@@ -51,10 +51,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.guidance.forget_trap();
         self.mission.forget_failure();
         // Full only if the shell does not drain; then the way around is late.
-        let _ = self.events.push_back(Event::PlanRequested);
+        let _ = self.events.push_back(Event::PlanRequested(Wanted::Detour));
     }
 
-    /// What the shell is asked for by [`Event::PlanRequested`] where it is a way around; `None` if it is the mission's plan.
+    /// What the shell is asked for by [`Wanted::Detour`]; `None` if nothing is, or no way around can be planned.
     /// `tell` is given all that is to be kept off.
     pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);

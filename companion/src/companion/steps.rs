@@ -3,7 +3,7 @@
 use super::{Companion, IDLE_EVERY, REPORT_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
 use crate::autopilot::requests::DISARM_AFTER;
 use crate::config::PlanFailure;
-use crate::events::{Event, Link};
+use crate::events::{Event, Link, Wanted};
 use crate::guidance::Scene;
 use crate::link::Fresh;
 use crate::margins;
@@ -37,6 +37,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if core::mem::take(&mut self.guidance.turned) {
             self.links.set_due(Link::Swarm, Fresh::Intent, true);
         }
+        self.step_division();
         self.name_who_never_starts();
         self.look_around();
         self.run_table();
@@ -57,7 +58,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let off_plan = self.guidance.returning || self.guidance.aside || self.detours.is_flying();
         let along = Along {
             progress_m: self.guidance.progress_m(state, &self.scene()),
-            follows: state == State::Follow && !off_plan,
+            // Where it brakes along its path it takes the pictures that it passes.
+            follows: state.holds_place() && !off_plan,
         };
         self.mission.step_task(along, self.now, &mut self.links);
     }
@@ -142,7 +144,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
-                let _ = self.events.push_back(Event::PlanRequested);
+                if let Some(fleet) = self.neighbours.fleet_mut() {
+                    fleet.begin(now);
+                }
+                let _ = self.events.push_back(Event::PlanRequested(Wanted::Mission));
             }
             Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
             Action::HoldHere => self.guidance.hold_at(position),
@@ -166,6 +171,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.guidance.begin_path(now);
                 self.guidance.aside = self.detours.is_aside();
             }
+            Action::FlyDivision => {
+                self.mission.fly_division();
+                self.guidance.run(now);
+            }
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
@@ -180,7 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
         match from {
-            Follow | Paused | Alone | Blocked | Replanning | Stopping | Land | Disarm => {
+            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land | Disarm => {
                 self.guidance.brake();
             }
             // Off the path, or not known to be on it: the reference may be beyond a wall.

@@ -13,6 +13,7 @@ use crate::guidance::Setpoint;
 use crate::link::Fresh;
 use crate::link::frame;
 use crate::link::intent::{self, Intent};
+use crate::link::roster;
 use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
@@ -47,6 +48,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             if self.guidance.hold.is_on() {
                 self.guidance.hold.note(self.now);
             }
+            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        if link == Link::Swarm
+            && self.links.take_due(link, Fresh::Roster)
+            && let Some(mut roster) = self.neighbours.roster()
+        {
+            (roster.system_id, roster.mission_crc) = (system, self.config.mission_crc);
+            let mut payload = [0; roster::LENGTH];
+            let len = roster.encode(&mut payload);
+            let header = self.links.header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
@@ -197,6 +208,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     | Follow
                     | Blocked
                     | Replanning
+                    | Dividing
                     | Paused
             )
             || matches!(self.mission.state(), Land | LandingHeld | Disarm | Done)
@@ -269,7 +281,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 last.into_iter()
                     .for_each(|last| add(Point::new(last.x, last.y, self.guidance.ground_m(plan))));
             }
-            Follow | Paused | Alone | Blocked | Replanning | Stopping => {
+            Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping => {
                 column = false;
                 add(setpoint);
                 let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);

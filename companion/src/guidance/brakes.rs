@@ -40,8 +40,10 @@ impl Guidance {
         }
         let alone = state == State::Alone;
         // On its way down it goes on, and on its way aside.
-        let waits = matches!(state, State::Follow | State::Blocked | State::Replanning | State::Alone)
-            && matches!(self.phase, Phase::Path | Phase::Join)
+        let waits = matches!(
+            state,
+            State::Follow | State::Blocked | State::Replanning | State::Dividing | State::Alone
+        ) && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
         let beside_m = safety_m + retreat::BESIDE_M;

@@ -28,9 +28,26 @@ impl Guidance {
         self.waypoints = Waypoints::default();
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
+        self.opened = 0;
         // Whatever kept it from going on did so on the other path.
         self.filter.reset();
         self.run(now);
+    }
+
+    /// It flies no further along its path than this for now, metres; ∞ for all of it.
+    pub(crate) fn halt_at(&mut self, along_m: f32) {
+        self.halt_m = along_m;
+    }
+
+    /// Whether the raw point is where the setpoint stands: another path may begin beside it.
+    pub(crate) fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Where along its path it could stop now, metres.
+    pub(crate) fn stops_by_m(&self) -> f32 {
+        let braking_m = self.door.braking_m(false);
+        self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
     /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down

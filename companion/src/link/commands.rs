@@ -222,6 +222,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
                 Alone,
                 Blocked,
                 Replanning,
+                Dividing,
             ],
         ),
         PAUSE_CONTINUE if command.param1 == 0.0 => {
@@ -255,7 +256,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
                 return Some(ACCEPTED);
             }
             let guard = if state == PilotReturned { Guard::ResumedOnPath } else { Guard::ResumeCommanded };
-            (&mut pending.resume, guard, &[Climb, Follow, Blocked, Replanning])
+            (&mut pending.resume, guard, &[Climb, Follow, Blocked, Replanning, Dividing])
         }
         PAUSE_CONTINUE => return Some(DENIED),
         LAND if matches!(state, Failsafe | Aborted) => {

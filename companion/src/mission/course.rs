@@ -37,6 +37,12 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     vague_since: Option<Instant>,
     waits: Waits,
     tasks: Tasks,
+    /// Divisions that count for the plan.
+    division: usize,
+    /// Whether the part that the last one gives has come and is not flown yet.
+    fresh: bool,
+    /// What the shell was asked to divide, and when.
+    asked: Option<(u32, Instant)>,
 }
 
 impl<const W: usize, const G: usize> Mission<W, G> {
@@ -56,6 +62,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             vague_since: None,
             waits: Waits::default(),
             tasks: Tasks::default(),
+            division: 0,
+            fresh: false,
+            asked: None,
         }
     }
 
@@ -178,7 +187,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// A plan is requested: there is none, and no failure.
     pub(crate) fn forget_plan(&mut self) {
-        (self.plan, self.failure) = (None, None);
+        (self.plan, self.failure, self.division) = (None, None, 0);
+        (self.fresh, self.asked) = (false, None);
         self.tasks.reset();
     }
 
@@ -193,6 +203,55 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             true => self.plan = Some(plan.clone()),
             false => self.failure = Some(PlanFailure::Invalid),
         }
+    }
+
+    /// Whether the part that the last division gives has come and is not flown yet.
+    pub(crate) fn has_division(&self) -> bool {
+        self.fresh
+    }
+
+    /// It is flown.
+    pub(crate) fn fly_division(&mut self) {
+        self.fresh = false;
+    }
+
+    /// Whether the shell is to be asked for this division: unless it was, less than `again` ago.
+    pub(crate) fn asks_division(&mut self, fingerprint: u32, now: Instant, again: Duration) -> bool {
+        let asked = self.asked.is_some_and(|(of, at)| of == fingerprint && now - at < again);
+        if !asked {
+            self.asked = Some((fingerprint, now));
+        }
+        !asked
+    }
+
+    /// Whether it was, and has not answered yet; now it has.
+    pub(crate) fn asked_division(&mut self, fingerprint: u32) -> bool {
+        let asked = self.asked.is_some_and(|(of, _)| of == fingerprint);
+        self.asked = self.asked.filter(|_| !asked);
+        asked
+    }
+
+    /// Divisions that count for the plan.
+    pub(crate) fn division(&self) -> usize {
+        self.division
+    }
+
+    /// Takes the plan after so many divisions; it is to begin at `place`. Returns whether it does. In the air it is flown
+    /// from the next row of the table on.
+    pub(crate) fn take_division(
+        &mut self,
+        plan: &VehiclePlan<W, G>,
+        place: &Point,
+        division: usize,
+        in_air: bool,
+    ) -> bool {
+        let begins = self.begins_at(plan, place);
+        if begins {
+            self.plan = Some(plan.clone());
+            self.tasks.reset();
+            (self.division, self.fresh) = (division, in_air);
+        }
+        begins
     }
 
     /// Commands what the task wants at this place of the path.

@@ -166,6 +166,14 @@ pub enum Guard {
     Underneath,
     /// Standing still.
     Standing,
+    /// Others have divided the part of this vehicle, or count it as lost.
+    Excluded,
+    /// It stands as far along its path as it promised to fly before the division.
+    HoldsToDivide,
+    /// The division counts, and its part of that has come.
+    DivisionReady,
+    /// No division is under way any more.
+    NothingToDivide,
 }
 
 /// What the guards look at: a snapshot of the vehicle, the commands and the plan.
@@ -189,6 +197,14 @@ pub struct Inputs {
     pub out_of_range: bool,
     /// A neighbour was heard within the last second.
     pub neighbour_heard: bool,
+    /// Others have divided the part of this vehicle, or count it as lost.
+    pub excluded: bool,
+    /// It stands where it promised to wait for a division.
+    pub holds_to_divide: bool,
+    /// The part that the last division gives has come.
+    pub division_ready: bool,
+    /// No division is under way.
+    pub undivided: bool,
     /// A plan is held.
     pub plan_ready: bool,
     /// The shell has none.
@@ -398,6 +414,10 @@ impl Guard {
             Self::NoWayOn => i.no_way_around && i.can_turn_back,
             Self::Underneath => i.underneath > limit,
             Self::Standing => i.standing,
+            Self::Excluded => i.excluded,
+            Self::HoldsToDivide => i.holds_to_divide,
+            Self::DivisionReady => i.division_ready,
+            Self::NothingToDivide => i.undivided,
         }
     }
 }

@@ -47,6 +47,8 @@ pub enum Action {
     MissDetour,
     /// Fly it.
     FlyDetour,
+    /// Fly the part of the area that the division gives.
+    FlyDivision,
     /// Ask to disarm: at once before take-off; after landing only if the autopilot has not done so in four seconds.
     AskDisarm,
     /// Forget MISSION_START, and ask to disarm, again every second.

@@ -60,6 +60,8 @@ pub enum State {
     CancelStart,
     /// A landing was stopped since another vehicle is below, or may be: holds until the column is free.
     LandingHeld,
+    /// Holds on its path, in a coverage mission, until what a lost vehicle left is divided.
+    Dividing,
 }
 
 impl State {
@@ -93,6 +95,7 @@ impl State {
         Self::PilotReturned,
         Self::CancelStart,
         Self::LandingHeld,
+        Self::Dividing,
     ];
 
     /// Whether setpoints go out: from before Offboard until the motors are off, never in a failsafe,
@@ -119,13 +122,14 @@ impl State {
                 | CancelStart
                 | Disarm
                 | LandingHeld
+                | Dividing
         )
     }
 
     /// Whether a vehicle that stands in this state stays there until it decides otherwise.
     pub(crate) fn holds_place(self) -> bool {
         use State::*;
-        matches!(self, Follow | Paused | Alone | Blocked | Replanning)
+        matches!(self, Follow | Paused | Alone | Blocked | Replanning | Dividing)
     }
 }
 
@@ -191,6 +195,7 @@ impl Interrupted {
             Paused => "Interrupted: Paused",
             Alone => "Interrupted: Alone",
             Blocked => "Interrupted: Blocked",
+            Dividing => "Interrupted: Dividing",
             Stopping => "Interrupted: Stopping",
             Land => "Interrupted: Land",
             _ => return None,

@@ -64,6 +64,7 @@ pub(crate) const FLYING: &[State] = &[
     Alone,
     Blocked,
     Replanning,
+    Dividing,
     Stopping,
     LandingHeld,
     AutopilotSilent,
@@ -71,16 +72,28 @@ pub(crate) const FLYING: &[State] = &[
 ];
 /// In the air, with links and position as they should be.
 pub(crate) const SOUND: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, LandingHeld];
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping, LandingHeld];
 /// The same, on its path under way or stopped: it can stop along it.
-pub(crate) const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning];
+pub(crate) const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
 
 /// The same, not yet landing.
-pub(crate) const IN_ROUTE: &[State] = &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping];
+pub(crate) const IN_ROUTE: &[State] =
+    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
 
 /// In the air, and the autopilot was heard.
-pub(crate) const LINKED: &[State] =
-    &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Stopping, LandingHeld, PositionLost];
+pub(crate) const LINKED: &[State] = &[
+    TakeOff,
+    Climb,
+    Follow,
+    Paused,
+    Alone,
+    Blocked,
+    Replanning,
+    Dividing,
+    Stopping,
+    LandingHeld,
+    PositionLost,
+];
 
 /// The mission.
 #[rustfmt::skip]
@@ -129,6 +142,9 @@ pub static TABLE: &[Row] = &[
     warn(&[TakeOff, Climb, PilotReturned], G::BatteryLow, NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(IN_ROUTE,            G::EstimateVague,    s(30),  Land,            A::AskLand,     "Estimate worse than margin for 30 s: landing"),
     warn(IN_ROUTE,            G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
+    // What others decided while it was not heard.
+    warn(&[TakeOff, Climb, PilotReturned], G::Excluded, NOW,   Land,            A::AskLand,     "Its part was given away: landing"),
+    warn(ON_PATH,             G::Excluded,         NOW,    Stopping,        A::BrakeOnPath, "Its part was given away: landing"),
     info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),
     info(&[Stopping],         G::Elapsed,          s(5),   Land,            A::AskLand,     ""),
     info(&[Paused],           G::ReturnInClimb,    NOW,    Land,            A::AskLand,     "Landing on the pad"),
@@ -148,6 +164,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Ready],            G::StartOutside,     NOW,    Aborted,         A::ForgetStart, "Outside the geofence: start refused"),
     warn(&[Ready],            G::StartVague,       s(3),    Aborted,         A::ForgetStart, "Estimate worse than margin: start refused"),
     info(&[Ready],            G::StartCommanded,   NOW,    Scheduled,       A::None,        "Started"),
+    warn(STARTED,             G::Excluded,         NOW,    Aborted,         A::ForgetStart, "Its part was given away: start cancelled"),
     info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::LandCommanded, NOW, Aborted, A::ForgetStart, "Start cancelled as commanded"),
     info(&[Ready, Scheduled, PadReplanning, Streaming, Engaging], G::ReturnCommanded, NOW, Aborted, A::ForgetStart, "Start cancelled as commanded"),
     info(&[Arming, CancelStart], G::LandCommanded, NOW,    CancelStart,     A::CancelStart, "Start cancelled as commanded"),
@@ -180,8 +197,12 @@ pub static TABLE: &[Row] = &[
     warn(&[Follow, Blocked],  G::Yielded,          s(60),  Stopping,        A::BrakeOnPath, "Yielded for 60 s: landing"),
     warn(&[Follow, Blocked],  G::Hindered,         s(90),  Stopping,        A::BrakeOnPath, "Vehicle on the path for 90 s: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
-    info(&[Climb, Follow, Alone, Blocked, Replanning], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
-    warn(&[Follow, Blocked],  G::NeighboursSilent, s(1),   Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
+    info(&[Follow],           G::HoldsToDivide,    NOW,    Dividing,        A::BrakeOnPath, "Vehicle lost: waits for the division"),
+    info(&[Dividing],         G::DivisionReady,    NOW,    Follow,          A::FlyDivision, "Area divided again: flying on"),
+    info(&[Dividing],         G::NothingToDivide,  NOW,    Follow,          A::RunPath,     "Nothing to divide: flying on"),
+    warn(&[Dividing],         G::Elapsed,          s(300), Stopping,        A::BrakeOnPath, "No division for 5 min: landing"),
+    info(&[Climb, Follow, Alone, Blocked, Replanning, Dividing], G::PauseCommanded, NOW, Paused, A::BrakeOnPath, "Paused"),
+    warn(&[Follow, Blocked, Dividing], G::NeighboursSilent, s(1), Alone,           A::BrakeOnPath, "Neighbours silent: stopping"),
     warn(&[Follow],           G::PadTaken,         s(20),  Replanning,      A::RequestLanding, "No room to land: seeking a place aside"),
     info(&[Follow],           G::AsideReached,     NOW,    Land,            A::AskLand,     "Landing aside"),
     warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),

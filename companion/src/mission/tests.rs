@@ -233,6 +233,10 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::NoWayOn => (i.no_way_around, i.can_turn_back) = (true, true),
         G::Underneath => i.underneath = long,
         G::Standing => i.standing = true,
+        G::Excluded => i.excluded = true,
+        G::HoldsToDivide => i.holds_to_divide = true,
+        G::DivisionReady => i.division_ready = true,
+        G::NothingToDivide => i.undivided = true,
     }
     i
 }

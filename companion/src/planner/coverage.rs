@@ -5,6 +5,7 @@ use core::fmt;
 use heapless::Vec;
 use planner_core::coverage::area::{Area, AreaError, Ring};
 use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
+use planner_core::coverage::losses::{self, Fate, Loss};
 use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
@@ -17,6 +18,7 @@ use super::failure;
 use crate::config::PlanFailure;
 use crate::storage::mission_file::coverage::{CoverageView, Heading, Parts};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
+use crate::swarm::fleet::Lot;
 
 /// Changes of the lanes' order that companions look at: on a board a few million instructions.
 pub const LOOKS: u32 = 2000;
@@ -33,6 +35,7 @@ pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     tracks: Tracks<L>,
     pack: PackWorkspace<K>,
     routes: Plan<K>,
+    losses: losses::Workspace<L, K>,
 }
 
 impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
@@ -45,6 +48,7 @@ impl<const X: usize, const L: usize, const K: usize> Workspace<X, L, K> {
             tracks: Tracks::new(),
             pack: PackWorkspace::new(),
             routes: Plan::new(),
+            losses: losses::Workspace::new(),
         }
     }
 
@@ -83,6 +87,15 @@ impl From<CoverageError> for Error {
 impl From<PlanError> for Error {
     fn from(error: PlanError) -> Self {
         Self::Plan(error)
+    }
+}
+
+impl From<losses::Error> for Error {
+    fn from(error: losses::Error) -> Self {
+        match error {
+            losses::Error::Coverage(error) => Self::Coverage(error),
+            losses::Error::Plan(error) => Self::Plan(error),
+        }
     }
 }
 
@@ -131,11 +144,24 @@ fn vehicle(
     }
 }
 
-/// Plans the flights of all vehicles, for companions with room for `gates_most`; no-fly zones may have `C` corners.
+/// What is planned.
+#[derive(Clone, Copy, Debug)]
+pub struct Request<'a, 'm> {
+    /// The mission.
+    pub mission: &'a MissionView<'m>,
+    /// Its area.
+    pub view: &'a CoverageView<'m>,
+    /// Most gates of one vehicle.
+    pub gates_most: usize,
+}
+
+/// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
+/// division: the lots of all vehicles by the rank of their ids.
 ///
 /// # Errors
 /// Why there is no plan.
 pub fn plan<
+    'l,
     const X: usize,
     const L: usize,
     const K: usize,
@@ -143,13 +169,13 @@ pub fn plan<
     const V: usize,
     const W: usize,
 >(
-    mission: &MissionView<'_>,
-    view: &CoverageView<'_>,
-    gates_most: usize,
+    request: &Request<'_, '_>,
+    losses: impl Iterator<Item = &'l [Lot]>,
     ws: &mut Workspace<X, L, K>,
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
+    let Request { mission, view, gates_most } = *request;
     let header = view.header();
     ws.vertices.clear();
     ws.rings.clear();
@@ -171,7 +197,8 @@ pub fn plan<
     tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
     let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
     for (i, own) in mission.vehicles().enumerate() {
-        let pad = Pad { id: own.task.id, start: own.start, climb_m: own.task.climb_m };
+        let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
+        let pad = Pad { id, start, climb_m, end_z_m: start.z, descent_m: climb_m, aloft: false };
         vehicles.push(vehicle(mission, &own, view, i)).map_err(|_| CoverageError::Vehicles)?;
         pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
         if area.forbids(&own.start.xy()) {
@@ -201,5 +228,17 @@ pub fn plan<
         gates_most,
     };
     flights::plan(&work, &ws.routes, &swarm, schedule, out)?;
+    ws.losses.begin();
+    for lots in losses {
+        let mut fates: Vec<Fate, K> = Vec::new();
+        for pad in &pads {
+            let rank = pads.iter().filter(|other| other.id < pad.id).count();
+            let lot = lots.get(rank).ok_or(CoverageError::Vehicles)?;
+            let fate = Fate { lives: lot.lives, along_m: f32::from(lot.along_dm) / 10.0 };
+            fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
+        }
+        let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
+        losses::again(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
+    }
     Ok(())
 }

@@ -437,6 +437,7 @@ impl<'a> MissionView<'a> {
             && let Some(share) = view.shares().nth(index)
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
+            config.division = Some(view.down_s());
         }
         config.radius_m = own.radius_m;
         config.required_clearance_m = own.task.required_clearance_m;

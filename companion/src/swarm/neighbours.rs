@@ -6,6 +6,7 @@
 
 mod bounds;
 mod contact;
+mod division;
 mod met;
 mod places;
 pub(crate) mod relay;
@@ -26,6 +27,7 @@ use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{Echo, Lateness};
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, WAITING};
+use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
 /// The table. Vehicles of the roster have their slot from the start. Others, the strangers, are known by their position only:
@@ -51,6 +53,10 @@ pub struct Neighbours<const V: usize> {
     relay_next: u16,
     /// The own place in the roster.
     own_rank: u16,
+    /// What all agree on in a coverage mission.
+    fleet: Option<Fleet<V>>,
+    /// With the vehicle of this rank the next report of all begins.
+    roster_next: usize,
 }
 
 impl<const V: usize> Neighbours<V> {
@@ -69,6 +75,8 @@ impl<const V: usize> Neighbours<V> {
             place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
+            fleet: None,
+            roster_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
             if entry.system_id == own_id {

@@ -16,7 +16,7 @@ use crate::autopilot::Kind;
 use crate::autopilot::px4;
 use crate::link::frame::{self, Frame, Framer, Header, MAX_SENT};
 use crate::link::intent;
-use crate::{Companion, Config, Duration, Event, Instant, Link};
+use crate::{Companion, Config, Duration, Event, Instant, Link, Wanted};
 
 mod commands;
 mod flight;
@@ -88,6 +88,8 @@ pub struct Bench {
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
     /// Whether there is a way around: by y = 16.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
+    /// Whether a division is planned.
+    pub answer_division: bool,
     /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
     /// flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
@@ -144,6 +146,7 @@ impl Bench {
             origin: EKF_ORIGIN,
             answer_plan: Some(Ok(plan())),
             answer_detour: Some(Ok(())),
+            answer_division: true,
             neighbour: None,
             neighbour_clock: None,
             neighbour_clear_m: -1e6,
@@ -211,7 +214,9 @@ impl Bench {
         }
         while let Some(event) = self.companion.poll_event() {
             self.events.push(event);
-            if let Some(request) = self.companion.detour(|_| {}) {
+            if event == Event::PlanRequested(Wanted::Division) {
+                self.divide();
+            } else if let Some(request) = self.companion.detour(|_| {}) {
                 let answer = self.answer_detour.map(|answer| {
                     answer.map(|()| {
                         let mut path = Path::new();
@@ -221,15 +226,31 @@ impl Bench {
                         VehiclePlan { path, ..plan() }
                     })
                 });
-                if let (Event::PlanRequested, Some(answer)) = (event, answer) {
-                    self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+                if let (Event::PlanRequested(wanted), Some(answer)) = (event, answer) {
+                    self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|e| *e));
                 }
-            } else if event == Event::PlanRequested
+            } else if let Event::PlanRequested(wanted) = event
                 && let Some(answer) = self.answer_plan.clone()
             {
-                self.companion.handle_plan(self.now, answer.as_ref().map_err(|e| *e));
+                self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|e| *e));
             }
         }
+    }
+
+    /// Gives it all that is left: the rest of its path from where it holds.
+    fn divide(&mut self) {
+        let rank = usize::from(self.companion.config.own().expect("it is in the roster").0);
+        let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
+        let plan = self.companion.mission.plan().filter(|_| self.answer_division).cloned();
+        let Some(mut plan) = plan else { return };
+        let held_m = f32::from(held_dm) / 10.0;
+        let mut path = Path::new();
+        path.push(plan.path.point_at(held_m).expect("a path"), 1.2).unwrap();
+        for waypoint in plan.path.waypoints().iter().filter(|w| w.along_m > held_m) {
+            path.push(waypoint.position, 1.2).unwrap();
+        }
+        (plan.path, plan.climb_m, plan.plan_crc) = (path, 0.0, plan.plan_crc + 1);
+        self.companion.handle_plan(self.now, Wanted::Division, Ok(&plan));
     }
 
     /// An ArduCopter that has just booted.

@@ -404,9 +404,7 @@ impl<'a, M: Meter> Flight<'a, M> {
             }
         }
         while let Some(event) = self.companion.poll_event() {
-            if event != Event::PlanRequested {
-                continue;
-            }
+            let Event::PlanRequested(wanted) = event else { continue };
             let (now, companion) = (self.now, &mut *self.companion);
             let mut obstacles = 0_usize;
             let around = self.meter.call("Companion::detour", size_of::<BoardCompanion>(), || {
@@ -414,7 +412,7 @@ impl<'a, M: Meter> Flight<'a, M> {
             });
             let answer = if around.is_some() { Err(PlanFailure::Unreachable) } else { Ok(self.plan) };
             self.meter.call("Companion::handle_plan", size_of::<BoardCompanion>(), || {
-                companion.handle_plan(now, answer);
+                companion.handle_plan(now, wanted, answer);
             });
         }
     }

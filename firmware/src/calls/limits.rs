@@ -353,6 +353,14 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
         let all = to.call("photographs::Photographs::count", || photographs.count(path));
         let stretches =
             to.call("photographs::Photographs::stretches", || photographs.stretches(path).count());
+        for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
+            let taken = to.call("photographs::Photographs::taken_by", || photographs.taken_by(path, along_m));
+            let at_m = to.call("photographs::Photographs::last_by", || photographs.last_by(path, along_m));
+            assert!(
+                taken <= all && at_m.is_none_or(|at_m| at_m <= path.length_m() + 1.0),
+                "{along_m}: {taken}"
+            );
+        }
         assert!(all as usize >= stretches && stretches <= 4, "{spacing_m}: {all} in {stretches}");
         for shots in photographs.stretches(path) {
             let place_m = to.call("photographs::Shots::place_m", || shots.place_m(shots.count));

@@ -110,13 +110,13 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 Event::WaitsForStart { id } => {
                     say!("{:9.3} s  waiting for vehicle {id}: not started", began.elapsed().as_secs_f32());
                 }
-                Event::PlanRequested => {
-                    let mut own = mission.answer(&plan, index, &companion);
+                Event::PlanRequested(wanted) => {
+                    let mut own = mission.answer(&plan, index, wanted, &companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {
                         own.gates.clear();
                         own.depart_s = 0.0;
                     }
-                    companion.handle_plan(now(), own.as_deref().map_err(|failure| *failure));
+                    companion.handle_plan(now(), wanted, own.as_deref().map_err(|failure| *failure));
                 }
                 Event::StateChanged { from, to, text, .. } => {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());

@@ -1,9 +1,12 @@
 //! A coverage mission as it is flown: the ground, the mission file, and what all companions plan from it.
 
+use std::iter;
+
 use anyhow::{anyhow, bail};
-use companion::planner::coverage::{self, Error, Workspace};
+use companion::planner::coverage::{self, Error, Request, Workspace};
 use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, CoverageView, Parts, Share};
 use companion::storage::mission_file::{Block, Kind};
+use companion::swarm::fleet::Lot;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::Unit;
@@ -71,7 +74,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     mission.encode_area(&climbs)?;
     let mut ws = on_heap(DeskWorkspace::new);
-    mission.plan_area(&mut ws)?;
+    mission.plan_area(iter::empty(), &mut ws)?;
     if ws.routes() != &routes {
         bail!(
             "cannot be flown: {}: companions would divide the area in another way\nhint: please report it, with the scenario",
@@ -154,15 +157,18 @@ impl Mission {
     }
 
     /// Plans as every companion does.
-    fn plan_area(&self, ws: &mut DeskWorkspace) -> anyhow::Result<Box<SwarmPlan>> {
+    fn plan_area<'l>(
+        &self,
+        losses: impl Iterator<Item = &'l [Lot]>,
+        ws: &mut DeskWorkspace,
+    ) -> anyhow::Result<Box<SwarmPlan>> {
         let mission = self.mission_view();
         let Kind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
         let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
         coverage::plan::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, VEHICLES, WAYPOINTS>(
-            &mission,
-            view,
-            self.board.map_or(GATES, |board| board.gates),
+            &Request { mission: &mission, view, gates_most: self.board.map_or(GATES, |board| board.gates) },
+            losses,
             ws,
             &mut schedule,
             &mut plan,
@@ -173,7 +179,15 @@ impl Mission {
 
     /// The plan of a coverage mission.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
-        self.plan_area(&mut on_heap(DeskWorkspace::new))
+        self.plan_area(iter::empty(), &mut on_heap(DeskWorkspace::new))
+    }
+
+    /// The plan after these losses.
+    ///
+    /// # Errors
+    /// Why there is none.
+    pub fn plan_losses<'l>(&self, losses: impl Iterator<Item = &'l [Lot]>) -> anyhow::Result<Box<SwarmPlan>> {
+        self.plan_area(losses, &mut on_heap(DeskWorkspace::new))
     }
 
     /// What of the area is more than a board holds.
@@ -187,7 +201,7 @@ impl Mission {
             ));
         }
         let mut ws = on_heap(DeskWorkspace::new);
-        match self.plan_area(&mut ws) {
+        match self.plan_area(iter::empty(), &mut ws) {
             Ok(_) => board.area_excess(vertices.len(), ws.tracks().lanes().len()),
             Err(error) => Some(format!("{error:#}")),
         }

@@ -1,7 +1,7 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
 use anyhow::Context;
-use companion::{Config, Event, Instant, Link, State};
+use companion::{Config, Event, Instant, Link, State, Wanted};
 use planner_core::Point;
 
 use super::board::{Board, Lines};
@@ -41,8 +41,8 @@ pub struct Member {
     pub companion: Box<DeskCompanion>,
     /// A board that decides in its place.
     board: Option<Board>,
-    /// Whether the companion waits for a plan.
-    pub wants_plan: bool,
+    /// The plan that the companion waits for.
+    pub wants_plan: Option<Wanted>,
     /// How it is answered.
     pub planner: Planner,
     /// The last warning of a mission that did not go on since: why it left its usual course.
@@ -78,7 +78,7 @@ impl Member {
             companion: new_companion(config.clone())?,
             board: None,
             config,
-            wants_plan: false,
+            wants_plan: None,
             planner: Planner::Sound,
             cause: None,
             took_off_s: None,
@@ -156,7 +156,7 @@ impl Member {
     pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
         self.companion = new_companion(self.config.clone())?;
         self.companion_us = now_us;
-        self.wants_plan = false;
+        self.wants_plan = None;
         Ok(())
     }
 
@@ -273,7 +273,7 @@ impl Member {
         let mut restarts = false;
         while let Some(happened) = self.companion.poll_event() {
             match happened {
-                Event::PlanRequested => self.wants_plan = true,
+                Event::PlanRequested(wanted) => self.wants_plan = Some(wanted),
                 Event::RestartRequested => restarts = true,
                 // Its text says so.
                 Event::WaitsForStart { .. } => {}
@@ -354,9 +354,9 @@ impl Member {
 
     /// Answers the companion's request for a plan.
     pub fn answer_plan(&mut self, now_us: u64, plan: Result<&OwnPlan, companion::PlanFailure>) {
-        self.wants_plan = false;
+        let Some(wanted) = self.wants_plan.take() else { return };
         let now = self.companion_now(now_us);
-        self.companion.handle_plan(now, plan);
+        self.companion.handle_plan(now, wanted, plan);
     }
 
     fn drain(&mut self, now_us: u64, station: usize, radio: &mut Radio, places: &[Point]) {
@@ -427,6 +427,7 @@ fn on_path(state: State) -> bool {
             | Alone
             | Blocked
             | Replanning
+            | Dividing
             | Stopping
             | AutopilotSilent
             | PositionLost

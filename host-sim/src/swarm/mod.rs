@@ -216,10 +216,10 @@ impl<'a> Run<'a> {
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
             member.step(step, i, &mission.map, radio, places, log)?;
-            if member.wants_plan && member.planner != Planner::Late {
+            if let Some(wanted) = member.wants_plan.filter(|_| member.planner != Planner::Late) {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
-                    _ => mission.answer(plan, i, &member.companion),
+                    _ => mission.answer(plan, i, wanted, &member.companion),
                 };
                 member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }

@@ -8,7 +8,7 @@
 use heapless::Vec;
 
 use super::Flat;
-use super::pack::{Heading, Plan, Route, Work};
+use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use crate::Point;
 use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
@@ -26,8 +26,14 @@ pub struct Pad {
     pub id: u8,
     /// First point of its path, above the pad. Its place is the vehicle's in [`Work::vehicles`].
     pub start: Point,
-    /// Height of that over where the vehicle stands, metres.
+    /// Height of that over where the vehicle stands, metres; 0 of one that is in the air.
     pub climb_m: f32,
+    /// Height of the last point of its path, above its home, metres up in the mission frame.
+    pub end_z_m: f32,
+    /// Height of that over the ground there, metres.
+    pub descent_m: f32,
+    /// Whether it is in the air: without a route it flies home.
+    pub aloft: bool,
 }
 
 /// How pictures are taken.
@@ -73,11 +79,18 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
         return Err(PlanError::Terminals);
     }
     out.flights.clear();
+    // The layers above those of the routes are free.
+    let mut layer = routes.routes.len() as u8;
     for (index, pad) in swarm.pads.iter().enumerate() {
         let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
-            Some(route) => flight(work, route, swarm, pad).map_err(|e| PlanError::Path(pad.id, e))?,
-            None => grounded(pad).map_err(|e| PlanError::Path(pad.id, e))?,
+            Some(route) => flight(work, route, swarm, pad),
+            None if pad.aloft => {
+                layer = layer.saturating_add(1);
+                homeward(work, layer, &work.vehicles[index], swarm, pad)
+            }
+            None => grounded(pad),
         };
+        let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     depart(swarm, ws, out)?;
@@ -89,7 +102,8 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
     Ok(())
 }
 
-/// The vehicle that flies longest leaves first, each other one as early as those before it allow.
+/// The vehicle that flies longest leaves first, each other one as early as those before it allow. One that they leave no
+/// departure goes before all of them, and the search begins again.
 fn depart<const V: usize, const W: usize>(
     swarm: &Swarm<'_>,
     ws: &mut ScheduleWorkspace,
@@ -103,6 +117,25 @@ fn depart<const V: usize, const W: usize>(
     }
     // Whoever stays on its pad is there before all others.
     sort::by(&mut order, |a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
+    let stay = order.iter().filter(|(flies, ..)| !flies).count();
+    let mut tries = order.len();
+    while let Err((place, error)) = depart_in_order(cfg, &order, ws, out) {
+        tries = tries.saturating_sub(1);
+        if tries == 0 || place == stay || error != ScheduleError::Blocked {
+            return Err(PlanError::Schedule(out.flights[usize::from(order[place].2)].id, error));
+        }
+        order[stay..=place].rotate_right(1);
+    }
+    Ok(())
+}
+
+/// Lets vehicles leave in this order; the place of the first that cannot.
+fn depart_in_order<const V: usize, const W: usize>(
+    cfg: &ScheduleConfig,
+    order: &[(bool, f32, u16)],
+    ws: &mut ScheduleWorkspace,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), (usize, ScheduleError)> {
     for (place, &(flies, _, i)) in order.iter().enumerate() {
         if !flies {
             continue;
@@ -110,8 +143,7 @@ fn depart<const V: usize, const W: usize>(
         let before = order[..place].iter().map(|&(_, _, j)| &out.flights[usize::from(j)]);
         let flight = &out.flights[usize::from(i)];
         let departure = schedule::earliest_departure(cfg, flight, 0.0, before, ws);
-        let depart_s = departure.map_err(|e: ScheduleError| PlanError::Schedule(flight.id, e))?;
-        out.flights[usize::from(i)].depart_s = depart_s;
+        out.flights[usize::from(i)].depart_s = departure.map_err(|error| (place, error))?;
     }
     Ok(())
 }
@@ -198,8 +230,47 @@ fn flight<const L: usize, const N: usize, const W: usize>(
         photographs.mark(from, to)?;
     }
     draft.to(at(&last, layer_m))?;
-    draft.around(&last, &vehicle.home, layer_m)?;
-    draft.to(at(&vehicle.home, pad.start.z))?;
+    let way_home = WayHome { from: last, layer_m, vehicle, photographs };
+    land(draft, &way_home, swarm, pad)
+}
+
+/// The flight home of a vehicle in the air that has no route: it photographs nothing.
+fn homeward<const L: usize, const N: usize, const W: usize>(
+    work: &Work<'_, L, N>,
+    layer: u8,
+    vehicle: &Vehicle,
+    swarm: &Swarm<'_>,
+    pad: &Pad,
+) -> Result<Flight<W>, PathError> {
+    let Manner { waypoint_m, look, trigger } = swarm.manner;
+    let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
+    let mut draft = Draft { path: Path::new(), transit: work.transit, clearance_m: swarm.clearance_m };
+    draft.to(pad.start)?;
+    draft.to(at(&vehicle.place, layer_m))?;
+    let photographs = Photographs::new(waypoint_m, look, trigger);
+    let way_home = WayHome { from: vehicle.place, layer_m, vehicle, photographs };
+    land(draft, &way_home, swarm, pad)
+}
+
+/// Where a vehicle begins its way home, in its layer.
+struct WayHome<'a> {
+    from: Flat,
+    layer_m: f32,
+    vehicle: &'a Vehicle,
+    /// What it has photographed by then.
+    photographs: Photographs,
+}
+
+/// Ends a flight: home in the layer, down, and labelled.
+fn land<const N: usize, const W: usize>(
+    mut draft: Draft<'_, N, W>,
+    way_home: &WayHome<'_>,
+    swarm: &Swarm<'_>,
+    pad: &Pad,
+) -> Result<Flight<W>, PathError> {
+    let WayHome { from, layer_m, vehicle, photographs } = *way_home;
+    draft.around(&from, &vehicle.home, layer_m)?;
+    draft.to(at(&vehicle.home, pad.end_z_m))?;
     let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {
         let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
@@ -212,7 +283,7 @@ fn flight<const L: usize, const N: usize, const W: usize>(
         task: Task::Photograph(photographs),
         path,
         climb_m: pad.climb_m,
-        descent_m: pad.climb_m,
+        descent_m: pad.descent_m,
         depart_s: 0.0,
         piece_m: PIECE_M,
     };

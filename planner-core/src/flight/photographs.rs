@@ -4,6 +4,9 @@ use libm::{ceilf, fmaxf};
 
 use super::{Path, PathError};
 
+/// Nearer than this along a path is the same place, metres.
+const SAME_PLACE_M: f32 = 1e-2;
+
 /// Where a vehicle looks while it photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Look {
@@ -39,6 +42,18 @@ pub struct Shots {
 }
 
 impl Shots {
+    /// Pictures of it that are taken once the vehicle is `along_m` metres along the path.
+    fn taken_by(&self, along_m: f32) -> u32 {
+        if along_m < self.from_m || along_m.is_nan() {
+            0
+        } else if self.step_m > 0.0 {
+            // What is too large for a count is the largest.
+            (((along_m - self.from_m) / self.step_m) as u32).saturating_add(1).min(self.count)
+        } else {
+            self.count
+        }
+    }
+
     /// Where picture `k` is taken, metres along the path.
     pub fn place_m(&self, k: u32) -> f32 {
         self.from_m + self.step_m * k as f32
@@ -99,6 +114,18 @@ impl Photographs {
         })
     }
 
+    /// Pictures taken once the vehicle is `along_m` metres along the path.
+    pub fn taken_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
+        let reached_m = along_m + SAME_PLACE_M;
+        self.stretches(path).map(|shots| shots.taken_by(reached_m)).fold(0, u32::saturating_add)
+    }
+
+    /// Where the last picture is taken no further than `along_m` metres along the path; none before the first.
+    pub fn last_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
+        let last = |shots: Shots| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
+        self.stretches(path).filter_map(last).last()
+    }
+
     /// Pictures of the whole path.
     pub fn count<const W: usize>(&self, path: &Path<W>) -> u32 {
         self.stretches(path).map(|shots| shots.count).fold(0, u32::saturating_add)
@@ -132,6 +159,16 @@ mod tests {
         assert_eq!(stretches.next(), Some(Shots { from_m: 80.0, to_m: 80.0, step_m: 0.0, count: 1 }));
         assert_eq!(stretches.next(), None);
         assert_eq!(photographs.count(&path), 11);
+        for (along_m, taken, last_m) in [
+            (-1.0, 0, None),
+            (0.0, 1, Some(0.0)),
+            (7.4, 1, Some(0.0)),
+            (39.0, 5, Some(30.0)),
+            (99.0, 11, Some(80.0)),
+        ] {
+            assert_eq!(photographs.taken_by(&path, along_m), taken, "{along_m}");
+            assert_eq!(photographs.last_by(&path, along_m), last_m, "{along_m}");
+        }
     }
 
     #[test]

@@ -15,7 +15,7 @@ pub mod scene;
 
 use companion::link::frame::{self, Framer, Header, MAX_SENT};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Event, Instant, Link, PlanFailure, State};
+use companion::{COMPONENT, Event, Instant, Link, PlanFailure, State, Wanted};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
@@ -247,7 +247,7 @@ impl<'a> World<'a> {
         }
         while let Some(event) = self.members[i].companion.poll_event() {
             match event {
-                Event::PlanRequested => self.plan(i),
+                Event::PlanRequested(_) => self.plan(i),
                 Event::StateChanged { from, to, text, .. } => {
                     self.members[i].blocked += u32::from((from, to) == (State::Follow, State::Blocked));
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
@@ -307,10 +307,10 @@ impl<'a> World<'a> {
                 let answer = around(&request, &keep, own);
                 let text = if answer.is_some() { "a way around" } else { "no way around" };
                 let answer = answer.as_ref().ok_or(PlanFailure::Unreachable);
-                member.companion.handle_plan(self.now, answer);
+                member.companion.handle_plan(self.now, Wanted::Detour, answer);
                 self.say(i, text);
             }
-            None => member.companion.handle_plan(self.now, Ok(own)),
+            None => member.companion.handle_plan(self.now, Wanted::Mission, Ok(own)),
         }
     }
 

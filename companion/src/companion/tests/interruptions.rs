@@ -441,7 +441,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     for point in [request.here, Point::new(13.0, 16.0, 2.0), GOAL] {
         path.push(point, 1.2).unwrap();
     }
-    b.companion.handle_plan(b.now, Ok(&VehiclePlan { path, ..plan() }));
+    b.companion.handle_plan(b.now, Wanted::Detour, Ok(&VehiclePlan { path, ..plan() }));
     b.drain();
     b.run(1.0);
     assert_eq!(b.state(), State::Blocked, "{:?}", b.texts);

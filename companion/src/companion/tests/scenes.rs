@@ -17,6 +17,7 @@ use planner_core::Point;
 mod autopilot;
 mod detours;
 mod landings;
+mod losses;
 mod pause;
 mod pilot;
 mod position;
@@ -69,6 +70,8 @@ fn every_row_has_its_scene() {
         landings::at_a_limit,
         landings::wait_for_room,
         landings::end_aside,
+        losses::another_leaves,
+        losses::the_others_give_it_up,
     ];
     for group in groups {
         group(&mut scenes);

@@ -39,6 +39,7 @@ impl Guidance {
             | State::Alone
             | State::Blocked
             | State::Replanning
+            | State::Dividing
             | State::Stopping
                 if self.on_path =>
             {

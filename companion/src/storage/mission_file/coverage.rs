@@ -153,7 +153,18 @@ pub struct CoverageView<'a> {
     vertices: &'a [[u8; VERTEX_LEN]],
 }
 
+/// A vehicle that nobody hears any more flies on for so long and hovers, and so much is added for its landing, seconds: the
+/// lease, a message's age and delay, the stop, what the row `Alone` waits, and the slow end of a descent.
+const DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
+
 impl<'a> CoverageView<'a> {
+    /// A vehicle that nobody hears any more is down after so many seconds, from the highest layer.
+    pub fn down_s(&self) -> f32 {
+        let Heights { mission_m, layer_m } = self.header.heights;
+        let slowest_mps = self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
+        DOWN_S + (mission_m + layer_m * self.shares.len() as f32) / slowest_mps
+    }
+
     /// Checks the block of a mission of so many vehicles.
     pub(super) fn parse(b: &'a [u8], vehicles: usize) -> Result<Self, MissionError> {
         let refuse = |name| Err(FileError::Header(name).into());

@@ -233,8 +233,14 @@ impl Contact {
         }
     }
 
-    /// Where it may be from now on, with `margin_m` beyond `apart_m`.
-    pub(super) fn obstacles(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    /// Where it may be from now on, `apart_m` around it. Over a field, which is level, it lies on the ground that it reported.
+    pub(super) fn obstacles(
+        &self,
+        now: Instant,
+        apart_m: f32,
+        over_field: bool,
+        mut tell: impl FnMut(KeepOff),
+    ) {
         let here = self.state.position;
         let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
         let column = |from: Point, nature: Nature| {
@@ -253,6 +259,11 @@ impl Contact {
             // Where the plan has it.
         } else if self.is_dead(now) {
             let down = !self.heard_within(now, DOWN);
+            if down && over_field && !self.floor_m.is_nan() {
+                let low = |at: Point| Point::new(at.x, at.y, self.floor_m);
+                return self
+                    .stretch(|at| tell(KeepOff { from: low(at), to: low(at), ..place(apart_m + VAGUE_M) }));
+            }
             let nature = if down { Nature::Lying } else { Nature::Solid };
             self.stretch(|at| tell(column(at, nature)));
         } else {

@@ -15,7 +15,7 @@ impl<const V: usize> Neighbours<V> {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, apart_m, tell);
+            contact.obstacles(now, apart_m, self.fleet.is_some(), tell);
         }
     }
 
@@ -32,7 +32,7 @@ impl<const V: usize> Neighbours<V> {
     /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
     pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
-        placed.for_each(|c| c.obstacles(now, apart_m, &mut tell));
+        placed.for_each(|c| c.obstacles(now, apart_m, self.fleet.is_some(), &mut tell));
     }
 
     /// Where vehicles that land without looking may come nearer than `apart_m`.

@@ -1,0 +1,194 @@
+//! A coverage mission whose vehicles are lost: what this one says of itself, where it holds, and what it asks the shell for.
+
+use planner_core::flight::{Task, VehiclePlan};
+
+use super::Companion;
+use crate::config::PlanFailure;
+use crate::events::{Event, Wanted};
+use crate::link::roster::Standing;
+use crate::mission::State;
+use crate::swarm::fleet::{Fleet, Lot, Own};
+use crate::time::Duration;
+
+/// A vehicle promises to fly on for so long, seconds, to the last picture that it takes by then.
+const PROMISE_S: f32 = 10.0;
+/// So much further than it needs to stop, metres.
+const SPARE_M: f32 = 0.3;
+/// This near where it promised to hold it is there, metres.
+const THERE_M: f32 = 0.2;
+/// Above its pad it waits while another vehicle has been silent for so long: that one's part may yet be given to it.
+const MISSED: Duration = Duration::from_secs(3);
+/// With its pilot for so long it has left.
+const WITH_PILOT: Duration = Duration::from_secs(20);
+/// A shell that has not answered for so long is asked again.
+const ASK_AGAIN: Duration = Duration::from_secs(30);
+
+fn dm(along_m: f32) -> Option<u16> {
+    let dm = libm::ceilf(along_m * 10.0);
+    (0.0..=f32::from(u16::MAX)).contains(&dm).then_some(dm as u16)
+}
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// The losses of the division that the shell is asked for by [`Wanted::Division`], division by division: the lots of all
+    /// vehicles by rank.
+    pub fn losses(&self) -> impl Iterator<Item = &[Lot]> {
+        self.neighbours.fleet().into_iter().flat_map(Fleet::losses)
+    }
+
+    /// Looks at who still flies, and what is to be divided.
+    pub(super) fn step_division(&mut self) {
+        let now = self.now;
+        if self.neighbours.fleet().is_none() {
+            return;
+        }
+        let own = self.own_in_fleet();
+        self.neighbours.step_fleet(&own, now);
+        let Some(fleet) = self.neighbours.fleet() else { return };
+        let home_m = self.home_m();
+        let waits = fleet.is_dividing() || fleet.misses_one(now, MISSED);
+        let halt_m = match fleet.promise_dm() {
+            Some(promise_dm) => f32::from(promise_dm) / 10.0,
+            None if waits && self.guidance.along_m() < home_m => home_m,
+            None => f32::INFINITY,
+        };
+        let behind = fleet.division() > self.mission.division();
+        let wants = fleet.wants_hash() || (behind && self.may_take_division());
+        let fingerprint = fleet.fingerprint();
+        self.guidance.halt_at(halt_m);
+        if wants && self.mission.asks_division(fingerprint, now, ASK_AGAIN) {
+            // Full only if the shell does not drain; then it is asked again.
+            let _ = self.events.push_back(Event::PlanRequested(Wanted::Division));
+        }
+    }
+
+    /// What this vehicle says of itself.
+    fn own_in_fleet(&self) -> Own {
+        use State::*;
+        let state = self.mission.state();
+        let off_plan = self.guidance.returning
+            || self.guidance.aside
+            || self.detours.is_flying()
+            || self.detours.has_left();
+        let ends = match state {
+            Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
+            PilotControl | PilotReturned => self.mission.with_pilot(self.now) >= WITH_PILOT,
+            _ => off_plan,
+        };
+        let along_m = self.guidance.progress_m(state, &self.scene());
+        let flies = self.guidance.along_m() >= 0.0 && !off_plan;
+        let nearly_down = flies && self.guidance.along_m() > self.home_m();
+        let standing = match ends || nearly_down {
+            true if self.has_all_pictures(along_m) => Standing::Finished,
+            _ if ends => Standing::Left,
+            _ => Standing::Alive,
+        };
+        let on_pad = matches!(state, Ready | Scheduled | PadReplanning);
+        Own {
+            standing,
+            waits: self.waits_on_ground(),
+            division: self.mission.division(),
+            done_dm: if flies { (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16 } else { 0 },
+            promise_dm: if on_pad { Some(0) } else { self.promise_dm().filter(|_| flies) },
+            holds: on_pad || state == Dividing,
+        }
+    }
+
+    /// Whether it has not been started: it may take part as a vehicle that is new.
+    pub(super) fn waits_on_ground(&self) -> bool {
+        use State::*;
+        matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
+    }
+
+    /// Whether all pictures of its part were taken, at this place of its path.
+    fn has_all_pictures(&self, along_m: f32) -> bool {
+        let Some(plan) = self.mission.plan() else { return false };
+        match &plan.task {
+            Task::Photograph(photographs) => {
+                photographs.taken_by(&plan.path, along_m) == photographs.count(&plan.path)
+            }
+            Task::Stay | Task::Goto(_) => true,
+        }
+    }
+
+    /// Where its last descent begins, metres along its path: above its pad.
+    fn home_m(&self) -> f32 {
+        let waypoints = self.mission.plan().map_or(&[][..], |plan| plan.path.waypoints());
+        waypoints.iter().nth_back(1).map_or(f32::NEG_INFINITY, |home| home.along_m)
+    }
+
+    /// Where it would hold if it promised that now: at the last picture that it takes soon, no further than its gates are open
+    /// and no nearer than it can stop.
+    fn promise_dm(&self) -> Option<u16> {
+        use State::*;
+        let fleet = self.neighbours.fleet()?;
+        let moves = matches!(self.mission.state(), Follow | Paused | Alone | Blocked | Replanning);
+        if !moves || !fleet.is_dividing() || fleet.promise_dm().is_some() {
+            return None;
+        }
+        let plan = self.mission.plan()?;
+        let Task::Photograph(photographs) = &plan.task else { return None };
+        let along_m = self.guidance.along_m();
+        let ahead_m = along_m + PROMISE_S * self.config.cruise_mps;
+        let clear_m = self.guidance.clear_m(&self.scene());
+        let most_m = ahead_m.min(clear_m).min(self.home_m()).max(along_m);
+        let stop_m = (self.guidance.stops_by_m() + SPARE_M).min(most_m);
+        let picture_m = photographs.last_by(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
+        dm(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
+    }
+
+    /// Whether it stands where it promised to.
+    pub(super) fn holds_to_divide(&self) -> bool {
+        let promise_dm = self.neighbours.fleet().and_then(Fleet::promise_dm);
+        promise_dm.is_some_and(|promise_dm| {
+            self.guidance.along_m() >= f32::from(promise_dm) / 10.0 - THERE_M && self.guidance.stands()
+        })
+    }
+
+    /// Whether no division is under way or to be flown.
+    pub(super) fn is_undivided(&self) -> bool {
+        self.neighbours.fleet().is_none_or(|fleet| {
+            let flown = fleet.division() == self.mission.division() && !self.mission.has_division();
+            flown && !fleet.is_dividing()
+        })
+    }
+
+    /// Whether it stands where the plan after the last division begins.
+    fn may_take_division(&self) -> bool {
+        match self.mission.state() {
+            State::Ready | State::Scheduled => true,
+            State::Dividing => self.guidance.is_settled(),
+            _ => false,
+        }
+    }
+
+    /// Takes the shell's answer.
+    pub(super) fn take_division(&mut self, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
+        let may_take = self.may_take_division();
+        let Some(fleet) = self.neighbours.fleet_mut() else { return };
+        if !self.mission.asked_division(fleet.fingerprint()) {
+            return;
+        }
+        let (division, along_m) = (fleet.division(), f32::from(fleet.held_at_dm()) / 10.0);
+        match outcome {
+            Err(_) => self.links.say(true, "What is left cannot be divided"),
+            Ok(plan) if fleet.wants_hash() => fleet.take_plan_crc(plan.plan_crc),
+            Ok(plan) if may_take && division > self.mission.division() => {
+                let in_air = self.mission.state() == State::Dividing;
+                let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
+                let place = here.filter(|_| in_air).unwrap_or(self.mission.start());
+                if self.mission.take_division(plan, &place, division, in_air) {
+                    self.neighbours.forget_plan();
+                    self.detours.forget_plan();
+                    // From now on places are those along this path.
+                    match in_air {
+                        true => self.guidance.begin_path(self.now),
+                        false => self.guidance.reset(),
+                    }
+                } else {
+                    self.links.say(true, "The division begins elsewhere");
+                }
+            }
+            Ok(_) => {}
+        }
+    }
+}

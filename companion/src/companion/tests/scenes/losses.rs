@@ -1,0 +1,79 @@
+//! In a coverage mission another vehicle leaves, or the others have given this one up.
+
+use planner_core::flight::{Look, Photographs, Task, Trigger};
+
+use super::State::*;
+use super::*;
+use crate::Link;
+use crate::link::frame::{self, Header, MAX_SENT};
+use crate::link::roster::{self, Entry, Roster, Standing};
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
+
+/// The two vehicles photograph an area, along the usual path.
+fn over_a_field(state: State) -> Bench {
+    let mut config = two_vehicles();
+    config.division = Some(60.0);
+    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
+    // A single picture: on the way to it the vehicle may look anywhere.
+    photographs.mark(1, 1).unwrap();
+    let mut bench = Bench::new(config);
+    bench.answer_plan = Some(Ok(VehiclePlan { task: Task::Photograph(photographs), ..plan() }));
+    bench.neighbour = on_pad(ON_PLAN);
+    bench.until(Ready, 6.0);
+    if state != Ready {
+        bench.start();
+        bench.until(state, 20.0);
+    }
+    bench
+}
+
+/// The other vehicle reports what it knows of this one and of itself.
+fn tells(b: &mut Bench, own: Standing, other: Standing) {
+    let entry = |standing| Entry { standing, ..Entry::default() };
+    let entries = [entry(own), entry(other)].into_iter().collect();
+    let roster = Roster { system_id: 77, mission_crc: 0xC0FFEE, entries, ..Roster::default() };
+    let (mut payload, mut out) = ([0; roster::LENGTH], [0; MAX_SENT]);
+    let len = roster.encode(&mut payload);
+    let header = Header { system: 77, component: crate::COMPONENT, sequence: 0 };
+    let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], &mut out);
+    b.companion.handle_bytes(Link::Swarm, b.now, &out[..n]);
+}
+
+pub(super) fn another_leaves(scenes: &mut Scenes) {
+    let leaves = |b: &mut Bench| {
+        tells(b, Standing::Alive, Standing::Left);
+        b.until(Dividing, 30.0);
+    };
+    scenes.play(over_a_field(Follow), leaves, Done, 120.0);
+    let nothing_left = |b: &mut Bench| {
+        b.answer_division = false;
+        leaves(b);
+        tells(b, Standing::Alive, Standing::Finished);
+    };
+    scenes.play(over_a_field(Follow), nothing_left, Done, 120.0);
+    let unanswered = |b: &mut Bench| {
+        b.answer_division = false;
+        leaves(b);
+        b.run(301.0);
+    };
+    scenes.play(over_a_field(Follow), unanswered, Aborted, 60.0);
+}
+
+pub(super) fn the_others_give_it_up(scenes: &mut Scenes) {
+    let given_up = |b: &mut Bench| tells(b, Standing::Lost, Standing::Alive);
+    for state in [Climb, Follow, Scheduled, Streaming] {
+        scenes.play(over_a_field(state), given_up, Aborted, 60.0);
+    }
+}
+
+/// What the others know of a flight before does not keep a vehicle from a new one.
+#[test]
+fn a_vehicle_that_was_restarted_comes_back_as_a_new_one() {
+    let mut bench = over_a_field(Ready);
+    tells(&mut bench, Standing::Lost, Standing::Alive);
+    bench.run(1.0);
+    bench.start();
+    bench.until(Follow, 30.0);
+    bench.until(Done, 120.0);
+}

@@ -1,0 +1,190 @@
+//! What a companion of a coverage mission reports of all vehicles: the payload of TUNNEL under a second private payload type.
+//!
+//! Little-endian, at most 128 bytes; more than 22 vehicles take two messages:
+//!
+//! | byte | type | field |
+//! |---|---|---|
+//! | 0 | u8 | version, 1 |
+//! | 1 | u8 | system id |
+//! | 2 | u8 | divisions that count |
+//! | 3 | u8 | rank of the first vehicle below |
+//! | 4 | u8 | number of vehicles n, 1…22 |
+//! | 5 | u8 | 0 |
+//! | 6 | u32 | CRC-32 of the mission file |
+//! | 10 | u32 | hash of the last division that counts; 0 for none |
+//! | 14 | u32 | hash of the division under way, as the sender computed it; 0 for none |
+//! | 18 | 5 × n | the vehicles: flags (bits 0–1 standing, 2 whether the promise is stated, 3 whether it has stopped there, 4 whether it computed the sender's hash too, 5–7 incarnation), u16 done and u16 promised, dm along its path |
+//!
+//! A receiver refuses another version, and a system id that is not the sender's.
+
+use heapless::Vec;
+
+/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+pub const PAYLOAD_TYPE: u16 = 0xF10E;
+/// Version of the layout.
+pub const VERSION: u8 = 1;
+/// Most vehicles of one message.
+pub const ENTRIES: usize = 22;
+const TUNNEL_HEAD: usize = 5;
+const HEAD: usize = 18;
+const ENTRY: usize = 5;
+/// Longest TUNNEL payload.
+pub const LENGTH: usize = TUNNEL_HEAD + HEAD + ENTRIES * ENTRY;
+
+/// Whether a vehicle takes part. What comes later in this list outlasts what comes before.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[repr(u8)]
+pub enum Standing {
+    /// It flies its part, or will.
+    #[default]
+    Alive,
+    /// The others have not heard it for so long that its part is theirs.
+    Lost,
+    /// By its own account it flies no further: what is left of its part is the others'.
+    Left,
+    /// The same, and nothing of its part is left.
+    Finished,
+}
+
+impl Standing {
+    const ALL: [Self; 4] = [Self::Alive, Self::Lost, Self::Left, Self::Finished];
+}
+
+/// One vehicle, as the sender knows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Entry {
+    /// Counts its flights: what is known of an earlier one does not count. 0…7, then 0 again.
+    pub incarnation: u8,
+    /// Whether it takes part.
+    pub standing: Standing,
+    /// How far along its path it has come, decimetres.
+    pub done_dm: u16,
+    /// So far along its path it flies before it waits for a division, decimetres; 0 on its pad.
+    pub promise_dm: Option<u16>,
+    /// Whether it stands there.
+    pub holds: bool,
+    /// Whether it computed the sender's hash of the division under way.
+    pub agrees: bool,
+}
+
+/// The message.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Roster {
+    /// MAVLink system id of the sender.
+    pub system_id: u8,
+    /// Divisions that count, as the sender knows.
+    pub divisions: u8,
+    /// Rank of the first entry.
+    pub first: u8,
+    /// CRC-32 of the mission file.
+    pub mission_crc: u32,
+    /// Hash of the last division that counts.
+    pub counted: u32,
+    /// Hash of the division under way; 0 for none.
+    pub hash: u32,
+    /// The vehicles by rank.
+    pub entries: Vec<Entry, ENTRIES>,
+}
+
+impl Roster {
+    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    pub fn encode(&self, out: &mut [u8; LENGTH]) -> usize {
+        let len = HEAD + ENTRY * self.entries.len();
+        out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+        (out[2], out[3], out[4]) = (0, 0, len as u8);
+        let body = &mut out[TUNNEL_HEAD..];
+        let count = self.entries.len() as u8;
+        body[..6].copy_from_slice(&[VERSION, self.system_id, self.divisions, self.first, count, 0]);
+        body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
+        body[10..14].copy_from_slice(&self.counted.to_le_bytes());
+        body[14..18].copy_from_slice(&self.hash.to_le_bytes());
+        for (to, entry) in body[HEAD..].chunks_exact_mut(ENTRY).zip(&self.entries) {
+            let bit = |set: bool, at: u8| u8::from(set) << at;
+            to[0] = entry.standing as u8
+                | bit(entry.promise_dm.is_some(), 2)
+                | bit(entry.holds, 3)
+                | bit(entry.agrees, 4)
+                | entry.incarnation << 5;
+            to[1..3].copy_from_slice(&entry.done_dm.to_le_bytes());
+            to[3..5].copy_from_slice(&entry.promise_dm.unwrap_or(0).to_le_bytes());
+        }
+        TUNNEL_HEAD + len
+    }
+
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no roster, or not a sound one.
+    pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
+        let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
+        let len = usize::from(padded[4]);
+        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
+        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+            return None;
+        }
+        let count = usize::from(body[4]);
+        if count == 0 || count > ENTRIES || len != HEAD + ENTRY * count {
+            return None;
+        }
+        let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
+        let entry = |b: &[u8]| {
+            let set = |at: u8| b[0] >> at & 1 != 0;
+            Entry {
+                incarnation: b[0] >> 5,
+                standing: Standing::ALL[usize::from(b[0] & 3)],
+                done_dm: u16::from_le_bytes([b[1], b[2]]),
+                promise_dm: set(2).then(|| u16::from_le_bytes([b[3], b[4]])),
+                holds: set(3),
+                agrees: set(4),
+            }
+        };
+        Some(Self {
+            system_id: sender,
+            divisions: body[2],
+            first: body[3],
+            mission_crc: word(6),
+            counted: word(10),
+            hash: word(14),
+            entries: body[HEAD..].chunks_exact(ENTRY).map(entry).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn padded(roster: &Roster) -> [u8; 255] {
+        let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+        let len = roster.encode(&mut out);
+        padded[..len].copy_from_slice(&out[..len]);
+        padded
+    }
+
+    proptest! {
+        #[test]
+        fn comes_back_as_sent_and_refuses_the_unsound(
+            entries in proptest::collection::vec((0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()), 1..=ENTRIES),
+            head in any::<(u8, u8, u32, u32, u32)>(),
+        ) {
+            let entries = entries.iter().map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| Entry {
+                incarnation, standing: Standing::ALL[standing], done_dm, promise_dm, holds, agrees,
+            }).collect();
+            let (divisions, first, mission_crc, counted, hash) = head;
+            let roster = Roster { system_id: 9, divisions, first, mission_crc, counted, hash, entries };
+            prop_assert_eq!(Roster::decode(&padded(&roster), 9), Some(roster.clone()));
+            prop_assert_eq!(Roster::decode(&padded(&roster), 8), None);
+            for (at, value) in [(0, 0), (4, 17), (5, 2), (9, 0), (9, 23)] {
+                let mut bad = padded(&roster);
+                bad[at] = value;
+                prop_assert_eq!(Roster::decode(&bad, 9), None);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 255)) {
+            let mut padded: [u8; 255] = bytes.try_into().unwrap();
+            padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+            padded[5] = VERSION;
+            let _ = Roster::decode(&padded, padded[6]);
+        }
+    }
+}

@@ -1,0 +1,429 @@
+//! Which vehicles of a coverage mission still fly, and the division of what the others left: agreed on with nobody in charge.
+//!
+//! Each vehicle keeps an entry for every vehicle of the roster. Entries only grow and are merged by maximum, so lost, repeated
+//! and reordered messages do no harm. Where a vehicle is lost or leaves, each of the others states once how far it flies on: its
+//! promise. It holds there. From the entries all compute the same division, report its hash, and fly on once all that live
+//! have reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its lease: within
+//! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT`] after each of them last heard
+//! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model.rs` searches it.
+
+use crc::{CRC_32_ISO_HDLC, Crc};
+use heapless::Vec;
+
+use crate::link::roster::{ENTRIES, Entry, Roster, Standing};
+use crate::time::{Duration, Instant};
+
+/// A vehicle photographs for so long after a majority last said that it hears it.
+pub const LEASE: Duration = Duration::from_secs(20);
+/// What was heard within this time counts for the lease.
+pub const HEARD: Duration = Duration::from_secs(1);
+/// After this silence a vehicle's part is the others'.
+pub const SILENT: Duration = Duration::from_secs(45);
+/// Most divisions of a mission; after them what a vehicle leaves stays undone.
+pub const DIVISIONS: usize = 5;
+/// Incarnations that can be told apart: 3 bits.
+const INCARNATIONS: u8 = 8;
+
+/// What a division follows from, of one vehicle: as [`planner_core::coverage::losses::Fate`], in decimetres.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub struct Lot {
+    /// Whether it flies on.
+    pub lives: bool,
+    /// How far along its path the pictures are its own.
+    pub along_dm: u16,
+}
+
+/// The lots of all vehicles by rank.
+pub type Lots<const V: usize> = Vec<Lot, V>;
+
+/// What a vehicle says of itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Own {
+    /// Whether it takes part.
+    pub standing: Standing,
+    /// Whether it has not been started: it may come back as one that is new.
+    pub waits: bool,
+    /// Divisions that count for the path it flies: what follows is along that.
+    pub division: usize,
+    /// How far along its path it has come, decimetres.
+    pub done_dm: u16,
+    /// Where it would hold if it were asked now; none while it cannot say.
+    pub promise_dm: Option<u16>,
+    /// Whether it stands where it promised.
+    pub holds: bool,
+}
+
+/// What it hears of another vehicle.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Hearing {
+    /// When it was last heard itself.
+    pub direct_at: Option<Instant>,
+    /// Whether that said that it hears this one.
+    pub hears_us: bool,
+    /// Whether another one that is heard said that it hears it.
+    pub by_others: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+struct Member {
+    entry: Entry,
+    /// Whether it was alive when the last division began to count.
+    in_roster: bool,
+    /// When it was last heard, by this vehicle or one that this one hears.
+    heard_at: Instant,
+    /// Its hash of the division under way; 0 for none.
+    hash: u32,
+}
+
+/// All vehicles of the roster, this one among them.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Fleet<const V: usize> {
+    own: usize,
+    members: Vec<Member, V>,
+    /// The divisions that count.
+    divisions: Vec<Lots<V>, DIVISIONS>,
+    counted: u32,
+    /// What the division under way follows from, once all of it is known.
+    lots: Lots<V>,
+    hash: u32,
+    /// The same as it was reported before that changed.
+    before: Lots<V>,
+    hash_before: u32,
+    lease_at: Instant,
+    excluded: bool,
+    /// A lost vehicle is down once it has been silent for so long.
+    down: Duration,
+}
+
+impl<const V: usize> Fleet<V> {
+    /// A fleet of so many vehicles (at most `V`), seen by the one of rank `own`. A vehicle that nobody hears any more is
+    /// down after `down`.
+    pub fn new(own: usize, count: usize, down: Duration) -> Self {
+        let member = Member { in_roster: true, ..Member::default() };
+        Self {
+            own,
+            members: core::iter::repeat_n(member, count.min(V)).collect(),
+            divisions: Vec::new(),
+            counted: 0,
+            lots: Vec::new(),
+            hash: 0,
+            before: Vec::new(),
+            hash_before: 0,
+            lease_at: Instant::ZERO,
+            excluded: false,
+            down,
+        }
+    }
+
+    /// A flight begins, or is planned again: whoever was silent before is not.
+    pub fn begin(&mut self, now: Instant) {
+        let entry = self.members[self.own].entry;
+        if entry.standing != Standing::Alive || self.excluded || !self.divisions.is_empty() {
+            self.renew((entry.incarnation + 1) % INCARNATIONS);
+        }
+        self.members.iter_mut().for_each(|member| member.heard_at = now);
+        self.lease_at = now;
+    }
+
+    /// Comes back as a vehicle that nothing is known of.
+    fn renew(&mut self, incarnation: u8) {
+        *self = Self { lease_at: self.lease_at, ..Self::new(self.own, self.members.len(), self.down) };
+        self.members[self.own].entry.incarnation = incarnation;
+    }
+
+    /// One step: what is known of all vehicles, the lease, and the division under way.
+    pub fn step(&mut self, now: Instant, own: &Own, hearing: impl Fn(usize) -> Hearing) {
+        // Its path may be that of the division before yet.
+        let caught_up = own.division == self.divisions.len();
+        let entry = &mut self.members[self.own].entry;
+        entry.standing = entry.standing.max(of_division(own.standing, caught_up));
+        if caught_up {
+            entry.done_dm = entry.done_dm.max(own.done_dm);
+        }
+        let mut linked = 1u32 << self.own.min(31);
+        for (rank, member) in self.members.iter_mut().enumerate() {
+            let heard = hearing(rank);
+            let lately = heard.direct_at.is_some_and(|at| now - at <= HEARD);
+            if rank == self.own || lately || heard.by_others {
+                member.heard_at = now;
+            }
+            linked |= u32::from(lately && heard.hears_us) << rank.min(31);
+        }
+        if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
+            self.lease_at = now;
+        }
+        if self.has_lease(now) {
+            for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= SILENT) {
+                member.entry.standing = member.entry.standing.max(Standing::Lost);
+            }
+        }
+        if self.is_dividing() && caught_up {
+            let entry = &mut self.members[self.own].entry;
+            entry.promise_dm = entry.promise_dm.or(own.promise_dm);
+            entry.holds |= own.holds && entry.promise_dm.is_some();
+            self.draw_lots(now);
+            if self.may_count(now) {
+                self.count();
+            }
+        }
+    }
+
+    /// Whether what some vehicle left is to be divided.
+    pub fn is_dividing(&self) -> bool {
+        let left = |m: &Member| m.in_roster && matches!(m.entry.standing, Standing::Lost | Standing::Left);
+        self.lives(self.own) && !self.divisions.is_full() && self.members.iter().any(left)
+    }
+
+    fn lives(&self, rank: usize) -> bool {
+        let member = &self.members[rank];
+        member.in_roster && member.entry.standing == Standing::Alive
+    }
+
+    /// Whether these are a majority of those that take part, or were lost: of half of them, the half with the lowest rank.
+    fn is_majority(&self, among: impl Fn(usize, &Member) -> bool) -> bool {
+        let counts = |m: &Member| m.in_roster && m.entry.standing <= Standing::Lost;
+        let all = || self.members.iter().enumerate().filter(|(_, m)| counts(m));
+        let these = all().filter(|(rank, m)| among(*rank, m)).count();
+        let lowest = all().next().is_some_and(|(rank, m)| among(rank, m));
+        2 * these > all().count() || (2 * these == all().count() && lowest)
+    }
+
+    /// What the division follows from, once all that live have stated their promise, and whoever is lost has been silent here too.
+    fn draw_lots(&mut self, now: Instant) {
+        let known = |m: &Member| match m.entry.standing {
+            Standing::Alive => m.entry.promise_dm.is_some(),
+            Standing::Lost => now - m.heard_at >= SILENT,
+            Standing::Left | Standing::Finished => true,
+        };
+        if !self.has_lease(now) || !self.members.iter().filter(|m| m.in_roster).all(known) {
+            self.withdraw();
+            self.lots.clear();
+            return;
+        }
+        let lot = |m: &Member| {
+            let lives = m.in_roster && m.entry.standing == Standing::Alive;
+            let promised = m.entry.promise_dm.filter(|_| lives);
+            Lot { lives, along_dm: promised.unwrap_or(m.entry.done_dm) }
+        };
+        if !self.members.iter().map(lot).eq(self.lots.iter().copied()) {
+            self.withdraw();
+            self.lots = self.members.iter().map(lot).collect();
+        }
+    }
+
+    /// What was reported last does not hold any more.
+    fn withdraw(&mut self) {
+        if self.hash != 0 {
+            (self.before, self.hash_before) = (self.lots.clone(), self.hash);
+            self.hash = 0;
+        }
+    }
+
+    /// The division to be computed, if there is one: all that count, and the one under way.
+    pub fn wants_hash(&self) -> bool {
+        self.hash == 0 && !self.lots.is_empty()
+    }
+
+    /// The lots of every division that counts, and of the one under way where that is to be computed.
+    pub fn losses(&self) -> impl Iterator<Item = &[Lot]> {
+        let under_way = self.wants_hash().then_some(&self.lots);
+        self.divisions.iter().chain(under_way).map(|lots| &lots[..])
+    }
+
+    /// Takes the CRC of the plan that was computed. The hash covers what it follows from as well: plans may be alike of which
+    /// one counts on a vehicle that the other has given up.
+    pub fn take_plan_crc(&mut self, plan_crc: u32) {
+        if self.wants_hash() {
+            const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+            let mut digest = CRC32.digest();
+            digest.update(&plan_crc.to_le_bytes());
+            for lot in &self.lots {
+                let [low, high] = lot.along_dm.to_le_bytes();
+                digest.update(&[u8::from(lot.lives), low, high]);
+            }
+            // 0 is none.
+            self.hash = digest.finalize().max(1);
+            self.members[self.own].hash = self.hash;
+        }
+    }
+
+    fn may_count(&self, now: Instant) -> bool {
+        let agrees = |rank: usize| {
+            let member = &self.members[rank];
+            member.hash == self.hash && member.entry.holds
+        };
+        let is_down = |m: &Member| m.entry.standing != Standing::Lost || now - m.heard_at >= self.down;
+        self.hash != 0
+            && self.members.iter().filter(|m| m.in_roster).all(is_down)
+            && (0..self.members.len()).filter(|rank| self.lives(*rank)).all(agrees)
+            && self.is_majority(|rank, _| self.lives(rank))
+    }
+
+    /// The division under way counts from now on.
+    fn count(&mut self) {
+        let lots = core::mem::take(&mut self.lots);
+        self.counted = self.hash;
+        (self.hash, self.hash_before) = (0, 0);
+        self.before.clear();
+        for (member, lot) in self.members.iter_mut().zip(&lots) {
+            member.in_roster &= lot.lives;
+            member.hash = 0;
+            let Entry { incarnation, standing, .. } = member.entry;
+            let standing = of_division(standing, !lot.lives);
+            member.entry = Entry { incarnation, standing, ..Entry::default() };
+        }
+        // No division is under way where they are full.
+        let _ = self.divisions.push(lots);
+    }
+
+    /// Takes in what the vehicle of rank `sender` reports.
+    pub fn handle(&mut self, sender: usize, roster: &Roster, waits: bool) {
+        if sender >= self.members.len() || sender == self.own {
+            return;
+        }
+        let here = self.divisions.len() as u8;
+        if roster.divisions > here && !self.catch_up(roster) {
+            self.excluded = !waits;
+        }
+        let same = usize::from(roster.divisions) == self.divisions.len();
+        if same {
+            self.members[sender].hash = roster.hash;
+        }
+        for (rank, entry) in
+            roster.entries.iter().enumerate().map(|(i, e)| (i + usize::from(roster.first), e))
+        {
+            if rank == self.own {
+                self.hear_of_itself(entry, waits);
+            } else if rank < self.members.len() {
+                self.merge(rank, entry, same);
+                if same && entry.agrees && rank != sender && roster.hash != 0 {
+                    self.members[rank].hash = roster.hash;
+                }
+            }
+        }
+    }
+
+    /// Lets the division count that counts for the sender, if it was reported here: then the others counted on that.
+    fn catch_up(&mut self, roster: &Roster) -> bool {
+        let here = self.divisions.len() as u8;
+        if roster.divisions != here + 1 || roster.counted == 0 || self.divisions.is_full() {
+            return false;
+        }
+        if roster.counted == self.hash_before {
+            (self.lots, self.hash) = (self.before.clone(), self.hash_before);
+        }
+        let reported = roster.counted == self.hash;
+        if reported {
+            self.count();
+        }
+        reported
+    }
+
+    fn merge(&mut self, rank: usize, entry: &Entry, same: bool) {
+        let member = &mut self.members[rank];
+        let newer = entry.incarnation.wrapping_sub(member.entry.incarnation) % INCARNATIONS;
+        if newer >= INCARNATIONS / 2 {
+            return;
+        }
+        if newer > 0 {
+            let Entry { incarnation, .. } = *entry;
+            member.entry = Entry { incarnation, ..Entry::default() };
+        }
+        let known = &mut member.entry;
+        known.standing = known.standing.max(of_division(entry.standing, same));
+        if same {
+            known.done_dm = known.done_dm.max(entry.done_dm);
+            known.promise_dm = known.promise_dm.or(entry.promise_dm);
+            known.holds |= entry.holds;
+        }
+    }
+
+    /// What others know of this vehicle.
+    fn hear_of_itself(&mut self, entry: &Entry, waits: bool) {
+        let own = self.members[self.own].entry;
+        let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
+        let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.standing > own.standing);
+        match (outlived, waits) {
+            (false, _) => {}
+            // It was restarted: what they know is of its flight before.
+            (true, true) => self.renew((entry.incarnation + 1) % INCARNATIONS),
+            (true, false) => self.excluded = true,
+        }
+    }
+
+    /// The vehicles from rank `first` on, as they are to be reported.
+    pub fn message(&self, first: usize) -> Roster {
+        let entry = |m: &Member| Entry { agrees: self.hash != 0 && m.hash == self.hash, ..m.entry };
+        Roster {
+            divisions: self.divisions.len() as u8,
+            first: first as u8,
+            counted: self.counted,
+            hash: self.hash,
+            entries: self.members.iter().skip(first).take(ENTRIES).map(entry).collect(),
+            ..Roster::default()
+        }
+    }
+
+    /// How many vehicles there are.
+    pub(crate) fn count_all(&self) -> usize {
+        self.members.len()
+    }
+
+    /// Whether it has its lease.
+    pub fn has_lease(&self, now: Instant) -> bool {
+        now - self.lease_at <= LEASE
+    }
+
+    /// Time since a majority last said that it hears this vehicle; nothing where it takes no part any more, and needs no lease.
+    pub fn unheard_for(&self, now: Instant) -> Duration {
+        if self.lives(self.own) { now - self.lease_at } else { Duration::default() }
+    }
+
+    /// What the division to be computed follows from, or the last one that counts, in a few bits.
+    pub fn fingerprint(&self) -> u32 {
+        const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+        let mut digest = CRC32.digest();
+        for lot in self.losses().flatten() {
+            let [low, high] = lot.along_dm.to_le_bytes();
+            digest.update(&[u8::from(lot.lives), low, high]);
+        }
+        digest.finalize()
+    }
+
+    /// Where it is to hold, decimetres along its path, while a division is under way.
+    pub fn promise_dm(&self) -> Option<u16> {
+        self.members[self.own].entry.promise_dm.filter(|_| self.is_dividing())
+    }
+
+    /// Where this vehicle held for the last division that counts, decimetres along its path before.
+    pub fn held_at_dm(&self) -> u16 {
+        let lots = self.divisions.last().and_then(|lots| lots.get(self.own));
+        lots.map_or(0, |lot| lot.along_dm)
+    }
+
+    /// Divisions that count.
+    pub fn division(&self) -> usize {
+        self.divisions.len()
+    }
+
+    /// The hash of the last of them.
+    pub fn counted(&self) -> u32 {
+        self.counted
+    }
+
+    /// Whether the others have counted it as lost, or have divided its part.
+    pub fn is_excluded(&self) -> bool {
+        self.excluded
+    }
+
+    /// Whether another vehicle that lives has not been heard for `span`.
+    pub fn misses_one(&self, now: Instant, span: Duration) -> bool {
+        let missed = |rank: &usize| self.lives(*rank) && now - self.members[*rank].heard_at >= span;
+        (0..self.members.len()).any(|rank| missed(&rank))
+    }
+}
+
+/// A standing in another division: who had finished its part there may have one more here.
+fn of_division(standing: Standing, same: bool) -> Standing {
+    if standing == Standing::Finished && !same { Standing::Left } else { standing }
+}

@@ -1,0 +1,57 @@
+//! What the fleet of a coverage mission agrees on follows from which vehicles hear each other.
+
+use super::*;
+use crate::link::roster::{ENTRIES, Roster};
+use crate::swarm::fleet::{HEARD, Hearing, Own};
+
+impl<const V: usize> Neighbours<V> {
+    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds.
+    pub(crate) fn form_fleet(&mut self, down_s: f32) {
+        let down = Duration::from_millis((down_s * 1000.0) as u64);
+        self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, down));
+    }
+
+    /// What they agree on; none where the mission is no area.
+    pub(crate) fn fleet(&self) -> Option<&Fleet<V>> {
+        self.fleet.as_ref()
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn fleet_mut(&mut self) -> Option<&mut Fleet<V>> {
+        self.fleet.as_mut()
+    }
+
+    /// Looks at who is heard.
+    pub(crate) fn step_fleet(&mut self, own: &Own, now: Instant) {
+        let Some(fleet) = &mut self.fleet else { return };
+        let roster = &self.contacts[..self.roster];
+        let lately = |c: &&Contact| c.belongs_at.is_some_and(|at| now - at <= HEARD);
+        let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.hears);
+        let own_rank = usize::from(self.own_rank);
+        fleet.step(now, own, |rank| {
+            let contact = rank.checked_sub(usize::from(rank > own_rank)).and_then(|at| roster.get(at));
+            let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
+            contact.filter(|_| rank != own_rank).map_or(Hearing::default(), |contact| Hearing {
+                direct_at: contact.belongs_at,
+                hears_us: contact.hears_us_at.is_some_and(|at| now - at <= HEARD),
+                by_others: by_others & bit != 0,
+            })
+        });
+    }
+
+    /// Takes in what another vehicle reports of all. `waits`: this one has not been started.
+    pub(crate) fn handle_roster(&mut self, id: u8, roster: &Roster, waits: bool) {
+        let rank = self.in_roster(id).map(|at| usize::from(self.contacts[at].rank));
+        if let (Some(fleet), Some(rank)) = (&mut self.fleet, rank) {
+            fleet.handle(rank, roster, waits);
+        }
+    }
+
+    /// The next of the reports of all vehicles.
+    pub(crate) fn roster(&mut self) -> Option<Roster> {
+        let fleet = self.fleet.as_ref()?;
+        let first = if self.roster_next < fleet.count_all() { self.roster_next } else { 0 };
+        self.roster_next = first + ENTRIES;
+        Some(fleet.message(first))
+    }
+}

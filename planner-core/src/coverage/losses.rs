@@ -1,0 +1,223 @@
+//! The division after a loss: what is left of the area goes to the vehicles that fly on, from where they hold.
+//!
+//! Beyond CPP, which has this as future work. It is BINPAT over what is left ([`super::divide`]), a pure function of the plan
+//! before it and of what all vehicles agree on, their [`Fate`]s: every vehicle computes the same bits. A further loss is
+//! divided from the division before.
+
+use heapless::Vec;
+
+use super::divide::{self, Range};
+use super::flights::{self, Pad, Swarm};
+use super::lanes::Tracks;
+use super::pack::{self, Heading, PackWorkspace, Plan, Route, Vehicle, Work};
+use super::{CoverageError, Flat};
+use crate::flight::Task;
+use crate::plan::{PlanError, SwarmPlan};
+use crate::schedule::ScheduleWorkspace;
+use crate::sort;
+
+/// Most stretches of waypoints that are done, apart from each other.
+const RANGES: usize = 128;
+
+/// What all vehicles agree on about one of them before the area is divided again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Fate {
+    /// Whether it flies on.
+    pub lives: bool,
+    /// How far along its path the pictures are its own, taken or promised, metres. One that lives holds there; at 0 it still
+    /// stands on its pad. Of one that does not live the last of them is taken again: it may be missing.
+    pub along_m: f32,
+}
+
+/// Memory lent for areas of at most `L` lanes and `K` vehicles.
+pub struct Workspace<const L: usize, const K: usize> {
+    done: Vec<Range, RANGES>,
+    left: Tracks<L>,
+    vehicles: Vec<Vehicle, K>,
+    pads: Vec<Pad, K>,
+    rest: Plan<K>,
+}
+
+impl<const L: usize, const K: usize> Workspace<L, K> {
+    /// All zeros.
+    pub const fn new() -> Self {
+        Self {
+            done: Vec::new(),
+            left: Tracks::new(),
+            vehicles: Vec::new(),
+            pads: Vec::new(),
+            rest: Plan::new(),
+        }
+    }
+
+    /// To be called before the first division of a plan: nothing is done.
+    pub fn begin(&mut self) {
+        self.done.clear();
+    }
+
+    /// Waypoints that are done or promised, in rising order, by their numbers on the whole path.
+    pub fn done(&self) -> &[Range] {
+        &self.done
+    }
+}
+
+impl<const L: usize, const K: usize> Default for Workspace<L, K> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+/// A loss: the plan before it, and what all agree on.
+#[derive(Clone, Copy)]
+pub struct Loss<'a, const L: usize, const N: usize> {
+    /// What was divided before: the lanes of the whole area, all vehicles.
+    pub work: &'a Work<'a, L, N>,
+    /// What flights follow from.
+    pub swarm: &'a Swarm<'a>,
+    /// One of each vehicle.
+    pub fates: &'a [Fate],
+}
+
+/// Why there is no division.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Error {
+    /// The area.
+    Coverage(CoverageError),
+    /// The flights.
+    Plan(PlanError),
+}
+
+impl From<CoverageError> for Error {
+    fn from(error: CoverageError) -> Self {
+        Self::Coverage(error)
+    }
+}
+
+impl From<PlanError> for Error {
+    fn from(error: PlanError) -> Self {
+        Self::Plan(error)
+    }
+}
+
+/// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards both are those of the division.
+///
+/// # Errors
+/// Those of [`divide::left`], [`pack::binpat`] and [`flights::plan`]; [`CoverageError::Vehicles`] where fates and vehicles do
+/// not belong together.
+pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+    loss: &Loss<'_, L, N>,
+    ws: &mut Workspace<L, K>,
+    pack: &mut PackWorkspace<K>,
+    schedule: &mut ScheduleWorkspace,
+    routes: &mut Plan<K>,
+    out: &mut SwarmPlan<V, W>,
+) -> Result<(), Error> {
+    let Loss { work, swarm, fates } = *loss;
+    if fates.len() != work.vehicles.len() || out.flights.len() != fates.len() {
+        return Err(CoverageError::Vehicles.into());
+    }
+    note_done(routes, fates, ws, out)?;
+    place(loss, ws, out)?;
+    routes.routes.clear();
+    match divide::left(work.tracks, &ws.done, work.transit, &mut ws.left) {
+        Ok(()) => share_out(work, fates, ws, pack, routes)?,
+        Err(CoverageError::NothingToCover) => {}
+        Err(error) => return Err(error.into()),
+    }
+    let work = Work { tracks: &ws.left, vehicles: &ws.vehicles, ..*work };
+    let swarm = Swarm { pads: &ws.pads, ..*swarm };
+    Ok(flights::plan(&work, routes, &swarm, schedule, out)?)
+}
+
+/// Adds what each vehicle has done, or keeps, to what was done before.
+fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
+    routes: &Plan<K>,
+    fates: &[Fate],
+    ws: &mut Workspace<L, K>,
+    before: &SwarmPlan<V, W>,
+) -> Result<(), CoverageError> {
+    let mut fresh: Vec<Range, K> = Vec::new();
+    for route in &routes.routes {
+        let index = usize::from(route.vehicle);
+        let (Some(fate), Some(flight)) = (fates.get(index), before.flights.get(index)) else { continue };
+        let Task::Photograph(photographs) = &flight.task else { continue };
+        let taken = photographs.taken_by(&flight.path, fate.along_m);
+        let count = if fate.lives { taken } else { taken.saturating_sub(1) };
+        if let Some(range) = own_range(route, count, &ws.done) {
+            fresh.push(range).map_err(|_| CoverageError::Vehicles)?;
+        }
+    }
+    for range in fresh {
+        ws.done.push(range).map_err(|_| CoverageError::LanesFull)?;
+    }
+    sort::by(&mut ws.done, |a, b| a.first.cmp(&b.first));
+    let mut kept = 0;
+    for i in 1..ws.done.len() {
+        let range = ws.done[i];
+        if range.first <= ws.done[kept].end {
+            ws.done[kept].end = ws.done[kept].end.max(range.end);
+        } else {
+            kept += 1;
+            ws.done[kept] = range;
+        }
+    }
+    ws.done.truncate(kept + 1);
+    Ok(())
+}
+
+/// The first `count` waypoints of a route, by their numbers on the whole path; what was done between them is among them.
+fn own_range(route: &Route, count: u32, done: &[Range]) -> Option<Range> {
+    let count = count.min(route.end - route.first);
+    let (first, end) = match route.heading {
+        Heading::Forward => (route.first, route.first + count),
+        Heading::Backward => (route.end - count, route.end),
+    };
+    (count > 0)
+        .then(|| Range { first: divide::original(done, first), end: divide::original(done, end - 1) + 1 })
+}
+
+/// Where each vehicle goes on from.
+fn place<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
+    loss: &Loss<'_, L, N>,
+    ws: &mut Workspace<L, K>,
+    before: &SwarmPlan<V, W>,
+) -> Result<(), CoverageError> {
+    let Loss { work, swarm, fates } = *loss;
+    ws.vehicles.clear();
+    ws.pads.clear();
+    for (index, (vehicle, pad)) in work.vehicles.iter().zip(swarm.pads).enumerate() {
+        let (mut vehicle, mut pad) = (*vehicle, *pad);
+        let (fate, flight) = (&fates[index], &before.flights[index]);
+        pad.aloft = fate.lives && (fate.along_m > 0.0 || flight.climb_m == 0.0) && flight.task.flies();
+        if pad.aloft {
+            pad.start = flight.path.point_at(fate.along_m).ok_or(CoverageError::Vehicles)?;
+            pad.climb_m = 0.0;
+            vehicle.place = Flat::new(pad.start.x, pad.start.y);
+        }
+        ws.vehicles.push(vehicle).map_err(|_| CoverageError::Vehicles)?;
+        ws.pads.push(pad).map_err(|_| CoverageError::Vehicles)?;
+    }
+    Ok(())
+}
+
+/// Gives what is left to those that live.
+fn share_out<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    fates: &[Fate],
+    ws: &mut Workspace<L, K>,
+    pack: &mut PackWorkspace<K>,
+    routes: &mut Plan<K>,
+) -> Result<(), CoverageError> {
+    let living = || fates.iter().enumerate().filter(|(_, fate)| fate.lives).map(|(index, _)| index);
+    let mut survivors: Vec<Vehicle, K> = living().map(|index| ws.vehicles[index]).collect();
+    if survivors.iter().all(|vehicle| vehicle.weight == 0.0) {
+        survivors.iter_mut().for_each(|vehicle| vehicle.weight = 1.0);
+    }
+    pack::binpat(&Work { tracks: &ws.left, vehicles: &survivors, ..*work }, pack, &mut ws.rest)?;
+    for route in &ws.rest.routes {
+        let vehicle = living().nth(usize::from(route.vehicle)).ok_or(CoverageError::Vehicles)?;
+        let route = Route { vehicle: vehicle as u8, ..*route };
+        routes.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+//! A vehicle lost in a coverage mission: the others divide what it leaves, and photograph all of it.
+//!
+//! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
+
+use companion::swarm::fleet::Lot;
+use flockmate_tests::{areas, covered, number};
+use host_sim::capacity::WAYPOINTS;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::result::MissionResult;
+use host_sim::scenario;
+use planner_core::Point;
+use planner_core::flight::{Flight, Task};
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+const MISSIONS: u64 = 10;
+
+/// What became of a mission.
+#[derive(Debug)]
+struct Outcome {
+    seed: u64,
+    kind: &'static str,
+    covered: f64,
+    left: u64,
+    twice: u64,
+    /// Vehicles that landed short of their part, beside those that were struck.
+    landed_short: usize,
+    /// Contacts with walls, distances below the safety distance, deadlocks.
+    broken: [u64; 3],
+    /// Another vehicle ended in a row of the table that says why.
+    explained: bool,
+    text: String,
+}
+
+/// Why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the lost one hovers
+/// where it was to fly.
+const EXPLAINED: [&str; 4] = [
+    "Neighbours still silent: landing",
+    "Vehicle on the path for 90 s: landing",
+    "No way around: landing",
+    "No progress for 10 min: landing",
+];
+
+const KINDS: [&str; 5] = ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset"];
+
+fn drawn(seed: u64) -> (String, &'static str, u8) {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let count = [3, 5][(seed % 2) as usize];
+    let mut text = areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.5 } else { 0.1 });
+    let kind = KINDS[(seed / 4 % 5) as usize];
+    let vehicle = 1 + (random.next_u32() % count as u32) as u8;
+    // Beside others, of which some are in the air and some on their pads yet.
+    let at_s = 20.0 + (random.next_u32() % 220) as f32;
+    text += &format!("[[faults]]\nat_s = {at_s}\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
+    (text, kind, vehicle)
+}
+
+fn outcome(seed: u64) -> Option<Outcome> {
+    let (text, kind, vehicle) = drawn(seed);
+    let (result, log) = match covered::fly_text(&text) {
+        Ok(flown) => flown,
+        Err(error) => {
+            assert!(
+                error.contains("too many corners") || error.contains("cannot keep"),
+                "seed {seed}: {error}"
+            );
+            return None;
+        }
+    };
+    let MissionResult { vehicles, safety, coverage, .. } = result;
+    let coverage = coverage.expect("it has an area");
+    let short = |end: &str| end != "Done" && !end.starts_with("no goal");
+    Some(Outcome {
+        seed,
+        kind,
+        covered: coverage.covered_share,
+        left: coverage.left,
+        twice: coverage.twice,
+        landed_short: vehicles.iter().filter(|v| v.id != vehicle && short(&v.end)).count(),
+        broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
+        explained: EXPLAINED.iter().any(|row| log.contains(row)),
+        text: log,
+    })
+}
+
+#[test]
+fn what_a_lost_vehicle_leaves_is_photographed_by_the_others() {
+    let (from, count) = (number("FLOCKMATE_LOSSES_FROM", 0), number("FLOCKMATE_LOSSES", MISSIONS));
+    let all: Vec<Outcome> = (from..from + count).into_par_iter().filter_map(outcome).collect();
+    let short = |o: &&Outcome| o.covered < 1.0 || o.landed_short > 0;
+    let wrong = |o: &&Outcome| o.broken != [0; 3] || (short(o) && !o.explained);
+    for o in all.iter().filter(|o| wrong(o) || short(o)) {
+        println!(
+            "seed {} {}: {:.2} %, left {}, twice {}, {} landed short, broken {:?}\n{}",
+            o.seed,
+            o.kind,
+            100.0 * o.covered,
+            o.left,
+            o.twice,
+            o.landed_short,
+            o.broken,
+            o.text
+        );
+    }
+    for kind in KINDS {
+        let of: Vec<&Outcome> = all.iter().filter(|o| o.kind == kind).collect();
+        let whole = of.iter().filter(|o| o.covered >= 1.0).count();
+        println!("{kind}: {whole} of {} whole", of.len());
+    }
+    let (wrong, short) = (all.iter().filter(wrong).count(), all.iter().filter(short).count());
+    println!("{} flown, {short} not whole for a reason that is named, {wrong} wrong", all.len());
+    assert_eq!(wrong, 0);
+    assert!(3 * short <= all.len(), "{short} not whole");
+}
+
+/// Places of the pictures that a flight takes up to a place of its path.
+fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
+    let Task::Photograph(photographs) = &flight.task else { return Vec::new() };
+    let places = photographs.stretches(&flight.path);
+    let places = places.flat_map(|shots| (0..shots.count).map(move |k| shots.place_m(k)));
+    places.filter(|at_m| *at_m <= along_m + 0.01).filter_map(|at_m| flight.path.point_at(at_m)).collect()
+}
+
+/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by who kept it, or by who has it now.
+#[test]
+fn divisions_leave_nothing_out_and_give_nothing_twice() {
+    let one = |seed: u64| -> usize {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let vehicles = 2 + (random.next_u32() % 5) as usize;
+        let text = areas::lost(&mut random, vehicles, 0.0);
+        let scenario = scenario::parse(&text, "area").expect("a scenario");
+        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
+        let Ok(mut plan) = mission.plan() else { return 0 };
+        let mut whole: Vec<Point> = plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)).collect();
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<Lot>>::new());
+        let mut lives = vec![true; vehicles];
+        let mut divided = 0;
+        for _ in 0..3 {
+            let living: Vec<usize> = (0..vehicles).filter(|i| lives[*i]).collect();
+            if living.len() < 2 {
+                break;
+            }
+            lives[living[random.next_u32() as usize % living.len()]] = false;
+            let lot = |i: usize, random: &mut Pcg32| {
+                let flight = &plan.flights[i];
+                let dm = (flight.path.length_m() * 10.0) as u32;
+                let on_pad = flight.climb_m > 0.0 && random.next_u32().is_multiple_of(5);
+                let flown = if on_pad || dm == 0 { 0 } else { 1 + random.next_u32() % dm };
+                Lot { lives: lives[i], along_dm: flown.min(65_535) as u16 }
+            };
+            let lots: Vec<Lot> = (0..vehicles).map(|i| lot(i, &mut random)).collect();
+            let before = plan;
+            losses.push(lots.clone());
+            // Where vehicles hold nearer to each other than any order of departures allows there is none, nor where a path
+            // would need more corners than it may have.
+            match mission.plan_losses(losses.iter().map(|lots| &lots[..])) {
+                Ok(divided) => plan = divided,
+                Err(error) => {
+                    let text = format!("{error:#}");
+                    let known = ["cannot pass", "too many corners"].iter().any(|known| text.contains(known));
+                    assert!(known, "seed {seed}: {text}");
+                    return divided;
+                }
+            }
+            divided += 1;
+            for (flight, lot) in before.flights.iter().zip(&lots) {
+                let mut done = pictures(flight, f32::from(lot.along_dm) / 10.0);
+                if !lot.lives {
+                    done.pop();
+                }
+                kept.extend(done);
+            }
+            for (i, flight) in plan.flights.iter().enumerate() {
+                assert!(lives[i] || !flight.task.flies(), "seed {seed}: {i} is lost");
+            }
+            let mut all = kept.clone();
+            all.extend(plan.flights.iter().flat_map(|f| pictures(f, f32::INFINITY)));
+            let key = |p: &Point| [p.x, p.y];
+            let order = |a: &Point, b: &Point| key(a).partial_cmp(&key(b)).expect("finite");
+            assert_eq!(all.len(), whole.len(), "seed {seed}");
+            whole.sort_by(order);
+            for place in &all {
+                let near = whole.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
+                assert!(near >= 1, "seed {seed}: {place:?} is no waypoint");
+            }
+            for place in &whole {
+                let taken = all.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
+                let twins = whole.iter().filter(|p| (*p - place).xy().norm() < 0.02).count();
+                assert_eq!(taken, twins, "seed {seed}: {place:?}");
+            }
+        }
+        divided
+    };
+    let count = number("FLOCKMATE_DIVIDED", 40);
+    let divided: usize = (0..count).into_par_iter().map(one).sum();
+    println!("{divided} divisions of {count} areas");
+    assert!(divided as u64 > count);
+}
