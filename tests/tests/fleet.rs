@@ -19,6 +19,8 @@ use rayon::prelude::*;
 
 /// Fleets drawn.
 const FLEETS: u64 = 400;
+/// Shares of messages that are lost.
+const LOSSES: [f32; 3] = [0.0, 0.1, 0.5];
 const STEP_S: f32 = 0.25;
 /// Waypoints a second.
 const PER_S: f32 = 0.5;
@@ -80,7 +82,10 @@ struct Vehicle {
 
 struct Outcome {
     wrong: Option<String>,
+    /// From when the first vehicle knew of the loss until each knew that all have the same division, seconds; where one is lost
+    /// and links fail by chance alone.
     agreed_s: Option<f32>,
+    loss: f32,
     left_out: usize,
     majority: bool,
 }
@@ -89,11 +94,18 @@ fn uniform(random: &mut Pcg32) -> f32 {
     (random.next_u32() >> 8) as f32 / (1u32 << 24) as f32
 }
 
-fn fly(seed: u64) -> Outcome {
+/// Whether vehicles obey their lease; a planted error if not.
+#[derive(Clone, Copy, PartialEq)]
+enum Lease {
+    Obeyed,
+    Ignored,
+}
+
+fn fly(seed: u64, lease: Lease) -> Outcome {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = 2 + (random.next_u32() % 4) as usize;
     let whole: Vec<u32> = (0..count as u32 * (20 + random.next_u32() % 60)).collect();
-    let loss = [0.0, 0.1, 0.5][(random.next_u32() % 3) as usize];
+    let loss = LOSSES[(random.next_u32() % 3) as usize];
     let delay_s = [0.05, 0.5, 1.9][(random.next_u32() % 3) as usize];
     let deaf = |random: &mut Pcg32| uniform(random) < 0.1;
     // Links that fail for good, one way, and a partition for a while.
@@ -102,7 +114,7 @@ fn fly(seed: u64) -> Outcome {
         let from_s = 300.0 * uniform(&mut random);
         (from_s, from_s + 120.0 * uniform(&mut random), random.next_u32())
     });
-    let clean = loss == 0.0 && delay_s < 0.1 && apart.is_none() && seed.is_multiple_of(2);
+    let clean = delay_s < 0.1 && apart.is_none() && seed.is_multiple_of(2);
     let losses: Vec<(f32, usize, bool)> = (0..random.next_u32() % 3)
         .map(|_| {
             (
@@ -200,12 +212,11 @@ fn fly(seed: u64) -> Outcome {
                 // What is under way now is not part of it.
                 vehicle.part = counted_parts(&whole, &vehicle.fleet, count).swap_remove(own);
                 vehicle.along_dm = 0;
-                agreed_s = agreed_s.or(detected_s.map(|at_s: f32| t_s - at_s));
             }
             if vehicle.down {
                 continue;
             }
-            if vehicle.fleet.has_lease(now) {
+            if lease == Lease::Ignored || vehicle.fleet.has_lease(now) {
                 vehicle.unheld_s = 0.0;
                 let most = vehicle.fleet.promise_dm().unwrap_or(u16::MAX);
                 let next = (vehicle.along_dm + (PER_S * STEP_S * f32::from(WAYPOINT_DM)) as u16).min(most);
@@ -221,9 +232,14 @@ fn fly(seed: u64) -> Outcome {
             }
         }
         wrong = wrong.or_else(|| {
-            owned_twice(&vehicles, &whole, now).map(|what| format!("seed {seed}, {t_s} s: {what}"))
+            owned_twice(&vehicles, &whole, lease, now).map(|what| format!("seed {seed}, {t_s} s: {what}"))
         });
-        // Intents each 0.25 s, rosters each half second.
+        if let Some(detected_s) = detected_s
+            && vehicles.iter().filter(|v| !v.down).all(|v| v.division > 0 || has_all_hashes(&v.fleet))
+        {
+            agreed_s.get_or_insert(t_s - detected_s);
+        }
+        // Intents each 0.25 s, rosters each half second, as often as intents while dividing.
         for own in 0..count {
             if vehicles[own].dead {
                 continue;
@@ -232,7 +248,8 @@ fn fly(seed: u64) -> Outcome {
                 vehicles[own].heard_at[*j].is_some_and(|at| now - at <= Duration::from_millis(800))
             });
             let bits = bits.fold(0u32, |bits, j| bits | 1 << j);
-            let roster = step.is_multiple_of(2).then(|| vehicles[own].fleet.message(0));
+            let due = step.is_multiple_of(2) || vehicles[own].fleet.is_dividing();
+            let roster = due.then(|| vehicles[own].fleet.message(0));
             for (to, vehicle) in vehicles.iter_mut().enumerate() {
                 let cut = apart.is_some_and(|(from_s, to_s, side)| {
                     (from_s..to_s).contains(&t_s) && (side >> own & 1) != (side >> to & 1)
@@ -265,10 +282,17 @@ fn fly(seed: u64) -> Outcome {
     }
     Outcome {
         wrong,
-        agreed_s: agreed_s.filter(|_| clean),
+        agreed_s: agreed_s.filter(|_| clean && losses.len() == 1),
+        loss,
         left_out: taken.iter().filter(|taken| !**taken).count(),
         majority: alive > 0,
     }
+}
+
+/// Whether it knows that all that live have computed its division.
+fn has_all_hashes(fleet: &Whole) -> bool {
+    let roster = fleet.message(0);
+    roster.hash != 0 && roster.entries.iter().all(|e| e.standing != Standing::Alive || e.agrees)
 }
 
 /// The parts by what counts alone.
@@ -278,10 +302,10 @@ fn counted_parts(whole: &[u32], fleet: &Whole, count: usize) -> Vec<Vec<u32>> {
 }
 
 /// A waypoint that two vehicles may yet photograph.
-fn owned_twice(vehicles: &[Vehicle], whole: &[u32], now: Instant) -> Option<String> {
+fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) -> Option<String> {
     let mut owner = vec![None; whole.len()];
     for (rank, vehicle) in vehicles.iter().enumerate() {
-        if vehicle.down || !vehicle.fleet.has_lease(now) {
+        if vehicle.down || (lease == Lease::Obeyed && !vehicle.fleet.has_lease(now)) {
             continue;
         }
         let end = vehicle.fleet.promise_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
@@ -298,19 +322,32 @@ fn owned_twice(vehicles: &[Vehicle], whole: &[u32], now: Instant) -> Option<Stri
 #[test]
 fn no_waypoint_has_two_owners_and_none_is_left_out() {
     let (from, count) = (number("FLOCKMATE_FLEETS_FROM", 0), number("FLOCKMATE_FLEETS", FLEETS));
-    let all: Vec<Outcome> = (from..from + count).into_par_iter().map(fly).collect();
+    let all: Vec<Outcome> =
+        (from..from + count).into_par_iter().map(|seed| fly(seed, Lease::Obeyed)).collect();
     let wrong: Vec<&String> = all.iter().filter_map(|outcome| outcome.wrong.as_ref()).collect();
     let left_out: Vec<usize> = (0..all.len()).filter(|i| all[*i].left_out > 0 && all[*i].majority).collect();
-    let mut agreed: Vec<f32> = all.iter().filter_map(|outcome| outcome.agreed_s).collect();
-    agreed.sort_by(f32::total_cmp);
     println!(
-        "{count} fleets: {} with two owners, {} with waypoints left out though somebody flew on; agreed within {:?} s (of {})",
+        "{count} fleets: {} with two owners, {} with waypoints left out though somebody flew on",
         wrong.len(),
-        left_out.len(),
-        agreed.last(),
-        agreed.len()
+        left_out.len()
     );
+    for loss in LOSSES {
+        let of = all.iter().filter(|outcome| outcome.loss == loss);
+        let mut agreed: Vec<f32> = of.filter_map(|outcome| outcome.agreed_s).collect();
+        agreed.sort_by(f32::total_cmp);
+        let p99 = agreed.get(agreed.len().saturating_sub(1) * 99 / 100);
+        println!("{loss} of messages lost: agreed within {p99:?} s, 99th percentile of {}", agreed.len());
+    }
     println!("left out: {:?}", &left_out[..left_out.len().min(20)]);
     assert!(wrong.is_empty(), "{:#?}", &wrong[..wrong.len().min(5)]);
     assert!(left_out.is_empty());
+}
+
+/// The test sees what it is there for.
+#[test]
+fn vehicles_that_fly_on_without_their_lease_are_found() {
+    let wrong = |seed: &u64| fly(*seed, Lease::Ignored).wrong.is_some();
+    let found = (0..FLEETS).into_par_iter().filter(wrong).count();
+    println!("{found} of {FLEETS} fleets have a waypoint with two owners");
+    assert!(found > 0);
 }
