@@ -45,10 +45,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
         let home_m = self.home_m();
-        let waits = fleet.is_dividing() || fleet.misses_one(now, MISSED);
-        let halt_m = match fleet.promise_dm() {
-            Some(promise_dm) => f32::from(promise_dm) / 10.0,
-            None if waits && self.guidance.along_m() < home_m => home_m,
+        // One that has left is on its way to the ground.
+        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.misses_one(now, MISSED));
+        let halt_m = match self.holds_at_m() {
+            Some(holds_at_m) => holds_at_m,
+            None if waits && self.guidance.along_m() <= home_m + THERE_M => home_m,
             None => f32::INFINITY,
         };
         let behind = fleet.division() > self.mission.division();
@@ -76,7 +77,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let along_m = self.guidance.progress_m(state, &self.scene());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
-        let nearly_down = flies && self.guidance.along_m() > self.home_m();
+        // One that holds, or waits, may have come a little further than where its descent begins.
+        let descends = self.guidance.along_m() > self.home_m() + THERE_M;
+        let nearly_down = flies && descends && self.holds_at_m().is_none();
         let standing = match ends || nearly_down {
             true if self.has_all_pictures(along_m) => Standing::Finished,
             _ if ends => Standing::Left,
@@ -97,6 +100,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn waits_on_ground(&self) -> bool {
         use State::*;
         matches!(self.mission.state(), WaitAutopilot | WaitPosition | Planning | Ready)
+    }
+
+    /// Whether it is to fly on though it has left, be it that its pilot had it for so long: what it would fly is the others'.
+    pub(super) fn resumes_too_late(&self) -> bool {
+        let resumes = match self.mission.state() {
+            State::PilotReturned => self.mission.pending().resume,
+            state => state == State::Dividing,
+        };
+        resumes && !self.lands_elsewhere() && self.neighbours.fleet().is_some_and(Fleet::has_left)
+    }
+
+    /// Whether it flies back, or aside, to land there.
+    fn lands_elsewhere(&self) -> bool {
+        self.guidance.returning || self.guidance.aside || self.detours.lands()
     }
 
     /// Whether all pictures of its part were taken, at this place of its path.
@@ -136,12 +153,19 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         dm(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
 
-    /// Whether it stands where it promised to.
+    /// Where it is to hold, metres along its path: for a division under way, or for one that counts until its part of that comes.
+    fn holds_at_m(&self) -> Option<f32> {
+        // What it was ordered since the last step the fleet does not know yet.
+        let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !self.lands_elsewhere())?;
+        let behind = fleet.division() > self.mission.division();
+        let held_dm = behind.then(|| fleet.held_at_dm());
+        held_dm.or(fleet.promise_dm()).map(|dm| f32::from(dm) / 10.0)
+    }
+
+    /// Whether it stands there.
     pub(super) fn holds_to_divide(&self) -> bool {
-        let promise_dm = self.neighbours.fleet().and_then(Fleet::promise_dm);
-        promise_dm.is_some_and(|promise_dm| {
-            self.guidance.along_m() >= f32::from(promise_dm) / 10.0 - THERE_M && self.guidance.stands()
-        })
+        self.holds_at_m()
+            .is_some_and(|at_m| self.guidance.along_m() >= at_m - THERE_M && self.guidance.stands())
     }
 
     /// Whether no division is under way or to be flown.

@@ -76,7 +76,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             way_free: self.flies_on(),
             out_of_range: self.neighbours.all_beyond(),
             neighbour_heard: self.is_linked(),
-            excluded: self.neighbours.fleet().is_some_and(Fleet::is_excluded),
+            excluded: self.neighbours.fleet().is_some_and(Fleet::is_excluded) || self.resumes_too_late(),
             holds_to_divide: self.holds_to_divide(),
             division_ready: self.mission.has_division(),
             undivided: self.is_undivided(),

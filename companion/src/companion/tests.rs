@@ -2,6 +2,7 @@
 
 extern crate std;
 mod ardupilot;
+mod divisions;
 mod estimate;
 mod hostile;
 mod interruptions;

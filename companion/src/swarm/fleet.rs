@@ -411,9 +411,19 @@ impl<const V: usize> Fleet<V> {
         self.counted
     }
 
-    /// Whether the others have counted it as lost, or have divided its part.
+    /// Whether the others have counted it as lost, or have divided its part; one that has finished its part has none.
     pub fn is_excluded(&self) -> bool {
-        self.excluded
+        self.excluded && self.members[self.own].entry.standing != Standing::Finished
+    }
+
+    /// Whether this one flies its part, or will.
+    pub(crate) fn takes_part(&self) -> bool {
+        self.lives(self.own)
+    }
+
+    /// Whether this one has left, and said so.
+    pub(crate) fn has_left(&self) -> bool {
+        self.members[self.own].entry.standing == Standing::Left
     }
 
     /// Whether another vehicle that lives has not been heard for `span`.

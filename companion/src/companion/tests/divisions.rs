@@ -1,0 +1,279 @@
+//! What interrupts a division, at random: whatever happens, a vehicle flies no part that is not its own any more, and an order of
+//! a person's outlasts the division. Vehicle 78 leaves; 77 agrees to everything, and its radio comes and goes.
+
+extern crate std;
+use std::format;
+use std::string::String;
+use std::vec::Vec;
+
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
+use planner_core::flight::{Look, Photographs, Task, Trigger};
+use proptest::prelude::{ProptestConfig, any};
+
+use super::State::*;
+use super::*;
+use crate::RosterEntry;
+use crate::link::frame::{self, Header, MAX_SENT};
+use crate::link::intent::ON_PLAN;
+use crate::link::roster::{self, Entry, Roster, Standing};
+
+/// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
+pub(super) fn over_a_field(px4: bool) -> Bench {
+    let mut config = two_vehicles();
+    config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
+    config.division = Some(60.0);
+    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
+    photographs.mark(1, 1).unwrap();
+    let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+    let mut path = planner_core::flight::Path::new();
+    for place in
+        [START, Point::new(10.0, 12.0, 1.5), Point::new(13.0, 12.0, 1.5), Point::new(16.0, 12.0, 1.5), GOAL]
+    {
+        path.push(place, 1.2).unwrap();
+    }
+    bench.answer_plan = Some(Ok(VehiclePlan { task: Task::Photograph(photographs), path, ..plan() }));
+    bench.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+    bench.until(Ready, 6.0);
+    bench
+}
+
+/// A roster of vehicle 77, as this one would have it.
+pub(super) fn own_roster(b: &Bench) -> Roster {
+    let fleet = b.companion.neighbours.fleet().expect("an area");
+    Roster { system_id: 77, mission_crc: 0xC0FFEE, ..fleet.message(0) }
+}
+
+/// The bytes of a roster of vehicle 77.
+pub(super) fn bytes(roster: &Roster, sequence: u8) -> Vec<u8> {
+    let (mut payload, mut out) = ([0; roster::LENGTH], [0; MAX_SENT]);
+    let len = roster.encode(&mut payload);
+    let header = Header { system: roster.system_id, component: crate::COMPONENT, sequence };
+    let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], &mut out);
+    out[..n].to_vec()
+}
+
+/// Vehicle 77: what it knows follows from what this one reports while it hears it.
+#[derive(Default)]
+struct Other {
+    known: Option<Roster>,
+    /// It reports nothing; it hears all the same.
+    mute: bool,
+    sequence: u8,
+    /// Reports of this vehicle after which it lets the division count.
+    counts_after: u32,
+}
+
+impl Other {
+    /// Takes in what this one reports, agrees, lets it count once both hold, and says so.
+    fn tick(&mut self, b: &mut Bench) {
+        self.sequence = self.sequence.wrapping_add(1);
+        if !self.sequence.is_multiple_of(4) {
+            return;
+        }
+        let mine = own_roster(b);
+        let counted = self.known.as_ref().map_or(0, |known| known.divisions);
+        let mut known = match &self.known {
+            Some(known) if counted > mine.divisions => known.clone(),
+            _ => Roster { hash: mine.hash, ..mine.clone() },
+        };
+        if known.divisions == mine.divisions {
+            known.entries[1] = Entry { promise_dm: Some(50), holds: true, agrees: true, ..known.entries[1] };
+            known.entries[2].standing = Standing::Left;
+            let own = mine.entries[0];
+            if known.divisions == 0 && mine.hash != 0 && own.holds && own.standing == Standing::Alive {
+                self.counts_after = self.counts_after.saturating_sub(1);
+            }
+            if known.divisions == 0 && mine.hash != 0 && own.holds && self.counts_after == 0 {
+                let entry = |e: &Entry| Entry {
+                    incarnation: e.incarnation,
+                    standing: e.standing,
+                    ..Entry::default()
+                };
+                known.entries = known.entries.iter().map(entry).collect();
+                (known.divisions, known.counted, known.hash) = (1, mine.hash, 0);
+            }
+        }
+        if !self.mute {
+            b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&known, self.sequence));
+        }
+        self.known = Some(known);
+        b.drain();
+    }
+}
+
+/// What can happen.
+#[derive(Clone, Copy, Debug)]
+enum Happens {
+    Pause,
+    Resume,
+    Pilot,
+    Back,
+    NoPosition,
+    Position,
+    Silent,
+    Heard,
+    Mute,
+    MuteLong,
+    Hears,
+    NoAnswer,
+    Answers,
+    Land,
+    Return,
+    Battery,
+}
+
+const ALL: [Happens; 16] = {
+    use Happens::*;
+    [
+        Pause, Resume, Pilot, Back, NoPosition, Position, Silent, Heard, Mute, MuteLong, Hears, NoAnswer,
+        Answers, Land, Return, Battery,
+    ]
+};
+
+struct Watch {
+    other: Other,
+    /// It was ordered to end its flight.
+    ends: bool,
+    /// Ticks for which it waits on its way back.
+    returns: u32,
+    log: Vec<String>,
+}
+
+impl Watch {
+    fn tick(&mut self, b: &mut Bench) {
+        b.tick();
+        self.other.tick(b);
+        let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
+        let guidance = &b.companion.guidance;
+        let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
+        let flies = state == Follow && !guidance.returning;
+        let behind = fleet.division() > b.companion.mission.division();
+        let held_m = f32::from(fleet.held_at_dm()) / 10.0;
+        assert!(
+            !behind || !flies || guidance.along_m() <= held_m + 0.3,
+            "on another's part, held {held_m} m: {said}"
+        );
+        let left = fleet.message(0).entries[0].standing == Standing::Left;
+        assert!(!left || !flies, "flies on though it left: {said}");
+        // On the way back there are no gates.
+        let halted = state == Follow && guidance.returning && guidance.advice.stop_within_m <= 0.05;
+        self.returns = if halted { self.returns + 1 } else { 0 };
+        assert!(self.returns < 20, "waits on its way back: {said}");
+        assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
+    }
+
+    fn happen(&mut self, b: &mut Bench, what: Happens) {
+        use Happens::*;
+        self.log.push(format!("{:.2} s {:?}: {what:?}", b.now.micros() as f64 * 1e-6, b.state()));
+        let order = |b: &mut Bench, command, param1| {
+            b.acks.clear();
+            b.command(command, param1, SYSTEM, crate::COMPONENT);
+            b.acks.pop().is_some_and(|ack| ack.1 == crate::link::commands::ACCEPTED)
+        };
+        match what {
+            Pause => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0),
+            Resume => _ = order(b, MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0),
+            Pilot => {
+                b.mode = if b.kind == crate::autopilot::Kind::Px4 {
+                    px4::HOLD
+                } else {
+                    crate::autopilot::ardupilot::BRAKE
+                }
+            }
+            Back if b.armed => b.mode = b.kind.setpoint_mode(),
+            Back => {}
+            NoPosition => b.no_position = true,
+            Position => b.no_position = false,
+            Silent => b.silent = true,
+            Heard => b.silent = false,
+            Mute | MuteLong => (b.neighbour, self.other.mute) = (None, true),
+            Hears => {
+                (b.neighbour, self.other.mute) =
+                    (Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5)), false);
+            }
+            NoAnswer => b.answer_division = false,
+            Answers => b.answer_division = true,
+            Land => self.ends |= order(b, MavCmd::MAV_CMD_NAV_LAND, 0.0),
+            Return => self.ends |= order(b, MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0),
+            Battery => b.battery = 2,
+        }
+        let ticks = if matches!(what, MuteLong) { 420 } else { 0 };
+        (0..ticks).for_each(|_| self.tick(b));
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 300 } else { 6000 }))]
+    #[test]
+    fn whatever_interrupts_a_division_no_part_is_flown_that_is_anothers(
+        px4 in any::<bool>(),
+        (lead, waits, counts_after) in (0u32..160, any::<bool>(), 0u32..100),
+        script in proptest::collection::vec((0usize..ALL.len(), 1u32..200), 1..14),
+    ) {
+        let mut b = over_a_field(px4);
+        let mut watch = Watch { other: Other { mute: true, counts_after, ..Other::default() }, ends: false, returns: 0, log: Vec::new() };
+        if !waits {
+            b.start();
+            b.until(Follow, 30.0);
+        }
+        (0..lead).for_each(|_| watch.tick(&mut b));
+        watch.other.mute = false;
+        for (what, ticks) in script {
+            if waits && b.state() == Ready {
+                b.start();
+            }
+            watch.happen(&mut b, ALL[what]);
+            (0..ticks).for_each(|_| watch.tick(&mut b));
+        }
+        // All is well again.
+        (b.silent, b.no_position, b.answer_division) = (false, false, true);
+        watch.happen(&mut b, Happens::Hears);
+        for second in 0..400 {
+            if b.armed && b.mode != b.kind.setpoint_mode() {
+                b.mode = if b.state() == PilotControl { b.kind.setpoint_mode() } else { b.kind.land_mode() };
+            }
+            if matches!(b.state(), PilotReturned | Paused) {
+                watch.happen(&mut b, Happens::Resume);
+            }
+            // Its pilot gave it back while the autopilot was silent: whose it is, a person has to say.
+            if b.state() == Aborted && b.armed && second == 40 {
+                watch.happen(&mut b, Happens::Land);
+            }
+            if second > 0 && !b.armed && b.on_ground() {
+                break;
+            }
+            (0..20).for_each(|_| watch.tick(&mut b));
+        }
+        proptest::prop_assert!(!b.armed && b.on_ground(), "{:?} {:#?} {:?}", b.state(), watch.log, b.texts);
+    }
+}
+
+/// Another vehicle that is silent keeps none above its pad that was ordered home.
+#[test]
+fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
+    for run_s in [3.0, 5.0, 7.0] {
+        let mut b = over_a_field(true);
+        b.start();
+        b.until(Follow, 30.0);
+        b.run(run_s);
+        b.neighbour = None;
+        b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+        b.until(Land, 40.0);
+        assert!((b.enu - START).xy().norm() < 0.5, "{run_s}: {:?} {:?}", b.enu, b.texts);
+    }
+}
+
+/// Its part may yet be another's: above its pad a vehicle waits while one that takes part is silent.
+#[test]
+fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
+    let mut b = over_a_field(true);
+    b.start();
+    b.until(Follow, 30.0);
+    b.neighbour = None;
+    b.run(15.0);
+    let along_m = b.companion.guidance.along_m();
+    assert!(b.state() == Follow && (7.5..8.3).contains(&along_m), "{:?} {along_m} {:?}", b.state(), b.texts);
+    b.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
+    b.until(Done, 60.0);
+}
