@@ -4,6 +4,8 @@
 //! What must hold: no panic; every setpoint finite, inside the fence and near the last one; nothing armed without a start; the
 //! pilot's mode left alone; answers bounded. One target ([`attack`]) serves the fuzzer and the bench.
 
+use core::ops::Range;
+
 use companion::autopilot::Kind;
 use companion::link::frame::{self, Framer, Header, MAX_SENT};
 use companion::link::intent::Intent;
@@ -11,7 +13,7 @@ use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, Ro
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
-use planner_core::flight::{Path, Task};
+use planner_core::flight::{Look, Path, Photographs, Task, Trigger};
 use planner_core::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
@@ -85,15 +87,20 @@ pub struct Flight {
     sent: [u32; 2],
     second_at: Instant,
     report: Report,
+    /// It photographs an area: the vehicles agree on what a lost one leaves.
+    over_area: bool,
 }
 
-fn plan() -> Plan16 {
+fn plan(over_area: bool) -> Plan16 {
     let mut path = Path::new();
     for point in [Point::new(8.0, 12.0, 3.0), Point::new(20.0, 12.0, 3.0), Point::new(20.0, 30.0, 6.0)] {
         path.push(point, 1.5).expect("a short path");
     }
     let gates = heapless::Vec::new();
-    Plan16 { task: Task::Goto(0), path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
+    let mut photographs = Photographs::new(3.0, Look::Ahead, Trigger::Distance);
+    photographs.mark(1, 1).expect("room for one");
+    let task = if over_area { Task::Photograph(photographs) } else { Task::Goto(0) };
+    Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }
 
 type Plan16 = planner_core::flight::VehiclePlan<16, 8>;
@@ -103,11 +110,12 @@ pub const PHASES: usize = 8;
 
 impl Flight {
     /// On its pad.
-    pub fn new(kind: Kind) -> Self {
+    fn new(kind: Kind, over_area: bool) -> Self {
         let start = Point::new(8.0, 12.0, 3.0);
         let mut config: Config<4> = Config::new(ID, start, ORIGIN);
         config.mission_crc = 0xC0FFEE;
         config.geofence = Some(FENCE);
+        config.division = over_area.then_some(60.0);
         let other = RosterEntry { system_id: NEIGHBOUR, start: Point::new(8.0, 30.0, 3.0) };
         config.roster.push(other).expect("room for two");
         let limits = Limits { speed_mps: SPEED_MPS, fence: Some(FENCE) };
@@ -127,13 +135,15 @@ impl Flight {
             sent: [0; 2],
             second_at: Instant::ZERO,
             report: Report::default(),
+            over_area,
         }
     }
 
-    /// One that has come to the phase of this number without an attack.
+    /// One that has come to the phase of this number without an attack; from [`PHASES`] on the same over an area.
     pub fn at_phase(phase: usize) -> Self {
         let kind = if phase.is_multiple_of(2) { Kind::Px4 } else { Kind::ArduPilot };
-        let mut flight = Self::new(kind);
+        let mut flight = Self::new(kind, phase >= PHASES);
+        let phase = phase % PHASES;
         flight.run(3.0);
         if phase < 2 {
             return flight;
@@ -266,7 +276,7 @@ impl Flight {
                 let answer = if self.companion.detour(|_| {}).is_some() {
                     Err(companion::PlanFailure::Unreachable)
                 } else {
-                    Ok(plan())
+                    Ok(plan(self.over_area))
                 };
                 self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|failure| *failure));
             }
@@ -358,8 +368,17 @@ const KEPT: usize = 40;
 
 /// Gives at least `frames` forged frames, in attacks seeded from `seed` on.
 pub fn attacks(seed: u64, frames: u64) -> Report {
+    attacks_in(0..PHASES, seed, frames)
+}
+
+/// The same on vehicles that photograph an area, rosters of the other one among the frames.
+pub fn attacks_over_area(seed: u64, frames: u64) -> Report {
+    attacks_in(PHASES..2 * PHASES, seed, frames)
+}
+
+fn attacks_in(phases: Range<usize>, seed: u64, frames: u64) -> Report {
     use rayon::prelude::*;
-    let phases: Vec<Flight> = (0..PHASES).map(Flight::at_phase).collect();
+    let phases: Vec<Flight> = phases.map(Flight::at_phase).collect();
     let attack = |seed: u64| {
         let flight = phases[seed as usize % PHASES].clone();
         let mut report = flight.attacked(&mut Dice::new(seed), EACH as usize);

@@ -19,6 +19,15 @@ fn forged_frames_break_no_rule() {
     assert!(seen >= 12, "only {seen} states were attacked");
 }
 
+#[test]
+fn forged_rosters_break_no_rule() {
+    let report = hostile::attacks_over_area(1, FRAMES / 4);
+    assert!(report.broken.is_empty() && report.unfit.is_empty(), "{report:#?}");
+    let seen = report.states.iter().filter(|steps| **steps > 0).count();
+    println!("{} frames in {seen} states", report.frames);
+    assert!(seen >= 10, "only {seen} states were attacked");
+}
+
 /// Attacks that once broke a rule: floods of requests after positions that jump, setpoints that followed them; EKF origins a
 /// thousand kilometres away, which round a setpoint out of the fence; a place that moved 12 m while no setpoint was sent.
 const ONCE_BROKEN: [u64; 29] = [

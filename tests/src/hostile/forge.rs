@@ -3,6 +3,7 @@
 use companion::autopilot::Kind;
 use companion::link::frame::{self, Header, MAX_SENT};
 use companion::link::intent::POINTS;
+use companion::link::roster::{self, Entry, Roster, Standing};
 use companion::{AUTOPILOT, COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -45,7 +46,10 @@ impl Flight {
     /// Fields random or at their bounds, and some of a message that would be believed.
     fn fill(&self, id: u32, payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
         if id == TUNNEL_DATA::ID && how & 3 != 0 {
-            return self.fill_intent(payload, entropy, how);
+            return match self.over_area && how & 3 == 1 {
+                true => fill_roster(payload, entropy, how),
+                false => self.fill_intent(payload, entropy, how),
+            };
         }
         let length = LENGTHS.iter().find(|(known, _)| *known == id).map_or(255, |(_, length)| *length);
         for word in payload[..length].chunks_mut(4) {
@@ -190,3 +194,36 @@ const EDGES: [f32; 10] = [
     16_777_217.0,
     -0.0,
 ];
+
+/// A roster like those of the neighbour.
+fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> usize {
+    const ALL: [Standing; 4] = [Standing::Alive, Standing::Lost, Standing::Left, Standing::Finished];
+    let entry = |bits: u64| Entry {
+        incarnation: bits as u8 & 7,
+        standing: ALL[(bits >> 3) as usize % 4],
+        done_dm: (bits >> 8) as u16,
+        promise_dm: (bits & 32 != 0).then_some((bits >> 24) as u16),
+        holds: bits & 64 != 0,
+        agrees: bits & 128 != 0,
+    };
+    let bits = entropy.bits();
+    // Seldom what lands the vehicle at once: the others gave it up, or are divisions ahead.
+    let (about_it, ahead) = (bits >> 40 & 255 == 0, bits >> 48 & 255 == 0);
+    let mut entry_of = |rank| {
+        let drawn = entry(entropy.bits());
+        if rank == 0 && !about_it { Entry::default() } else { drawn }
+    };
+    let roster = Roster {
+        system_id: if how & 8 == 0 { NEIGHBOUR } else { bits as u8 },
+        divisions: if ahead { (bits >> 8) as u8 } else { 0 },
+        first: if how & 64 == 0 { 0 } else { 1 + (bits >> 16) as u8 % 255 },
+        mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
+        counted: (bits >> 24) as u32 % 3,
+        hash: (bits >> 32) as u32,
+        entries: (0..1 + (bits >> 56) as usize % roster::ENTRIES).map(&mut entry_of).collect(),
+    };
+    let mut whole = [0; roster::LENGTH];
+    let length = roster.encode(&mut whole);
+    payload[..length].copy_from_slice(&whole[..length]);
+    length
+}

@@ -13,10 +13,10 @@ use proptest::prelude::{ProptestConfig, any};
 
 use super::State::*;
 use super::*;
-use crate::RosterEntry;
 use crate::link::frame::{self, Header, MAX_SENT};
 use crate::link::intent::ON_PLAN;
 use crate::link::roster::{self, Entry, Roster, Standing};
+use crate::{Link, RosterEntry};
 
 /// Three vehicles photograph an area, this one along the usual path; the first other one is heard.
 pub(super) fn over_a_field(px4: bool) -> Bench {
@@ -276,4 +276,93 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     assert!(b.state() == Follow && (7.5..8.3).contains(&along_m), "{:?} {along_m} {:?}", b.state(), b.texts);
     b.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
     b.until(Done, 60.0);
+}
+
+/// A roster as a liar sends it: one that would be true, with some of it replaced.
+#[derive(Clone, Debug)]
+struct Lie {
+    system_id: u8,
+    crc: bool,
+    divisions: Option<u8>,
+    first: Option<u8>,
+    counted: Option<u32>,
+    hash: Option<u32>,
+    entries: Vec<(usize, u8, u8, u16, Option<u16>, bool)>,
+}
+
+fn lie() -> impl proptest::strategy::Strategy<Value = Lie> {
+    use proptest::prelude::{Just, Strategy, prop_oneof};
+    let id = prop_oneof![4 => Just(77u8), 1 => Just(78), 1 => Just(SYSTEM), 1 => any::<u8>()];
+    let crc = prop_oneof![4 => Just(true), 1 => Just(false)];
+    let divisions =
+        prop_oneof![3 => Just(None), 1 => any::<u8>().prop_map(Some), 1 => (0u8..7).prop_map(Some)];
+    let first = prop_oneof![6 => Just(None), 1 => any::<u8>().prop_map(Some)];
+    let entry = (0usize..3, 0u8..8, 0u8..4, any::<u16>(), any::<Option<u16>>(), any::<bool>());
+    let entries = proptest::collection::vec(entry, 0..4);
+    (id, crc, divisions, first, any::<Option<u32>>(), any::<Option<u32>>(), entries).prop_map(
+        |(system_id, crc, divisions, first, counted, hash, entries)| Lie {
+            system_id,
+            crc,
+            divisions,
+            first,
+            counted,
+            hash,
+            entries,
+        },
+    )
+}
+
+impl Lie {
+    fn told(&self, b: &Bench) -> Roster {
+        const ALL: [Standing; 4] = [Standing::Alive, Standing::Lost, Standing::Left, Standing::Finished];
+        let mut roster = own_roster(b);
+        roster.system_id = self.system_id;
+        roster.mission_crc = if self.crc { roster.mission_crc } else { 7 };
+        roster.divisions = self.divisions.unwrap_or(roster.divisions);
+        roster.first = self.first.unwrap_or(roster.first);
+        roster.counted = self.counted.unwrap_or(roster.hash);
+        roster.hash = self.hash.unwrap_or(roster.hash);
+        for &(rank, incarnation, standing, done_dm, promise_dm, holds) in &self.entries {
+            let standing = ALL[usize::from(standing)];
+            roster.entries[rank] = Entry { incarnation, standing, done_dm, promise_dm, holds, agrees: holds };
+        }
+        roster
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 200 } else { 5000 }))]
+    /// Rosters of strangers, of another mission and in this vehicle's own name change nothing. One vehicle of the roster that lies
+    /// may end the flight, by a landing; it moves the vehicle nowhere.
+    #[test]
+    fn lies_of_a_roster_land_a_vehicle_at_worst(
+        waits in any::<bool>(),
+        lies in proptest::collection::vec((lie(), 0u32..60), 1..20),
+    ) {
+        let mut b = over_a_field(true);
+        if !waits {
+            b.start();
+            b.until(Follow, 30.0);
+        }
+        for (i, (lie, ticks)) in lies.iter().enumerate() {
+            let before = std::boxed::Box::new(b.companion.neighbours.fleet().cloned());
+            b.companion.handle_bytes(Link::Swarm, b.now, &bytes(&lie.told(&b), i as u8));
+            let of_roster = lie.crc && matches!(lie.system_id, 77 | 78);
+            proptest::prop_assert!(of_roster || *before == b.companion.neighbours.fleet().cloned(), "{lie:?}");
+            b.drain();
+            (0..*ticks).for_each(|_| b.tick());
+            let y_m = (b.enu.y - START.y).abs();
+            proptest::prop_assert!(y_m < 0.3 && b.enu.z < GOAL.z + 0.3, "off its path: {:?} {lies:?}", b.enu);
+        }
+        if b.state() == Ready {
+            b.start();
+        }
+        for _ in 0..700 {
+            b.run(1.0);
+            if !b.armed && b.on_ground() {
+                break;
+            }
+        }
+        proptest::prop_assert!(!b.armed && b.on_ground(), "{:?} {:?} {lies:#?}", b.state(), b.texts);
+    }
 }
