@@ -4,6 +4,7 @@ mod board;
 mod division;
 mod frames;
 mod inputs;
+mod photographed;
 mod replanning;
 mod steps;
 mod transmit;

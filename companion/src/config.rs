@@ -67,6 +67,8 @@ pub struct Config<const V: usize> {
     /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a lost vehicle may take until
     /// it is down, seconds.
     pub division: Option<f32>,
+    /// Whether a new start leaves out what of an area is photographed already.
+    pub resumes: bool,
     /// System ids whose commands, parameters and files count; 0 is no id.
     pub ground_stations: [u8; GROUND_STATIONS],
 }
@@ -131,6 +133,7 @@ impl<const V: usize> Config<V> {
             swarm_hz: 5,
             geofence: None,
             division: None,
+            resumes: true,
             ground_stations: USUAL_GROUND_STATIONS,
         }
     }

@@ -64,6 +64,7 @@ pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link, Wanted};
 pub use mission::State;
+pub use mission::photographed::DONE;
 pub use time::{Duration, Instant};
 
 /// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.

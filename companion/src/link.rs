@@ -2,6 +2,7 @@
 
 pub mod budget;
 pub mod commands;
+pub mod done;
 pub mod echo;
 pub mod frame;
 pub mod intent;
@@ -39,6 +40,10 @@ pub(crate) enum Fresh {
     Relay,
     /// What all agree on in a coverage mission.
     Roster,
+    /// What of the area is photographed.
+    Done,
+    /// The same as a number to be plotted.
+    DoneCount,
 }
 
 /// Both links.
@@ -47,7 +52,7 @@ pub(crate) struct Links {
     framers: [Framer; 2],
     outboxes: [Outbox; 2],
     /// Bits of [`Fresh`].
-    due: [u8; 2],
+    due: [u16; 2],
     radio: Budget,
     sent: Sent,
     rates: Rates,

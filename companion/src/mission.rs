@@ -6,6 +6,7 @@
 
 pub(crate) mod course;
 mod guard;
+pub(crate) mod photographed;
 mod row;
 mod state;
 pub mod table;

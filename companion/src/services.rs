@@ -19,7 +19,7 @@ use crate::link::Links;
 use crate::link::frame::Frame;
 use crate::link::outbox::Outgoing;
 use crate::link::senders::{Kind, Sender};
-use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
+use crate::storage::store::{self, Erasing, Fault, FlashRequest, Store};
 use crate::time::Instant;
 
 /// `MAV_PARAM_TYPE_REAL32`.
@@ -72,6 +72,18 @@ impl Services {
     /// Keeps files and parameters in a flash from now on.
     pub(crate) fn mount(&mut self, store: Store) {
         self.store = Some(store);
+    }
+
+    /// What the flash has of an area that is photographed.
+    pub(crate) fn photographed(&self) -> &[u8] {
+        self.store.as_ref().map_or(&[], Store::photographed)
+    }
+
+    /// Keeps that.
+    pub(crate) fn keep_photographed(&mut self, photographed: store::Photographed) {
+        if let Some(store) = &mut self.store {
+            store.keep_photographed(photographed);
+        }
     }
 
     /// Whether a parameter was set that is not in use yet.

@@ -16,6 +16,10 @@ pub(crate) enum Timer {
     Swarm,
     /// What all agree on in a coverage mission, to the swarm.
     Roster,
+    /// What of the area is photographed: noted, kept, reported.
+    Done,
+    /// The same to the swarm.
+    DoneReport,
     /// The request that the state repeats: mode, take-off, landing, disarming.
     Request,
     /// A request for the EKF origin.
@@ -30,7 +34,7 @@ pub(crate) enum Timer {
     OriginReport,
 }
 
-const TIMERS: usize = 10;
+const TIMERS: usize = 12;
 /// Those that wake the shell.
 const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 

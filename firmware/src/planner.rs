@@ -5,10 +5,10 @@ use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{Kind, MissionView};
 use companion::swarm::fleet::{DIVISIONS, Lots};
-use companion::{PlanFailure, Wanted, planner};
+use companion::{DONE, PlanFailure, Wanted, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
-use planner_core::flight::VehiclePlan;
+use planner_core::flight::{Range, VehiclePlan};
 use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
@@ -38,6 +38,7 @@ pub struct Own {
     obstacles: Vec<KeepOff, OBSTACLES>,
     /// Whether there were more.
     crowded: bool,
+    done: Vec<Range, DONE>,
     losses: Vec<Lots<VEHICLES>, DIVISIONS>,
     nodes: Vec<u16, WAYPOINTS>,
 }
@@ -49,6 +50,7 @@ impl Own {
             plan: VehiclePlan::new(),
             obstacles: Vec::new(),
             crowded: false,
+            done: Vec::new(),
             losses: Vec::new(),
             nodes: Vec::new(),
         }
@@ -78,10 +80,13 @@ pub struct Planner<'a> {
 impl Planner<'_> {
     /// What the plan that the companion wants follows from: what was lost, or what it would have flown around.
     pub fn note(&mut self, wanted: Wanted, companion: &BoardCompanion) -> Option<DetourRequest> {
-        let Own { obstacles, crowded, losses, .. } = &mut *self.memory.own;
+        let Own { obstacles, crowded, done, losses, .. } = &mut *self.memory.own;
         obstacles.clear();
+        done.clear();
         losses.clear();
         *crowded = false;
+        // As many as the companion keeps.
+        let _ = done.extend_from_slice(companion.done());
         if wanted == Wanted::Division {
             // As many as the companion keeps, and the one under way.
             companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
@@ -163,7 +168,7 @@ fn plan_area<'m>(
     let Memory { scratch, swarm, own } = memory;
     let ws = scratch.area();
     planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
-        &Request { mission, view: area, gates_most: GATES },
+        &Request { mission, view: area, gates_most: GATES, done: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,
         &mut ws.schedule,

@@ -210,10 +210,11 @@ impl Mission {
     ) -> Result<Box<OwnPlan>, PlanFailure> {
         let own = |plan: &SwarmPlan| self.own_plan(plan, index).map_err(|_| PlanFailure::Capacity);
         match wanted {
-            Wanted::Mission => own(plan),
-            Wanted::Division => {
-                let divided = self.plan_losses(companion.losses()).map_err(|_| PlanFailure::Unreachable)?;
-                own(&divided)
+            Wanted::Mission if companion.done().is_empty() => own(plan),
+            Wanted::Mission | Wanted::Division => {
+                let losses = companion.losses().take(if wanted == Wanted::Division { usize::MAX } else { 0 });
+                let rest = self.plan_rest(companion.done(), losses);
+                own(&*rest.map_err(|_| PlanFailure::Unreachable)?)
             }
             Wanted::Detour => {
                 let mut obstacles = Vec::new();

@@ -41,8 +41,9 @@ pub fn planned_page(
         command: result.command.to_owned(),
         generated_by: concat!(env!("CARGO_PKG_NAME"), " ", env!("CARGO_PKG_VERSION")).to_owned(),
         scenario_toml: scenario.text.clone(),
-        map: Some(MapSurface::of(&mission.map.grid())),
-        roadmap: Some(RoadmapLines {
+        // The ground below an area is level, and has no roadmap.
+        map: scenario.area.is_none().then(|| MapSurface::of(&mission.map.grid())),
+        roadmap: scenario.area.is_none().then(|| RoadmapLines {
             nodes: mission.roadmap.nodes.clone(),
             edges: mission.roadmap.edges.iter().map(|e| [e.a, e.b]).collect(),
         }),
@@ -77,10 +78,11 @@ pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyho
     };
     let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
     let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
-    page.plots = vec![
-        plot("Smallest separation", safety, |s| s.separation_m),
-        plot("Smallest wall clearance", body, |s| s.clearance_m),
-    ];
+    page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
+    // Nothing stands on the ground below an area.
+    if mission.scenario.area.is_none() {
+        page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
+    }
     Ok(page)
 }
 

@@ -2,6 +2,12 @@
 
 use core::fmt;
 
+use crc::{CRC_32_ISO_HDLC, Crc};
+
+/// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFFFFFF. One table, of
+/// 1 kB, for all that is summed.
+pub static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
 /// Why bytes are not a whole file, whatever the file holds. Printed, it says so in at most 41 characters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileError {

@@ -2,11 +2,13 @@
 //!
 //! They hold data and answer for geometry alone. Metres, seconds, ENU in the mission frame; arc length runs along the path.
 
+mod done;
 mod photographs;
 
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+pub use self::done::{Done, Range};
 pub use self::photographs::{Look, Photographs, Shots, Trigger};
 use crate::Point;
 

@@ -13,12 +13,12 @@ mod order;
 mod request;
 mod workspace;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 
 pub use self::request::{Mode, Objective, PlanError, PlanRequest, VehicleTask};
 pub use self::workspace::{PlanWorkspace, SwarmPlan};
 use crate::assignment;
+use crate::file::CRC32;
 use crate::flight::{Flight, Path, VehiclePlan};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
@@ -179,7 +179,6 @@ impl<const V: usize, const W: usize> SwarmPlan<V, W> {
 
 /// CRC-32 over all that gates follow from.
 fn crc<const V: usize, const W: usize>(cfg: &ScheduleConfig, plan: &SwarmPlan<V, W>) -> u32 {
-    const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
     let mut digest = CRC32.digest();
     let mut numbers = |numbers: &[f32]| numbers.iter().for_each(|c| digest.update(&c.to_le_bytes()));
     numbers(&[cfg.separation_m, cfg.parked_separation_m, cfg.cruise_mps, cfg.vertical_mps]);

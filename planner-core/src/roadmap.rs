@@ -17,10 +17,8 @@
 //! an offset or a target out of range, and A* finds shortest ways, whatever the bytes were. Whether an edge is as clear as
 //! it says only the map can tell.
 
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
-
 use crate::Point;
-use crate::file::FileError;
+use crate::file::{CRC32, FileError};
 use crate::frames::Geodetic;
 use crate::prm::squared_length;
 
@@ -56,8 +54,6 @@ const NODE_LEN: usize = 12;
 const LANDMARKS_LEN: usize = 4 * LANDMARKS;
 const HEIGHT_LEN: usize = 4;
 const WORD_LEN: usize = 4;
-/// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFFFFFF.
-const CRC: Crc<u32, Table<16>> = Crc::<u32, Table<16>>::new(&CRC_32_ISO_HDLC);
 
 /// Why a roadmap was refused, on reading or writing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -229,7 +225,7 @@ impl<'a> RoadmapView<'a> {
         let body = bytes.get(..total).ok_or(FileError::Truncated)?;
         let (covered, stored) = body.split_last_chunk::<WORD_LEN>().ok_or(FileError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
-        if CRC.checksum(covered) != crc {
+        if CRC32.checksum(covered) != crc {
             return Err(FileError::Crc.into());
         }
         let header = RoadmapHeader {

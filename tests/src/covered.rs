@@ -2,11 +2,13 @@
 
 use std::fmt::Write as _;
 
+use host_sim::coverage::check::Picture;
 use host_sim::coverage::flown;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::report::Event;
+use host_sim::report::{Event, Level};
 use host_sim::result::MissionResult;
+use host_sim::swarm::Flight;
 use host_sim::{scenario, swarm};
 
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
@@ -14,13 +16,34 @@ use host_sim::{scenario, swarm};
 /// # Errors
 /// Why it cannot be planned, flown or judged.
 pub fn fly(mission: &mut Mission) -> anyhow::Result<(MissionResult, Vec<Event>)> {
+    fly_on(mission, &mut Vec::new())
+}
+
+/// The same, judged by the pictures of flights before too; those of this one are added to them.
+///
+/// # Errors
+/// As [`fly`].
+pub fn fly_on(
+    mission: &mut Mission,
+    pictures: &mut Vec<Picture>,
+) -> anyhow::Result<(MissionResult, Vec<Event>)> {
+    let flight = flight(mission, pictures)?;
+    Ok((flight.result, flight.log))
+}
+
+/// The same, with all that was recorded.
+///
+/// # Errors
+/// As [`fly`].
+pub fn flight(mission: &mut Mission, pictures: &mut Vec<Picture>) -> anyhow::Result<Flight> {
     let plan = mission.plan()?;
-    let flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
-    let judged = flown::judge(&mission.scenario, &plan, flight.pictures)?;
-    let mut result = flight.result;
-    result.complete &= judged.complete;
-    result.coverage = Some(judged.result);
-    Ok((result, flight.log))
+    let mut flight = swarm::fly(mission, &plan, "fly", false, &Progress::hidden())?;
+    pictures.iter_mut().for_each(|picture| picture.t_s = 0.0);
+    pictures.append(&mut flight.pictures);
+    let judged = flown::judge(&mission.scenario, &plan, pictures.clone())?;
+    flight.result.complete &= judged.complete;
+    flight.result.coverage = Some(judged.result);
+    Ok(flight)
 }
 
 /// The same from a scenario's text: its result, and what was said that matters.
@@ -32,11 +55,16 @@ pub fn fly_text(text: &str) -> Result<(MissionResult, String), String> {
     let scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
     let (result, log) = fly(&mut mission).map_err(said)?;
+    Ok((result, lines(&log)))
+}
+
+/// What was said that matters.
+pub fn lines(log: &[Event]) -> String {
     let mut lines = String::new();
-    for event in log.iter().filter(|event| event.text.contains(':')) {
+    for event in log.iter().filter(|event| event.text.contains(':') || event.level == Level::Error) {
         let _ = writeln!(lines, "{:8.2} {:?} {}", event.t_s, event.vehicle, event.text);
     }
-    Ok((result, lines))
+    lines
 }
 
 /// What is wrong with a flight.

@@ -1,8 +1,10 @@
 //! Three boards plan an area from the mission file in their flash, divide it alike and photograph it. The pictures are judged
-//! by where they were truly taken.
+//! by where they were truly taken. Where one of them is switched off in flight, the other two divide what it left.
 
 use flockmate_tests::vehicle::mission;
 use flockmate_tests::{board, covered};
+use host_sim::mission::Mission;
+use host_sim::swarm::Flight;
 
 /// A field with a zone that nobody enters, small: boards in QEMU are no faster than a few times the clock.
 const FIELD: &str = r#"
@@ -43,5 +45,67 @@ fn three_boards_photograph_an_area_whole() {
     println!("{:?}", result.coverage);
     for vehicle in &result.vehicles {
         assert!(vehicle.flown_m > 60.0, "a board had no part of the area: {vehicle:?}");
+    }
+}
+
+/// A field that three vehicles photograph in a minute; one of them loses all power amid its part.
+const LOSS: &str = r#"
+[area]
+polygon = [[0, 0], [40, 0], [44, 24], [4, 26]]
+camera = { fov_deg = 73.7, aspect = 1.5 }
+height_m = 14.0
+layer_m = 3.0
+[mission]
+cruise_mps = 5.0
+[[vehicles]]
+id = 1
+start = [-6, 0, 0]
+speed_max_mps = 8.0
+[[vehicles]]
+id = 2
+start = [-6, 8, 0]
+personality = "ardupilot"
+speed_max_mps = 8.0
+[[vehicles]]
+id = 3
+start = [-6, 16, 0]
+speed_max_mps = 8.0
+[simulation]
+gust_mps = 2.0
+radio_loss = 0.1
+[[faults]]
+at_s = 60.0
+kind = "kill"
+vehicle = 3
+"#;
+
+/// Each vehicle that is left flies one division: what the desk plans from the same lots, bit by bit.
+fn divides_as_planned(mission: &Mission, flight: &Flight, left: [u8; 2]) {
+    for vehicle in left {
+        let told: Vec<_> = flight.divisions.iter().filter(|d| d.vehicle == vehicle).collect();
+        assert_eq!(told.len(), 1, "vehicle {vehicle}: {:?}", flight.divisions);
+        let lots = &told[0].lots;
+        let plan = mission.plan_rest(&[], std::iter::once(&lots[..])).expect("the desk divides it too");
+        println!("{:?}", told[0]);
+        assert_eq!(lots.iter().map(|lot| lot.lives).collect::<Vec<_>>(), [true, true, false]);
+        assert_eq!(told[0].plan_crc, plan.crc, "vehicle {vehicle}: {lots:?}");
+    }
+}
+
+#[test]
+fn two_boards_photograph_what_a_third_leaves_that_is_switched_off() {
+    let Some(program) = board::program("flockmate") else { return };
+    let folder = tempfile::tempdir().expect("a temporary directory");
+    let mut mission = mission(LOSS);
+    let desk = covered::flight(&mut mission, &mut Vec::new()).expect("the desk flies it");
+    board::put_on_boards(&mut mission, &program, folder.path());
+    let boards = covered::flight(&mut mission, &mut Vec::new()).expect("the boards fly it");
+    for flight in [&desk, &boards] {
+        let said = || flight.log.iter().map(|e| (e.t_s, e.vehicle, &e.text)).collect::<Vec<_>>();
+        assert_eq!(covered::faults(&flight.result), None, "{:?}", said());
+        println!("{:.0} s in {:.1} s: {:?}", flight.simulated_s, flight.took_s, flight.result.coverage);
+        let third = &flight.result.vehicles[2];
+        assert!(third.end == "Killed" && third.flown_m > 20.0, "it was struck on its pad: {third:?}");
+        divides_as_planned(&mission, flight, [1, 2]);
     }
 }

@@ -155,7 +155,7 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
             losses.push(lots.clone());
             // Where vehicles hold nearer to each other than any order of departures allows there is none, nor where a path
             // would need more corners than it may have.
-            match mission.plan_losses(losses.iter().map(|lots| &lots[..])) {
+            match mission.plan_rest(&[], losses.iter().map(|lots| &lots[..])) {
                 Ok(divided) => plan = divided,
                 Err(error) => {
                     let text = format!("{error:#}");

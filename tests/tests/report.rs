@@ -102,6 +102,7 @@ fn report() -> ReportData {
         ],
         vehicles,
         outlines: Vec::new(),
+        coverage: None,
         obstacles: vec![],
         result: json!({
             "complete": true,
@@ -269,4 +270,75 @@ fn map_style_and_roadmap_change_the_picture() {
     assert!(changed(&solid, &glass) > 20_000, "solid against x-ray: {}", changed(&solid, &glass));
     // Beside the lines themselves one row of the layer panel goes with the roadmap.
     assert!(changed(&none, &bare) > 300, "roadmap: {}", changed(&none, &bare));
+}
+
+/// Three vehicles, of which one loses all power over the area.
+const LOST: &str = r#"
+seed = 7
+[area]
+polygon = [[0, 0], [150, 10], [170, 90], [80, 120], [-10, 80]]
+camera = { fov_deg = 73.7, aspect = 1.5 }
+height_m = 25.0
+[mission]
+cruise_mps = 5.0
+[[vehicles]]
+id = 1
+start = [0, -20, 0]
+[[vehicles]]
+id = 2
+start = [10, -20, 0]
+[[vehicles]]
+id = 3
+start = [20, -20, 0]
+[[faults]]
+at_s = 70.0
+kind = "kill"
+vehicle = 2
+"#;
+
+#[test]
+fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
+    let dir = tempfile::tempdir().expect("a directory");
+    let scenario = dir.path().join("lost.toml");
+    fs::write(&scenario, LOST).expect("the scenario is written");
+    let mut fly = Command::new(host_sim(Profile::Release));
+    let flown = fly.arg("fly").arg(&scenario).arg("--out").arg(dir.path()).output().expect("it flies");
+    assert!(flown.status.success(), "{}", String::from_utf8_lossy(&flown.stdout));
+    let page = dir.path().join("report.html");
+    let text = fs::read_to_string(&page).expect("the page is there");
+    let (_, data) = text.split_once("type=\"application/json\">").expect("its data");
+    let (data, _) = data.split_once("</script>").expect("their end");
+    let data: serde_json::Value = serde_json::from_str(data).expect("JSON");
+    let coverage = &data["coverage"];
+    let [plan, after] = &coverage["divisions"].as_array().expect("divisions")[..] else {
+        panic!("{}", coverage["divisions"])
+    };
+    let waypoints = |division: &serde_json::Value| -> Vec<(u64, u64)> {
+        let parts = division["parts"].as_array().expect("parts").iter();
+        let number = |part: &serde_json::Value, key: &str| part[key].as_u64().expect("a number");
+        parts.map(|part| (number(part, "vehicle"), number(part, "waypoints"))).collect()
+    };
+    assert_eq!(waypoints(plan).iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 2, 3]);
+    assert_eq!(waypoints(after).iter().map(|(id, _)| *id).collect::<Vec<_>>(), [1, 3]);
+    let all: u64 = waypoints(plan).iter().map(|(_, count)| count).sum();
+    assert_eq!(all, data["result"]["coverage"]["waypoints"].as_u64().expect("a number"));
+    // The loss is seen no sooner than 45 s after it; what the lost one left has others now.
+    assert!(after["t_s"].as_f64().expect("a time") > 70.0 + 45.0);
+    assert_eq!((&plan["lost"], &after["lost"]), (&json!([]), &json!([2])));
+    let taken = after["taken"].as_array().expect("what changed hands").iter();
+    let of_lost = taken.filter(|taken| taken["from"] == 2).map(|taken| taken["waypoints"].as_u64());
+    let of_lost: u64 = of_lost.map(|count| count.expect("a number")).sum();
+    assert!(of_lost > 20 && of_lost < waypoints(plan)[1].1, "{of_lost}");
+    let Some(chromium) = chromium() else { return };
+    let (before, later) =
+        (open(&chromium, &page, "#t=60&view=top"), open(&chromium, &page, "#t=200&view=top"));
+    assert_eq!((before.count("divisions"), before.count("paths")), (2.0, 5.0));
+    assert_eq!(before.count("footprints"), data["result"]["coverage"]["photos"].as_f64().expect("a number"));
+    let now = |opened: &Opened| {
+        let (_, rest) = opened.dom.split_once("<li class=\"now\"><time>").expect("a division that counts");
+        rest.contains("Without UAV 2") && !rest.contains("<b>Plan</b>")
+    };
+    assert_eq!((now(&before), now(&later)), (false, true));
+    let changed = before.pixels.iter().zip(&later.pixels).filter(|(a, b)| a != b).count();
+    assert!(changed > 20_000, "{changed} pixels differ");
 }

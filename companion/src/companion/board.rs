@@ -15,6 +15,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// forgotten.
     pub fn mount(&mut self, store: Store) {
         self.services.mount(store);
+        let Self { services, mission, config, .. } = self;
+        mission.photographed_mut().restore(services.photographed(), config.mission_crc);
         self.tune();
     }
 

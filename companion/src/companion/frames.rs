@@ -11,6 +11,7 @@ use crate::autopilot::requests::ORIGIN_AGAIN;
 use crate::autopilot::telemetry::Change;
 use crate::events::Link;
 use crate::link::commands::{self, ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED, UNSUPPORTED};
+use crate::link::done::DoneReport;
 use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
@@ -115,6 +116,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     let waits = self.waits_on_ground();
                     self.neighbours.handle_roster(id, &roster, waits);
                 }
+                return;
+            }
+            if let Some(report) = DoneReport::decode(frame.padded(), id) {
+                self.handle_done(&report);
                 return;
             }
             let Some(intent) = Intent::decode(frame.padded(), id) else { return };

@@ -77,6 +77,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             out_of_range: self.neighbours.all_beyond(),
             neighbour_heard: self.is_linked(),
             excluded: self.neighbours.fleet().is_some_and(Fleet::is_excluded) || self.resumes_too_late(),
+            more_is_done: self.mission.photographed().is_outdated(),
+            plans_differ: self.hears_another_plan(),
             holds_to_divide: self.holds_to_divide(),
             division_ready: self.mission.has_division(),
             undivided: self.is_undivided(),
@@ -84,6 +86,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             plan_failed: self.mission.failure().is_some(),
             roadmap_bad: self.mission.failure() == Some(PlanFailure::NoRoadmap),
             has_goal: self.mission.plan().is_some_and(|plan| plan.task.flies()),
+            plans_as_others: self.plans_as_others(),
             at_start: away.xy().norm() <= self.config.start_tolerance_m && away.z.abs() <= height_tolerance_m,
             imprecise: self.mission.state() == State::Ready && self.guidance.pace < 1.0,
             vague: self.mission.vague_for(now),
@@ -111,6 +114,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             gates_open: self.guidance.advice.stop_within_m > 0.05
                 && self.guidance.filter.column_clear()
                 && self.mission.departure_due(now)
+                && !self.hears_another_plan()
                 && !self.mission.pending().pause
                 && battery_reported(t, self.config.battery_low_percent, now)
                 && !self.detours.is_blocked()

@@ -56,6 +56,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn step_task(&mut self) {
         let state = self.mission.state();
         let off_plan = self.guidance.returning || self.guidance.aside || self.detours.is_flying();
+        self.step_photographed(off_plan);
         let along = Along {
             progress_m: self.guidance.progress_m(state, &self.scene()),
             // Where it brakes along its path it takes the pictures that it passes.
@@ -144,10 +145,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 self.detours.forget_plan();
                 self.neighbours.forget_plan();
                 self.guidance.reset();
+                self.mission.photographed_mut().begin(self.config.resumes);
                 if let Some(fleet) = self.neighbours.fleet_mut() {
                     fleet.begin(now);
                 }
                 let _ = self.events.push_back(Event::PlanRequested(Wanted::Mission));
+            }
+            Action::HoldHere if to == State::Streaming => {
+                self.mission.leave_pad();
+                self.guidance.hold_at(position);
             }
             Action::HoldHere if to == State::PilotReturned => self.guidance.hold_after_pilot(position),
             Action::HoldHere => self.guidance.hold_at(position),

@@ -10,10 +10,10 @@ use planner_core::{Point, frames};
 use super::Companion;
 use crate::events::Link;
 use crate::guidance::Setpoint;
-use crate::link::Fresh;
 use crate::link::frame;
 use crate::link::intent::{self, Intent};
 use crate::link::roster;
+use crate::link::{Fresh, done};
 use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
@@ -59,6 +59,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             let len = roster.encode(&mut payload);
             let header = self.links.header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        if link == Link::Swarm && self.links.take_due(link, Fresh::Done) {
+            let mut payload = [0; done::LENGTH];
+            let len = self.done_report().encode(&mut payload);
+            let header = self.links.header(link, system);
+            return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
+        }
+        if self.links.take_due(link, Fresh::DoneCount) {
+            let data = self.done_count();
+            return frame::encode(self.links.header(link, system), &data, out);
         }
         if link == Link::Swarm && !self.links.radio_allows(self.now, self.telemetry.armed) {
             return 0;

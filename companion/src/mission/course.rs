@@ -1,13 +1,13 @@
 //! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
 
 use planner_core::Point;
-use planner_core::flight::Path;
-use planner_core::flight::VehiclePlan;
+use planner_core::flight::{Path, Task, VehiclePlan};
 
 use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
 use crate::link::Links;
 use crate::link::commands::{self, Command, Pending};
+use crate::mission::photographed::Photographed;
 use crate::mission::task::{Along, Tasks};
 use crate::mission::waits::Waits;
 use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
@@ -37,6 +37,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     vague_since: Option<Instant>,
     waits: Waits,
     tasks: Tasks,
+    photographed: Photographed,
     /// Divisions that count for the plan.
     division: usize,
     /// Whether the part that the last one gives has come and is not flown yet.
@@ -62,6 +63,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             vague_since: None,
             waits: Waits::default(),
             tasks: Tasks::default(),
+            photographed: Photographed::default(),
             division: 0,
             fresh: false,
             asked: None,
@@ -258,6 +260,32 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     pub(crate) fn step_task(&mut self, along: Along, now: Instant, links: &mut Links) {
         if let Some(plan) = &self.plan {
             self.tasks.step(&plan.task, &plan.path, along, now, links);
+        }
+    }
+
+    /// What of an area is photographed.
+    pub(crate) fn photographed(&self) -> &Photographed {
+        &self.photographed
+    }
+
+    /// The same, to be changed.
+    pub(crate) fn photographed_mut(&mut self) -> &mut Photographed {
+        &mut self.photographed
+    }
+
+    /// Notes the pictures that it has passed, `along_m` metres along its path.
+    pub(crate) fn note_photographed(&mut self, along_m: f32) {
+        let Some(plan) = &self.plan else { return };
+        if let Task::Photograph(photographs) = &plan.task {
+            let count = photographs.passed_by(&plan.path, along_m);
+            self.photographed.note(photographs, &plan.path, count);
+        }
+    }
+
+    /// It leaves its pad to fly its plan.
+    pub(crate) fn leave_pad(&mut self) {
+        if let Some(VehiclePlan { task: Task::Photograph(photographs), .. }) = &self.plan {
+            self.photographed.leave_pad(photographs);
         }
     }
 

@@ -168,6 +168,10 @@ pub enum Guard {
     Standing,
     /// Others have divided the part of this vehicle, or count it as lost.
     Excluded,
+    /// Others on the ground know of more that is photographed than its plan leaves out.
+    MoreIsDone,
+    /// A vehicle that follows another plan of this mission is heard.
+    PlansDiffer,
     /// It stands as far along its path as it promised to fly before the division.
     HoldsToDivide,
     /// The division counts, and its part of that has come.
@@ -199,6 +203,10 @@ pub struct Inputs {
     pub neighbour_heard: bool,
     /// Others have divided the part of this vehicle, or count it as lost.
     pub excluded: bool,
+    /// More is photographed than its plan leaves out.
+    pub more_is_done: bool,
+    /// Another plan of this mission is heard.
+    pub plans_differ: bool,
     /// It stands where it promised to wait for a division.
     pub holds_to_divide: bool,
     /// The part that the last division gives has come.
@@ -213,6 +221,8 @@ pub struct Inputs {
     pub roadmap_bad: bool,
     /// The plan has a goal.
     pub has_goal: bool,
+    /// In a coverage mission: all that are heard have its plan, and had the time to say otherwise.
+    pub plans_as_others: bool,
     /// Near the pad below the start point, in height too.
     pub at_start: bool,
     /// On the pad: the estimate's bound does not fit into the margin at cruise speed.
@@ -343,7 +353,7 @@ impl Guard {
             Self::PlanFailed => i.plan_failed,
             Self::RoadmapBad => i.roadmap_bad,
             Self::StartCommanded => i.start && !i.imprecise,
-            Self::StartWithoutGoal => i.start && !i.has_goal,
+            Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
             Self::StartElsewhere => i.start && !i.at_start,
             Self::StartArmed => i.start && i.armed,
             Self::StartBatteryLow => i.start && i.battery_low,
@@ -415,6 +425,8 @@ impl Guard {
             Self::Underneath => i.underneath > limit,
             Self::Standing => i.standing,
             Self::Excluded => i.excluded,
+            Self::MoreIsDone => i.more_is_done,
+            Self::PlansDiffer => i.plans_differ && i.in_state >= limit,
             Self::HoldsToDivide => i.holds_to_divide,
             Self::DivisionReady => i.division_ready,
             Self::NothingToDivide => i.undivided,

@@ -159,7 +159,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::PlanFailed => i.plan_failed = true,
         G::RoadmapBad => (i.plan_failed, i.roadmap_bad) = (true, true),
         G::StartCommanded => (i.start, i.has_goal, i.at_start, i.armed) = (true, true, true, false),
-        G::StartWithoutGoal => (i.start, i.at_start, i.armed) = (true, true, false),
+        G::StartWithoutGoal => (i.start, i.plans_as_others, i.at_start, i.armed) = (true, true, true, false),
         G::StartElsewhere => (i.start, i.has_goal, i.armed) = (true, true, false),
         G::StartArmed => (i.start, i.has_goal, i.at_start) = (true, true, true),
         G::StartVague => {
@@ -234,6 +234,8 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::Underneath => i.underneath = long,
         G::Standing => i.standing = true,
         G::Excluded => i.excluded = true,
+        G::MoreIsDone => i.more_is_done = true,
+        G::PlansDiffer => (i.plans_differ, i.in_state) = (true, long),
         G::HoldsToDivide => i.holds_to_divide = true,
         G::DivisionReady => i.division_ready = true,
         G::NothingToDivide => i.undivided = true,

@@ -10,7 +10,7 @@ use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat};
-use planner_core::flight::Look;
+use planner_core::flight::{Look, Photographs, Range};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
 
@@ -153,6 +153,8 @@ pub struct Request<'a, 'm> {
     pub view: &'a CoverageView<'m>,
     /// Most gates of one vehicle.
     pub gates_most: usize,
+    /// Waypoints that were photographed before, by their numbers on the path along all lanes.
+    pub done: &'a [Range],
 }
 
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
@@ -175,7 +177,7 @@ pub fn plan<
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Request { mission, view, gates_most } = *request;
+    let Request { mission, view, gates_most, done } = *request;
     let header = view.header();
     ws.vertices.clear();
     ws.rings.clear();
@@ -195,6 +197,9 @@ pub fn plan<
         looks: header.looks,
     };
     tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
+    if ws.tracks.waypoint_count() > Photographs::NUMBERS {
+        return Err(CoverageError::LanesFull.into());
+    }
     let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
     for (i, own) in mission.vehicles().enumerate() {
         let (id, start, climb_m) = (own.task.id, own.start, own.task.climb_m);
@@ -206,7 +211,9 @@ pub fn plan<
         }
     }
     let (tracks, transit) = (&ws.tracks, &transit);
-    let work = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
+    let (left, done) = ws.losses.begin(tracks, transit, done)?;
+    let whole = Work { tracks, transit, vehicles: &vehicles, heights: header.heights, unit: header.unit };
+    let work = Work { tracks: left, ..whole };
     match header.parts {
         Parts::SameWeight => pack::binpat(&work, &mut ws.pack, &mut ws.routes)?,
         Parts::Anyone => {
@@ -226,9 +233,9 @@ pub fn plan<
         clearance_m: CLEARANCE_M,
         schedule: mission.header().schedule,
         gates_most,
+        done: &[],
     };
-    flights::plan(&work, &ws.routes, &swarm, schedule, out)?;
-    ws.losses.begin();
+    flights::plan(&work, &ws.routes, &Swarm { done, ..swarm }, schedule, out)?;
     for lots in losses {
         let mut fates: Vec<Fate, K> = Vec::new();
         for pad in &pads {
@@ -237,7 +244,7 @@ pub fn plan<
             let fate = Fate { lives: lot.lives, along_m: f32::from(lot.along_dm) / 10.0 };
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
-        let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
+        let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };
         losses::again(&loss, &mut ws.losses, &mut ws.pack, schedule, &mut ws.routes, out)?;
     }
     Ok(())

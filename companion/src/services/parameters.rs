@@ -35,7 +35,7 @@ const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Param
 }
 
 /// How many there are.
-pub const COUNT: usize = 9;
+pub const COUNT: usize = 10;
 /// Bytes they take in flash.
 pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
 
@@ -46,6 +46,7 @@ pub const TABLE: [Parameter; COUNT] = [
     real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
     real("FLK_EST_M", 0.05, 10.0, 0.1),
     real("FLK_RADIO_M", 1.0, REACHES_ALL_M, REACHES_ALL_M),
+    whole("FLK_RESUME", 0.0, 1.0, 1.0),
     real("FLK_SPEED_MAX", 0.1, 20.0, 20.0),
     real("FLK_START_TOL", 0.2, 20.0, 2.0),
     whole("FLK_SWARM_HZ", 2.0, 10.0, 5.0),
@@ -57,10 +58,11 @@ const BATT_LOW: usize = 1;
 const CLIMB_MAX: usize = 2;
 const EST_M: usize = 3;
 const RADIO_M: usize = 4;
-const SPEED_MAX: usize = 5;
-const START_TOL: usize = 6;
-const SWARM_HZ: usize = 7;
-const SYS_ID: usize = 8;
+const RESUME: usize = 5;
+const SPEED_MAX: usize = 6;
+const START_TOL: usize = 7;
+const SWARM_HZ: usize = 8;
+const SYS_ID: usize = 9;
 
 /// Why a value was not taken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -123,6 +125,7 @@ impl Parameters {
         config.cruise_mps = libm::fminf(config.cruise_mps, self.values[SPEED_MAX]);
         config.estimate_m = self.values[EST_M];
         config.radio_range_m = self.values[RADIO_M];
+        config.resumes = self.values[RESUME] != 0.0;
         config.start_tolerance_m = self.values[START_TOL];
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }

@@ -7,11 +7,10 @@
 //! [`MissionView::parse`] checks everything once, in O(vehicles + goals); afterwards no accessor can meet a number that is
 //! not sound, whatever the bytes were.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::file::FileError;
+use planner_core::file::{CRC32, FileError};
 use planner_core::frames::Geodetic;
 use planner_core::plan::{Mode, Objective, PlanRequest, VehicleTask};
 use planner_core::roadmap::{MAX_COORDINATE_M, RoadmapView};
@@ -41,7 +40,6 @@ const WITHOUT_GROUND_STATIONS: u16 = 1;
 pub const MOST_BYTES: usize = 4096;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 const CRC_LEN: usize = 4;
 /// Flag: the six numbers of the geofence count.
 const FENCED: u8 = 1;
@@ -214,7 +212,7 @@ pub fn write(
     if let Block::Coverage(parts) = block {
         parts.write(to_block);
     }
-    let crc = CRC.checksum(&out[..needed - CRC_LEN]);
+    let crc = CRC32.checksum(&out[..needed - CRC_LEN]);
     out[needed - CRC_LEN..].copy_from_slice(&crc.to_le_bytes());
     MissionView::parse(out)?;
     Ok(needed)
@@ -257,7 +255,7 @@ impl<'a> MissionView<'a> {
         let body = bytes.get(..total).ok_or(FileError::Truncated)?;
         let (covered, stored) = body.split_last_chunk::<CRC_LEN>().ok_or(FileError::Truncated)?;
         let crc = u32::from_le_bytes(*stored);
-        if CRC.checksum(covered) != crc {
+        if CRC32.checksum(covered) != crc {
             return Err(FileError::Crc.into());
         }
         let f64_at = |at: usize| f64::from_bits(u64::from(u32_at(at)) | u64::from(u32_at(at + 4)) << 32);

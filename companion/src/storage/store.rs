@@ -1,4 +1,5 @@
-//! What a companion keeps in flash: two slots for roadmaps, and a journal with the mission file and the parameters.
+//! What a companion keeps in flash: two slots for roadmaps, and a journal with the mission file, the parameters
+//! and what of an area is photographed.
 //!
 //! Flash is I/O: the store asks ([`Store::poll`]) for one sector to be erased, one block to be programmed or some bytes to be
 //! read, and is given the result ([`Store::handle`]). So a slow erasure never stops the setpoints, and the same code keeps
@@ -35,6 +36,9 @@ pub use self::upload_state::{UploadError, UploadState};
 use self::window::Window;
 use crate::services::parameters::Parameters;
 
+/// What of an area is photographed, as the mission writes it.
+pub(crate) type Photographed = heapless::Vec<u8, BLOCK>;
+
 /// A companion's flash.
 #[derive(Clone, Debug)]
 pub struct Store {
@@ -46,6 +50,8 @@ pub struct Store {
     /// Roadmaps up to this number were removed.
     forgotten: u32,
     unsaved: bool,
+    photographed: Photographed,
+    unsaved_photographed: bool,
     window: Window,
     upload: Option<(File, UploadState)>,
     job: Job,
@@ -71,6 +77,8 @@ impl Store {
             parameters: Parameters::default(),
             forgotten: 0,
             unsaved: false,
+            photographed: Photographed::new(),
+            unsaved_photographed: false,
             window: Window::default(),
             upload: None,
             job: Job::None,
@@ -130,6 +138,17 @@ impl Store {
     /// Whether parameters wait to be kept.
     pub fn is_unsaved(&self) -> bool {
         self.unsaved
+    }
+
+    /// What was last kept of an area that is photographed.
+    pub(crate) fn photographed(&self) -> &[u8] {
+        &self.photographed
+    }
+
+    /// Keeps that when the flash has time.
+    pub(crate) fn keep_photographed(&mut self, photographed: Photographed) {
+        self.photographed = photographed;
+        self.unsaved_photographed = true;
     }
 
     /// Length of a file; `None` where there is none.

@@ -7,8 +7,8 @@
 //! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT`] after each of them last heard
 //! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model.rs` searches it.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use heapless::Vec;
+use planner_core::file::CRC32;
 
 use crate::link::roster::{ENTRIES, Entry, Roster, Standing};
 use crate::time::{Duration, Instant};
@@ -234,7 +234,6 @@ impl<const V: usize> Fleet<V> {
     /// one counts on a vehicle that the other has given up.
     pub fn take_plan_crc(&mut self, plan_crc: u32) {
         if self.wants_hash() {
-            const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
             let mut digest = CRC32.digest();
             digest.update(&plan_crc.to_le_bytes());
             for lot in &self.lots {
@@ -381,7 +380,6 @@ impl<const V: usize> Fleet<V> {
 
     /// What the division to be computed follows from, or the last one that counts, in a few bits.
     pub fn fingerprint(&self) -> u32 {
-        const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
         let mut digest = CRC32.digest();
         for lot in self.losses().flatten() {
             let [low, high] = lot.along_dm.to_le_bytes();

@@ -152,6 +152,7 @@ impl<const V: usize> Neighbours<V> {
             floor_m: f32::NAN,
             speed_mps: 0.0,
             shares_plan: false,
+            other_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
             avoided: None,
@@ -266,7 +267,10 @@ impl<const V: usize> Neighbours<V> {
         self.keep_strangers(|c| c.id != intent.system_id);
         let contact = &mut self.contacts[at];
         contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
-        let shared = intent.flags & ON_PLAN != 0 && contact.shares_plan;
+        let on_plan = intent.flags & ON_PLAN != 0;
+        let shared = on_plan && contact.shares_plan;
+        let follows = on_plan && intent.flags & LANDED == 0 && intent.plan_crc != 0;
+        contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
         let out = contact.tells(OUT) && contact.position_at.is_some();

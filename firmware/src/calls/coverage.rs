@@ -4,12 +4,13 @@
 use heapless::Vec;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
-use planner_core::coverage::divide::{self, Range};
+use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use planner_core::coverage::pack::{self, Heights, Plan, Unit, Vehicle, Work};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{Flat, powell, sweep};
+use planner_core::flight::Range;
 
 use super::Meter;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES, VEHICLES};

@@ -6,7 +6,7 @@
 use heapless::Vec;
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour, Own};
-use planner_core::flight::{Look, Path, Photographs, Task, Trigger};
+use planner_core::flight::{Done, Look, Path, Photographs, Range, Task, Trigger};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
 use planner_core::safety::{Bounds, Braking, Heard, Set, conflicts};
@@ -333,6 +333,7 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
             track::advance(&config, &path, &mut Tracker::default(), &Advice::FREE, 0.05);
         }
         tasks(to, &path);
+        sets_of_waypoints(to);
         to.count(to_len(&path));
         path = Path::new();
         let _ = path.push(Point::zeros(), 1.0);
@@ -347,14 +348,22 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
         let new = || Photographs::new(spacing_m, Look::Ahead, Trigger::Distance);
         let mut photographs = to.call("photographs::Photographs::new", new);
         for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::WAYPOINTS), (62, 63)] {
-            let marked = to.call("photographs::Photographs::mark", || photographs.mark(from, until));
+            let marked = to.call("photographs::Photographs::mark", || {
+                photographs.mark(from, until, Photographs::NUMBERS - 1)
+            });
             assert_eq!(marked.is_ok(), from <= until && until < Photographs::WAYPOINTS);
         }
+        let photographs =
+            to.call("photographs::Photographs::of_area", || photographs.of_area(u32::MAX, spacing_m > 0.0));
+        assert_eq!(to.call("photographs::Photographs::area", || photographs.area()), u32::MAX);
         let all = to.call("photographs::Photographs::count", || photographs.count(path));
         let stretches =
             to.call("photographs::Photographs::stretches", || photographs.stretches(path).count());
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {
             let taken = to.call("photographs::Photographs::taken_by", || photographs.taken_by(path, along_m));
+            let passed =
+                to.call("photographs::Photographs::passed_by", || photographs.passed_by(path, along_m));
+            assert!(passed <= taken || spacing_m <= 0.0, "{along_m}: {passed} of {taken}");
             let at_m = to.call("photographs::Photographs::last_by", || photographs.last_by(path, along_m));
             assert!(
                 taken <= all && at_m.is_none_or(|at_m| at_m <= path.length_m() + 1.0),
@@ -362,6 +371,10 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
             );
         }
         assert!(all as usize >= stretches && stretches <= 4, "{spacing_m}: {all} in {stretches}");
+        for count in [0, 1, all, u32::MAX] {
+            let shown = to.call("photographs::Photographs::first", || photographs.first(path, count).count());
+            assert!(shown <= stretches, "{count}: {shown} of {stretches}");
+        }
         for shots in photographs.stretches(path) {
             let place_m = to.call("photographs::Shots::place_m", || shots.place_m(shots.count));
             to.add(place_m);
@@ -369,6 +382,24 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
         let task = Task::Photograph(photographs);
         assert!(to.call("flight::Task::flies", || task.flies()));
         assert_eq!(to.call("flight::Task::goal", || task.goal()), None);
+    }
+}
+
+/// Sets of waypoints, of ranges that turn back, touch, cover all, or find no room.
+fn sets_of_waypoints(to: &mut Answers<'_, impl Listener>) {
+    let ends = [0, 1, 2, 9, 10, 11, 40, u32::MAX - 1, u32::MAX];
+    let mut done = to.call("done::Done::new", Done::<2>::new);
+    for (first, end) in ends.into_iter().flat_map(|first| ends.map(|end| (first, end))) {
+        let before = to.call("done::Done::count", || done.count());
+        let inserted = to.call("done::Done::insert", || done.insert(Range { first, end }));
+        let after = done.count();
+        assert_eq!(inserted == Ok(true), after > before, "{first} to {end}: {before}, {after}");
+        let ranges = to.call("done::Done::ranges", || done.ranges().len());
+        assert_eq!(to.call("done::Done::is_empty", || done.is_empty()), ranges == 0);
+        to.count(after as usize);
+        if after == u32::MAX || inserted.is_err() {
+            to.call("done::Done::clear", || done.clear());
+        }
     }
 }
 

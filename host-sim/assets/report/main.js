@@ -18,6 +18,7 @@ function reportWithoutScene(host) {
 buildHeader();
 buildSummary();
 const markRow = buildVehicleTable((id) => select(state.selected === id ? null : id));
+const showDivision = buildDivisions((t) => seek(t));
 const showEvents = buildEvents((t) => seek(t));
 const showPlots = buildPlots((t) => seek(t));
 byId("scenario").hidden = report.scenario_toml === "";
@@ -33,6 +34,7 @@ function setTime(t) {
   byId("clock").textContent = `${state.time.toFixed(1)} / ${endTime.toFixed(1)} s`;
   document.body.dataset.t = state.time.toFixed(2);
   view?.setTime(state.time);
+  showDivision(state.time);
   showEvents(state.time);
   showPlots(state.time);
   showSelected();

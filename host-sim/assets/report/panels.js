@@ -75,7 +75,7 @@ function buildSummary() {
   }
   if (flown && ends.length > 0) {
     const top = host.appendChild(element("dl"));
-    for (const [key, name] of [["reached", "Reached their goal"], ["landed", "Landed"]]) {
+    for (const [key, name] of [["reached", coverage ? "Back at their pad" : "Reached their goal"], ["landed", "Landed"]]) {
       if (!ends.some((v) => typeof v[key] === "boolean")) continue;
       const count = ends.filter((v) => v[key]).length;
       row(top, name, `${count} of ${ends.length}`, { style: count === ends.length ? "ok" : "bad" });
@@ -90,6 +90,7 @@ function buildSummary() {
   const sections = { ...result, computing_time: report.timing };
   for (const section of ["safety", "totals", "coverage", "formation", "roadmap", "computing_time"]) {
     const figures = sections[section];
+    if (section === "roadmap" && coverage) continue;
     if (!figures || typeof figures !== "object") continue;
     const folded = ["roadmap", "computing_time"].includes(section);
     const name = section[0].toUpperCase() + section.slice(1).replace("_", " ");
@@ -103,7 +104,8 @@ function buildSummary() {
 // Each route's cost as a bar, with a line at the lower bound.
 function costBars({ routes, max_cost_s, lower_bound_s }) {
   const host = element("div", null, { class: "bars" });
-  for (const route of routes) {
+  host.append(element("p", `Planned cost of each flight; white: no division costs less than ${fixed(lower_bound_s, 1)} s`));
+  for (const route of [...routes].sort((a, b) => a.vehicle - b.vehicle)) {
     const bar = host.appendChild(element("div", `UAV ${route.vehicle}: ${fixed(route.cost_s, 1)} s`, { class: "bar" }));
     const color = cssColor(vehicleById.get(route.vehicle)?.color ?? [99, 197, 176]);
     bar.style.background = `linear-gradient(90deg, ${color} ${(100 * route.cost_s) / max_cost_s}%, transparent 0)`;
@@ -214,6 +216,8 @@ function buildLayers(view, asked) {
   }
   layer("Roadmap", "roadmap", true);
   layer("Area", "outlines", true);
+  layer("Strips by UAV", "strips", true);
+  layer("Footprints", "footprints", true);
   layer("Planned paths", "planned", true);
   layer("Flown tracks", "track", true);
   layer("Starts □ and goals ◇", "terminals", true);

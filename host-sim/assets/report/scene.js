@@ -194,10 +194,11 @@ function buildVehicle(v, safetyDistance) {
     parts.terminals.add(goal);
   }
   for (const sprite of parts.terminals.children) sprite.renderOrder = 4;
-  if (v.planned.length >= 6) {
-    parts.planned = fatLine(v.planned, color, 1.6, 0.85);
-    parts.planned.renderOrder = 2;
-  }
+  parts.planned = plannedPaths(v).filter(([, path]) => path.length >= 6).map(([division, path]) => {
+    const line = fatLine(path, color, 1.6, 0.85);
+    line.renderOrder = 2;
+    return { division, line };
+  });
   if (v.track.length >= 8) {
     const xyz = new Float32Array((v.track.length / 4) * 3);
     for (let i = 0; i < v.track.length / 4; i++) xyz.set(v.track.subarray(4 * i + 1, 4 * i + 4), 3 * i);

@@ -25,7 +25,7 @@ function buildView(host, onPick) {
   sun.position.set(0.5, -0.8, 1.2);
   scene.add(new THREE.HemisphereLight(0xdfe9f5, 0x39424c, 1.5), sun);
 
-  const layers = { grid: new THREE.Group(), outlines: new THREE.Group(), roadmap: new THREE.Group(), planned: new THREE.Group(), track: new THREE.Group(), vehicles: new THREE.Group(), terminals: new THREE.Group(), obstacles: new THREE.Group() };
+  const layers = { grid: new THREE.Group(), outlines: new THREE.Group(), strips: new THREE.Group(), footprints: new THREE.Group(), roadmap: new THREE.Group(), planned: new THREE.Group(), track: new THREE.Group(), vehicles: new THREE.Group(), terminals: new THREE.Group(), obstacles: new THREE.Group() };
   for (const layer of Object.values(layers)) scene.add(layer);
   layers.grid.add(buildGrid());
   if (roadmap) layers.roadmap.add(buildRoadmap());
@@ -37,9 +37,10 @@ function buildView(host, onPick) {
   for (const p of parts) {
     layers.vehicles.add(p.body);
     layers.terminals.add(p.terminals);
-    if (p.planned) layers.planned.add(p.planned);
+    for (const { line } of p.planned) layers.planned.add(line);
     if (p.track) layers.track.add(p.track);
   }
+  const area = buildCoverage(layers);
   const obstacles = report.obstacles.map(buildObstacle);
   for (const o of obstacles) layers.obstacles.add(o.mesh);
   const sprites = [];
@@ -120,7 +121,10 @@ function buildView(host, onPick) {
 
   function setTime(t) {
     time = t;
+    const division = divisionAt(t);
+    area.show(t, (id) => selected === null || id === selected);
     for (const p of parts) {
+      for (const planned of p.planned) planned.line.visible = planned.division === division && isShown(p);
       const { position } = stateAt(p.vehicle, t);
       p.body.position.set(...position);
       if (p.track) {
@@ -144,7 +148,6 @@ function buildView(host, onPick) {
   function select(id) {
     selected = id;
     for (const p of parts) {
-      if (p.planned) p.planned.visible = isShown(p);
       p.labelText.classList.toggle("dim", !isShown(p));
       p.dot.material.opacity = isShown(p) ? 1 : 0.4;
       p.terminals.visible = isShown(p);

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::coverage::check::{self, Findings, Flown};
+use crate::coverage::check::{self, Findings};
 use crate::coverage::{self, Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
@@ -59,8 +59,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let usual = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
     let planned = Planned::new(&scenario, args.method.unwrap_or(usual))?;
     let flights = planned.flights();
-    let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
-    let findings = check::check(&planned, &flown);
+    let findings = check::check(&planned, &check::flown(&planned, &flights));
     let result = described(&planned, &findings);
     add_flights(&planned, &flights, &mut results)?;
     results.add(output::NAMES[0], result::json(&result)?.as_bytes())?;

@@ -1,5 +1,6 @@
 //! `host-sim fly` and `host-sim demo`: plan, fly, report.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
@@ -7,12 +8,14 @@ use std::time::Instant;
 use anyhow::{Context, ensure};
 
 use super::load;
-use crate::coverage::flown;
+use crate::coverage::kept::Kept;
+use crate::coverage::{Planned, flown, parts};
 use crate::files::Results;
 use crate::link::LinkUrl;
 use crate::mission::Mission;
 use crate::output;
 use crate::progress::Progress;
+use crate::quote::quoted_path;
 use crate::report::Level;
 use crate::say;
 use crate::scenario::{self, Companion, Scenario};
@@ -52,9 +55,20 @@ pub struct FlyArgs {
     /// roadmap and mission in its flash and logs to board-N.defmt in the directory
     #[arg(long, value_name = "FIRMWARE", conflicts_with = "companion")]
     emulate: Option<PathBuf>,
+    /// Keep what each companion keeps in its flash in this directory, as boards do: parameters, and in a coverage mission
+    /// what is photographed. The next flight goes on there, and is judged by the pictures of all
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["companion", "emulate"])]
+    flash: Option<PathBuf>,
     /// How many of the scenario's first vehicles have such a board, if not all
     #[arg(long, value_name = "N", requires = "emulate")]
     boards: Option<usize>,
+}
+
+/// How a flight is looked at while it lasts.
+#[derive(Default)]
+struct Shown<'a> {
+    realtime: bool,
+    qgc: Option<&'a LinkUrl>,
 }
 
 /// Arguments of `host-sim demo`.
@@ -75,7 +89,11 @@ pub fn run(args: &FlyArgs) -> anyhow::Result<ExitCode> {
     if let Some(program) = &args.emulate {
         emulate(&mut scenario, program, args.boards, &args.out)?;
     }
-    plan_and_fly(scenario, "fly", &args.out, args.realtime, args.qgc.as_ref())
+    if let Some(dir) = &args.flash {
+        keep_flashes(&mut scenario, dir)?;
+    }
+    let shown = Shown { realtime: args.realtime, qgc: args.qgc.as_ref() };
+    plan_and_fly(scenario, "fly", &args.out, &shown, args.flash.as_deref())
 }
 
 /// The first vehicles are decided for behind these links.
@@ -89,6 +107,21 @@ fn put_on_boards(scenario: &mut Scenario, companions: &[LinkUrl], radios: &[Link
     );
     for (i, (vehicle, autopilot)) in scenario.vehicles.iter_mut().zip(companions).enumerate() {
         vehicle.companion = Companion::Url { autopilot: autopilot.clone(), radio: radios.get(i).cloned() };
+    }
+    Ok(())
+}
+
+/// Each companion has a file in this directory for its flash.
+fn keep_flashes(scenario: &mut Scenario, dir: &Path) -> anyhow::Result<()> {
+    fs::create_dir_all(dir).with_context(|| format!("cannot keep flashes: {}", quoted_path(dir)))?;
+    for vehicle in &mut scenario.vehicles {
+        ensure!(
+            matches!(vehicle.companion, Companion::InProcess { .. }),
+            "--flash: vehicle {} has a companion elsewhere, with a flash of its own",
+            vehicle.id
+        );
+        let file = dir.join(format!("vehicle-{}.flash", vehicle.id));
+        vehicle.companion = Companion::InProcess { flash: Some(file) };
     }
     Ok(())
 }
@@ -111,18 +144,19 @@ fn emulate(scenario: &mut Scenario, program: &Path, boards: Option<usize>, out: 
 /// The output cannot be written.
 pub fn demo(args: &DemoArgs) -> anyhow::Result<ExitCode> {
     let scenario = scenario::parse(DEMO, "demo.toml").context("the demo's own scenario")?;
-    plan_and_fly(scenario, "demo", &args.out, false, None)
+    plan_and_fly(scenario, "demo", &args.out, &Shown::default(), None)
 }
 
 fn plan_and_fly(
     scenario: Scenario,
     command: &'static str,
     out: &Path,
-    realtime: bool,
-    qgc: Option<&LinkUrl>,
+    shown: &Shown<'_>,
+    flashes: Option<&Path>,
 ) -> anyhow::Result<ExitCode> {
     faults::check(&scenario)?;
-    let gateway = qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
+    let kept = flashes.filter(|_| scenario.area.is_some()).map(Kept::open).transpose()?;
+    let gateway = shown.qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
     let mut results = Results::open(out, &output::NAMES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
@@ -130,20 +164,29 @@ fn plan_and_fly(
     let plan = mission.plan()?;
     let mut flight = match gateway {
         Some(gateway) => swarm::fly_shown(&mission, &plan, command, gateway, &progress)?,
-        None => swarm::fly(&mission, &plan, command, realtime, &progress)?,
+        None => swarm::fly(&mission, &plan, command, shown.realtime, &progress)?,
     };
+    if let Some(kept) = &kept {
+        kept.add_to(&mut flight.pictures);
+    }
+    let pictures = std::mem::take(&mut flight.pictures);
     let judged = match &mission.scenario.area {
-        Some(_) => Some(flown::judge(&mission.scenario, &plan, std::mem::take(&mut flight.pictures))?),
+        Some(_) => Some(flown::judge(&mission.scenario, &plan, pictures.clone())?),
         None => None,
     };
     if let Some(judged) = &judged {
         flight.result.complete &= judged.complete;
         flight.result.coverage = Some(judged.result.clone());
+        if let Some(kept) = kept {
+            kept.keep(&pictures, judged.complete)?;
+        }
     }
     let mut page = output::flown_page(&mission, &plan, &flight)?;
     if let Some(judged) = judged {
         page.outlines = judged.outlines;
         page.plots.insert(0, judged.plot);
+        let planned = Planned::flown(&mission.scenario)?;
+        page.coverage = Some(parts::flown(&planned, &mission, &plan, &flight, pictures)?);
     }
     mission.timing.simulated_s = flight.simulated_s;
     mission.timing.wall_s = began.elapsed().as_secs_f64();

@@ -10,8 +10,8 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
-use super::Planned;
 use super::flight::{Act, Stop};
+use super::{Flight, Planned};
 
 /// Most cells looked at; larger areas are looked at in larger cells.
 const MOST_CELLS: f64 = 4e7;
@@ -50,6 +50,8 @@ impl Findings {
 
 /// One vehicle's flight: its stops, and when it passes each.
 pub struct Flown<'a> {
+    /// MAVLink system id.
+    pub vehicle: u8,
     /// The stops.
     pub stops: &'a [Stop],
     /// Seconds.
@@ -59,6 +61,8 @@ pub struct Flown<'a> {
 /// A picture: when, where, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
+    /// Who took it, its MAVLink system id; none in an earlier flight.
+    pub vehicle: Option<u8>,
     /// Seconds.
     pub t_s: f32,
     /// Where the camera is, which looks straight down.
@@ -70,8 +74,16 @@ pub struct Picture {
 /// Checks what a plan flies.
 pub fn check_plan(planned: &Planned<'_>) -> Findings {
     let flights: Vec<_> = planned.flights();
-    let flown: Vec<Flown<'_>> = flights.iter().map(|(_, stops, times_s)| Flown { stops, times_s }).collect();
-    check(planned, &flown)
+    check(planned, &flown(planned, &flights))
+}
+
+/// The flights as the checker takes them.
+pub fn flown<'f>(planned: &Planned<'_>, flights: &'f [Flight]) -> Vec<Flown<'f>> {
+    let flown = |(route, stops, times_s): &'f Flight| {
+        let vehicle = planned.scenario.vehicles[usize::from(route.vehicle)].id;
+        Flown { vehicle, stops, times_s }
+    };
+    flights.iter().map(flown).collect()
 }
 
 /// Checks flights against the area.
@@ -82,16 +94,22 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
         let enters = |pair: &&[Stop]| enters_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
-    let mut pictures = Vec::new();
+    Cells::new(planned).judge(planned, pictures(planned, flights), &mut findings);
+    findings
+}
+
+/// The pictures that a plan takes.
+pub fn pictures(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Vec<Picture> {
     let along = planned.tracks.along();
     let heading = along.y.atan2(along.x);
-    for flight in flights {
-        let taken =
-            flight.stops.iter().zip(flight.times_s).filter(|(stop, _)| matches!(stop.act, Act::Photo(_)));
-        pictures.extend(taken.map(|(stop, &t_s)| Picture { t_s, position: stop.position, heading }));
-    }
-    Cells::new(planned).judge(planned, pictures, &mut findings);
-    findings
+    let taken = |flight: &Flown<'_>| {
+        let vehicle = Some(flight.vehicle);
+        let stops = flight.stops.iter().zip(flight.times_s);
+        let photos = stops.filter(|(stop, _)| matches!(stop.act, Act::Photo(_)));
+        let taken = photos.map(|(stop, &t_s)| Picture { vehicle, t_s, position: stop.position, heading });
+        taken.collect::<Vec<_>>()
+    };
+    flights.iter().flat_map(taken).collect()
 }
 
 /// Judges pictures that were taken in a flight, by where the camera truly was. A waypoint is left out if no picture was
@@ -108,6 +126,12 @@ pub fn check_pictures(planned: &Planned<'_>, pictures: Vec<Picture>) -> Findings
     }
     Cells::new(planned).judge(planned, pictures, &mut findings);
     findings
+}
+
+/// Corners of what each picture shows, in turn, metres east and north.
+pub fn footprints(planned: &Planned<'_>, pictures: &[Picture]) -> Vec<[[f32; 2]; 4]> {
+    let cells = Cells::new(planned);
+    pictures.iter().map(|picture| cells.corners(planned, picture)).collect()
 }
 
 fn count_waypoints(planned: &Planned<'_>, flights: &[Flown<'_>], findings: &mut Findings) {
@@ -243,6 +267,16 @@ impl Cells {
         let fits = |own: f64, other: f64| own / (own * cos + other * sin);
         let share = fits(half[0], half[1]).min(fits(half[1], half[0])).min(1.0);
         half.map(|side| side * share * f64::from(picture.position.z) / f64::from(height_m))
+    }
+
+    /// Corners of what a picture is judged to show, in turn, metres east and north.
+    fn corners(&self, planned: &Planned<'_>, picture: &Picture) -> [[f32; 2]; 4] {
+        let ([u, v], [along, across]) = (self.rotated(&picture.position.xy()), self.half(planned, picture));
+        [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]].map(|[i, j]| {
+            let (u, v) = (u + i * along, v + j * across);
+            let [x, y] = self.along;
+            [u * x - v * y, u * y + v * x].map(|metres| metres as f32)
+        })
     }
 
     fn judge(&self, planned: &Planned<'_>, mut pictures: Vec<Picture>, findings: &mut Findings) {

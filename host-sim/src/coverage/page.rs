@@ -6,7 +6,7 @@ use planner_core::coverage::area::RingKind;
 
 use super::check::Findings;
 use super::flight::Stop;
-use super::{Flight, Planned};
+use super::{Flight, Planned, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// What the page shows.
@@ -38,6 +38,7 @@ pub fn page(
         scenario_toml: scenario.text.clone(),
         vehicles: vehicles.collect(),
         outlines: outlines(planned),
+        coverage: Some(parts::planned(planned, flights)),
         plots: vec![photographed(findings)],
         result,
         ..ReportData::default()

@@ -11,7 +11,7 @@ use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::Unit;
 use planner_core::coverage::transit::Transit;
-use planner_core::flight::PathError;
+use planner_core::flight::{PathError, Range};
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
@@ -74,7 +74,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     mission.encode_area(&climbs)?;
     let mut ws = on_heap(DeskWorkspace::new);
-    mission.plan_area(iter::empty(), &mut ws)?;
+    mission.plan_area(&[], iter::empty(), &mut ws)?;
     if ws.routes() != &routes {
         bail!(
             "cannot be flown: {}: companions would divide the area in another way\nhint: please report it, with the scenario",
@@ -159,6 +159,7 @@ impl Mission {
     /// Plans as every companion does.
     fn plan_area<'l>(
         &self,
+        done: &[Range],
         losses: impl Iterator<Item = &'l [Lot]>,
         ws: &mut DeskWorkspace,
     ) -> anyhow::Result<Box<SwarmPlan>> {
@@ -167,7 +168,12 @@ impl Mission {
         let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
         coverage::plan::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, VEHICLES, WAYPOINTS>(
-            &Request { mission: &mission, view, gates_most: self.board.map_or(GATES, |board| board.gates) },
+            &Request {
+                mission: &mission,
+                view,
+                gates_most: self.board.map_or(GATES, |board| board.gates),
+                done,
+            },
             losses,
             ws,
             &mut schedule,
@@ -179,15 +185,19 @@ impl Mission {
 
     /// The plan of a coverage mission.
     pub(super) fn plan_coverage(&self) -> anyhow::Result<Box<SwarmPlan>> {
-        self.plan_area(iter::empty(), &mut on_heap(DeskWorkspace::new))
+        self.plan_area(&[], iter::empty(), &mut on_heap(DeskWorkspace::new))
     }
 
-    /// The plan after these losses.
+    /// The plan of what is left when these waypoints are photographed, after these losses.
     ///
     /// # Errors
     /// Why there is none.
-    pub fn plan_losses<'l>(&self, losses: impl Iterator<Item = &'l [Lot]>) -> anyhow::Result<Box<SwarmPlan>> {
-        self.plan_area(losses, &mut on_heap(DeskWorkspace::new))
+    pub fn plan_rest<'l>(
+        &self,
+        done: &[Range],
+        losses: impl Iterator<Item = &'l [Lot]>,
+    ) -> anyhow::Result<Box<SwarmPlan>> {
+        self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
     }
 
     /// What of the area is more than a board holds.
@@ -201,7 +211,7 @@ impl Mission {
             ));
         }
         let mut ws = on_heap(DeskWorkspace::new);
-        match self.plan_area(iter::empty(), &mut ws) {
+        match self.plan_area(&[], iter::empty(), &mut ws) {
             Ok(_) => board.area_excess(vertices.len(), ws.tracks().lanes().len()),
             Err(error) => Some(format!("{error:#}")),
         }

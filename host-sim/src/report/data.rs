@@ -3,6 +3,7 @@
 use planner_core::Point;
 use serde::Serialize;
 
+use super::coverage::CoverageLayers;
 use super::pack;
 use super::surface::MapSurface;
 use super::track::TrackPoint;
@@ -26,6 +27,8 @@ pub struct ReportData {
     pub vehicles: Vec<VehicleTrack>,
     /// Borders on the ground: the area of a coverage mission.
     pub outlines: Vec<Outline>,
+    /// Who photographs what, in a coverage mission.
+    pub coverage: Option<CoverageLayers>,
     /// Obstacles that are not in the map.
     pub obstacles: Vec<SphereObstacle>,
     /// What happened, in any order.

@@ -5,6 +5,7 @@
 //! long array is base64 of little-endian numbers (see [`pack`]). Positions are ENU metres of the mission frame, times
 //! are seconds since the start of the simulation.
 
+mod coverage;
 mod data;
 mod pack;
 mod page;
@@ -13,12 +14,13 @@ mod track;
 
 use anyhow::Context;
 
+pub use coverage::{CoverageLayers, Division, Part, Taken};
 pub use data::{
     Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines, SphereObstacle,
     VehicleTrack, vehicle_color,
 };
 pub use surface::{FACE_LIMIT, MapSurface};
-pub use track::TrackPoint;
+pub use track::{Footprint, TrackPoint};
 
 /// The page, in one piece of a few megabytes.
 ///

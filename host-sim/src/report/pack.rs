@@ -1,6 +1,6 @@
 //! Long arrays as base64 of little-endian numbers: a third of the size of decimal text, and a typed array in the page.
 //!
-//! Points are `x y z` as f32, track points `t x y z` as f32, edges two u16. The page's `decode` in `data.js` is the
+//! Points are `x y z` as f32, track points `t x y z` as f32, footprints `t vehicle` and four `x y` as f32, edges two u16. The page's `decode` in `data.js` is the
 //! other end.
 
 use base64::Engine;
@@ -8,7 +8,7 @@ use base64::engine::general_purpose::STANDARD;
 use planner_core::Point;
 use serde::{Serialize, Serializer};
 
-use super::track::TrackPoint;
+use super::track::{Footprint, TrackPoint};
 
 fn base64<S: Serializer>(bytes: impl Iterator<Item = u8>, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&STANDARD.encode(bytes.collect::<Vec<u8>>()))
@@ -32,6 +32,14 @@ pub(super) fn pairs<S: Serializer>(pairs: &[[u16; 2]], serializer: S) -> Result<
 
 pub(super) fn track<S: Serializer>(track: &[TrackPoint], serializer: S) -> Result<S::Ok, S::Error> {
     let floats = track.iter().flat_map(|p| [p.t_s, p.position.x, p.position.y, p.position.z]);
+    base64(floats.flat_map(f32::to_le_bytes), serializer)
+}
+
+pub(super) fn footprints<S: Serializer>(all: &[Footprint], serializer: S) -> Result<S::Ok, S::Error> {
+    let floats = all.iter().flat_map(|f| {
+        let corners = f.corners.as_flattened().iter().copied();
+        [f.t_s, f32::from(f.vehicle)].into_iter().chain(corners)
+    });
     base64(floats.flat_map(f32::to_le_bytes), serializer)
 }
 

@@ -18,6 +18,7 @@ const SCRIPT: &str = concat!(
     include_str!("../../assets/report/data.js"),
     include_str!("../../assets/report/map.js"),
     include_str!("../../assets/report/scene.js"),
+    include_str!("../../assets/report/coverage.js"),
     include_str!("../../assets/report/view.js"),
     include_str!("../../assets/report/panels.js"),
     include_str!("../../assets/report/plots.js"),

@@ -443,9 +443,9 @@ fn vehicle(
         &[("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)],
     )?;
     let companion = match table.get("companion") {
-        None => Companion::InProcess,
+        None => Companion::InProcess { flash: None },
         Some(value) => match value.str()? {
-            "in-process" => Companion::InProcess,
+            "in-process" => Companion::InProcess { flash: None },
             _ => Companion::Url {
                 autopilot: link(&value)?,
                 radio: table.get("radio").map(|radio| link(&radio)).transpose()?,

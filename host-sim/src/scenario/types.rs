@@ -196,7 +196,10 @@ pub struct Vehicle {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Companion {
     /// In this process.
-    InProcess,
+    InProcess {
+        /// What it keeps its flash in; no scenario's file says so.
+        flash: Option<PathBuf>,
+    },
     /// On a board, or in another process.
     Url {
         /// Its port for the autopilot.

@@ -48,7 +48,7 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
     for fault in &scenario.faults {
         for vehicle in scenario.vehicles.iter().filter(|vehicle| fault.strikes(vehicle)) {
             let in_vain = match (&vehicle.companion, fault.kind) {
-                (Companion::InProcess, _) => false,
+                (Companion::InProcess { .. }, _) => false,
                 (_, "companion-reset" | "late-plan" | "bad-roadmap") => true,
                 (Companion::Emulated { .. }, _) => false,
                 (Companion::Url { radio, .. }, kind) => kind == "radio-cut" && radio.is_none(),

@@ -5,6 +5,7 @@
 //! radio to every companion; each heeds what is addressed to it, as behind a real telemetry radio.
 
 use std::io;
+use std::rc::Rc;
 
 use companion::link::frame::Framer;
 use companion::time::Instant;
@@ -31,13 +32,12 @@ impl Gateway {
         Self { link, datagram: Vec::new() }
     }
 
-    /// Gives the vehicles their port for it, and has it hear the radio.
-    pub fn attach(&self, members: &mut [Member], radio: &mut Radio) {
+    /// Gives the vehicles their port for it.
+    pub fn attach(&self, members: &mut [Member]) {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
-        radio.overhear();
     }
 
-    /// What came in since the last step, then what is to go out.
+    /// What came in since the last step, then what is to go out: of the radio's packets those `overheard`.
     ///
     /// # Errors
     /// The link is gone for good.
@@ -47,6 +47,7 @@ impl Gateway {
         members: &mut [Member],
         radio: &mut Radio,
         places: &[Point],
+        overheard: &[Rc<[u8]>],
     ) -> io::Result<()> {
         let mut buffer = [0; 2048];
         loop {
@@ -58,10 +59,8 @@ impl Gateway {
             members.iter_mut().for_each(|member| member.hear_ground(now_us, bytes));
             radio.broadcast(now_us, None, places, bytes);
         }
-        for packet in radio.overheard() {
-            if is_for_ground(&packet) {
-                self.send(&packet)?;
-            }
+        for packet in overheard.iter().filter(|packet| is_for_ground(packet)) {
+            self.send(packet)?;
         }
         for member in members {
             loop {

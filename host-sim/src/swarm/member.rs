@@ -1,6 +1,7 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
 use anyhow::Context;
+use companion::storage::store::{READ, Store};
 use companion::{Config, Event, Instant, Link, State, Wanted};
 use planner_core::Point;
 
@@ -13,6 +14,7 @@ use crate::autopilot::{self, Autopilot, Photo};
 use crate::boards::STACK_LEN;
 use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
+use crate::flash::{DeskFlash, LAYOUT};
 use crate::map::VoxelMap;
 use crate::mission::OwnPlan;
 use crate::report::{self, Level};
@@ -41,6 +43,8 @@ pub struct Member {
     pub companion: Box<DeskCompanion>,
     /// A board that decides in its place.
     board: Option<Board>,
+    /// What the companion keeps its files in.
+    flash: Option<DeskFlash>,
     /// The plan that the companion waits for.
     pub wants_plan: Option<Wanted>,
     /// How it is answered.
@@ -77,6 +81,7 @@ impl Member {
             autopilot: Autopilot::new(autopilot)?,
             companion: new_companion(config.clone())?,
             board: None,
+            flash: None,
             config,
             wants_plan: None,
             planner: Planner::Sound,
@@ -92,6 +97,23 @@ impl Member {
             killed: false,
             wrecked: false,
         })
+    }
+
+    /// From now on its companion has this flash.
+    ///
+    /// # Errors
+    /// None that the first start had not.
+    pub fn keep_flash(&mut self, flash: DeskFlash) -> anyhow::Result<()> {
+        self.flash = Some(flash);
+        self.start_companion()
+    }
+
+    fn start_companion(&mut self) -> anyhow::Result<()> {
+        self.companion = new_companion(self.config.clone())?;
+        if let Some(flash) = &mut self.flash {
+            self.companion.mount(Store::mount(LAYOUT, flash));
+        }
+        Ok(())
     }
 
     /// From now on a board decides.
@@ -154,7 +176,7 @@ impl Member {
     /// # Errors
     /// None that the first start had not.
     pub fn reset_companion(&mut self, now_us: u64) -> anyhow::Result<()> {
-        self.companion = new_companion(self.config.clone())?;
+        self.start_companion()?;
         self.companion_us = now_us;
         self.wants_plan = None;
         Ok(())
@@ -283,6 +305,13 @@ impl Member {
                 }
             }
         }
+        if let Some(flash) = &mut self.flash {
+            let mut read = [0; READ];
+            while let Some(request) = self.companion.poll_flash() {
+                let outcome = flash.obey(request, &mut read);
+                self.companion.handle_flash(now, outcome);
+            }
+        }
         self.drain(now_us, station, radio, places);
         if restarts {
             // It could be made once, so it can again.
@@ -379,7 +408,9 @@ impl Member {
 
     /// The pictures that its autopilot took.
     pub fn take_pictures(&mut self) -> Vec<Picture> {
+        let vehicle = Some(self.system_id());
         let picture = |photo: Photo| Picture {
+            vehicle,
             t_s: photo.time_us as f32 * 1e-6,
             position: photo.position,
             heading: std::f32::consts::FRAC_PI_2 - photo.heading_rad,

@@ -5,6 +5,7 @@
 //! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and gives it to nobody.
 
 pub mod board;
+pub mod divisions;
 pub mod faults;
 pub mod gateway;
 pub mod ground_station;
@@ -18,12 +19,14 @@ use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
 use companion::config::REACHES_ALL_M;
-use companion::{Config, PlanFailure, State};
+use companion::{Config, PlanFailure, State, Wanted};
 use planner_core::Point;
+use planner_core::flight::{Range, Task};
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
 
 use self::board::Board;
+use self::divisions::{Division, Divisions};
 use self::faults::{Script, World};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
@@ -35,6 +38,7 @@ use self::step::STEP_US;
 use crate::autopilot;
 use crate::capacity::VEHICLES;
 use crate::coverage::check::Picture;
+use crate::flash::DeskFlash;
 use crate::margins;
 use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
@@ -45,6 +49,8 @@ use crate::shortage;
 
 /// A vehicle within this distance of its goal has reached it, metres.
 const REACHED_M: f32 = 0.5;
+/// Further from its pad than this, a vehicle has left it, metres.
+const AWAY_M: f32 = 2.0;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// A simulated radio of this range, the default, reaches everybody, metres.
@@ -70,6 +76,10 @@ pub struct Flight {
     pub pictures: Vec<Picture>,
     /// What the companions reported.
     pub log: Vec<report::Event>,
+    /// Waypoints of a coverage mission that were photographed in flights before.
+    pub done: Vec<Range>,
+    /// What companions of a coverage mission divided, in order of time.
+    pub divisions: Vec<Division>,
     /// Simulated seconds.
     pub simulated_s: f64,
     /// Seconds of this machine's clock that the simulation took.
@@ -110,8 +120,10 @@ struct Run<'a> {
     monitor: Monitor<'a>,
     ground_station: GroundStation,
     gateway: Option<Gateway>,
+    divisions: Divisions,
     script: Script<'a>,
     log: Vec<report::Event>,
+    done: Vec<Range>,
     places: Vec<Point>,
     nearest_goal_m: Vec<f32>,
     /// Simulated seconds.
@@ -160,8 +172,19 @@ fn simulate(
     run.log_losses(&result);
     let tracks = (0..run.members.len()).map(|i| run.monitor.track(i).to_vec()).collect();
     let pictures = run.members.iter_mut().flat_map(Member::take_pictures).collect();
-    let Run { monitor, log, t_s, .. } = run;
-    Ok(Flight { result, tracks, samples: monitor.samples, pictures, log, simulated_s: t_s, took_s })
+    let Run { monitor, log, done, divisions, t_s, .. } = run;
+    let divisions = divisions.told();
+    Ok(Flight {
+        result,
+        tracks,
+        samples: monitor.samples,
+        pictures,
+        log,
+        done,
+        divisions,
+        simulated_s: t_s,
+        took_s,
+    })
 }
 
 impl<'a> Run<'a> {
@@ -179,7 +202,10 @@ impl<'a> Run<'a> {
             scenario.seed,
         );
         if let Some(gateway) = &gateway {
-            gateway.attach(&mut members, &mut radio);
+            gateway.attach(&mut members);
+        }
+        if gateway.is_some() || scenario.area.is_some() {
+            radio.overhear();
         }
         let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
@@ -193,8 +219,10 @@ impl<'a> Run<'a> {
             monitor,
             ground_station: GroundStation::new(scenario.mission.ground_stations[0]),
             gateway,
+            divisions: Divisions::default(),
             script: Script::new(scenario),
             log: Vec::new(),
+            done: Vec::new(),
             places: members.iter().map(|m| m.autopilot.truth().position).collect(),
             nearest_goal_m: vec![f32::INFINITY; members.len()],
             members,
@@ -221,17 +249,29 @@ impl<'a> Run<'a> {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),
                     _ => mission.answer(plan, i, wanted, &member.companion),
                 };
+                if wanted == Wanted::Mission {
+                    self.done = member.companion.done().to_vec();
+                }
                 member.answer_plan(now_us, own.as_deref().map_err(|failure| *failure));
             }
             places[i] = member.autopilot.truth().position;
             if let (true, Some(end)) = (plan.flights[i].task.flies(), plan.flights[i].path.waypoints().last())
             {
-                self.nearest_goal_m[i] = self.nearest_goal_m[i].min((places[i] - end.position).norm());
+                let off = places[i] - end.position;
+                let nearest_m = &mut self.nearest_goal_m[i];
+                *nearest_m = match plan.flights[i].task {
+                    // It began where it ends: over its pad.
+                    Task::Photograph(_) if off.xy().norm() > AWAY_M => f32::INFINITY,
+                    Task::Photograph(_) => nearest_m.min(off.xy().norm()),
+                    _ => nearest_m.min(off.norm()),
+                };
             }
         }
         self.ground_station.step(now_us, members, radio, places);
+        let overheard = radio.overheard();
+        self.divisions.hear(self.t_s as f32, &overheard);
         if let Some(gateway) = &mut self.gateway {
-            gateway.step(now_us, members, radio, places).context("link lost: --qgc")?;
+            gateway.step(now_us, members, radio, places, &overheard).context("link lost: --qgc")?;
         }
         let seen: Vec<_> = members.iter().map(Member::observation).collect();
         self.monitor.observe(self.t_s, &seen);
@@ -426,7 +466,10 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
             member.autopilot.land_on_stream_loss();
             match &vehicle.companion {
-                Companion::InProcess => {}
+                Companion::InProcess { flash: None } => {}
+                Companion::InProcess { flash: Some(file) } => {
+                    member.keep_flash(DeskFlash::open(Some(file))?)?;
+                }
                 Companion::Url { autopilot, radio } => {
                     member.put_on(Board::open(autopilot, radio.as_ref())?);
                 }

@@ -304,13 +304,22 @@ impl<'a> Monitor<'a> {
             let ends = moved || now.phase == Phase::TakeOffOrLanding;
             if std::mem::take(&mut vehicle.stuck) && ends && self.waits_end {
                 self.deadlocks -= 1;
+                let text = no_progress();
+                if let Some(at) = self.incidents.iter().rposition(|(_, who, what)| *who == i && *what == text)
+                {
+                    self.incidents.remove(at);
+                }
             }
         } else if t_s - vehicle.progressed_s > DEADLOCK_S && !vehicle.stuck {
             vehicle.stuck = true;
             self.deadlocks += 1;
-            self.incidents.push((t_s, i, format!("no progress for {DEADLOCK_S} s")));
+            self.incidents.push((t_s, i, no_progress()));
         }
     }
+}
+
+fn no_progress() -> String {
+    format!("no progress for {DEADLOCK_S} s")
 }
 
 /// Clearances beyond this are not measured, metres.

@@ -6,15 +6,7 @@
 use super::CoverageError;
 use super::tracks::{Lane, Tracks};
 use super::transit::Transit;
-
-/// Waypoints `first` up to before `end`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Range {
-    /// The first number.
-    pub first: u32,
-    /// After the last number.
-    pub end: u32,
-}
+use crate::flight::Range;
 
 /// Sets `left` to the lanes without these waypoints. Ranges are in rising order and do not overlap. The number that a
 /// waypoint had before is [`original`].

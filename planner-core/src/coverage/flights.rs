@@ -7,11 +7,11 @@
 
 use heapless::Vec;
 
-use super::Flat;
 use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
+use super::{Flat, divide};
 use crate::Point;
-use crate::flight::{Flight, Look, Path, PathError, Photographs, Task, Trigger};
+use crate::flight::{Flight, Look, Path, PathError, Photographs, Range, Task, Trigger};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
@@ -60,6 +60,8 @@ pub struct Swarm<'a> {
     pub schedule: ScheduleConfig,
     /// Most gates of one vehicle.
     pub gates_most: usize,
+    /// Waypoints of the area that the lanes leave out, in rising order.
+    pub done: &'a [Range],
 }
 
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there.
@@ -206,7 +208,10 @@ fn flight<const L: usize, const N: usize, const W: usize>(
 ) -> Result<Flight<W>, PathError> {
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
     let Manner { waypoint_m, look, trigger } = swarm.manner;
-    let mut photographs = Photographs::new(waypoint_m, look, trigger);
+    let done: u32 = swarm.done.iter().map(|range| range.end - range.first).sum();
+    let area = work.tracks.waypoint_count() + done;
+    let backward = route.heading == Heading::Backward;
+    let mut photographs = Photographs::new(waypoint_m, look, trigger).of_area(area, backward);
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
@@ -220,14 +225,15 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
     for lane in lanes {
-        let lane = if route.heading == Heading::Forward { lane } else { high - (lane - low) };
+        let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
         let (begin, end) = (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1);
-        let (begin, end) = if route.heading == Heading::Forward { (begin, end) } else { (end, begin) };
+        let number = begin;
+        let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let from = draft.around(&here, &place(begin)?, mission_m)?;
         here = place(end)?;
         let to = draft.to(at(&here, mission_m))?;
-        photographs.mark(from, to)?;
+        photographs.mark(from, to, divide::original(swarm.done, number))?;
     }
     draft.to(at(&last, layer_m))?;
     let way_home = WayHome { from: last, layer_m, vehicle, photographs };

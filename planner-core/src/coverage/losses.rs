@@ -6,15 +6,15 @@
 
 use heapless::Vec;
 
-use super::divide::{self, Range};
+use super::divide;
 use super::flights::{self, Pad, Swarm};
 use super::lanes::Tracks;
-use super::pack::{self, Heading, PackWorkspace, Plan, Route, Vehicle, Work};
+use super::pack::{self, PackWorkspace, Plan, Route, Vehicle, Work};
+use super::transit::Transit;
 use super::{CoverageError, Flat};
-use crate::flight::Task;
+use crate::flight::{Done, Range, Task};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::ScheduleWorkspace;
-use crate::sort;
 
 /// Most stretches of waypoints that are done, apart from each other.
 const RANGES: usize = 128;
@@ -31,7 +31,7 @@ pub struct Fate {
 
 /// Memory lent for areas of at most `L` lanes and `K` vehicles.
 pub struct Workspace<const L: usize, const K: usize> {
-    done: Vec<Range, RANGES>,
+    done: Done<RANGES>,
     left: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
@@ -42,7 +42,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
     /// All zeros.
     pub const fn new() -> Self {
         Self {
-            done: Vec::new(),
+            done: Done::new(),
             left: Tracks::new(),
             vehicles: Vec::new(),
             pads: Vec::new(),
@@ -50,14 +50,37 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         }
     }
 
-    /// To be called before the first division of a plan: nothing is done.
-    pub fn begin(&mut self) {
+    /// To be called before the first division of a plan: these waypoints are done, by their numbers on the whole path. Where
+    /// that is all of it, the area is begun again. Returns the lanes that are left, and what is
+    /// done.
+    ///
+    /// # Errors
+    /// Those of [`divide::left`]; [`CoverageError::LanesFull`] for too many ranges.
+    pub fn begin<'a, const N: usize>(
+        &'a mut self,
+        tracks: &'a Tracks<L>,
+        transit: &Transit<'_, N>,
+        done: &[Range],
+    ) -> Result<(&'a Tracks<L>, &'a [Range]), CoverageError> {
         self.done.clear();
+        let all = tracks.waypoint_count();
+        for range in done {
+            let range = Range { first: range.first, end: range.end.min(all) };
+            self.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
+        }
+        if self.done.count() == all {
+            self.done.clear();
+        }
+        if self.done.is_empty() {
+            return Ok((tracks, &[]));
+        }
+        divide::left(tracks, self.done.ranges(), transit, &mut self.left)?;
+        Ok((&self.left, self.done.ranges()))
     }
 
     /// Waypoints that are done or promised, in rising order, by their numbers on the whole path.
     pub fn done(&self) -> &[Range] {
-        &self.done
+        self.done.ranges()
     }
 }
 
@@ -116,64 +139,34 @@ pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, con
     if fates.len() != work.vehicles.len() || out.flights.len() != fates.len() {
         return Err(CoverageError::Vehicles.into());
     }
-    note_done(routes, fates, ws, out)?;
+    note_done(fates, ws, out)?;
     place(loss, ws, out)?;
     routes.routes.clear();
-    match divide::left(work.tracks, &ws.done, work.transit, &mut ws.left) {
+    match divide::left(work.tracks, ws.done.ranges(), work.transit, &mut ws.left) {
         Ok(()) => share_out(work, fates, ws, pack, routes)?,
         Err(CoverageError::NothingToCover) => {}
         Err(error) => return Err(error.into()),
     }
     let work = Work { tracks: &ws.left, vehicles: &ws.vehicles, ..*work };
-    let swarm = Swarm { pads: &ws.pads, ..*swarm };
+    let swarm = Swarm { pads: &ws.pads, done: ws.done.ranges(), ..*swarm };
     Ok(flights::plan(&work, routes, &swarm, schedule, out)?)
 }
 
 /// Adds what each vehicle has done, or keeps, to what was done before.
 fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
-    routes: &Plan<K>,
     fates: &[Fate],
     ws: &mut Workspace<L, K>,
     before: &SwarmPlan<V, W>,
 ) -> Result<(), CoverageError> {
-    let mut fresh: Vec<Range, K> = Vec::new();
-    for route in &routes.routes {
-        let index = usize::from(route.vehicle);
-        let (Some(fate), Some(flight)) = (fates.get(index), before.flights.get(index)) else { continue };
+    for (fate, flight) in fates.iter().zip(&before.flights) {
         let Task::Photograph(photographs) = &flight.task else { continue };
         let taken = photographs.taken_by(&flight.path, fate.along_m);
         let count = if fate.lives { taken } else { taken.saturating_sub(1) };
-        if let Some(range) = own_range(route, count, &ws.done) {
-            fresh.push(range).map_err(|_| CoverageError::Vehicles)?;
+        for range in photographs.first(&flight.path, count) {
+            ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
     }
-    for range in fresh {
-        ws.done.push(range).map_err(|_| CoverageError::LanesFull)?;
-    }
-    sort::by(&mut ws.done, |a, b| a.first.cmp(&b.first));
-    let mut kept = 0;
-    for i in 1..ws.done.len() {
-        let range = ws.done[i];
-        if range.first <= ws.done[kept].end {
-            ws.done[kept].end = ws.done[kept].end.max(range.end);
-        } else {
-            kept += 1;
-            ws.done[kept] = range;
-        }
-    }
-    ws.done.truncate(kept + 1);
     Ok(())
-}
-
-/// The first `count` waypoints of a route, by their numbers on the whole path; what was done between them is among them.
-fn own_range(route: &Route, count: u32, done: &[Range]) -> Option<Range> {
-    let count = count.min(route.end - route.first);
-    let (first, end) = match route.heading {
-        Heading::Forward => (route.first, route.first + count),
-        Heading::Backward => (route.end - count, route.end),
-    };
-    (count > 0)
-        .then(|| Range { first: divide::original(done, first), end: divide::original(done, end - 1) + 1 })
 }
 
 /// Where each vehicle goes on from.

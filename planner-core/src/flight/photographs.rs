@@ -2,7 +2,7 @@
 
 use libm::{ceilf, fmaxf};
 
-use super::{Path, PathError};
+use super::{Path, PathError, Range};
 
 /// Nearer than this along a path is the same place, metres.
 const SAME_PLACE_M: f32 = 1e-2;
@@ -67,6 +67,12 @@ pub struct Photographs {
     begins: u64,
     /// Bit `i`: it ends at waypoint `i`.
     ends: u64,
+    /// Of each stretch in its order, the lowest number that one of its waypoints has in the area.
+    numbers: [u16; Self::WAYPOINTS],
+    /// Whether numbers fall along the path.
+    backward: bool,
+    /// Waypoints of the whole area.
+    area: u32,
     /// From one picture to the next, metres: at most.
     spacing_m: f32,
     /// Where the vehicle looks.
@@ -78,20 +84,36 @@ pub struct Photographs {
 impl Photographs {
     /// Most waypoints of a path that is photographed along.
     pub const WAYPOINTS: usize = 64;
+    /// Most waypoints of an area.
+    pub const NUMBERS: u32 = u16::MAX as u32 + 1;
 
     /// None yet; pictures are to be `spacing_m` apart at most (positive).
     pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
-        Self { begins: 0, ends: 0, spacing_m, look, trigger }
+        let numbers = [0; Self::WAYPOINTS];
+        Self { begins: 0, ends: 0, numbers, backward: false, area: 0, spacing_m, look, trigger }
     }
 
-    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before.
+    /// The same of an area with so many waypoints, along its path or back.
+    pub const fn of_area(self, area: u32, backward: bool) -> Self {
+        Self { area, backward, ..self }
+    }
+
+    /// Waypoints of the whole area; 0 where they have no numbers.
+    pub fn area(&self) -> u32 {
+        self.area
+    }
+
+    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before. `number` is
+    /// the lowest that one of the waypoints between has in the area.
     ///
     /// # Errors
-    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`].
-    pub fn mark(&mut self, from: usize, to: usize) -> Result<(), PathError> {
+    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`], and for a number beyond [`Self::NUMBERS`].
+    pub fn mark(&mut self, from: usize, to: usize, number: u32) -> Result<(), PathError> {
+        let number = u16::try_from(number).map_err(|_| PathError::PathFull)?;
         if from > to || to >= Self::WAYPOINTS {
             return Err(PathError::PathFull);
         }
+        self.numbers[self.begins.count_ones() as usize & (Self::WAYPOINTS - 1)] = number;
         self.begins |= 1 << from;
         self.ends |= 1 << to;
         Ok(())
@@ -120,10 +142,27 @@ impl Photographs {
         self.stretches(path).map(|shots| shots.taken_by(reached_m)).fold(0, u32::saturating_add)
     }
 
+    /// The same, but for one that it has not come a spacing further than yet: that one may be missing.
+    pub fn passed_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
+        self.taken_by(path, along_m - self.spacing_m)
+    }
+
     /// Where the last picture is taken no further than `along_m` metres along the path; none before the first.
     pub fn last_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
         let last = |shots: Shots| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
         self.stretches(path).filter_map(last).last()
+    }
+
+    /// The waypoints of the area that the first `count` pictures show.
+    pub fn first<const W: usize>(&self, path: &Path<W>, count: u32) -> impl Iterator<Item = Range> {
+        let (mut left, backward) = (count, self.backward);
+        self.stretches(path).zip(self.numbers).map_while(move |(shots, number)| {
+            let taken = shots.count.min(left);
+            left -= taken;
+            let number = u32::from(number);
+            let first = if backward { number.saturating_add(shots.count - taken) } else { number };
+            (taken > 0).then(|| Range { first, end: first.saturating_add(taken) })
+        })
     }
 
     /// Pictures of the whole path.
@@ -134,6 +173,8 @@ impl Photographs {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
     use super::*;
     use crate::Point;
 
@@ -148,9 +189,9 @@ mod tests {
     #[test]
     fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
         let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        photographs.mark(0, 1).unwrap();
-        photographs.mark(2, 3).unwrap();
-        photographs.mark(4, 4).unwrap();
+        photographs.mark(0, 1, 7).unwrap();
+        photographs.mark(2, 3, 30).unwrap();
+        photographs.mark(4, 4, 40).unwrap();
         let path = path();
         let mut stretches = photographs.stretches(&path);
         assert_eq!(stretches.next(), Some(Shots { from_m: 0.0, to_m: 30.0, step_m: 7.5, count: 5 }));
@@ -172,12 +213,31 @@ mod tests {
     }
 
     #[test]
+    fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
+        for (backward, [part, whole]) in [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])] {
+            let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance).of_area(50, backward);
+            photographs.mark(0, 1, 7).unwrap();
+            photographs.mark(2, 3, 30).unwrap();
+            photographs.mark(4, 4, 40).unwrap();
+            let path = path();
+            let numbers = |count| -> std::vec::Vec<_> {
+                photographs.first(&path, count).map(|range| (range.first, range.end)).collect()
+            };
+            assert_eq!(numbers(0), []);
+            assert_eq!(numbers(5), [(7, 12)]);
+            assert_eq!(numbers(8), [(7, 12), part]);
+            assert_eq!(numbers(11), [(7, 12), whole, (40, 41)]);
+            assert_eq!(numbers(99), numbers(11));
+        }
+    }
+
+    #[test]
     fn waypoints_beyond_the_bits_are_refused() {
         let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        assert_eq!(photographs.mark(63, 64), Err(PathError::PathFull));
-        assert_eq!(photographs.mark(3, 2), Err(PathError::PathFull));
+        assert_eq!(photographs.mark(63, 64, 0), Err(PathError::PathFull));
+        assert_eq!(photographs.mark(3, 2, 0), Err(PathError::PathFull));
         // On a path that is shorter than what was marked there is nothing to photograph.
-        photographs.mark(62, 63).unwrap();
+        photographs.mark(62, 63, 0).unwrap();
         assert_eq!(photographs.stretches(&path()).next(), None);
     }
 }

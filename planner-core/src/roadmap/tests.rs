@@ -77,7 +77,7 @@ fn small() -> (Vec<Point>, Vec<Edge>) {
 /// Bytes of a file with its CRC made good again: what only the other checks can catch.
 fn sealed(mut bytes: Vec<u8>) -> Vec<u8> {
     let end = bytes.len() - 4;
-    let crc = CRC.checksum(&bytes[..end]).to_le_bytes();
+    let crc = CRC32.checksum(&bytes[..end]).to_le_bytes();
     bytes[end..].copy_from_slice(&crc);
     bytes
 }

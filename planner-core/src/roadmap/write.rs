@@ -1,12 +1,11 @@
 //! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
 
 use super::{
-    CRC, HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN,
-    RoadmapError, RoadmapHeader, RoadmapView, VERSION, WITHOUT_HEIGHTS, WORD_LEN, in_range, millimetres_down,
-    target_of,
+    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN, RoadmapError,
+    RoadmapHeader, RoadmapView, VERSION, WITHOUT_HEIGHTS, WORD_LEN, in_range, millimetres_down, target_of,
 };
 use crate::Point;
-use crate::file::FileError;
+use crate::file::{CRC32, FileError};
 use crate::search::{SearchWorkspace, ways_from};
 use crate::sort;
 
@@ -131,7 +130,7 @@ fn write_graph<'a>(
 /// Closes the roadmap with its CRC; its length.
 fn seal(out: &mut [u8]) -> usize {
     let (body, crc) = out.split_at_mut(out.len() - WORD_LEN);
-    crc.copy_from_slice(&CRC.checksum(body).to_le_bytes());
+    crc.copy_from_slice(&CRC32.checksum(body).to_le_bytes());
     out.len()
 }
 

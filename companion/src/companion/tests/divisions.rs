@@ -24,7 +24,7 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
     config.division = Some(60.0);
     let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
-    photographs.mark(1, 1).unwrap();
+    photographs.mark(1, 1, 0).unwrap();
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
     let mut path = planner_core::flight::Path::new();
     for place in

@@ -419,5 +419,5 @@ fn the_swarm_is_told_where_it_is_and_where_it_goes() {
 #[test]
 fn a_companion_fits_its_memory() {
     let bytes = core::mem::size_of::<Companion<32, 64, 64>>();
-    assert!(bytes <= 34 * 1024, "{bytes}");
+    assert!(bytes <= 36 * 1024, "{bytes}");
 }

@@ -21,6 +21,7 @@ mod losses;
 mod pause;
 mod pilot;
 mod position;
+mod resume;
 mod start;
 
 /// The other vehicle: place, flags of its intent, progress, CRC of its plan.
@@ -72,6 +73,8 @@ fn every_row_has_its_scene() {
         landings::end_aside,
         losses::another_leaves,
         losses::the_others_give_it_up,
+        resume::others_know_of_more,
+        resume::another_plan_is_flown,
     ];
     for group in groups {
         group(&mut scenes);

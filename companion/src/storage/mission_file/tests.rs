@@ -53,7 +53,7 @@ fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     let mut file = file();
     file[at..at + bytes.len()].copy_from_slice(bytes);
     let end = file.len() - 4;
-    let crc = CRC.checksum(&file[..end]);
+    let crc = CRC32.checksum(&file[..end]);
     file[end..].copy_from_slice(&crc.to_le_bytes());
     file
 }
@@ -202,7 +202,7 @@ proptest! {
             bytes[at] = byte;
         }
         let end = bytes.len() - 4;
-        let crc = CRC.checksum(&bytes[..end]);
+        let crc = CRC32.checksum(&bytes[..end]);
         bytes[end..].copy_from_slice(&crc.to_le_bytes());
         if let Ok(view) = MissionView::parse(&bytes) {
             for vehicle in view.vehicles() {

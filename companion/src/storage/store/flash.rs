@@ -1,6 +1,6 @@
 //! What the store and its shell share: the flash's layout, requests to it, the files.
 
-use crc::{CRC_32_ISO_HDLC, Crc};
+use planner_core::file::CRC32;
 
 /// Bytes that are programmed at once and are whole or torn: the H743's flash word. Smaller ones divide it.
 pub const WORD: usize = 32;
@@ -9,19 +9,18 @@ pub const BLOCK: usize = 256;
 /// Most bytes of one request to read.
 pub const READ: usize = 1024;
 
-static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// State of a CRC-32 before its first byte.
 pub(crate) const CRC_START: u32 = u32::MAX;
 
 /// A running CRC-32 (ISO-HDLC without its last inversion) after some more bytes.
 pub(crate) fn crc_step(state: u32, bytes: &[u8]) -> u32 {
-    let mut digest = CRC.digest_with_initial(state.reverse_bits());
+    let mut digest = CRC32.digest_with_initial(state.reverse_bits());
     digest.update(bytes);
     !digest.finalize()
 }
 
 pub(crate) fn crc32(bytes: &[u8]) -> u32 {
-    CRC.checksum(bytes)
+    CRC32.checksum(bytes)
 }
 
 /// Where things are in the storage bank, counted from its first byte: two slots, then two halves of the journal.

@@ -237,7 +237,7 @@ impl Store {
             Area::Half(_) => {
                 self.journal.compacting = None;
                 self.journal.failures += 1;
-                self.unsaved = true;
+                (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());
             }
         }
     }

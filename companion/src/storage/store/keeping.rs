@@ -15,7 +15,8 @@ impl Store {
             let Compaction { half, at, step, mission } = compaction;
             return Some(match (step, self.journal.mission.clone()) {
                 (0, _) => Job::Record(self.parameters_record(at)),
-                (1, Some(kept)) => Job::Record(Record {
+                (1, _) if !self.photographed.is_empty() => Job::Record(self.photographed_record(at)),
+                (1 | 2, Some(kept)) => Job::Record(Record {
                     kind: Kind::Mission,
                     at,
                     len: kept.end - kept.start,
@@ -28,7 +29,7 @@ impl Store {
                 _ => {
                     let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
                     let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
-                    self.journal.compacting = Some(Compaction { half, at, step: 2, mission });
+                    self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
                     Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0 })
                 }
             });
@@ -46,6 +47,8 @@ impl Store {
             (Kind::Mission, 0)
         } else if self.unsaved {
             (Kind::Parameters, journal::PARAMETERS_LEN as u32)
+        } else if self.unsaved_photographed {
+            (Kind::Photographed, self.photographed.len() as u32)
         } else {
             return None;
         };
@@ -56,6 +59,7 @@ impl Store {
         let at = self.journal.end;
         Some(Job::Record(match kind {
             Kind::Parameters => self.parameters_record(at),
+            Kind::Photographed => self.photographed_record(at),
             Kind::Mission => {
                 let crc = if len == 0 { crc32(&[]) } else { crc32(self.window.rest().unwrap_or_default()) };
                 let (step, source) = (Step::Head, Source::Window);
@@ -89,8 +93,21 @@ impl Store {
         self.buffer[..4].copy_from_slice(&self.forgotten.to_le_bytes());
         self.buffer[4..len].copy_from_slice(&self.parameters.to_bytes());
         self.unsaved = false;
+        self.buffer_record(Kind::Parameters, at, len)
+    }
+
+    fn photographed_record(&mut self, at: u32) -> Record {
+        let len = self.photographed.len();
+        self.buffer.fill(0xFF);
+        self.buffer[..len].copy_from_slice(&self.photographed);
+        self.unsaved_photographed = false;
+        self.buffer_record(Kind::Photographed, at, len)
+    }
+
+    /// A record of what is in the buffer.
+    fn buffer_record(&self, kind: Kind, at: u32, len: usize) -> Record {
         Record {
-            kind: Kind::Parameters,
+            kind,
             at,
             len: len as u32,
             crc: crc32(&self.buffer[..len]),
@@ -146,7 +163,11 @@ impl Store {
         let end = record.at + record_len(record.len);
         if let Some(compaction) = &mut self.journal.compacting {
             compaction.at = end;
-            compaction.step += 1;
+            compaction.step = match record.kind {
+                Kind::Parameters => 1,
+                Kind::Photographed => 2,
+                Kind::Mission => 3,
+            };
             if record.kind == Kind::Mission {
                 compaction.mission = held;
             }
@@ -170,7 +191,7 @@ impl Store {
             return self.fail(Area::Half(compaction.half));
         }
         self.journal.failures += 1;
-        self.unsaved = true;
+        (self.unsaved, self.unsaved_photographed) = (true, !self.photographed.is_empty());
         if let Some(active) = self.journal.active {
             self.journal.end = Area::Half(active).end(&self.layout);
         }

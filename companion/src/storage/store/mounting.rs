@@ -58,6 +58,8 @@ impl Store {
             self.forgotten = u32_at(&block, 0);
             let (entries, _) = block[4..len as usize].as_chunks();
             entries.iter().for_each(|entry| self.parameters.restore(entry));
+        } else if kind == Kind::Photographed as u8 && len <= BLOCK as u32 {
+            self.photographed = block[..len as usize].iter().copied().collect();
         }
     }
 }

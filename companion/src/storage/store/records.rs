@@ -11,6 +11,8 @@ pub enum Kind {
     Parameters = 1,
     /// The mission file; of length 0 when it was removed.
     Mission = 2,
+    /// What of an area is photographed: as [`crate::mission::photographed`] writes it.
+    Photographed = 3,
 }
 
 /// Tries to write the journal before that is given up until the next start.
@@ -58,7 +60,7 @@ pub enum Step {
 pub struct Compaction {
     pub half: usize,
     pub at: u32,
-    /// Next: 0 the parameters, 1 the mission, 2 the seal.
+    /// Next: 0 the parameters, 1 what is photographed, 2 the mission, 3 the seal.
     pub step: u8,
     pub mission: Option<Range<u32>>,
 }

@@ -53,6 +53,8 @@ pub(super) struct Contact {
     pub(super) speed_mps: f32,
     /// Whether its plan is ours, whether it follows it or not.
     pub(super) shares_plan: bool,
+    /// Whether it follows another plan of our mission.
+    pub(super) other_plan: bool,
     /// When it was last known to move.
     pub(super) moved_at: Instant,
     /// The furthest it can have come, metres along its path, and when that was.

@@ -4,6 +4,9 @@ use super::*;
 use crate::link::roster::{ENTRIES, Roster};
 use crate::swarm::fleet::{HEARD, Hearing, Own};
 
+/// So long what one said of its plan counts.
+const LATELY: Duration = Duration::from_secs(3);
+
 impl<const V: usize> Neighbours<V> {
     /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds.
     pub(crate) fn form_fleet(&mut self, down_s: f32) {
@@ -37,6 +40,12 @@ impl<const V: usize> Neighbours<V> {
                 by_others: by_others & bit != 0,
             })
         });
+    }
+
+    /// Whether one that follows another plan of this mission was heard lately.
+    pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
+        let lately = |c: &Contact| c.belongs_at.is_some_and(|at| now - at <= LATELY);
+        self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
     /// Takes in what another vehicle reports of all. `waits`: this one has not been started.

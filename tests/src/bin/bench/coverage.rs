@@ -17,12 +17,13 @@ use anyhow::{Context, Result, ensure};
 use flockmate_tests::workspace;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
-use planner_core::coverage::divide::{self, Range};
+use planner_core::coverage::divide;
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{Heading, Heights, PackWorkspace, Plan, Unit, Vehicle, Work, binpat};
 use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
+use planner_core::flight::Range;
 
 use crate::row::Row;
 

@@ -11,12 +11,12 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
 /// The two vehicles photograph an area, along the usual path.
-fn over_a_field(state: State) -> Bench {
+pub(super) fn over_a_field(state: State) -> Bench {
     let mut config = two_vehicles();
     config.division = Some(60.0);
     let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
     // A single picture: on the way to it the vehicle may look anywhere.
-    photographs.mark(1, 1).unwrap();
+    photographs.mark(1, 1, 0).unwrap();
     let mut bench = Bench::new(config);
     bench.answer_plan = Some(Ok(VehiclePlan { task: Task::Photograph(photographs), ..plan() }));
     bench.neighbour = on_pad(ON_PLAN);
@@ -33,10 +33,16 @@ fn tells(b: &mut Bench, own: Standing, other: Standing) {
     let entry = |standing| Entry { standing, ..Entry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
     let roster = Roster { system_id: 77, mission_crc: 0xC0FFEE, entries, ..Roster::default() };
-    let (mut payload, mut out) = ([0; roster::LENGTH], [0; MAX_SENT]);
+    let mut payload = [0; roster::LENGTH];
     let len = roster.encode(&mut payload);
+    tunnels(b, &payload[..len]);
+}
+
+/// The other vehicle sends a TUNNEL.
+pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
+    let mut out = [0; MAX_SENT];
     let header = Header { system: 77, component: crate::COMPONENT, sequence: 0 };
-    let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], &mut out);
+    let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, payload, &mut out);
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..n]);
 }
 

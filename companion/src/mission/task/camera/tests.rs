@@ -31,9 +31,9 @@ fn path() -> Path<16> {
 
 fn photographs(trigger: Trigger) -> Photographs {
     let mut photographs = Photographs::new(8.0, Look::Ahead, trigger);
-    photographs.mark(1, 2).unwrap();
-    photographs.mark(3, 4).unwrap();
-    photographs.mark(5, 5).unwrap();
+    photographs.mark(1, 2, 0).unwrap();
+    photographs.mark(3, 4, 0).unwrap();
+    photographs.mark(5, 5, 0).unwrap();
     photographs
 }
 
@@ -164,6 +164,6 @@ fn a_vehicle_looks_along_the_next_lane_or_one_way() {
     let fixed = Photographs::new(8.0, Look::Fixed(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
     let mut point = Photographs::new(8.0, Look::Ahead, Trigger::Distance);
-    point.mark(5, 5).unwrap();
+    point.mark(5, 5, 0).unwrap();
     assert_eq!(heading(&point, &path, 3.0), None, "one picture leads no way");
 }

@@ -102,7 +102,7 @@ fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Erro
     let view = MissionView::parse(file).ok()?;
     let Kind::Coverage(area) = view.kind() else { return None };
     let (ws, schedule, plan) = memory;
-    let request = coverage::Request { mission: &view, view: area, gates_most: 128 };
+    let request = coverage::Request { mission: &view, view: area, gates_most: 128, done: &[] };
     Some(coverage::plan::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan))
 }
 

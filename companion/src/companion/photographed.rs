@@ -1,0 +1,98 @@
+//! What of the area is photographed: noted in flight, kept in flash, exchanged, and left out by the next plan.
+
+use mavlink::dialects::ardupilotmega::NAMED_VALUE_FLOAT_DATA;
+use planner_core::flight::Range;
+
+use super::Companion;
+use crate::events::Link;
+use crate::link::Fresh;
+use crate::link::done::{self, DoneReport};
+use crate::mission::State;
+use crate::time::Duration;
+use crate::timers::Timer;
+
+/// Noted, and sent as a number, so often.
+const NOTED_EVERY: Duration = Duration::from_millis(1000);
+/// Others on the ground say what they know each second, and lose half of it.
+const OTHERS_SAY: Duration = Duration::from_secs(5);
+
+impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
+    /// Waypoints of the area that the plan asked for by [`crate::events::Wanted::Mission`] leaves out, those asked for later too.
+    pub fn done(&self) -> &[Range] {
+        self.mission.photographed().before()
+    }
+
+    /// Whether the mission is an area.
+    fn photographs(&self) -> bool {
+        self.neighbours.fleet().is_some()
+    }
+
+    /// Whether it stands on its pad before its start, and is to plan the same as others that do.
+    fn plans_with_others(&self) -> bool {
+        self.waits_on_ground() || self.mission.state() == State::Scheduled
+    }
+
+    /// Whether it has left its pad, so that more may come.
+    fn may_photograph(&self) -> bool {
+        !self.plans_with_others() && !matches!(self.mission.state(), State::Done | State::Aborted)
+    }
+
+    /// Notes what it has photographed, where it is on its plan.
+    pub(super) fn step_photographed(&mut self, off_plan: bool) {
+        if !self.photographs() || !self.timers.take(Timer::Done, self.now, NOTED_EVERY) {
+            return;
+        }
+        let flies = self.may_photograph();
+        let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
+        if flies && !off_plan && !self.detours.has_left() && self.guidance.along_m() >= 0.0 {
+            self.mission.note_photographed(along_m);
+        }
+        let crc = self.config.mission_crc;
+        if let Some(kept) = self.mission.photographed_mut().keep(crc, !flies) {
+            self.services.keep_photographed(kept);
+        }
+        [Link::Autopilot, Link::Swarm]
+            .into_iter()
+            .for_each(|link| self.links.set_due(link, Fresh::DoneCount, true));
+        let every = if flies { done::EVERY_IN_FLIGHT } else { done::EVERY };
+        if self.timers.take(Timer::DoneReport, self.now, every) {
+            self.links.set_due(Link::Swarm, Fresh::Done, true);
+        }
+    }
+
+    /// What others are to know.
+    pub(super) fn done_report(&mut self) -> DoneReport {
+        let (waits, flies) = (self.plans_with_others(), self.may_photograph());
+        let report = self.mission.photographed_mut().report(waits, flies);
+        DoneReport { system_id: self.config.system_id, mission_crc: self.config.mission_crc, ..report }
+    }
+
+    /// Takes in what another one knows.
+    pub(super) fn handle_done(&mut self, report: &DoneReport) {
+        let ours = report.mission_crc == self.config.mission_crc
+            && self.config.roster.iter().any(|entry| entry.system_id == report.system_id);
+        if ours && self.photographs() && self.config.resumes {
+            let waits = self.plans_with_others();
+            self.mission.photographed_mut().handle(report, waits, self.now);
+        }
+    }
+
+    /// The same as a number to be plotted: waypoints of the area that it knows to be photographed.
+    pub(super) fn done_count(&self) -> NAMED_VALUE_FLOAT_DATA {
+        NAMED_VALUE_FLOAT_DATA {
+            time_boot_ms: self.now.boot_ms(),
+            value: self.mission.photographed().count() as f32,
+            name: (*b"FLK_DONE\0\0").into(),
+        }
+    }
+
+    /// Whether it has stood ready for as long as others take to say what they know, and all that are heard have its plan.
+    pub(super) fn plans_as_others(&self) -> bool {
+        !self.photographs() || (self.mission.in_state(self.now) >= OTHERS_SAY && !self.hears_another_plan())
+    }
+
+    /// Whether a vehicle that follows another plan of this mission was heard lately: their gates do not fit.
+    pub(super) fn hears_another_plan(&self) -> bool {
+        self.photographs() && self.neighbours.hears_another_plan(self.now)
+    }
+}

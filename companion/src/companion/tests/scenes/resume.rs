@@ -1,0 +1,82 @@
+//! A coverage mission is started where some of the area is photographed already.
+
+use planner_core::flight::Range;
+
+use super::State::*;
+use super::losses::{over_a_field, tunnels};
+use super::*;
+use crate::link::done::{self, DoneReport};
+
+/// The other vehicle reports what it knows to be photographed.
+fn knows(b: &mut Bench, first: u32, round: u8, flies: bool) {
+    reports(b, &DoneReport { round, flies, ..report(first) });
+}
+
+fn report(first: u32) -> DoneReport {
+    let ranges = [Range { first, end: first + 10 }].into_iter().collect();
+    DoneReport { system_id: 77, mission_crc: 0xC0FFEE, ranges, ..DoneReport::default() }
+}
+
+fn reports(b: &mut Bench, report: &DoneReport) {
+    let mut payload = [0; done::LENGTH];
+    let len = report.encode(&mut payload);
+    tunnels(b, &payload[..len]);
+}
+
+pub(super) fn others_know_of_more(scenes: &mut Scenes) {
+    for state in [Ready, Scheduled] {
+        let told = |b: &mut Bench| {
+            knows(b, 20, 0, false);
+            b.run(1.0);
+            assert_eq!(b.companion.done(), [Range { first: 20, end: 30 }]);
+        };
+        let end = if state == Ready { Ready } else { Follow };
+        scenes.play(over_a_field(state), told, end, 20.0);
+    }
+}
+
+pub(super) fn another_plan_is_flown(scenes: &mut Scenes) {
+    let another = |b: &mut Bench| {
+        let flown = b.neighbour;
+        b.neighbour = flown.map(|(place, flags, along_m, crc)| (place, flags, along_m, !crc));
+        b.run(12.0);
+        assert_eq!(b.companion.state(), Scheduled);
+        b.neighbour = flown;
+    };
+    scenes.play(over_a_field(Scheduled), another, Follow, 30.0);
+}
+
+/// One that comes late plans as those that fly, whatever others on the ground know.
+#[test]
+fn who_comes_late_takes_the_set_of_those_that_fly() {
+    let mut bench = over_a_field(Ready);
+    knows(&mut bench, 40, 0, false);
+    bench.run(1.0);
+    reports(&mut bench, &DoneReport { flies: true, plan: true, ..report(20) });
+    bench.run(1.0);
+    assert_eq!(bench.companion.done(), [Range { first: 20, end: 30 }]);
+    knows(&mut bench, 60, 0, false);
+    bench.run(1.0);
+    assert_eq!(bench.companion.done(), [Range { first: 20, end: 30 }]);
+}
+
+/// What a vehicle in flight photographs changes no plan on the ground, nor does a round before; a later round takes all back.
+#[test]
+fn only_what_others_on_the_ground_know_changes_the_plan() {
+    let mut bench = over_a_field(Ready);
+    knows(&mut bench, 20, 0, true);
+    bench.run(2.0);
+    assert_eq!((bench.companion.state(), bench.companion.done()), (Ready, &[][..]));
+    knows(&mut bench, 40, 3, false);
+    bench.run(2.0);
+    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+    knows(&mut bench, 60, 2, false);
+    bench.run(2.0);
+    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+    // In flight nothing changes the plan.
+    bench.start();
+    bench.until(Follow, 30.0);
+    knows(&mut bench, 80, 4, false);
+    bench.run(2.0);
+    assert_eq!(bench.companion.done(), [Range { first: 40, end: 50 }]);
+}

@@ -1,0 +1,161 @@
+//! Which waypoints of an area a companion knows to be photographed: the payload of TUNNEL under a third private payload type.
+//!
+//! Little-endian, at most 128 bytes; more than 19 ranges take several messages, in turn:
+//!
+//! | byte | type | field |
+//! |---|---|---|
+//! | 0 | u8 | version, 1 |
+//! | 1 | u8 | system id |
+//! | 2 | u8 | round: how often the area was begun again |
+//! | 3 | u8 | bit 0: the sender flies, so that what it knows still grows; bit 1: the ranges are all that its plan leaves out, not what it knows |
+//! | 4 | u8 | number of ranges n, 0…19 |
+//! | 5 | u8 | 0 |
+//! | 6 | u32 | CRC-32 of the mission file |
+//! | 10 | 6 × n | ranges: u24 first waypoint, by its number on the path along all lanes; u24 how many |
+//!
+//! A receiver refuses another version, and a system id that is not the sender's.
+
+use heapless::Vec;
+use planner_core::flight::Range;
+
+use crate::time::Duration;
+
+/// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
+pub const PAYLOAD_TYPE: u16 = 0xF10F;
+/// Version of the layout.
+pub const VERSION: u8 = 1;
+/// Most ranges of one message.
+pub const RANGES: usize = 19;
+/// Bytes of a range.
+pub(crate) const RANGE: usize = 6;
+/// On the ground it is sent so often.
+pub(crate) const EVERY: Duration = Duration::from_millis(1000);
+/// The same in flight.
+pub(crate) const EVERY_IN_FLIGHT: Duration = Duration::from_millis(5000);
+const TUNNEL_HEAD: usize = 5;
+const HEAD: usize = 10;
+/// Longest TUNNEL payload.
+pub const LENGTH: usize = TUNNEL_HEAD + HEAD + RANGES * RANGE;
+
+/// The message.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DoneReport {
+    /// MAVLink system id of the sender.
+    pub system_id: u8,
+    /// CRC-32 of the mission file.
+    pub mission_crc: u32,
+    /// How often the area was begun again.
+    pub round: u8,
+    /// Whether the sender flies.
+    pub flies: bool,
+    /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of that.
+    pub plan: bool,
+    /// What is photographed.
+    pub ranges: Vec<Range, RANGES>,
+}
+
+/// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed again.
+pub(crate) fn range_bytes(range: &Range) -> [u8; RANGE] {
+    let [a, b, c, over] = range.first.to_le_bytes();
+    let [d, e, f, many] = range.end.saturating_sub(range.first).to_le_bytes();
+    if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE] }
+}
+
+/// The same read.
+pub(crate) fn range_of(bytes: &[u8; RANGE]) -> Range {
+    let [a, b, c, d, e, f] = *bytes;
+    let first = u32::from_le_bytes([a, b, c, 0]);
+    Range { first, end: first + u32::from_le_bytes([d, e, f, 0]) }
+}
+
+impl DoneReport {
+    /// Writes the whole TUNNEL payload, to everyone; the bytes written.
+    pub fn encode(&self, out: &mut [u8; LENGTH]) -> usize {
+        let len = HEAD + RANGE * self.ranges.len();
+        out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+        (out[2], out[3], out[4]) = (0, 0, len as u8);
+        let body = &mut out[TUNNEL_HEAD..];
+        let count = self.ranges.len() as u8;
+        body[..6].copy_from_slice(&[
+            VERSION,
+            self.system_id,
+            self.round,
+            u8::from(self.flies) | u8::from(self.plan) << 1,
+            count,
+            0,
+        ]);
+        body[6..HEAD].copy_from_slice(&self.mission_crc.to_le_bytes());
+        for (to, range) in body[HEAD..].chunks_exact_mut(RANGE).zip(&self.ranges) {
+            to.copy_from_slice(&range_bytes(range));
+        }
+        TUNNEL_HEAD + len
+    }
+
+    /// Reads a TUNNEL payload, zero-padded, from system `sender`; `None` if it is no such report, or not a sound one.
+    pub fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
+        let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
+        let len = usize::from(padded[4]);
+        let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
+        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+            return None;
+        }
+        let count = usize::from(body[4]);
+        if count > RANGES || len != HEAD + RANGE * count {
+            return None;
+        }
+        let (ranges, _) = body[HEAD..].as_chunks();
+        Some(Self {
+            system_id: sender,
+            mission_crc: u32::from_le_bytes([body[6], body[7], body[8], body[9]]),
+            round: body[2],
+            flies: body[3] & 1 != 0,
+            plan: body[3] & 2 != 0,
+            ranges: ranges.iter().map(range_of).collect(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn padded(report: &DoneReport) -> [u8; 255] {
+        let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+        let len = report.encode(&mut out);
+        padded[..len].copy_from_slice(&out[..len]);
+        padded
+    }
+
+    proptest! {
+        #[test]
+        fn comes_back_as_sent_and_refuses_the_unsound(
+            ranges in proptest::collection::vec((0u32..1 << 24, 1u32..1 << 24), 0..=RANGES),
+            (mission_crc, round, flies, plan) in any::<(u32, u8, bool, bool)>(),
+        ) {
+            let ranges = ranges.iter().map(|&(first, count)| Range { first, end: first + count }).collect();
+            let report = DoneReport { system_id: 9, mission_crc, round, flies, plan, ranges };
+            prop_assert_eq!(DoneReport::decode(&padded(&report), 9), Some(report.clone()));
+            prop_assert_eq!(DoneReport::decode(&padded(&report), 8), None);
+            for (at, value) in [(0, 0), (4, 9), (5, 2), (9, 20)] {
+                let mut bad = padded(&report);
+                bad[at] = value;
+                prop_assert_eq!(DoneReport::decode(&bad, 9), None);
+            }
+        }
+
+        #[test]
+        fn any_bytes_are_survived(bytes in proptest::collection::vec(any::<u8>(), 255)) {
+            let mut padded: [u8; 255] = bytes.try_into().unwrap();
+            padded[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
+            padded[5] = VERSION;
+            let _ = DoneReport::decode(&padded, padded[6]);
+        }
+    }
+
+    #[test]
+    fn a_range_that_is_too_large_is_left_out() {
+        let range = Range { first: 1 << 24, end: (1 << 24) + 1 };
+        assert_eq!(range_of(&range_bytes(&range)), Range { first: 0, end: 0 });
+    }
+}

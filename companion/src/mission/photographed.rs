@@ -1,0 +1,182 @@
+//! Which waypoints of an area are photographed: over flights, restarts and vehicles, so that a new start flies the rest.
+//!
+//! A set of numbers that only grows: lost, repeated and reordered reports do no harm. Before it starts a vehicle takes in what all
+//! others on the ground know, so that all plan the rest of the same set; where others fly already it takes the set of theirs.
+//! A start waits while another plan is heard. In flight it notes what it photographs, and what it hears of others, for the start after. An area that is whole is begun again: that is
+//! another round, and what is known of a round before does not count.
+
+use planner_core::flight::{Done, Path, Photographs, Range};
+
+use crate::link::done::{DoneReport, RANGE, RANGES, range_bytes, range_of};
+use crate::storage::store::{self, BLOCK};
+use crate::time::{Duration, Instant};
+
+/// Most ranges of waypoints that are known to be photographed; what is more is photographed again.
+pub const DONE: usize = 40;
+/// What is done is kept in flash each time so many waypoints came to it.
+const KEEP_EVERY: u32 = 10;
+/// Reports of ones in flight come this often at least: so long their set counts, not what others on the ground know.
+const FOLLOWS: Duration = Duration::from_secs(25);
+/// Mission CRC and round, before the ranges.
+const HEAD: usize = 5;
+const _: () = assert!(HEAD + DONE * RANGE <= BLOCK);
+
+/// What is photographed.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Photographed {
+    /// How often the area was begun again.
+    round: u8,
+    /// What the plan leaves out, or will.
+    before: Done<DONE>,
+    /// All that is known.
+    known: Done<DONE>,
+    /// How many of those the flash has.
+    kept: u32,
+    /// Whether `before` has changed since a plan was requested.
+    outdated: bool,
+    /// Round of the plan.
+    planned: u8,
+    /// Whether it has flown since.
+    flown: bool,
+    /// When one in flight last reported what its plan leaves out.
+    followed_at: Option<Instant>,
+    /// With this range the next report begins.
+    next: usize,
+    /// Whether that is of what its plan leaves out.
+    reports_plan: bool,
+}
+
+impl Photographed {
+    /// Takes what the flash has kept of this mission.
+    pub(crate) fn restore(&mut self, kept: &[u8], mission_crc: u32) {
+        let Some((head, ranges)) = kept.split_at_checked(HEAD) else { return };
+        if head[..4] != mission_crc.to_le_bytes() {
+            return;
+        }
+        self.round = head[4];
+        let (ranges, _) = ranges.as_chunks::<RANGE>();
+        ranges.iter().for_each(|bytes| _ = self.known.insert(range_of(bytes)));
+        self.kept = self.known.count();
+        self.before = self.known.clone();
+    }
+
+    /// What the flash is to keep, if that is worth a record: at once where nothing more is to come.
+    pub(crate) fn keep(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
+        let count = self.known.count();
+        let least = if at_once { self.kept + 1 } else { self.kept + KEEP_EVERY };
+        // Fewer than before: another round.
+        if (self.kept..least).contains(&count) {
+            return None;
+        }
+        self.kept = count;
+        let mut kept = store::Photographed::new();
+        // They fit: `HEAD` and `DONE` ranges are no more than a block.
+        let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
+        let _ = kept.push(self.round);
+        self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&range_bytes(range)));
+        Some(kept)
+    }
+
+    /// A plan is requested: it leaves out what is known, or nothing.
+    pub(crate) fn begin(&mut self, resumes: bool) {
+        if !resumes {
+            self.begin_again();
+            self.before.clear();
+        } else if self.flown {
+            self.before = self.known.clone();
+        }
+        (self.planned, self.flown, self.outdated) = (self.round, false, false);
+    }
+
+    /// What the plan leaves out.
+    pub(crate) fn before(&self) -> &[Range] {
+        self.before.ranges()
+    }
+
+    /// Whether more is known to be done than the plan leaves out.
+    pub(crate) fn is_outdated(&self) -> bool {
+        self.outdated
+    }
+
+    /// How many waypoints are known to be done.
+    pub(crate) fn count(&self) -> u32 {
+        self.known.count()
+    }
+
+    /// The vehicle leaves its pad. Where the area was whole the plan is for all of it again: another round, unless one that left
+    /// before has said so.
+    pub(crate) fn leave_pad(&mut self, photographs: &Photographs) {
+        self.flown = true;
+        let whole = photographs.area() > 0 && self.before.count() >= photographs.area();
+        if whole && self.round == self.planned {
+            self.begin_again();
+        }
+    }
+
+    /// Nothing of a round before counts any more.
+    fn begin_again(&mut self) {
+        self.round = self.round.wrapping_add(1);
+        self.known.clear();
+    }
+
+    /// Notes the first `count` pictures of the path.
+    pub(crate) fn note<const W: usize>(&mut self, photographs: &Photographs, path: &Path<W>, count: u32) {
+        // What does not fit is photographed again.
+        photographs.first(path, count).for_each(|range| _ = self.known.insert(range));
+    }
+
+    /// Takes in what another one knows. `waits`: this one stands on the ground, and is to plan as others do.
+    pub(crate) fn handle(&mut self, report: &DoneReport, waits: bool, now: Instant) {
+        if report.plan {
+            if waits {
+                self.follow(report, now);
+            }
+            return;
+        }
+        let newer = report.round.wrapping_sub(self.round);
+        if newer > 127 {
+            return;
+        }
+        let follows = self.followed_at.is_some_and(|at| now - at <= FOLLOWS);
+        let plans = waits && !report.flies && !follows;
+        if newer > 0 {
+            self.round = report.round;
+            self.known.clear();
+            if plans {
+                self.outdated |= !self.before.is_empty();
+                self.before.clear();
+            }
+        }
+        for range in &report.ranges {
+            let _ = self.known.insert(*range);
+            if plans {
+                self.outdated |= self.before.insert(*range) == Ok(true);
+            }
+        }
+    }
+
+    /// Plans as one that has started already.
+    fn follow(&mut self, report: &DoneReport, now: Instant) {
+        self.followed_at = Some(now);
+        if self.before.ranges() != &report.ranges[..] {
+            self.before.clear();
+            report.ranges.iter().for_each(|range| _ = self.before.insert(*range));
+            self.outdated = true;
+        }
+    }
+
+    /// What others are to know, a part after the other; in flight, in turn, what the plan leaves out, if one report holds that.
+    pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
+        let plan = flies && !self.reports_plan && self.before.ranges().len() <= RANGES;
+        self.reports_plan = plan;
+        if plan {
+            let ranges = self.before.ranges().iter().copied().collect();
+            return DoneReport { round: self.round, flies, plan, ranges, ..DoneReport::default() };
+        }
+        let done = if waits { &self.before } else { &self.known };
+        let first = if self.next < done.ranges().len() { self.next } else { 0 };
+        self.next = first + RANGES;
+        let ranges = done.ranges().iter().skip(first).take(RANGES).copied().collect();
+        DoneReport { round: self.round, flies, ranges, ..DoneReport::default() }
+    }
+}

@@ -1,0 +1,85 @@
+//! The pictures of earlier flights of a mission, beside the flashes of its companions.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context as _;
+use planner_core::Point;
+
+use super::check::Picture;
+use crate::files::{self, Results};
+use crate::quote::quoted_path;
+
+/// What they are kept in.
+const NAME: &str = "pictures.json";
+
+/// Time, place and heading of a picture.
+type Row = [f32; 5];
+
+/// Where they are kept.
+pub struct Kept {
+    path: PathBuf,
+    before: Vec<Picture>,
+}
+
+impl Kept {
+    /// Reads those of earlier flights from a directory, if there were any.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is none of these.
+    pub fn open(dir: &Path) -> anyhow::Result<Self> {
+        let path = dir.join(NAME);
+        let mut before = Vec::new();
+        if path.exists() {
+            let bad = || format!("no pictures of earlier flights: {}", quoted_path(&path));
+            let text = files::read(&path, files::BINARY_BYTES).with_context(bad)?;
+            let rows: Vec<Row> = serde_json::from_slice(&text).with_context(bad)?;
+            // Before this flight began.
+            let picture = |[_, x, y, z, heading]: Row| Picture {
+                vehicle: None,
+                t_s: 0.0,
+                position: Point::new(x, y, z),
+                heading,
+            };
+            before = rows.into_iter().map(picture).collect();
+        }
+        Ok(Self { path, before })
+    }
+
+    /// Adds those of earlier flights.
+    pub fn add_to(&self, pictures: &mut Vec<Picture>) {
+        pictures.splice(..0, self.before.iter().copied());
+    }
+
+    /// Keeps all pictures for the next flight; none where the area is whole, which is begun again then.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    pub fn keep(&self, pictures: &[Picture], whole: bool) -> anyhow::Result<()> {
+        let pictures = if whole { &[] } else { pictures };
+        let row = |p: &Picture| -> Row { [p.t_s, p.position.x, p.position.y, p.position.z, p.heading] };
+        let rows: Vec<Row> = pictures.iter().map(row).collect();
+        let mut results = Results::file(&self.path)?;
+        results.add_file(&self.path, &serde_json::to_vec(&rows)?)?;
+        results.keep()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_come_back_until_the_area_is_whole() {
+        let dir = tempfile::tempdir().unwrap();
+        let picture = Picture { vehicle: None, t_s: 7.0, position: Point::new(1.0, 2.0, 3.0), heading: 0.5 };
+        Kept::open(dir.path()).unwrap().keep(&[picture], false).unwrap();
+        let mut pictures = vec![Picture { t_s: 1.0, ..picture }];
+        let kept = Kept::open(dir.path()).unwrap();
+        kept.add_to(&mut pictures);
+        assert_eq!(pictures, [Picture { t_s: 0.0, ..picture }, Picture { t_s: 1.0, ..picture }]);
+        kept.keep(&pictures, true).unwrap();
+        assert!(Kept::open(dir.path()).unwrap().before.is_empty());
+        std::fs::write(dir.path().join(NAME), "[[1, 2]]").unwrap();
+        assert!(Kept::open(dir.path()).is_err());
+    }
+}

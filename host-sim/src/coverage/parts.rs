@@ -1,0 +1,129 @@
+//! Who photographs what, for the page: the parts of the plan, and of each division after a loss.
+
+use std::collections::BTreeMap;
+
+use companion::swarm::fleet::Lot;
+use planner_core::Point;
+use planner_core::flight::{Flight as PathFlight, Task};
+
+use super::Flight;
+use super::Planned;
+use super::check::{self, Picture};
+use super::flight::{Act, Stop};
+use crate::capacity::WAYPOINTS;
+use crate::mission::{Mission, SwarmPlan};
+use crate::report::{CoverageLayers, Division, Footprint, Part, Taken};
+use crate::swarm::Flight as Flown;
+use crate::swarm::divisions::Division as Begun;
+
+/// Whose each waypoint is.
+type Owners = BTreeMap<u32, u8>;
+
+/// What the page shows of a plan.
+pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
+    let part = |(route, stops, _): &Flight| {
+        let photos = |stop: &&Stop| matches!(stop.act, Act::Photo(_));
+        let photos: Vec<&Stop> = stops.iter().filter(photos).collect();
+        let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
+        Part {
+            vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
+            waypoints: photos.len() as u32,
+            path: stops.iter().map(|stop| stop.position).collect(),
+            lanes: lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]).collect(),
+        }
+    };
+    let mut parts: Vec<Part> = flights.iter().map(part).collect();
+    parts.sort_by_key(|part| part.vehicle);
+    let divisions = vec![Division { parts, ..Division::default() }];
+    let pictures = check::pictures(planned, &check::flown(planned, flights));
+    layers(planned, divisions, pictures)
+}
+
+/// What the page shows of a flight: its plan and what became of that, and its pictures.
+///
+/// # Errors
+/// A division that cannot be planned here, though companions did.
+pub fn flown(
+    planned: &Planned<'_>,
+    mission: &Mission,
+    plan: &SwarmPlan,
+    flight: &Flown,
+    pictures: Vec<Picture>,
+) -> anyhow::Result<CoverageLayers> {
+    let mut ids: Vec<u8> = plan.flights.iter().map(|flight| flight.id).collect();
+    ids.sort_unstable();
+    let mut shown: Vec<Division> = Vec::new();
+    let (mut before, mut gone, mut losses) = (Owners::new(), Vec::new(), Vec::<&[Lot]>::new());
+    let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, lots: Vec::new(), plan_crc: 0 };
+    for division in std::iter::once(&whole).chain(&flight.divisions) {
+        // Others fly the same later; a division of which nobody said what it follows from cannot be planned here.
+        if usize::from(division.number) != shown.len() || (division.number > 0 && division.lots.is_empty()) {
+            continue;
+        }
+        losses.extend((division.number > 0).then_some(&division.lots[..]));
+        let rest = match losses.is_empty() && flight.done.is_empty() {
+            true => None,
+            false => Some(mission.plan_rest(&flight.done, losses.iter().copied())?),
+        };
+        let flights = rest.as_ref().map_or(&plan.flights, |rest| &rest.flights);
+        let own = owners(flights);
+        let lost = ids.iter().zip(&division.lots).filter(|(_, lot)| !lot.lives).map(|(id, _)| *id);
+        let lost: Vec<u8> = lost.filter(|id| !gone.contains(id)).collect();
+        gone.extend(&lost);
+        shown.push(Division {
+            t_s: division.t_s,
+            lost,
+            parts: flights.iter().filter(|flight| flight.task.flies()).map(part).collect(),
+            taken: taken(&before, &own),
+        });
+        before = own;
+    }
+    Ok(layers(planned, shown, pictures))
+}
+
+fn layers(planned: &Planned<'_>, divisions: Vec<Division>, mut pictures: Vec<Picture>) -> CoverageLayers {
+    pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
+    let corners = check::footprints(planned, &pictures);
+    let footprint = |(picture, corners): (&Picture, [[f32; 2]; 4])| Footprint {
+        t_s: picture.t_s,
+        vehicle: picture.vehicle.unwrap_or(0),
+        corners,
+    };
+    let footprints = pictures.iter().zip(corners).map(footprint).collect();
+    CoverageLayers { lane_m: planned.wanted.spacing.lane_m, divisions, footprints }
+}
+
+fn part(flight: &PathFlight<WAYPOINTS>) -> Part {
+    let path = &flight.path;
+    let (mut lanes, mut waypoints) = (Vec::<Point>::new(), 0);
+    if let Task::Photograph(photographs) = &flight.task {
+        waypoints = photographs.count(path);
+        for shots in photographs.stretches(path) {
+            lanes.extend([shots.from_m, shots.to_m].iter().filter_map(|at_m| path.point_at(*at_m)));
+        }
+    }
+    let places = path.waypoints().iter().map(|waypoint| waypoint.position);
+    Part { vehicle: flight.id, waypoints, path: places.collect(), lanes }
+}
+
+fn owners(flights: &[PathFlight<WAYPOINTS>]) -> Owners {
+    let mut owners = Owners::new();
+    for flight in flights {
+        let Task::Photograph(photographs) = &flight.task else { continue };
+        for range in photographs.first(&flight.path, u32::MAX) {
+            owners.extend((range.first..range.end).map(|number| (number, flight.id)));
+        }
+    }
+    owners
+}
+
+/// What changed hands.
+fn taken(before: &Owners, now: &Owners) -> Vec<Taken> {
+    let mut counts = BTreeMap::<(u8, u8), u32>::new();
+    for (number, to) in now {
+        if let Some(from) = before.get(number).filter(|from| *from != to) {
+            *counts.entry((*from, *to)).or_default() += 1;
+        }
+    }
+    counts.into_iter().map(|((from, to), waypoints)| Taken { from, to, waypoints }).collect()
+}

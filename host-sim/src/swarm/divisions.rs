@@ -1,0 +1,107 @@
+//! What companions of a coverage mission divide in flight, as their radio tells: the plans that they fly after it, and what each
+//! division follows from. Whoever has the mission file can plan the same again.
+
+use std::collections::HashMap;
+use std::rc::Rc;
+
+use companion::link::frame::Framer;
+use companion::link::intent::Intent;
+use companion::link::roster::{Roster, Standing};
+use companion::swarm::fleet::Lot;
+use companion::time::Instant;
+use mavlink::MessageData;
+use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
+
+/// A division that counts, as one vehicle flies it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Division {
+    /// When the vehicle first told that it flies it, seconds.
+    pub t_s: f32,
+    /// Its MAVLink system id.
+    pub vehicle: u8,
+    /// Divisions that count, this one among them.
+    pub number: u8,
+    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody told them.
+    pub lots: Vec<Lot>,
+    /// The CRC of the plan that the vehicle flies.
+    pub plan_crc: u32,
+}
+
+/// What one vehicle told last.
+#[derive(Clone, Copy, Debug, Default)]
+struct Told {
+    plan_crc: u32,
+    number: u8,
+    counted: u32,
+    /// The division whose plan it flies, and the CRC of that.
+    flies: u8,
+    flown_crc: u32,
+}
+
+/// What was heard.
+#[derive(Debug, Default)]
+pub struct Divisions {
+    vehicles: HashMap<u8, Told>,
+    /// By the hash under which they were reported.
+    lots: HashMap<u32, Vec<Lot>>,
+    told: Vec<Division>,
+}
+
+impl Divisions {
+    /// Takes in what stations sent.
+    pub fn hear(&mut self, t_s: f32, packets: &[Rc<[u8]>]) {
+        for packet in packets {
+            let mut input = &packet[..];
+            let frame = Framer::new().next(Instant::ZERO, &mut input);
+            let Some(frame) = frame.filter(|frame| frame.message_id == TUNNEL_DATA::ID) else { continue };
+            if let Some(roster) = Roster::decode(frame.padded(), frame.system) {
+                self.take_roster(t_s, &roster);
+            } else if let Some(intent) = Intent::decode(frame.padded(), frame.system) {
+                self.take_intent(t_s, &intent);
+            }
+        }
+    }
+
+    fn take_roster(&mut self, t_s: f32, roster: &Roster) {
+        let told = self.vehicles.entry(roster.system_id).or_default();
+        (told.number, told.counted) = (roster.divisions, roster.counted);
+        if told.number == told.flies {
+            told.flown_crc = told.plan_crc;
+        }
+        self.note(t_s, roster.system_id);
+        if roster.hash == 0 {
+            return;
+        }
+        // Who had no part in the division before has none in this one.
+        let before = self.lots.get(&roster.counted).cloned().unwrap_or_default();
+        let lots = self.lots.entry(roster.hash).or_default();
+        for (i, entry) in roster.entries.iter().enumerate() {
+            let rank = i + usize::from(roster.first);
+            let lives = entry.standing == Standing::Alive && before.get(rank).is_none_or(|lot| lot.lives);
+            let promised = entry.promise_dm.filter(|_| lives);
+            lots.resize(lots.len().max(rank + 1), Lot::default());
+            lots[rank] = Lot { lives, along_dm: promised.unwrap_or(entry.done_dm) };
+        }
+    }
+
+    fn take_intent(&mut self, t_s: f32, intent: &Intent) {
+        self.vehicles.entry(intent.system_id).or_default().plan_crc = intent.plan_crc;
+        self.note(t_s, intent.system_id);
+    }
+
+    /// A division that counts is flown once the plan is another one.
+    fn note(&mut self, t_s: f32, vehicle: u8) {
+        let told = self.vehicles.entry(vehicle).or_default();
+        if told.number > told.flies && told.plan_crc != told.flown_crc {
+            (told.flies, told.flown_crc) = (told.number, told.plan_crc);
+            let Told { number, counted, plan_crc, .. } = *told;
+            let lots = self.lots.get(&counted).cloned().unwrap_or_default();
+            self.told.push(Division { t_s, vehicle, number, lots, plan_crc });
+        }
+    }
+
+    /// The divisions that were flown, in order of time.
+    pub fn told(self) -> Vec<Division> {
+        self.told
+    }
+}

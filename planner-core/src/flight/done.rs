@@ -1,0 +1,129 @@
+//! Which waypoints of an area are done: ranges of their numbers on the path along all lanes.
+
+use heapless::{Vec, VecView};
+
+/// Waypoints `first` up to before `end`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Range {
+    /// The first number.
+    pub first: u32,
+    /// After the last number.
+    pub end: u32,
+}
+
+/// A set of waypoints that only grows, of at most `N` ranges: in rising order, apart from each other.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Done<const N: usize> {
+    ranges: Vec<Range, N>,
+}
+
+impl<const N: usize> Done<N> {
+    /// None yet.
+    pub const fn new() -> Self {
+        Self { ranges: Vec::new() }
+    }
+
+    /// The ranges, in rising order; none is empty, and none touches the next.
+    pub fn ranges(&self) -> &[Range] {
+        &self.ranges
+    }
+
+    /// How many waypoints there are.
+    pub fn count(&self) -> u32 {
+        self.ranges.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add)
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.ranges.is_empty()
+    }
+
+    /// Forgets all.
+    pub fn clear(&mut self) {
+        self.ranges.clear();
+    }
+
+    /// Adds a range; whether anything of it is new.
+    ///
+    /// # Errors
+    /// The range, where it touches none and there are `N` already: nothing changes.
+    pub fn insert(&mut self, range: Range) -> Result<bool, Range> {
+        insert(&mut self.ranges, range)
+    }
+}
+
+/// Whatever the capacity, so that there is one of it.
+fn insert(ranges: &mut VecView<Range>, range: Range) -> Result<bool, Range> {
+    if range.first >= range.end {
+        return Ok(false);
+    }
+    let from = ranges.iter().take_while(|held| held.end < range.first).count();
+    let touched = ranges.iter().skip(from).take_while(|held| held.first <= range.end).count();
+    let mut whole = range;
+    for held in &ranges[from..from + touched] {
+        if held.first <= range.first && range.end <= held.end {
+            return Ok(false);
+        }
+        whole = Range { first: whole.first.min(held.first), end: whole.end.max(held.end) };
+    }
+    // From there on the later ones move: one on, or back to behind the one that holds all that were touched.
+    if touched == 0 {
+        ranges.push(whole)?;
+        ranges[from..].rotate_right(1);
+    } else {
+        ranges[from] = whole;
+        ranges[from + 1..].rotate_left(touched - 1);
+        ranges.truncate(ranges.len() + 1 - touched);
+    }
+    Ok(true)
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use proptest::prelude::*;
+    use std::collections::BTreeSet;
+    use std::vec::Vec;
+
+    use super::{Done, Range};
+
+    proptest! {
+        #[test]
+        fn holds_what_was_added_whatever_the_order(
+            added in proptest::collection::vec((0u32..80, 0u32..9), 0..40),
+            at in any::<proptest::sample::Index>(),
+        ) {
+            let range = |&(first, count): &(u32, u32)| Range { first, end: first + count };
+            let (mut done, mut model) = (Done::<40>::new(), BTreeSet::new());
+            for range in added.iter().map(range) {
+                let grew = done.insert(range).unwrap();
+                let before = model.len();
+                model.extend(range.first..range.end);
+                prop_assert_eq!(grew, model.len() > before);
+            }
+            let held: Vec<u32> = done.ranges().iter().flat_map(|r| r.first..r.end).collect();
+            prop_assert_eq!(done.count() as usize, model.len());
+            prop_assert_eq!(held, model.into_iter().collect::<Vec<_>>());
+            prop_assert!(done.ranges().windows(2).all(|pair| pair[0].end < pair[1].first));
+            let mut turned = Done::<40>::new();
+            let cut = at.index(added.len() + 1);
+            for range in added[cut..].iter().chain(&added[..cut]).rev().map(range) {
+                turned.insert(range).unwrap();
+            }
+            prop_assert_eq!(turned, done);
+        }
+
+        #[test]
+        fn what_does_not_fit_changes_nothing(firsts in proptest::collection::vec(0u32..60, 1..30)) {
+            let mut done = Done::<4>::new();
+            for first in firsts {
+                let (range, before) = (Range { first, end: first + 1 }, done.clone());
+                if done.insert(range).is_err() {
+                    prop_assert_eq!(&before, &done);
+                    prop_assert_eq!(done.ranges().len(), 4);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Coverage missions that are interrupted, and started again: the rest is flown, and nothing is left out.
+//!
+//! `FLOCKMATE_RESUMED=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_RESUMED_FROM` others.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use flockmate_tests::{areas, covered, number};
+use host_sim::coverage::check::Picture;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::result::MissionResult;
+use host_sim::scenario::{self, Companion};
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+const MISSIONS: u64 = 8;
+/// Starts until the area is whole.
+const STARTS: usize = 4;
+/// What brings a vehicle down early; it is carried back to its pad, charged and switched on.
+const KINDS: [&str; 5] = ["battery-low", "battery-low", "pilot-takeover", "companion-reset", "kill"];
+
+/// The scenario without faults, and what happens in the first flights.
+fn drawn(seed: u64) -> (String, Vec<String>) {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let count = [1, 3, 5][(seed % 3) as usize];
+    let loss = if seed.is_multiple_of(2) { 0.5 } else { 0.1 };
+    let text = areas::lost(&mut random, count, if count == 1 { 0.0 } else { loss });
+    let flights = 1 + random.next_u32() % 2;
+    let mut faults = Vec::new();
+    for _ in 0..flights {
+        let mut lines = String::new();
+        // All of them, or some: then the others divide what they leave.
+        let all = random.next_u32().is_multiple_of(2);
+        let kind = KINDS[(random.next_u32() % 5) as usize];
+        for vehicle in 1..=count {
+            let many = kind != "kill" && kind != "companion-reset";
+            if vehicle == 1 || (many && (all || random.next_u32().is_multiple_of(2))) {
+                let at_s = 20 + random.next_u32() % 160;
+                let _ =
+                    write!(lines, "[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
+            }
+        }
+        faults.push(lines);
+    }
+    (text, faults)
+}
+
+fn fly(text: &str, dir: &Path, pictures: &mut Vec<Picture>) -> Result<(MissionResult, String), String> {
+    let said = |error: anyhow::Error| format!("{error:#}");
+    let mut scenario = scenario::parse(text, "area").map_err(|error| error.to_string())?;
+    for vehicle in &mut scenario.vehicles {
+        let flash = Some(dir.join(format!("{}.flash", vehicle.id)));
+        vehicle.companion = Companion::InProcess { flash };
+    }
+    let mut mission = Mission::prepare(scenario, &Progress::hidden()).map_err(said)?;
+    let (result, log) = covered::fly_on(&mut mission, pictures).map_err(said)?;
+    Ok((result, covered::lines(&log)))
+}
+
+/// What came of a mission.
+struct Outcome {
+    seed: u64,
+    /// Starts until the area was whole, if it came to be.
+    starts: Option<usize>,
+    twice: u64,
+    broken: bool,
+    said: String,
+}
+
+fn outcome(seed: u64) -> Option<Outcome> {
+    let (text, faults) = drawn(seed);
+    let dir = tempfile::tempdir().expect("a directory");
+    let (mut pictures, mut said) = (Vec::new(), String::new());
+    let mut outcome = Outcome { seed, starts: None, twice: 0, broken: false, said: String::new() };
+    for start in 0..STARTS {
+        let struck = format!("{text}{}", faults.get(start).map_or("", |lines| lines));
+        let (result, log) = match fly(&struck, dir.path(), &mut pictures) {
+            Ok(flown) => flown,
+            Err(error) => {
+                let known = ["too many corners", "cannot keep", "to land beside"]
+                    .iter()
+                    .any(|why| error.contains(why));
+                assert!(known, "seed {seed}: {error}");
+                return None;
+            }
+        };
+        let coverage = result.coverage.expect("it has an area");
+        let safety = &result.safety;
+        outcome.broken |= (safety.wall_contacts, safety.violations) != (0, 0);
+        // With nobody struck all come home.
+        let home = |end: &str| end == "Done" || end.starts_with("no goal");
+        outcome.broken |= start >= faults.len() && !result.vehicles.iter().all(|v| home(&v.end));
+        outcome.twice = coverage.twice;
+        let _ = writeln!(said, "start {start}: {:.2} % {:?}\n{log}", 100.0 * coverage.covered_share, safety);
+        if coverage.covered_share >= 1.0 {
+            outcome.starts = Some(start + 1);
+            break;
+        }
+    }
+    outcome.said = said;
+    Some(outcome)
+}
+
+#[test]
+fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
+    let (from, count) = (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_RESUMED", MISSIONS));
+    let all: Vec<Outcome> = (from..from + count).into_par_iter().filter_map(outcome).collect();
+    let wrong = |o: &&Outcome| o.broken || o.starts.is_none();
+    for o in all.iter().filter(wrong) {
+        println!("seed {}: whole after {:?} starts, {} twice\n{}", o.seed, o.starts, o.twice, o.said);
+    }
+    let after = |starts| all.iter().filter(|o| o.starts == Some(starts)).count();
+    let twice: u64 = all.iter().map(|o| o.twice).sum();
+    println!(
+        "{} flown, whole after 1 to {STARTS} starts: {:?}, {twice} waypoints twice",
+        all.len(),
+        [1, 2, 3, 4].map(after)
+    );
+    assert_eq!(all.iter().filter(wrong).count(), 0);
+}
