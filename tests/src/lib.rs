@@ -10,6 +10,7 @@ pub mod fidelity;
 pub mod hostile;
 pub mod logs;
 pub mod meeting;
+pub mod parts;
 pub mod roadmaps;
 pub mod setpoints;
 pub mod swarms;

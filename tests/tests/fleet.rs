@@ -10,9 +10,10 @@
 use std::collections::VecDeque;
 
 use companion::link::roster::{Roster, Standing};
-use companion::swarm::fleet::{Fleet, Hearing, Own};
+use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
 use companion::time::{Duration, Instant};
 use flockmate_tests::number;
+use flockmate_tests::parts::{WAYPOINT_DM, parts};
 use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
@@ -24,8 +25,6 @@ const LOSSES: [f32; 3] = [0.0, 0.1, 0.5];
 const STEP_S: f32 = 0.25;
 /// Waypoints a second.
 const PER_S: f32 = 0.5;
-/// A waypoint is so long, decimetres.
-const WAYPOINT_DM: u16 = 100;
 /// What a stop takes, seconds.
 const STOP_S: f32 = 3.0;
 /// After the lease has run out a vehicle hovers so long before it lands, seconds.
@@ -33,35 +32,6 @@ const HOVERS_S: f32 = 20.0;
 const ENDS_S: f32 = 900.0;
 
 type Whole = Fleet<8>;
-
-/// The part of one vehicle in a division: waypoints in the order in which it flies them.
-fn parts(whole: &[u32], fleet: &Whole, count: usize) -> (Vec<Vec<u32>>, u32) {
-    let mut left = whole.to_vec();
-    let mut living = vec![true; count];
-    let share = |left: &[u32], living: &[bool]| {
-        let many = living.iter().filter(|lives| **lives).count();
-        let each = left.len().div_ceil(many.max(1)).max(1);
-        let mut chunks = left.chunks(each);
-        let next = |lives: &bool| {
-            if *lives { chunks.next().map(<[u32]>::to_vec).unwrap_or_default() } else { Vec::new() }
-        };
-        living.iter().map(next).collect::<Vec<_>>()
-    };
-    let mut parts = share(&left, &living);
-    let mut hash = 17u32;
-    for lots in fleet.losses() {
-        let mut done = Vec::new();
-        for (rank, lot) in lots.iter().enumerate() {
-            let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());
-            done.extend(&parts[rank][..if lot.lives { taken } else { taken.saturating_sub(1) }]);
-            living[rank] = lot.lives;
-            hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.lives));
-        }
-        left.retain(|waypoint| !done.contains(waypoint));
-        parts = share(&left, &living);
-    }
-    (parts, hash)
-}
 
 struct Vehicle {
     fleet: Whole,
@@ -127,7 +97,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let zero = Instant::ZERO;
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
-            let mut fleet = Whole::new(own, count, Duration::from_secs(60));
+            let mut fleet = Whole::new(own, count, Limits::of_flight(Duration::from_secs(60)));
             fleet.begin(zero);
             let part = parts(&whole, &fleet, count).0.swap_remove(own);
             Vehicle {
@@ -350,4 +320,24 @@ fn vehicles_that_fly_on_without_their_lease_are_found() {
     let found = (0..FLEETS).into_par_iter().filter(wrong).count();
     println!("{found} of {FLEETS} fleets have a waypoint with two owners");
     assert!(found > 0);
+}
+
+/// The model found that such a vehicle flew on, while its promise already counted for another one.
+#[test]
+fn a_promise_binds_though_the_lost_vehicle_turns_out_to_have_finished() {
+    let mut fleet = Whole::new(1, 3, Limits::of_flight(Duration::from_secs(60)));
+    fleet.begin(Instant::ZERO);
+    let own = Own { promise_dm: Some(WAYPOINT_DM), ..Own::default() };
+    let step = |fleet: &mut Whole, at_s: u64, heard: usize| {
+        let now = Instant::from_millis(1000 * at_s);
+        let hears = Hearing { direct_at: Some(now), hears_us: true, by_others: false };
+        fleet.step(now, &own, |rank| if rank == heard { hears } else { Hearing::default() });
+    };
+    (1..50).for_each(|at_s| step(&mut fleet, at_s, 0));
+    assert_eq!(fleet.promise_dm(), Some(WAYPOINT_DM), "vehicle 2 is lost");
+    let mut finished = fleet.message(0);
+    finished.entries[2].standing = Standing::Finished;
+    fleet.handle(2, &finished, false);
+    step(&mut fleet, 50, 2);
+    assert_eq!(fleet.promise_dm(), Some(WAYPOINT_DM));
 }

@@ -68,7 +68,7 @@ pub struct Entry {
 }
 
 /// The message.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Roster {
     /// MAVLink system id of the sender.
     pub system_id: u8,

@@ -5,7 +5,7 @@
 //! promise. It holds there. From the entries all compute the same division, report its hash, and fly on once all that live
 //! have reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its lease: within
 //! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT`] after each of them last heard
-//! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model.rs` searches it.
+//! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
@@ -23,6 +23,26 @@ pub const SILENT: Duration = Duration::from_secs(45);
 pub const DIVISIONS: usize = 5;
 /// Incarnations that can be told apart: 3 bits.
 const INCARNATIONS: u8 = 8;
+
+/// What a fleet's times are measured by. A vehicle that has no lease lands after twice the lease.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Limits {
+    /// As [`LEASE`].
+    pub lease: Duration,
+    /// As [`HEARD`].
+    pub heard: Duration,
+    /// As [`SILENT`].
+    pub silent: Duration,
+    /// A lost vehicle is down once it has been silent for so long.
+    pub down: Duration,
+}
+
+impl Limits {
+    /// Those of a flight in which a vehicle that nobody hears any more is down after `down`.
+    pub const fn of_flight(down: Duration) -> Self {
+        Self { lease: LEASE, heard: HEARD, silent: SILENT, down }
+    }
+}
 
 /// What a division follows from, of one vehicle: as [`planner_core::coverage::losses::Fate`], in decimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -91,14 +111,12 @@ pub struct Fleet<const V: usize> {
     hash_before: u32,
     lease_at: Instant,
     excluded: bool,
-    /// A lost vehicle is down once it has been silent for so long.
-    down: Duration,
+    limits: Limits,
 }
 
 impl<const V: usize> Fleet<V> {
-    /// A fleet of so many vehicles (at most `V`), seen by the one of rank `own`. A vehicle that nobody hears any more is
-    /// down after `down`.
-    pub fn new(own: usize, count: usize, down: Duration) -> Self {
+    /// A fleet of so many vehicles (at most `V`), seen by the one of rank `own`.
+    pub fn new(own: usize, count: usize, limits: Limits) -> Self {
         let member = Member { in_roster: true, ..Member::default() };
         Self {
             own,
@@ -111,7 +129,7 @@ impl<const V: usize> Fleet<V> {
             hash_before: 0,
             lease_at: Instant::ZERO,
             excluded: false,
-            down,
+            limits,
         }
     }
 
@@ -127,7 +145,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Comes back as a vehicle that nothing is known of.
     fn renew(&mut self, incarnation: u8) {
-        *self = Self { lease_at: self.lease_at, ..Self::new(self.own, self.members.len(), self.down) };
+        *self = Self { lease_at: self.lease_at, ..Self::new(self.own, self.members.len(), self.limits) };
         self.members[self.own].entry.incarnation = incarnation;
     }
 
@@ -143,7 +161,7 @@ impl<const V: usize> Fleet<V> {
         let mut linked = 1u32 << self.own.min(31);
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
-            let lately = heard.direct_at.is_some_and(|at| now - at <= HEARD);
+            let lately = heard.direct_at.is_some_and(|at| now - at <= self.limits.heard);
             if rank == self.own || lately || heard.by_others {
                 member.heard_at = now;
             }
@@ -153,7 +171,8 @@ impl<const V: usize> Fleet<V> {
             self.lease_at = now;
         }
         if self.has_lease(now) {
-            for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= SILENT) {
+            let silent = self.limits.silent;
+            for member in self.members.iter_mut().filter(|m| m.in_roster && now - m.heard_at >= silent) {
                 member.entry.standing = member.entry.standing.max(Standing::Lost);
             }
         }
@@ -168,10 +187,16 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// Whether what some vehicle left is to be divided.
+    /// Whether what some vehicle left is to be divided. What was promised binds until a division counts, even if the lost
+    /// vehicle turns out to have finished: it may count for others already.
     pub fn is_dividing(&self) -> bool {
-        let left = |m: &Member| m.in_roster && matches!(m.entry.standing, Standing::Lost | Standing::Left);
-        self.lives(self.own) && !self.divisions.is_full() && self.members.iter().any(left)
+        let asks = |m: &Member| match m.entry.standing {
+            Standing::Alive => m.entry.promise_dm.is_some(),
+            Standing::Lost | Standing::Left => true,
+            Standing::Finished => false,
+        };
+        let asked = self.members.iter().any(|m| m.in_roster && asks(m));
+        self.lives(self.own) && !self.divisions.is_full() && asked
     }
 
     fn lives(&self, rank: usize) -> bool {
@@ -192,7 +217,7 @@ impl<const V: usize> Fleet<V> {
     fn draw_lots(&mut self, now: Instant) {
         let known = |m: &Member| match m.entry.standing {
             Standing::Alive => m.entry.promise_dm.is_some(),
-            Standing::Lost => now - m.heard_at >= SILENT,
+            Standing::Lost => now - m.heard_at >= self.limits.silent,
             Standing::Left | Standing::Finished => true,
         };
         if !self.has_lease(now) || !self.members.iter().filter(|m| m.in_roster).all(known) {
@@ -251,7 +276,7 @@ impl<const V: usize> Fleet<V> {
             let member = &self.members[rank];
             member.hash == self.hash && member.entry.holds
         };
-        let is_down = |m: &Member| m.entry.standing != Standing::Lost || now - m.heard_at >= self.down;
+        let is_down = |m: &Member| m.entry.standing != Standing::Lost || now - m.heard_at >= self.limits.down;
         self.hash != 0
             && self.members.iter().filter(|m| m.in_roster).all(is_down)
             && (0..self.members.len()).filter(|rank| self.lives(*rank)).all(agrees)
@@ -363,6 +388,21 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
+    /// The same on a clock that says `then` where this one's says `now`. Of times that are past every limit only that is kept:
+    /// fleets that will act alike are equal then, so a search knows that it has been here before.
+    pub fn set_clock(&mut self, now: Instant, then: Instant) {
+        let Limits { lease, silent, down, .. } = self.limits;
+        let moved = |at: Instant, most: Duration| {
+            let age = (now - at).min(most);
+            Instant::from_micros(then.micros().saturating_sub(age.micros()))
+        };
+        self.lease_at = moved(self.lease_at, Duration::from_micros(2 * lease.micros()));
+        for member in &mut self.members {
+            let counts = member.in_roster && member.entry.standing <= Standing::Lost;
+            member.heard_at = if counts { moved(member.heard_at, silent.max(down)) } else { then };
+        }
+    }
+
     /// How many vehicles there are.
     pub(crate) fn count_all(&self) -> usize {
         self.members.len()
@@ -370,7 +410,7 @@ impl<const V: usize> Fleet<V> {
 
     /// Whether it has its lease.
     pub fn has_lease(&self, now: Instant) -> bool {
-        now - self.lease_at <= LEASE
+        now - self.lease_at <= self.limits.lease
     }
 
     /// Time since a majority last said that it hears this vehicle; nothing where it takes no part any more, and needs no lease.

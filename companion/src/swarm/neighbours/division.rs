@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::link::roster::{ENTRIES, Roster};
-use crate::swarm::fleet::{HEARD, Hearing, Own};
+use crate::swarm::fleet::{HEARD, Hearing, Limits, Own};
 
 /// So long what one said of its plan counts.
 const LATELY: Duration = Duration::from_secs(3);
@@ -11,7 +11,7 @@ impl<const V: usize> Neighbours<V> {
     /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds.
     pub(crate) fn form_fleet(&mut self, down_s: f32) {
         let down = Duration::from_millis((down_s * 1000.0) as u64);
-        self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, down));
+        self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
     }
 
     /// What they agree on; none where the mission is no area.

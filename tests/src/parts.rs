@@ -1,0 +1,35 @@
+//! Divisions of numbered waypoints: what the models of fleets have in place of lanes and plans.
+
+use companion::swarm::fleet::Fleet;
+
+/// A waypoint is so long, decimetres.
+pub const WAYPOINT_DM: u16 = 100;
+
+/// The part of each vehicle, waypoints in the order in which it flies them, by what `fleet` knows; and a hash of it.
+pub fn parts<const V: usize>(whole: &[u32], fleet: &Fleet<V>, count: usize) -> (Vec<Vec<u32>>, u32) {
+    let mut left = whole.to_vec();
+    let mut living = vec![true; count];
+    let share = |left: &[u32], living: &[bool]| {
+        let many = living.iter().filter(|lives| **lives).count();
+        let each = left.len().div_ceil(many.max(1)).max(1);
+        let mut chunks = left.chunks(each);
+        let next = |lives: &bool| {
+            if *lives { chunks.next().map(<[u32]>::to_vec).unwrap_or_default() } else { Vec::new() }
+        };
+        living.iter().map(next).collect::<Vec<_>>()
+    };
+    let mut parts = share(&left, &living);
+    let mut hash = 17u32;
+    for lots in fleet.losses() {
+        let mut done = Vec::new();
+        for (rank, lot) in lots.iter().enumerate() {
+            let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());
+            done.extend(&parts[rank][..if lot.lives { taken } else { taken.saturating_sub(1) }]);
+            living[rank] = lot.lives;
+            hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.lives));
+        }
+        left.retain(|waypoint| !done.contains(waypoint));
+        parts = share(&left, &living);
+    }
+    (parts, hash)
+}
