@@ -1,0 +1,485 @@
+//! The model: what a vehicle knows, what it may do in a tick, and what must hold.
+
+use std::collections::{HashMap, HashSet};
+use std::sync::{Arc, Mutex};
+
+use companion::link::roster::{Roster, Standing};
+use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
+use companion::time::{Duration, Instant};
+use flockmate_tests::parts::{WAYPOINT_DM, parts};
+use stateright::{Model, Property};
+
+use crate::links::{Links, one_way, partitions, whole};
+
+/// Most vehicles.
+pub const MOST: usize = 4;
+const LEASE: u64 = 3;
+const SILENT: u64 = 6;
+/// A vehicle that has lost its lease stops within so many ticks.
+const STOP: u64 = 1;
+/// It comes to rest within so many ticks.
+pub const SETTLES: usize = 80;
+/// The time that every clock says between two ticks.
+const NOW: Instant = Instant::from_millis(100_000);
+
+const fn ticks(count: u64) -> Duration {
+    Duration::from_secs(count)
+}
+
+type Whole = Fleet<MOST>;
+
+/// An error that the search must find.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Planted {
+    Nothing,
+    /// Vehicles photograph without their lease.
+    LeaseIgnored,
+    /// Others take a part over after four ticks of silence.
+    TakenOverEarly,
+    /// Who is silent does not count: the majority is one of those present.
+    PresentAlone,
+    /// A vehicle flies on beyond where it promised to hold.
+    PromiseBroken,
+}
+
+/// Which messages arrive.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Radio {
+    /// Any of those between each two, either way alone.
+    Any,
+    /// Those over any set of links, each one way, that changes so often.
+    Links(u8),
+    /// Those within each part of a partition, which changes so often.
+    Parts(u8),
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub enum Flight {
+    Flies,
+    Down,
+    Dead,
+}
+
+/// What one vehicle knows and has done; its clock says [`NOW`].
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+pub struct Vehicle {
+    pub rank: usize,
+    pub fleet: Whole,
+    pub flight: Flight,
+    /// Divisions whose part it flies, and waypoints of that.
+    pub division: usize,
+    pub along: u16,
+    /// Whom it heard in the last tick.
+    pub hears: u32,
+    /// Whether its clock is a tick slow.
+    pub slow: bool,
+    /// Whether it stands, and goes on only to where it has promised to hold.
+    pub stands: bool,
+    /// Waypoints that it has photographed.
+    pub taken: u32,
+    /// For how many ticks it has not heard each other one, where [`Planted::PresentAlone`] asks for that.
+    pub silent: [u8; MOST],
+}
+
+/// What it sends.
+#[derive(Clone, PartialEq, Eq, Hash, Debug)]
+struct Message {
+    hears: u32,
+    roster: Roster,
+}
+
+/// What one vehicle may do in a tick.
+#[derive(Clone, Copy)]
+struct Choice {
+    /// Even if it stands.
+    advances: bool,
+    slow: bool,
+    leaves: bool,
+}
+
+const BEST: Choice = Choice { advances: true, slow: false, leaves: false };
+
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub struct State {
+    pub vehicles: [u32; MOST],
+    pub losses: u8,
+    /// From whom a message may reach each vehicle.
+    pub links: Links,
+    pub changes: u8,
+}
+
+/// Next states of a vehicle, and what each costs of the losses.
+type Next = Arc<Vec<(u32, u8)>>;
+
+/// Every vehicle's state, message and next states by number, computed once.
+#[derive(Default)]
+pub struct Known {
+    numbers: HashMap<Vehicle, u32>,
+    pub vehicles: Vec<Arc<Vehicle>>,
+    /// The number of the message of each; 0 for none.
+    sends: Vec<u32>,
+    message_numbers: HashMap<Message, u32>,
+    messages: Vec<Message>,
+    /// Next states, and what each costs of the losses, by the vehicle and what may reach it.
+    next: HashMap<(u32, [u32; MOST]), Next>,
+    best: HashMap<(u32, [u32; MOST]), u32>,
+    /// The waypoints that each may yet photograph, as bits.
+    owned: HashMap<u32, u32>,
+    settled: HashSet<State>,
+}
+
+pub struct FleetModel {
+    pub count: usize,
+    pub whole: Vec<u32>,
+    pub radio: Radio,
+    pub losses: u8,
+    /// Whose clock may be slow.
+    pub slow: Option<usize>,
+    pub planted: Planted,
+    pub limits: Limits,
+    /// What the links may change to.
+    pub all_links: Vec<Links>,
+    pub known: Mutex<Known>,
+}
+
+impl FleetModel {
+    pub fn new(count: usize, radio: Radio, planted: Planted) -> Self {
+        let silent = if planted == Planted::TakenOverEarly { 4 } else { SILENT };
+        let limits =
+            Limits { lease: ticks(LEASE), heard: ticks(0), silent: ticks(silent), down: ticks(silent) };
+        Self {
+            count,
+            whole: (0..count as u32 * 2).collect(),
+            radio,
+            losses: 2,
+            slow: None,
+            planted,
+            limits,
+            all_links: match radio {
+                Radio::Any => Vec::new(),
+                Radio::Links(_) => one_way(count),
+                Radio::Parts(_) => partitions(count),
+            },
+            known: Mutex::default(),
+        }
+    }
+
+    fn part(&self, vehicle: &Vehicle) -> Vec<u32> {
+        parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank)
+    }
+
+    /// Whether it may photograph: it has its lease, or has not come to a stop since.
+    fn flies(&self, vehicle: &Vehicle) -> bool {
+        let unheard = vehicle.fleet.unheard_for(NOW);
+        vehicle.flight == Flight::Flies
+            && (unheard <= ticks(LEASE + STOP) || self.planted == Planted::LeaseIgnored)
+    }
+
+    /// Up to where on its part it flies, in waypoints.
+    fn end(&self, vehicle: &Vehicle) -> u16 {
+        let promise = vehicle.fleet.promise_dm().filter(|_| self.planted != Planted::PromiseBroken);
+        promise.map_or(u16::MAX, |dm| dm / WAYPOINT_DM)
+    }
+
+    /// The waypoints that it may yet photograph, as bits.
+    fn owned(&self, vehicle: &Vehicle) -> u32 {
+        if !self.flies(vehicle) {
+            return 0;
+        }
+        let part = self.part(vehicle);
+        let yet = part.iter().take(usize::from(self.end(vehicle))).skip(usize::from(vehicle.along));
+        yet.fold(0, |bits, waypoint| bits | 1 << waypoint)
+    }
+
+    /// A vehicle one tick later, once these messages have reached it.
+    fn step(&self, before: &Vehicle, heard: &[(usize, &Message)], choice: Choice) -> Vehicle {
+        let mut vehicle = before.clone();
+        if vehicle.flight == Flight::Dead {
+            return vehicle;
+        }
+        let passed = 1 + u64::from(before.slow) - u64::from(choice.slow);
+        let now = NOW + ticks(passed);
+        vehicle.slow = choice.slow;
+        vehicle.hears = 0;
+        for (from, message) in heard {
+            vehicle.hears |= 1 << from;
+            vehicle.fleet.handle(*from, &message.roster, false);
+        }
+        if self.planted == Planted::PresentAlone {
+            self.forget_silent(&mut vehicle);
+        }
+        let bit = |bits: u32, rank: usize| bits >> rank & 1 != 0;
+        let hearing = |rank: usize| Hearing {
+            direct_at: bit(vehicle.hears, rank).then_some(now),
+            hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
+            by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
+        };
+        let done = usize::from(vehicle.along) >= self.part(&vehicle).len();
+        let lands = choice.leaves || vehicle.flight == Flight::Down || vehicle.fleet.is_excluded();
+        let standing = match (lands, done) {
+            (false, _) => Standing::Alive,
+            (true, false) => Standing::Left,
+            (true, true) => Standing::Finished,
+        };
+        let promise = vehicle.fleet.promise_dm();
+        let own = Own {
+            standing,
+            waits: false,
+            division: vehicle.division,
+            done_dm: vehicle.along * WAYPOINT_DM,
+            promise_dm: Some((vehicle.along + 1) * WAYPOINT_DM),
+            holds: done || promise.is_some_and(|dm| vehicle.along * WAYPOINT_DM >= dm),
+        };
+        vehicle.fleet.step(now, &own, hearing);
+        if vehicle.fleet.wants_hash() {
+            let hash = parts(&self.whole, &vehicle.fleet, self.count).1;
+            vehicle.fleet.take_plan_crc(hash);
+        }
+        if vehicle.fleet.division() > vehicle.division {
+            vehicle.division = vehicle.fleet.division();
+            vehicle.along = 0;
+        }
+        let hovered = vehicle.fleet.unheard_for(now) >= ticks(2 * LEASE);
+        if lands || (hovered && self.planted != Planted::LeaseIgnored) {
+            vehicle.flight = Flight::Down;
+        }
+        vehicle.fleet.set_clock(now, NOW);
+        let part = self.part(&vehicle);
+        let waypoint = part.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
+        let promised = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
+        let advances = choice.advances || !vehicle.stands || promised;
+        if let Some(waypoint) = waypoint.filter(|_| advances && self.flies(&vehicle)) {
+            vehicle.taken |= 1 << waypoint;
+            vehicle.along += 1;
+        }
+        vehicle
+    }
+
+    /// Plants the error: who is silent does not count any more, as if it had left.
+    fn forget_silent(&self, vehicle: &mut Vehicle) {
+        let mut roster = vehicle.fleet.message(0);
+        roster.hash = 0;
+        for rank in (0..self.count).filter(|rank| *rank != vehicle.rank) {
+            let silent = &mut vehicle.silent[rank];
+            *silent = if vehicle.hears >> rank & 1 != 0 { 0 } else { (*silent + 1).min(SILENT as u8) };
+            if u64::from(*silent) == SILENT {
+                roster.entries[rank].standing = roster.entries[rank].standing.max(Standing::Left);
+            }
+        }
+        for sender in (0..self.count).filter(|rank| *rank != vehicle.rank).take(1) {
+            vehicle.fleet.handle(sender, &roster, false);
+        }
+    }
+
+    /// The number of a vehicle's state.
+    fn number(&self, known: &mut Known, vehicle: Vehicle) -> u32 {
+        if let Some(number) = known.numbers.get(&vehicle) {
+            return *number;
+        }
+        let number = known.vehicles.len() as u32;
+        let sends = if vehicle.flight == Flight::Dead {
+            0
+        } else {
+            let message = Message { hears: vehicle.hears, roster: vehicle.fleet.message(0) };
+            let messages = &mut known.messages;
+            *known.message_numbers.entry(message).or_insert_with_key(|message| {
+                messages.push(message.clone());
+                messages.len() as u32
+            })
+        };
+        known.sends.push(sends);
+        known.owned.insert(number, self.owned(&vehicle));
+        known.numbers.insert(vehicle.clone(), number);
+        known.vehicles.push(Arc::new(vehicle));
+        number
+    }
+
+    fn dead(&self, rank: usize, taken: u32) -> Vehicle {
+        Vehicle {
+            rank,
+            fleet: Whole::new(rank, self.count, self.limits),
+            flight: Flight::Dead,
+            division: 0,
+            along: 0,
+            hears: 0,
+            slow: false,
+            stands: false,
+            taken,
+            silent: [0; MOST],
+        }
+    }
+
+    /// What may reach vehicle `rank`, by number.
+    fn reach(&self, known: &Known, state: &State, rank: usize) -> [u32; MOST] {
+        std::array::from_fn(|from| match state.links[rank] >> from & 1 {
+            0 => 0,
+            _ => known.sends[state.vehicles[from] as usize],
+        })
+    }
+
+    /// All that vehicle `at` may be a tick later, and what that costs of the losses.
+    fn next(&self, known: &mut Known, at: u32, reach: [u32; MOST]) -> Next {
+        if let Some(next) = known.next.get(&(at, reach)) {
+            return next.clone();
+        }
+        let vehicle = known.vehicles[at as usize].clone();
+        let mut all = Vec::new();
+        let senders: Vec<usize> = (0..MOST).filter(|from| reach[*from] != 0).collect();
+        let subsets = match self.radio {
+            Radio::Any => 0..1usize << senders.len(),
+            Radio::Links(_) | Radio::Parts(_) => (1 << senders.len()) - 1..1 << senders.len(),
+        };
+        let clocks: &[bool] = if self.slow == Some(vehicle.rank) { &[false, true] } else { &[false] };
+        for subset in subsets.filter(|_| vehicle.flight != Flight::Dead) {
+            let arrived = (0..senders.len()).filter(|k| subset >> k & 1 != 0).map(|k| senders[k]);
+            let messages: Vec<(usize, Message)> =
+                arrived.map(|from| (from, known.messages[reach[from] as usize - 1].clone())).collect();
+            let heard: Vec<(usize, &Message)> = messages.iter().map(|(from, m)| (*from, m)).collect();
+            for &slow in clocks {
+                for leaves in [false, true] {
+                    if leaves && vehicle.flight == Flight::Down {
+                        continue;
+                    }
+                    let next = self.step(&vehicle, &heard, Choice { advances: false, slow, leaves });
+                    all.push((self.number(known, next), u8::from(leaves)));
+                }
+            }
+        }
+        let cost = u8::from(vehicle.flight != Flight::Dead);
+        all.push((self.number(known, self.dead(vehicle.rank, vehicle.taken)), cost));
+        all.sort_unstable();
+        all.dedup_by_key(|(number, _)| *number);
+        let all = Arc::new(all);
+        known.next.insert((at, reach), all.clone());
+        all
+    }
+
+    /// All states a tick later.
+    fn tick(&self, known: &mut Known, state: &State, all: &mut Vec<State>) {
+        let from = all.len();
+        all.push(*state);
+        for rank in 0..self.count {
+            let reach = self.reach(known, state, rank);
+            let next = self.next(known, state.vehicles[rank], reach);
+            for part in all.split_off(from) {
+                for &(number, cost) in next.iter().filter(|(_, cost)| *cost <= part.losses) {
+                    let mut vehicles = part.vehicles;
+                    vehicles[rank] = number;
+                    all.push(State { vehicles, losses: part.losses - cost, ..part });
+                }
+            }
+        }
+    }
+
+    /// The state a tick later if all messages arrive, all advance, and nothing more happens.
+    pub fn best(&self, known: &mut Known, state: &State) -> State {
+        let mut next = *state;
+        for rank in 0..self.count {
+            let (at, reach) = (state.vehicles[rank], self.reach(known, state, rank));
+            next.vehicles[rank] = match known.best.get(&(at, reach)) {
+                Some(number) => *number,
+                None => {
+                    let messages: Vec<(usize, Message)> = (0..MOST)
+                        .filter(|from| reach[*from] != 0)
+                        .map(|from| (from, known.messages[reach[from] as usize - 1].clone()))
+                        .collect();
+                    let heard: Vec<(usize, &Message)> = messages.iter().map(|(from, m)| (*from, m)).collect();
+                    let vehicle = known.vehicles[at as usize].clone();
+                    let number = self.number(known, self.step(&vehicle, &heard, BEST));
+                    known.best.insert((at, reach), number);
+                    number
+                }
+            };
+        }
+        next
+    }
+
+    /// Whether the fleet comes to rest from here with nothing left out, if nothing more happens.
+    fn ends_well(&self, state: &State) -> bool {
+        let known = &mut *self.known.lock().unwrap();
+        let mut passed = Vec::new();
+        let mut state = *state;
+        while !known.settled.contains(&state) {
+            passed.push(state);
+            let next = self.best(known, &state);
+            if next == state {
+                let all = |f: &dyn Fn(&Vehicle) -> bool| {
+                    (0..self.count).any(|rank| f(&known.vehicles[state.vehicles[rank] as usize]))
+                };
+                let flies = all(&|vehicle| vehicle.flight == Flight::Flies);
+                let taken = (0..self.count)
+                    .fold(0, |bits, rank| bits | known.vehicles[state.vehicles[rank] as usize].taken);
+                if flies && taken.count_ones() as usize != self.whole.len() {
+                    return false;
+                }
+                break;
+            }
+            if passed.len() > SETTLES {
+                return false;
+            }
+            state = next;
+        }
+        known.settled.extend(passed);
+        true
+    }
+
+    fn one_owner(&self, state: &State) -> bool {
+        let known = &*self.known.lock().unwrap();
+        let mut all = 0;
+        (0..self.count).all(|rank| {
+            let owned = known.owned[&state.vehicles[rank]];
+            let twice = all & owned;
+            all |= owned;
+            twice == 0
+        })
+    }
+}
+
+impl Model for FleetModel {
+    type State = State;
+    type Action = State;
+
+    fn init_states(&self) -> Vec<State> {
+        let known = &mut *self.known.lock().unwrap();
+        let begin = |known: &mut Known, stands: usize| {
+            let mut vehicles = [0; MOST];
+            for (rank, number) in vehicles.iter_mut().enumerate().take(self.count) {
+                let stands = stands >> rank & 1 != 0;
+                let mut vehicle = Vehicle { flight: Flight::Flies, stands, ..self.dead(rank, 0) };
+                vehicle.fleet.begin(NOW);
+                vehicle.fleet.set_clock(NOW, NOW);
+                *number = self.number(known, vehicle);
+            }
+            vehicles
+        };
+        let changes = match self.radio {
+            Radio::Any => 0,
+            Radio::Links(changes) | Radio::Parts(changes) => changes,
+        };
+        let links = whole(self.count);
+        let state = |vehicles| State { vehicles, losses: self.losses, links, changes };
+        (0..1 << self.count).map(|stands| state(begin(known, stands))).collect()
+    }
+
+    fn actions(&self, state: &State, actions: &mut Vec<State>) {
+        let known = &mut *self.known.lock().unwrap();
+        self.tick(known, state, actions);
+        if state.changes > 0 {
+            let (to, changes) = (actions.len(), state.changes - 1);
+            for links in self.all_links.iter().copied().filter(|links| *links != state.links) {
+                (0..to).for_each(|k| actions.push(State { links, changes, ..actions[k] }));
+            }
+        }
+    }
+
+    fn next_state(&self, _: &State, action: State) -> Option<State> {
+        Some(action)
+    }
+
+    fn properties(&self) -> Vec<Property<Self>> {
+        vec![
+            Property::always("one owner", |model: &Self, state| model.one_owner(state)),
+            Property::always("nothing left out", |model: &Self, state| model.ends_well(state)),
+        ]
+    }
+}
