@@ -11,6 +11,7 @@
 //! | `patches.rs` | more lanes where a no-fly zone covers a lane and not what it should photograph |
 //! | `order.rs` | the order and the directions in which lanes are flown |
 //! | `transit.rs` | shortest ways around no-fly zones |
+//! | `around.rs` | the way home, or aside, of a vehicle that leaves its route |
 //! | `pack.rs` | CBinPack, SIMPLE-BINPAT and BINPAT: routes, vehicles, layers, costs |
 //! | `powell.rs` | POWELL-BINPAT: the shares that make the largest cost least |
 //! | `exact.rs` | the least largest cost of all contiguous divisions |
@@ -23,6 +24,7 @@
 //! lane and index and are not stored.
 
 pub mod area;
+pub mod around;
 pub mod bound;
 pub mod divide;
 pub mod exact;

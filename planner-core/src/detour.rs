@@ -1,4 +1,5 @@
-//! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it.
+//! One vehicle's way around what left the plan: a vehicle that lies, stands or hovers where the schedule did not put it. Over a
+//! field, where there is no roadmap, [`crate::coverage::around`] plans it.
 //!
 //! It is flown alone, while all others stand (`companion/src/swarm/detour.rs` waits for that), so there is no time in it: the
 //! shortest path on the roadmap from where the vehicle hovers to its goal that keeps off every [`KeepOff`]. It begins with
@@ -79,7 +80,7 @@ impl KeepOff {
 
     /// What of it is not to be flown through. A vehicle that descends may be met half way by one that climbs as fast: of its column
     /// the lower third of what is above `here` is left to cross.
-    fn solid(&self, here: &Point) -> Self {
+    pub(crate) fn solid(&self, here: &Point) -> Self {
         if self.nature != Nature::Landing {
             return *self;
         }
@@ -97,7 +98,7 @@ impl KeepOff {
         self.touches(place, place)
     }
 
-    fn touches(&self, a: &Point, b: &Point) -> bool {
+    pub(crate) fn touches(&self, a: &Point, b: &Point) -> bool {
         // Most are apart along one axis alone, which is cheaper to see than a distance.
         let sorted = |a: f32, b: f32| if a < b { (a, b) } else { (b, a) };
         let beside = |axis: usize| {
@@ -180,6 +181,20 @@ fn legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
 
+/// Where a way around leads.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Goal {
+    /// To this goal of the roadmap, by its index.
+    Node(u16),
+    /// Over a field, without a roadmap: to this place over the vehicle's pad.
+    Home {
+        /// The place.
+        over: Point,
+        /// Height of the layer in which the vehicle crosses the field, metres.
+        layer_m: f32,
+    },
+}
+
 /// What to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
@@ -191,8 +206,8 @@ pub struct DetourRequest {
     pub leg: [Point; 2],
     /// Its clearance, metres.
     pub leg_clearance_m: f32,
-    /// Index of the goal.
-    pub goal: u16,
+    /// Where to.
+    pub goal: Goal,
     /// Height of the goal over its ground, metres.
     pub descent_m: f32,
     /// Radius + safety margin, metres.
@@ -206,6 +221,10 @@ impl DetourRequest {
         finite("here", &self.here)?;
         finite("leg", &self.leg[0])?;
         finite("leg", &self.leg[1])?;
+        if let Goal::Home { over, layer_m } = &self.goal {
+            finite("over", over)?;
+            finite("layer_m", &Point::repeat(*layer_m))?;
+        }
         not_negative("leg_clearance_m", self.leg_clearance_m)?;
         not_negative("descent_m", self.descent_m)?;
         not_negative("required_clearance_m", self.required_clearance_m)
@@ -252,12 +271,11 @@ pub fn plan<const N: usize, const W: usize>(
     for obstacle in obstacles.iter_mut() {
         *obstacle = obstacle.settled(view);
     }
-    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
-        *obstacle = obstacle.seen_from(&here, NEARER_M);
-    }
+    shorten(obstacles, &here);
     let clear = |a: &Point, b: &Point| !obstacles.iter().any(|obstacle| obstacle.solid(&here).touches(a, b));
-    let goal = view.header().starts.saturating_add(request.goal);
-    if request.goal >= view.header().goals {
+    let Goal::Node(number) = request.goal else { return Err(DetourError::Search(SearchError::NoPath)) };
+    let goal = view.header().starts.saturating_add(number);
+    if number >= view.header().goals {
         return Err(DetourError::Search(SearchError::BadNode(goal)));
     }
     let above = view.node(goal);
@@ -303,6 +321,13 @@ pub fn plan<const N: usize, const W: usize>(
     failed
 }
 
+/// Of what is nearer already than it should be, no more distance than there is.
+pub(crate) fn shorten(obstacles: &mut [KeepOff], here: &Point) {
+    for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
+        *obstacle = obstacle.seen_from(here, NEARER_M);
+    }
+}
+
 /// As [`plan`], as the plan of one vehicle: without gates, since all others stand while it is flown.
 pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     view: &RoadmapView<'_>,
@@ -313,7 +338,10 @@ pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), DetourError> {
     plan(view, request, obstacles, ws, nodes, &mut out.path)?;
-    out.task = Task::Goto(request.goal);
+    out.task = match request.goal {
+        Goal::Node(goal) => Task::Goto(goal),
+        Goal::Home { .. } => Task::Stay,
+    };
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();
     out.plan_crc = 0;

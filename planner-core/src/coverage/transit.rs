@@ -84,6 +84,16 @@ impl<'a, const N: usize> Transit<'a, N> {
         }
     }
 
+    /// Where ways turn: the zones' outward corners.
+    pub fn corners(&self) -> &[Flat] {
+        &self.corners
+    }
+
+    /// Whether a place is in a no-fly zone.
+    pub fn forbids(&self, place: &Flat) -> bool {
+        self.area.forbids(place)
+    }
+
     /// Whether a straight way meets no no-fly zone.
     pub fn is_clear(&self, from: &Flat, to: &Flat) -> bool {
         let (low, high) = (from.inf(to), from.sup(to));

@@ -23,7 +23,7 @@ fn request() -> DetourRequest {
         here: Point::new(2.0, 0.0, 5.0),
         leg: [NODES[2], NODES[0]],
         leg_clearance_m: 1.2,
-        goal: 0,
+        goal: Goal::Node(0),
         descent_m: 4.0,
         required_clearance_m: 0.8,
     }
@@ -66,7 +66,7 @@ fn the_shortest_way_is_taken_and_another_where_something_is_on_it() {
 fn a_goal_that_something_lies_below_is_blocked() {
     let lies = at(Point::new(8.0, 1.0, 1.5), 1.5);
     assert_eq!(planned(&request(), &[lies]), Err(DetourError::GoalBlocked));
-    let bad = DetourRequest { goal: 9, ..request() };
+    let bad = DetourRequest { goal: Goal::Node(9), ..request() };
     assert_eq!(planned(&bad, &[]), Err(DetourError::Search(SearchError::BadNode(10))));
 }
 

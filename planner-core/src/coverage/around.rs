@@ -1,0 +1,229 @@
+//! One vehicle's way home over a field, or aside: around no-fly zones and whatever left the plan, without a roadmap.
+//!
+//! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad, and down. What is to be kept off is
+//! walked around: a visibility graph over the zones' corners ([`Transit::corners`]) and eight corners around either end of
+//! each [`KeepOff`] that reaches the layer, searched by A*. Where the layer leaves no way, the same at the height at which the
+//! vehicle hovers. Aside: the nearest of [`RINGS`] × [`DIRECTIONS`] places around it, straight there.
+//!
+//! ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
+
+use heapless::Vec;
+use libm::{cosf, fabsf, fminf, sinf};
+
+use super::Flat;
+use super::transit::Transit;
+use crate::Point;
+use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOff};
+use crate::flight::{Path, PathError, Task, VehiclePlan};
+use crate::search::SearchError;
+
+/// Most places of the visibility graph.
+const PLACES: usize = 320;
+/// Corners around an end of what is kept off.
+const CORNERS: usize = 8;
+/// The radius of those corners, as a share of the distance kept: what joins two neighbours keeps it still.
+const OUTWARD: f32 = 1.09;
+/// And this much more, metres: rounding.
+const OUTWARD_M: f32 = 0.05;
+/// Nearer than this is the same place, metres.
+const SAME_M: f32 = 0.01;
+/// A place aside is so many metres away at most, in steps of a metre.
+const RINGS: usize = 20;
+/// Directions that are looked in for it.
+const DIRECTIONS: usize = 16;
+
+/// Zones and things that no leg meets.
+struct Clear<'a, 't, const N: usize> {
+    transit: &'a Transit<'t, N>,
+    obstacles: &'a [KeepOff],
+    here: Point,
+}
+
+impl<const N: usize> Clear<'_, '_, N> {
+    fn leg(&self, a: &Point, b: &Point) -> bool {
+        let touches = |obstacle: &KeepOff| obstacle.solid(&self.here).touches(a, b);
+        self.transit.is_clear(&a.xy(), &b.xy()) && !self.obstacles.iter().any(touches)
+    }
+}
+
+/// The way to the goal ([`Goal::Home`]), or aside, that keeps off all `obstacles` and the zones that `transit` knows, written to `out`. Of an
+/// obstacle that is nearer already the distance is shortened.
+///
+/// # Errors
+/// Why there is none.
+pub fn plan<const N: usize, const W: usize>(
+    transit: &Transit<'_, N>,
+    request: &DetourRequest,
+    obstacles: &mut [KeepOff],
+    out: &mut Path<W>,
+) -> Result<(), DetourError> {
+    request.check().map_err(DetourError::Config)?;
+    obstacles.iter().try_for_each(KeepOff::check).map_err(DetourError::Config)?;
+    let Goal::Home { over, layer_m } = request.goal else {
+        return Err(DetourError::Search(SearchError::NoPath));
+    };
+    detour::shorten(obstacles, &request.here);
+    let clear = Clear { transit, obstacles, here: request.here };
+    let from = |points: &[Point], out: &mut Path<W>| write(request, points, out).map_err(DetourError::Path);
+    if request.aside {
+        let place = aside(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
+        return from(&[place], out);
+    }
+    let mut graph = Graph::EMPTY;
+    for height_m in [layer_m, request.here.z] {
+        let level = |place: &Point| Point::new(place.x, place.y, height_m);
+        let (up, down) = (level(&request.here), level(&over));
+        if !clear.leg(&request.here, &up) {
+            continue;
+        }
+        if !clear.leg(&down, &over) {
+            return Err(DetourError::GoalBlocked);
+        }
+        let mut points = Vec::<Point, W>::new();
+        if graph.search(&clear, &up, &down, &mut points)? {
+            points.push(over).map_err(|_| DetourError::Path(PathError::PathFull))?;
+            return from(&points, out);
+        }
+    }
+    Err(DetourError::Search(SearchError::NoPath))
+}
+
+/// As [`plan`], as the plan of one vehicle that leaves the others' plan: of it the path alone counts, it has no gates.
+///
+/// # Errors
+/// Why there is none.
+pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
+    transit: &Transit<'_, N>,
+    request: &DetourRequest,
+    obstacles: &mut [KeepOff],
+    out: &mut VehiclePlan<W, G>,
+) -> Result<(), DetourError> {
+    plan(transit, request, obstacles, &mut out.path)?;
+    out.task = Task::Goto(0);
+    (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
+    out.gates.clear();
+    out.plan_crc = 0;
+    Ok(())
+}
+
+/// The nearest place to rest at that is reached straight.
+fn aside<const N: usize>(clear: &Clear<'_, '_, N>) -> Option<Point> {
+    let here = clear.here;
+    let step = core::f32::consts::TAU / DIRECTIONS as f32;
+    let place = |i: usize| {
+        let (far_m, angle) = ((i / DIRECTIONS + 1) as f32, (i % DIRECTIONS) as f32 * step);
+        here + Point::new(cosf(angle), sinf(angle), 0.0) * far_m
+    };
+    let rests = |place: &Point| {
+        !clear.transit.forbids(&place.xy()) && !clear.obstacles.iter().any(|obstacle| obstacle.holds(place))
+    };
+    (0..RINGS * DIRECTIONS).map(place).find(|place| rests(place) && clear.leg(&here, place))
+}
+
+/// Places at one height, and the shortest ways found to them so far.
+struct Graph {
+    places: Vec<Flat, PLACES>,
+    far_m: [f32; PLACES],
+    before: [u16; PLACES],
+    ended: [bool; PLACES],
+}
+
+impl Graph {
+    const EMPTY: Self =
+        Self { places: Vec::new(), far_m: [0.0; PLACES], before: [0; PLACES], ended: [false; PLACES] };
+
+    /// The shortest way between two places of one height: all its points but the first, none where it stays. Whether there is one.
+    fn search<const N: usize, const W: usize>(
+        &mut self,
+        clear: &Clear<'_, '_, N>,
+        from: &Point,
+        to: &Point,
+        points: &mut Vec<Point, W>,
+    ) -> Result<bool, DetourError> {
+        const HERE: usize = 0;
+        const THERE: usize = 1;
+        let height_m = from.z;
+        self.gather(clear, from, to);
+        let level = |place: &Flat| Point::new(place.x, place.y, height_m);
+        self.far_m.fill(f32::INFINITY);
+        self.ended.fill(false);
+        self.far_m[HERE] = 0.0;
+        loop {
+            let open = (0..self.places.len()).filter(|&i| !self.ended[i] && self.far_m[i].is_finite());
+            let whole = |i: usize| self.far_m[i] + (self.places[i] - to.xy()).norm();
+            let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else { return Ok(false) };
+            if next == THERE {
+                break;
+            }
+            self.ended[next] = true;
+            let place = level(&self.places[next]);
+            for i in 0..self.places.len() {
+                let far_m = self.far_m[next] + (self.places[i] - place.xy()).norm();
+                // A look costs more than the sum: only at what would be shorter.
+                if !self.ended[i] && far_m < self.far_m[i] && clear.leg(&place, &level(&self.places[i])) {
+                    (self.far_m[i], self.before[i]) = (far_m, next as u16);
+                }
+            }
+        }
+        let mut at = THERE;
+        while at != HERE {
+            points.push(level(&self.places[at])).map_err(|_| DetourError::Path(PathError::PathFull))?;
+            at = usize::from(self.before[at]);
+        }
+        points.push(*from).map_err(|_| DetourError::Path(PathError::PathFull))?;
+        points.reverse();
+        Ok(true)
+    }
+
+    /// Both ends, corners of zones, and corners around what reaches this height: as many as there is room for.
+    fn gather<const N: usize>(&mut self, clear: &Clear<'_, '_, N>, from: &Point, to: &Point) {
+        self.places.clear();
+        let mut add = |place: Flat| _ = self.places.push(place);
+        add(from.xy());
+        add(to.xy());
+        clear.transit.corners().iter().for_each(|corner| add(*corner));
+        let step = core::f32::consts::TAU / CORNERS as f32;
+        for obstacle in clear.obstacles {
+            let (low_m, high_m) = match obstacle.from.z < obstacle.to.z {
+                true => (obstacle.from.z, obstacle.to.z),
+                false => (obstacle.to.z, obstacle.from.z),
+            };
+            let beside_m = fabsf(from.z - fminf(from.z.max(low_m), high_m));
+            if beside_m > obstacle.radius_m {
+                continue;
+            }
+            let far_m = obstacle.radius_m * OUTWARD + OUTWARD_M;
+            let twice = (obstacle.from - obstacle.to).xy().norm() > SAME_M;
+            let ends = [Some(obstacle.from), twice.then_some(obstacle.to)];
+            for end in ends.into_iter().flatten() {
+                for i in 0..CORNERS {
+                    let angle = i as f32 * step;
+                    let place = end.xy() + Flat::new(cosf(angle), sinf(angle)) * far_m;
+                    if !clear.transit.forbids(&place) {
+                        add(place);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn write<const W: usize>(
+    request: &DetourRequest,
+    points: &[Point],
+    out: &mut Path<W>,
+) -> Result<(), PathError> {
+    *out = Path::new();
+    out.push(request.here, request.leg_clearance_m)?;
+    let mut before = request.here;
+    for point in points {
+        if (point - before).norm() > SAME_M {
+            out.push(*point, request.leg_clearance_m)?;
+            before = *point;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests;
