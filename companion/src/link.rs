@@ -21,6 +21,8 @@ use crate::time::Instant;
 
 /// Entries of a link's queue that no answer takes: they are left for texts, acks of the own requests, and commands.
 const KEPT_FREE: usize = 8;
+/// And entries that are left for answers to a ground station: a list of all parameters, and two more.
+const KEPT_FOR_GROUND: usize = 12;
 const BOTH: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
 /// What is made from the newest state when its link is polled, instead of waiting in a queue.
@@ -107,7 +109,11 @@ impl Links {
 
     /// Whether an answer may be queued now; if so, it is counted.
     pub(crate) fn may_answer(&mut self, now: Instant, link: Link, sender: Sender, kind: Kind) -> bool {
-        self.outboxes[link as usize].room() > KEPT_FREE && self.rates.take(now, link, sender, kind)
+        let kept = match sender {
+            Sender::GroundStation => KEPT_FREE,
+            Sender::Autopilot | Sender::Other => KEPT_FREE + KEPT_FOR_GROUND,
+        };
+        self.outboxes[link as usize].room() > kept && self.rates.take(now, link, sender, kind)
     }
 
     /// Queues an answer, unless its rate or the queue is used up.

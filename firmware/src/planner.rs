@@ -128,9 +128,10 @@ impl Planner<'_> {
         let index = mission.index_of(self.system_id).ok_or(PlanFailure::Invalid)?;
         let schedule = &mission.header().schedule;
         if let Kind::Coverage(area) = mission.kind() {
-            // Where nobody knows the ground, nobody flies around.
-            let whole = detour.is_none().then_some(()).ok_or(PlanFailure::Unreachable);
-            return whole.and_then(|()| plan_area(mission, area, index, &mut self.memory));
+            return match detour {
+                Some(request) => plan_around(area, request, &mut self.memory),
+                None => plan_area(mission, area, index, &mut self.memory),
+            };
         }
         let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
         let Memory { scratch, swarm, own } = &mut self.memory;
@@ -155,6 +156,28 @@ impl Planner<'_> {
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)
     }
+}
+
+/// The way home over the area, or aside. Apart as [`plan_area`].
+#[inline(never)]
+fn plan_around<'m>(
+    area: &CoverageView<'_>,
+    request: &DetourRequest,
+    memory: &'m mut Memory<'_>,
+) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+    let Memory { scratch, own, .. } = memory;
+    if own.crowded {
+        return Err(PlanFailure::Capacity);
+    }
+    let ws = &mut scratch.area().area;
+    planner::coverage::around::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
+        area,
+        request,
+        &mut own.obstacles,
+        ws,
+        &mut own.plan,
+    )?;
+    Ok(&own.plan)
 }
 
 /// The plan of a coverage mission. Apart, so that what it has on the stack is not there while others plan.

@@ -14,7 +14,7 @@ use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::flight::{PathError, Task};
 use planner_core::plan::{self, PlanError, PlanRequest};
 use planner_core::schedule::ScheduleError;
-use planner_core::search::{SearchError, SearchWorkspace};
+use planner_core::search::SearchWorkspace;
 
 pub use self::ready::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
 use self::ready::{planner_mode, schedule_config};
@@ -220,7 +220,10 @@ impl Mission {
                 let mut obstacles = Vec::new();
                 let request = companion.detour(|obstacle| obstacles.push(obstacle));
                 let request = request.ok_or(PlanFailure::Unreachable)?;
-                self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable)
+                match self.scenario.area.is_some() {
+                    true => self.around(&request, &mut obstacles),
+                    false => self.detour(&request, &mut obstacles).map_err(|_| PlanFailure::Unreachable),
+                }
             }
         }
     }
@@ -231,9 +234,6 @@ impl Mission {
         request: &DetourRequest,
         obstacles: &mut [KeepOff],
     ) -> Result<Box<OwnPlan>, DetourError> {
-        if self.roadmap_file.is_empty() {
-            return Err(DetourError::Search(SearchError::NoPath));
-        }
         let mut search = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
         let mut own = Box::new(OwnPlan::default());
         let mut nodes = heapless::Vec::new();

@@ -10,7 +10,7 @@ use host_sim::capacity::BOARDS;
 use host_sim::map::{self, Unknown, VoxelMap, building};
 use host_sim::roadmap::{self, Roadmap};
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOff, Nature};
 use planner_core::flight::Path;
 use planner_core::frames::Geodetic;
 use planner_core::prm::{Config, Sampling};
@@ -145,7 +145,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             here,
             leg: [new.node(nodes[1]), here],
             leg_clearance_m: 1.0,
-            goal,
+            goal: Goal::Node(goal),
             descent_m,
             required_clearance_m: clearance_m,
         };

@@ -79,9 +79,13 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'late-plan'\nduration_s = 40", then: GoesOn, says: &["Plan is late: asked again"] },
     Case { script: "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD", then: GoesOn, says: &["Flying around", AT_GOAL] },
     Case { script: GEOFENCE, then: Out, says: &["Geofence reached: landing"] },
+    Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
+    Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
+    Case { script: "kind = 'land-order'", then: Out, says: &["Landing as commanded", CANCELLED] },
     Case { script: "kind = 'bad-roadmap'", then: Out, says: &["Roadmap missing or wrong: mission aborted"] },
 ];
 
+const CANCELLED: &str = "Start cancelled as commanded";
 /// Not solved yet: beside a vehicle whose autopilot is silent for good others may land short of their goals.
 const OTHERS_LAND_SHORT: &str = "duration_s = 600";
 /// States in which the mission of a vehicle struck may rest.

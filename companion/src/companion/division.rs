@@ -69,6 +69,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let off_plan = self.guidance.returning
             || self.guidance.aside
             || self.detours.is_flying()
+            || self.detours.is_homeward()
             || self.detours.has_left();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
@@ -81,7 +82,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let descends = self.guidance.along_m() > self.home_m() + THERE_M;
         let nearly_down = flies && descends && self.holds_at_m().is_none();
         let standing = match ends || nearly_down {
-            true if self.has_all_pictures(along_m) => Standing::Finished,
+            true if self.mission.has_all_pictures(along_m) => Standing::Finished,
             _ if ends => Standing::Left,
             _ => Standing::Alive,
         };
@@ -103,7 +104,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// Whether it is to fly on though it has left, be it that its pilot had it for so long: what it would fly is the others'.
-    pub(super) fn resumes_too_late(&self) -> bool {
+    fn resumes_too_late(&self) -> bool {
         let resumes = match self.mission.state() {
             State::PilotReturned => self.mission.pending().resume,
             state => state == State::Dividing,
@@ -111,20 +112,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         resumes && !self.lands_elsewhere() && self.neighbours.fleet().is_some_and(Fleet::has_left)
     }
 
-    /// Whether it flies back, or aside, to land there.
+    /// Whether it flies home, back, or aside, to land there.
     fn lands_elsewhere(&self) -> bool {
-        self.guidance.returning || self.guidance.aside || self.detours.lands()
+        let home = self.guidance.returning || self.detours.is_homeward();
+        home || self.guidance.aside || self.detours.lands()
     }
 
-    /// Whether all pictures of its part were taken, at this place of its path.
-    fn has_all_pictures(&self, along_m: f32) -> bool {
-        let Some(plan) = self.mission.plan() else { return false };
-        match &plan.task {
-            Task::Photograph(photographs) => {
-                photographs.taken_by(&plan.path, along_m) == photographs.count(&plan.path)
-            }
-            Task::Stay | Task::Goto(_) => true,
-        }
+    /// Whether others have divided its part, or count it as lost, while it would fly it.
+    pub(super) fn is_excluded(&self) -> bool {
+        let excluded = self.neighbours.fleet().is_some_and(Fleet::is_excluded);
+        (excluded && !self.lands_elsewhere()) || self.resumes_too_late()
     }
 
     /// Where its last descent begins, metres along its path: above its pad.

@@ -7,7 +7,6 @@ use crate::autopilot::requests::battery_reported;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
 use crate::mission::{FRESH, Inputs, State};
-use crate::swarm::fleet::Fleet;
 use crate::swarm::neighbours::STANDING_MPS;
 use crate::time::Duration;
 
@@ -76,7 +75,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             way_free: self.flies_on(),
             out_of_range: self.neighbours.all_beyond(),
             neighbour_heard: self.is_linked(),
-            excluded: self.neighbours.fleet().is_some_and(Fleet::is_excluded) || self.resumes_too_late(),
+            excluded: self.is_excluded(),
             more_is_done: self.mission.photographed().is_outdated(),
             plans_differ: self.hears_another_plan(),
             holds_to_divide: self.holds_to_divide(),
@@ -95,7 +94,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             pause: self.mission.pending().pause,
             resume: self.mission.pending().resume,
             land: self.mission.pending().land,
-            turn_back: self.mission.pending().turn_back && !self.guidance.returning,
+            turn_back: self.mission.pending().turn_back
+                && !self.guidance.returning
+                && !self.detours.is_homeward(),
+            over_field: self.detours.can_turn_home(&view),
+            homeward: self.detours.is_homeward(),
+            sought_home: self.detours.sought_home_for(now),
+            stands_to_return: standing && self.detours.may_ask_home(now),
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
             armed_unseen: handshake.is_armed_unseen(now),
@@ -122,7 +127,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && (self.is_linked() || self.neighbours.all_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
             path_done: follow && self.guidance.path_done(scene),
-            at_goal: self.guidance.at_goal(scene),
+            at_goal: self.guidance.at_goal(scene) && !self.detours.is_homeward(),
             near_path: match (beneath, self.mission.state()) {
                 // Those refer to no place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
@@ -138,8 +143,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             must_land: self.must_land(),
             can_turn_back: self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
+                && (self.config.division.is_none() || self.detours.seeks_home())
                 && !self.neighbours.is_deaf(now),
-            pad_taken: match follow && self.guidance.returning {
+            pad_taken: match follow && (self.guidance.returning || self.detours.is_homeward()) {
                 true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
                 true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),

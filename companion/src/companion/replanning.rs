@@ -70,7 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return;
         }
         let progress_m = self.guidance.progress_m(self.mission.state(), &self.scene());
-        self.mission.leave_plan(&detour.path);
+        self.mission.leave_plan(&detour.path, progress_m);
         self.detours.take(progress_m, self.now, self.guidance.progress_at());
         self.neighbours.avoid(self.now);
     }

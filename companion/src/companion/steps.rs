@@ -165,6 +165,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),
             Action::RequestDetour => self.request_detour(Aim::Goal),
+            Action::RequestHome => self.request_detour(Aim::Home),
+            Action::TurnHome => {
+                self.guidance.brake();
+                self.detours.turn_home(now);
+            }
             Action::RequestAside => {
                 self.guidance.brake();
                 // On its way back it was to land already.
@@ -184,8 +189,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
+                self.detours.forget_home();
+                let along_m = self.guidance.progress_m(from, &self.scene());
                 let guidance = &mut self.guidance;
-                self.mission.turn_back(|path| guidance.turn_back(path, now));
+                self.mission.turn_back(along_m, |path| guidance.turn_back(path, now));
             }
         }
     }

@@ -185,13 +185,14 @@ impl Pending {
         }
         let lands = matches!(to, Land | Stopping);
         let resumed = matches!(guard, Guard::ResumeCommanded | Guard::ResumedOnPath) && to != Paused;
-        if lands || resumed || matches!(guard, Guard::ReturnCommanded) {
+        let returns = matches!(guard, Guard::ReturnCommanded | Guard::ReturnOverField);
+        if lands || resumed || returns {
             self.pause = false;
         }
         if lands || matches!(to, PilotControl | Failsafe) {
             self.land = false;
         }
-        if lands || guard == Guard::ReturnCommanded || matches!(to, PilotControl | Failsafe) {
+        if lands || returns || matches!(to, PilotControl | Failsafe) {
             self.turn_back = false;
         }
     }

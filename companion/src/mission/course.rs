@@ -1,6 +1,7 @@
 //! Where the mission is: its state and what that interrupts, what was commanded, and the plan.
 
 use planner_core::Point;
+use planner_core::detour::Goal;
 use planner_core::flight::{Path, Task, VehiclePlan};
 
 use crate::autopilot::telemetry::Ack;
@@ -32,6 +33,10 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     /// First point of the path, above the pad.
     start: Point,
     plan: Option<VehiclePlan<W, G>>,
+    /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
+    left_with_all: Option<bool>,
+    /// Where the plan ends, and the height in which it leads there, metres.
+    home: (Point, f32),
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
     vague_since: Option<Instant>,
@@ -59,6 +64,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             mode_before: 0,
             start,
             plan: None,
+            left_with_all: None,
+            home: (start, start.z),
             failure: None,
             vague_since: None,
             waits: Waits::default(),
@@ -189,7 +196,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     /// A plan is requested: there is none, and no failure.
     pub(crate) fn forget_plan(&mut self) {
-        (self.plan, self.failure, self.division) = (None, None, 0);
+        (self.plan, self.failure, self.division, self.left_with_all) = (None, None, 0, None);
         (self.fresh, self.asked) = (false, None);
         self.tasks.reset();
     }
@@ -202,9 +209,22 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     /// Takes the plan requested.
     pub(crate) fn take_plan(&mut self, plan: &VehiclePlan<W, G>) {
         match self.begins_at(plan, &self.start) {
-            true => self.plan = Some(plan.clone()),
+            true => self.fly(plan),
             false => self.failure = Some(PlanFailure::Invalid),
         }
+    }
+
+    fn fly(&mut self, plan: &VehiclePlan<W, G>) {
+        self.plan = Some(plan.clone());
+        self.left_with_all = None;
+        if let [.., down, over] = plan.path.waypoints() {
+            self.home = (over.position, down.position.z);
+        }
+    }
+
+    /// Where its plan ends, as a goal that is reached without a roadmap.
+    pub(crate) fn home(&self) -> Goal {
+        Goal::Home { over: self.home.0, layer_m: self.home.1 }
     }
 
     /// Whether the part that the last division gives has come and is not flown yet.
@@ -249,7 +269,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     ) -> bool {
         let begins = self.begins_at(plan, place);
         if begins {
-            self.plan = Some(plan.clone());
+            self.fly(plan);
             self.tasks.reset();
             (self.division, self.fresh) = (division, in_air);
         }
@@ -299,8 +319,28 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.failure = Some(failure);
     }
 
-    /// Flies along another path, beside the shared plan.
-    pub(crate) fn leave_plan(&mut self, path: &Path<W>) {
+    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it left that.
+    pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
+        self.left_with_all.unwrap_or_else(|| match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
+            Some((Task::Photograph(photographs), path)) => {
+                photographs.taken_by(path, along_m) == photographs.count(path)
+            }
+            Some((Task::Stay | Task::Goto(_), _)) => true,
+            None => false,
+        })
+    }
+
+    /// It leaves its path `along_m` metres along it: from now on places are those of another one.
+    fn leave_path(&mut self, along_m: f32) {
+        if self.left_with_all.is_none() {
+            self.note_photographed(along_m);
+            self.left_with_all = Some(self.has_all_pictures(along_m));
+        }
+    }
+
+    /// Flies along another path, beside the shared plan, `along_m` metres along that.
+    pub(crate) fn leave_plan(&mut self, path: &Path<W>, along_m: f32) {
+        self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
             plan.path = path.clone();
             plan.gates.clear();
@@ -308,8 +348,10 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies back, as `turn` makes the path. Off the shared plan: neighbours keep clear of it as of a stranger.
-    pub(crate) fn turn_back(&mut self, turn: impl FnOnce(&mut Path<W>)) {
+    /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan: neighbours keep clear of it as of a
+    /// stranger.
+    pub(crate) fn turn_back(&mut self, along_m: f32, turn: impl FnOnce(&mut Path<W>)) {
+        self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
             turn(&mut plan.path);
             plan.gates.clear();

@@ -111,6 +111,16 @@ pub enum Guard {
     ReturnCommanded,
     /// NAV_RETURN_TO_LAUNCH, and the climb is not done.
     ReturnInClimb,
+    /// NAV_RETURN_TO_LAUNCH in a coverage mission, where the way home is planned.
+    ReturnOverField,
+    /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
+    BlockedOverField,
+    /// It is to fly home, and stands.
+    StandsToReturn,
+    /// The way home has come.
+    WayHomeReady,
+    /// For the limit there has been none, and it can fly back as it came.
+    NoWayHome,
     /// The safety filter finds another vehicle in the column to the ground.
     LandingBlocked,
     /// It has found none for the limit.
@@ -241,6 +251,14 @@ pub struct Inputs {
     pub land: bool,
     /// NAV_RETURN_TO_LAUNCH holds.
     pub turn_back: bool,
+    /// In a coverage mission: the way home can be planned from here.
+    pub over_field: bool,
+    /// It is to fly home, or does.
+    pub homeward: bool,
+    /// For how long it has sought its way home.
+    pub sought_home: Duration,
+    /// It stands, and may ask for its way home.
+    pub stands_to_return: bool,
     /// The climb is not done: it goes on after the interruption.
     pub in_climb: bool,
     /// Motors on.
@@ -287,7 +305,7 @@ pub struct Inputs {
     pub column_barred: Duration,
     /// Time that it was free.
     pub column_clear: Duration,
-    /// On its path, and not on the way back yet.
+    /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
     /// Time for which something has stopped the descent to its pad, or a vehicle that rests the way
     /// there.
@@ -397,6 +415,13 @@ impl Guard {
             Self::LandUnattended => i.land && i.armed && i.offboard,
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
+            Self::ReturnOverField => i.turn_back && i.over_field,
+            Self::BlockedOverField => {
+                i.blocked && i.over_field && i.sought_home == Duration::default() && i.in_state >= limit
+            }
+            Self::StandsToReturn => i.stands_to_return,
+            Self::WayHomeReady => i.detour_ready && i.homeward,
+            Self::NoWayHome => i.sought_home >= limit && i.can_turn_back,
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,

@@ -39,6 +39,10 @@ pub enum Action {
     AskLand,
     /// Ask the shell for a way around, from here.
     RequestDetour,
+    /// Brake the reference along the path, to fly home from there.
+    TurnHome,
+    /// Ask the shell for the way home over a field, from here.
+    RequestHome,
     /// Ask the shell for a way aside, from here.
     RequestAside,
     /// Ask the shell for a way aside, from here, to land there.

@@ -9,8 +9,9 @@ use planner_core::coverage::losses::{self, Fate, Loss};
 use planner_core::coverage::pack::{self, PackWorkspace, Plan, Vehicle, Work};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
-use planner_core::coverage::{CoverageError, Flat};
-use planner_core::flight::{Look, Photographs, Range};
+use planner_core::coverage::{CoverageError, Flat, around};
+use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::flight::{Look, Photographs, Range, VehiclePlan};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
 
@@ -157,6 +158,48 @@ pub struct Request<'a, 'm> {
     pub done: &'a [Range],
 }
 
+/// The area of a mission.
+fn area<'a, const X: usize>(
+    view: &CoverageView<'_>,
+    vertices: &'a mut Vec<Flat, X>,
+    rings: &'a mut Vec<Ring, RINGS>,
+) -> Result<Area<'a>, CoverageError> {
+    vertices.clear();
+    rings.clear();
+    for vertex in view.vertices() {
+        vertices.push(vertex).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
+    }
+    for ring in view.rings() {
+        rings.push(ring).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
+    }
+    Area::new(vertices, rings).map_err(CoverageError::Area)
+}
+
+/// Plans one vehicle's way home over the area, or aside, that keeps off all `obstacles` and out of no-fly zones, which may have `C`
+/// corners.
+///
+/// # Errors
+/// Why there is none.
+pub fn around<
+    const X: usize,
+    const L: usize,
+    const K: usize,
+    const C: usize,
+    const W: usize,
+    const G: usize,
+>(
+    view: &CoverageView<'_>,
+    request: &DetourRequest,
+    obstacles: &mut [KeepOff],
+    ws: &mut Workspace<X, L, K>,
+    out: &mut VehiclePlan<W, G>,
+) -> Result<(), PlanFailure> {
+    let area = area(view, &mut ws.vertices, &mut ws.rings).map_err(Error::Coverage)?;
+    let mut transit = Transit::<C>::empty();
+    transit.learn(area).map_err(Error::Coverage)?;
+    around::plan_vehicle(&transit, request, obstacles, out).map_err(|_| PlanFailure::Unreachable)
+}
+
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
 /// division: the lots of all vehicles by the rank of their ids.
 ///
@@ -179,15 +222,7 @@ pub fn plan<
 ) -> Result<(), Error> {
     let Request { mission, view, gates_most, done } = *request;
     let header = view.header();
-    ws.vertices.clear();
-    ws.rings.clear();
-    for vertex in view.vertices() {
-        ws.vertices.push(vertex).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
-    }
-    for ring in view.rings() {
-        ws.rings.push(ring).map_err(|_| CoverageError::Area(AreaError::AreaFull))?;
-    }
-    let area = Area::new(&ws.vertices, &ws.rings).map_err(CoverageError::Area)?;
+    let area = area(view, &mut ws.vertices, &mut ws.rings)?;
     let mut transit = Transit::<C>::empty();
     transit.learn(area)?;
     let pattern = Pattern {

@@ -13,14 +13,19 @@
 //! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
 //! step, so a look among many takes several steps.
 //!
+//! Over a field there is no roadmap, and nobody flies around: who is stopped flies home ([`homeward`]).
+//!
 //! ENU metres.
 
+mod asking;
+mod homeward;
+
 use planner_core::Point;
-use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::detour;
 use planner_core::frames::Geodetic;
 
+use self::homeward::Homeward;
 use crate::autopilot::telemetry::Telemetry;
-use crate::guidance::retreat;
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
 use crate::swarm::neighbours::STANDING_MPS;
@@ -55,8 +60,6 @@ const DEAF_ASIDE: Duration = Duration::from_secs(60);
 /// So many ways around that are not found are enough, or one less in this time, seconds.
 const DETOURS_TRIED: u8 = 4;
 const GIVES_UP_S: u64 = 60;
-/// What is sought this near to where it was sought before is sought from the same place, metres.
-const HERE_M: f32 = 1.0;
 /// A way around on which there is no progress for this long is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
 /// What kept the vehicle from going on within this time still does; once it counts as blocked, within [`FREE`]: what sways
@@ -73,8 +76,6 @@ const UNHEARD: Duration = Duration::from_secs(10);
 const FRESH: Duration = Duration::from_secs(2);
 /// What a vehicle may stray from its path, metres: a path that comes nearer to what lies there by that much is blocked.
 const STRAY_M: f32 = 0.25;
-/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
-const MARGIN_M: f32 = 0.5;
 
 /// What a way around is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -85,6 +86,8 @@ pub(crate) enum Aim {
     Aside,
     /// To land where nobody lies.
     Landing,
+    /// To fly home over a field.
+    Home,
 }
 
 /// What is known of the way ahead, and of ways around.
@@ -101,6 +104,7 @@ pub(crate) struct Detours {
     aside: bool,
     /// And it lands at the end of that.
     lands: bool,
+    home: Homeward,
     /// Progress on the plan when it was left for a way around, metres.
     left_at_m: f32,
     /// The way around asked for has come.
@@ -167,7 +171,7 @@ impl Detours {
 
     /// Whether the path is blocked, or the plan was left.
     pub(crate) fn is_blocked(&self) -> bool {
-        self.blocked
+        self.blocked || self.seeks_home()
     }
 
     /// Whether it was out once: the others do not count on it any more.
@@ -367,7 +371,9 @@ impl Detours {
         let wait_s = QUIET_S
             + TURN_S * view.neighbours.blocked_before(view.config.system_id)
             + RETRY_S * u64::from(self.failed);
+        // Over a field nobody flies around.
         self.blocked
+            && view.config.division.is_none()
             && view.neighbours.all_stand(view.now)
             && self.quiet_since.is_some_and(|at| view.now - at >= Duration::from_secs(wait_s))
     }
@@ -380,80 +386,6 @@ impl Detours {
         self.is_due(view)
             && self.claimed_since.is_some_and(|at| view.now - at >= CLAIM)
             && view.neighbours.all_wait(view.now)
-    }
-
-    /// A way around, or just aside, is requested of the shell.
-    pub(crate) fn request(&mut self, aim: Aim) {
-        self.aside = aim != Aim::Goal;
-        self.lands = aim == Aim::Landing;
-        self.obstacles.request();
-        self.ready = false;
-    }
-
-    /// What is requested; `None` without a plan. `tell` is given all that is to be kept off.
-    pub(crate) fn requested<const V: usize, const W: usize, const G: usize>(
-        &self,
-        view: &View<'_, V, W, G>,
-        mut tell: impl FnMut(KeepOff),
-    ) -> Option<DetourRequest> {
-        let plan = view.mission.plan()?;
-        let points = plan.path.waypoints();
-        let along_m = view.guidance.along_m();
-        let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
-        let ahead = points.get(next)?;
-        let behind = points.get(next.saturating_sub(1))?;
-        let apart_m = view.config.safety_distance_m;
-        self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
-        view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell);
-        if self.aside {
-            view.neighbours.landing_columns(view.now, apart_m + retreat::BESIDE_M, &mut tell);
-        }
-        if self.lands {
-            view.neighbours.lands_on(apart_m + MARGIN_M, tell);
-        }
-        Some(DetourRequest {
-            aside: self.aside,
-            here: plan.path.point_at(along_m)?,
-            leg: [ahead.position, behind.position],
-            leg_clearance_m: ahead.clearance_m,
-            goal: plan.task.goal()?,
-            descent_m: plan.descent_m,
-            required_clearance_m: view.config.required_clearance_m,
-        })
-    }
-
-    /// The way around has come: it is flown from here on. `progress_m` is the progress on the plan.
-    pub(crate) fn take(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
-        if !self.flying {
-            self.left_at_m = progress_m;
-        }
-        let stuck = self.flying && now - progress_at > STUCK;
-        let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
-        self.obstacles.avoid_requested();
-        let Self { aside, lands, left_at_m, .. } = *self;
-        let obstacles = core::mem::take(&mut self.obstacles);
-        let flying = Self { left: true, flying: true, ready: true, obstacles, ..Self::default() };
-        *self = Self { aside, lands, left_at_m, fruitless, ..flying };
-    }
-
-    /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
-    pub(crate) fn miss(&mut self, along_m: f32, for_good: bool, now: Instant) {
-        // Where no way aside is found there may yet be one around.
-        if self.aside {
-            self.no_way_aside_at = Some(now);
-            return;
-        }
-        if (along_m - self.failed_at_m).abs() > HERE_M {
-            (self.failed_here, self.failed_at_m) = (0, along_m);
-        }
-        if self.failed_here == 0 {
-            self.failed_since = now;
-        }
-        self.failed = self.failed.saturating_add(1);
-        self.failed_here = self.failed_here.saturating_add(1);
-        let long = now - self.failed_since >= Duration::from_secs(GIVES_UP_S);
-        let often = long && self.failed_here >= DETOURS_TRIED - 1;
-        self.hopeless = often || for_good;
     }
 
     /// Whether it may seek a place aside to land at: from its path, with somebody heard, and not soon after there was none.

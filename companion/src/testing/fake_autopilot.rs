@@ -9,6 +9,9 @@ use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
 use planner_core::Point;
+use planner_core::coverage::around;
+use planner_core::coverage::transit::Transit;
+use planner_core::detour::{DetourRequest, Goal, KeepOff};
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
 
@@ -86,7 +89,7 @@ pub struct Bench {
     idle_since: Option<Instant>,
     pub origin: Geodetic,
     pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
-    /// Whether there is a way around: by y = 16.
+    /// Whether there is a way around: by y = 16; over a field as planned.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
@@ -216,14 +219,19 @@ impl Bench {
             self.events.push(event);
             if event == Event::PlanRequested(Wanted::Division) {
                 self.divide();
-            } else if let Some(request) = self.companion.detour(|_| {}) {
+            } else if let Some((request, mut obstacles)) = self.requested() {
                 let answer = self.answer_detour.map(|answer| {
-                    answer.map(|()| {
+                    answer.and_then(|()| {
                         let mut path = Path::new();
+                        if matches!(request.goal, Goal::Home { .. }) {
+                            around::plan(&Transit::<1>::empty(), &request, &mut obstacles, &mut path)
+                                .map_err(|_| crate::PlanFailure::Unreachable)?;
+                            return Ok(VehiclePlan { path, ..plan() });
+                        }
                         path.push(request.here, 1.2).unwrap();
                         path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
                         path.push(GOAL, 1.2).unwrap();
-                        VehiclePlan { path, ..plan() }
+                        Ok(VehiclePlan { path, ..plan() })
                     })
                 });
                 if let (Event::PlanRequested(wanted), Some(answer)) = (event, answer) {
@@ -235,6 +243,13 @@ impl Bench {
                 self.companion.handle_plan(self.now, wanted, answer.as_ref().map_err(|e| *e));
             }
         }
+    }
+
+    /// What way around it asks for.
+    fn requested(&self) -> Option<(DetourRequest, Vec<KeepOff>)> {
+        let mut obstacles = Vec::new();
+        let request = self.companion.detour(|obstacle| obstacles.push(obstacle))?;
+        Some((request, obstacles))
     }
 
     /// Gives it all that is left: the rest of its path from where it holds.

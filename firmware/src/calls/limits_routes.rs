@@ -2,7 +2,7 @@
 
 use heapless::Vec;
 use planner_core::Point;
-use planner_core::detour::{self, DetourError, DetourRequest, KeepOff, Nature};
+use planner_core::detour::{self, DetourError, DetourRequest, Goal, KeepOff, Nature};
 use planner_core::flight::{Flight, Gate, Path, VehiclePlan};
 use planner_core::plan::{
     self, Goals, Mode, Objective, PlanError, PlanRequest, PlanWorkspace, SwarmPlan, VehicleTask,
@@ -235,7 +235,7 @@ fn detours(
         here: PLACES[0],
         leg: [PLACES[0], PLACES[4]],
         leg_clearance_m: 1.0,
-        goal: 0,
+        goal: Goal::Node(0),
         descent_m: 1.5,
         required_clearance_m: 0.8,
     };
@@ -252,13 +252,15 @@ fn detours(
             DetourRequest { leg: [p, p], ..good },
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
+            DetourRequest { goal: Goal::Home { over: p, layer_m: hard }, ..good },
         ] {
             let bad = [
                 to.call("detour::DetourRequest::check", || request.check()).is_err(),
                 to.call("detour::KeepOff::check", || thing.check()).is_err(),
             ];
             let finite = |places: &[Point]| places.iter().flatten().all(|c| c.is_finite());
-            assert!(finite(&[request.here, request.leg[0], request.leg[1]]) || bad[0]);
+            let over = if let Goal::Home { over, .. } = request.goal { over } else { request.here };
+            assert!(finite(&[request.here, request.leg[0], request.leg[1], over]) || bad[0]);
             assert!((finite(&[thing.from, thing.to]) && hard >= 0.0 && hard.is_finite()) != bad[1]);
             let answer = to.call("detour::plan", || {
                 detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path)
@@ -279,7 +281,7 @@ fn detours(
             assert_eq!(again, answer);
         }
         for goal in [2, 4, u16::MAX - 1, u16::MAX] {
-            let request = DetourRequest { goal, ..good };
+            let request = DetourRequest { goal: Goal::Node(goal), ..good };
             assert!(detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path).is_err());
         }
         let holds = to.call("detour::KeepOff::holds", || thing.holds(&PLACES[5]));

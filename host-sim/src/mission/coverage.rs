@@ -3,6 +3,7 @@
 use std::iter;
 
 use anyhow::{anyhow, bail};
+use companion::PlanFailure;
 use companion::planner::coverage::{self, Error, Request, Workspace};
 use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, CoverageView, Parts, Share};
 use companion::storage::mission_file::{Block, Kind};
@@ -11,11 +12,12 @@ use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::Unit;
 use planner_core::coverage::transit::Transit;
+use planner_core::detour::{DetourRequest, KeepOff};
 use planner_core::flight::{PathError, Range};
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
-use super::ready::{Mission, SwarmPlan, schedule_config};
+use super::ready::{Mission, OwnPlan, SwarmPlan, schedule_config};
 use crate::area::MOST_VERTICES;
 use crate::autopilot::VehicleLimits;
 use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
@@ -198,6 +200,21 @@ impl Mission {
         losses: impl Iterator<Item = &'l [Lot]>,
     ) -> anyhow::Result<Box<SwarmPlan>> {
         self.plan_area(done, losses, &mut on_heap(DeskWorkspace::new))
+    }
+
+    /// A vehicle's way home over the area, or aside.
+    pub(super) fn around(
+        &self,
+        request: &DetourRequest,
+        obstacles: &mut [KeepOff],
+    ) -> Result<Box<OwnPlan>, PlanFailure> {
+        let mission = self.mission_view();
+        let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
+        let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
+        coverage::around::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, WAYPOINTS, GATES>(
+            view, request, obstacles, &mut ws, &mut own,
+        )?;
+        Ok(own)
     }
 
     /// What of the area is more than a board holds.

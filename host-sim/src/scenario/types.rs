@@ -281,7 +281,7 @@ impl Fault {
 }
 
 /// Every kind of fault.
-pub const FAULT_KINDS: [&str; 14] = [
+pub const FAULT_KINDS: [&str; 17] = [
     "kill",
     "radio-cut",
     "serial-stall",
@@ -296,6 +296,9 @@ pub const FAULT_KINDS: [&str; 14] = [
     "companion-reset",
     "late-plan",
     "bad-roadmap",
+    "pause-order",
+    "return-order",
+    "land-order",
 ];
 /// The fault that puts an obstacle into the world.
 pub const FAULT_OBSTACLE: &str = "obstacle";

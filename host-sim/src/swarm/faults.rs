@@ -16,6 +16,9 @@
 //! | `companion-reset` | a new companion with a new clock | |
 //! | `late-plan` | a request for a plan gets no answer | answered |
 //! | `bad-roadmap` | the roadmap on the board is damaged | the board holds the right one again |
+//! | `pause-order` | the ground station commands a pause | commands to go on |
+//! | `return-order` | the ground station commands to fly home | |
+//! | `land-order` | the ground station commands to land | |
 //! | `obstacle` | a sphere of `radius_m` at `position`, which the ground station sees and reports to all companions | gone; the companions keep off on |
 //!
 //! A fault without a vehicle strikes all; an obstacle strikes nobody.
@@ -23,7 +26,7 @@
 use planner_core::Point;
 use planner_core::frames::enu_to_geodetic;
 
-use super::ground_station::GroundStation;
+use super::ground_station::{GroundStation, Order};
 use super::member::{Member, Planner};
 use super::radio::{Cut, Radio};
 use crate::report::{Event, Level};
@@ -184,6 +187,9 @@ fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow:
         "companion-reset" => member.reset_companion(now_us)?,
         "late-plan" => member.planner = Planner::Late,
         "bad-roadmap" => member.planner = Planner::BadRoadmap,
+        "pause-order" => world.ground_station.order(now_us, i, Order::Pause),
+        "return-order" => world.ground_station.order(now_us, i, Order::Return),
+        "land-order" => world.ground_station.order(now_us, i, Order::Land),
         kind => anyhow::bail!("no fault of this kind can be played: {kind}"),
     }
     Ok(())
@@ -199,6 +205,7 @@ fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: 
         "gps-loss" => member.autopilot.set_gps_ok(true),
         "pilot-takeover" => give_back(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,
+        "pause-order" => world.ground_station.order(now_us, i, Order::Resume),
         // The others end by themselves, or never.
         _ => {}
     }
@@ -206,7 +213,7 @@ fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: 
 
 fn give_back(i: usize, now_us: u64, world: &mut World<'_>) {
     world.members[i].autopilot.pilot_returns();
-    world.ground_station.resume(now_us, i);
+    world.ground_station.order(now_us, i, Order::Resume);
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! The operator: starts the whole swarm by radio once every companion is ready, as QGroundControl or a script would, and
-//! commands a vehicle to go on that its pilot gave back, and reports each obstacle it sees to all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
+//! commands a vehicle to go on that its pilot gave back, gives the orders of the script, and reports each obstacle it sees to
+//! all. A vehicle that cannot fly is not waited for, and one that is late not for ever.
 
 use companion::State;
 use companion::link::frame::{self, Header};
@@ -17,8 +18,41 @@ const COMPONENT_ID: u8 = 190;
 const REPEAT_US: u64 = 1_000_000;
 /// After this long with some vehicle ready those that are ready are started, microseconds.
 const PATIENCE_US: u64 = 90_000_000;
-/// The command to go on is repeated for this long, microseconds.
-const RESUME_US: u64 = 10_000_000;
+/// An order is repeated for this long, microseconds: some of it is lost.
+const ORDERED_US: u64 = 10_000_000;
+
+/// What it commands one vehicle to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Order {
+    /// To go on after its pilot, or after a pause.
+    Resume,
+    /// To stop where it is.
+    Pause,
+    /// To fly home.
+    Return,
+    /// To land where it is.
+    Land,
+}
+
+impl Order {
+    /// Whether a vehicle in this state is still to be told.
+    fn is_open(self, state: State) -> bool {
+        match self {
+            Self::Resume => matches!(state, State::PilotReturned | State::Paused),
+            Self::Pause => state != State::Paused,
+            Self::Return | Self::Land => true,
+        }
+    }
+
+    fn command(self, id: u8) -> COMMAND_LONG_DATA {
+        match self {
+            Self::Resume => order(PAUSE_CONTINUE, id, 1.0),
+            Self::Pause => order(PAUSE_CONTINUE, id, 0.0),
+            Self::Return => order(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, id, 0.0),
+            Self::Land => order(MavCmd::MAV_CMD_NAV_LAND, id, 0.0),
+        }
+    }
+}
 
 /// Sends MISSION_START to system 0.
 #[derive(Debug)]
@@ -28,8 +62,8 @@ pub struct GroundStation {
     ready_us: Option<u64>,
     first_us: Option<u64>,
     last_us: u64,
-    /// Vehicles to command to go on, and until when.
-    resumes: Vec<(usize, u64)>,
+    /// What vehicles are told, and until when.
+    orders: Vec<(usize, Order, u64)>,
     /// Centres and radii of obstacles to report, metres.
     obstacles: Vec<(Geodetic, f32)>,
 }
@@ -43,7 +77,7 @@ impl GroundStation {
             ready_us: None,
             first_us: None,
             last_us: 0,
-            resumes: Vec::new(),
+            orders: Vec::new(),
             obstacles: Vec::new(),
         }
     }
@@ -58,9 +92,10 @@ impl GroundStation {
         self.first_us.map_or(0.0, |us| us as f64 * 1e-6)
     }
 
-    /// Commands a vehicle to go on once its companion leaves it to the pilot.
-    pub fn resume(&mut self, now_us: u64, vehicle: usize) {
-        self.resumes.push((vehicle, now_us + RESUME_US));
+    /// Commands a vehicle to do this from now on, in place of what it was told before.
+    pub fn order(&mut self, now_us: u64, vehicle: usize, order: Order) {
+        self.orders.retain(|&(of, ..)| of != vehicle);
+        self.orders.push((vehicle, order, now_us + ORDERED_US));
     }
 
     /// Reports an obstacle to all vehicles, from now on.
@@ -98,7 +133,10 @@ impl GroundStation {
             return Vec::new();
         }
         self.last_us = now_us;
-        self.resumes.retain(|&(_, until_us)| now_us < until_us);
+        // A pause that was obeyed is not commanded again: it may be resumed.
+        self.orders.retain(|&(of, order, until_us)| {
+            now_us < until_us && (order != Order::Pause || order.is_open(state(&members[of])))
+        });
         let mut frames = Vec::new();
         for (centre, radius_m) in self.obstacles.clone() {
             frames.push(self.frame(&COMMAND_INT_DATA {
@@ -117,8 +155,10 @@ impl GroundStation {
             if state(member) == State::Ready {
                 frames.push(self.frame(&order(START, id, 0.0)));
             }
-            if state(member) == State::PilotReturned && self.resumes.iter().any(|&(of, _)| of == i) {
-                frames.push(self.frame(&order(PAUSE_CONTINUE, id, 1.0)));
+            for (_, order, _) in self.orders.clone().into_iter().filter(|&(of, ..)| of == i) {
+                if order.is_open(state(member)) {
+                    frames.push(self.frame(&order.command(id)));
+                }
             }
         }
         frames

@@ -8,7 +8,6 @@ use std::vec::Vec;
 
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
-use planner_core::flight::{Look, Photographs, Task, Trigger};
 use proptest::prelude::{ProptestConfig, any};
 
 use super::State::*;
@@ -23,16 +22,8 @@ pub(super) fn over_a_field(px4: bool) -> Bench {
     let mut config = two_vehicles();
     config.roster.push(RosterEntry { system_id: 78, start: Point::new(8.0, 28.0, 1.5) }).unwrap();
     config.division = Some(60.0);
-    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
-    photographs.mark(1, 1, 0).unwrap();
     let mut bench = if px4 { Bench::new(config) } else { Bench::ardupilot(config) };
-    let mut path = planner_core::flight::Path::new();
-    for place in
-        [START, Point::new(10.0, 12.0, 1.5), Point::new(13.0, 12.0, 1.5), Point::new(16.0, 12.0, 1.5), GOAL]
-    {
-        path.push(place, 1.2).unwrap();
-    }
-    bench.answer_plan = Some(Ok(VehiclePlan { task: Task::Photograph(photographs), path, ..plan() }));
+    bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
     bench.until(Ready, 6.0);
     bench
@@ -147,7 +138,8 @@ impl Watch {
         let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
         let guidance = &b.companion.guidance;
         let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
-        let flies = state == Follow && !guidance.returning;
+        let homeward = guidance.returning || b.companion.detours.is_homeward();
+        let flies = state == Follow && !homeward;
         let behind = fleet.division() > b.companion.mission.division();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;
         assert!(
@@ -157,7 +149,7 @@ impl Watch {
         let left = fleet.message(0).entries[0].standing == Standing::Left;
         assert!(!left || !flies, "flies on though it left: {said}");
         // On the way back there are no gates.
-        let halted = state == Follow && guidance.returning && guidance.advice.stop_within_m <= 0.05;
+        let halted = state == Follow && homeward && guidance.advice.stop_within_m <= 0.05;
         self.returns = if halted { self.returns + 1 } else { 0 };
         assert!(self.returns < 20, "waits on its way back: {said}");
         assert!(!self.ends || !(flies || state == Dividing), "an order is forgotten: {said}");
@@ -273,7 +265,12 @@ fn a_vehicle_waits_above_its_pad_while_another_is_silent() {
     b.neighbour = None;
     b.run(15.0);
     let along_m = b.companion.guidance.along_m();
-    assert!(b.state() == Follow && (7.5..8.3).contains(&along_m), "{:?} {along_m} {:?}", b.state(), b.texts);
+    assert!(
+        b.state() == Follow && (17.5..18.3).contains(&along_m),
+        "{:?} {along_m} {:?}",
+        b.state(),
+        b.texts
+    );
     b.neighbour = Some((Point::new(8.0, 120.0, 1.5), ON_PLAN, 0.0, 5));
     b.until(Done, 60.0);
 }

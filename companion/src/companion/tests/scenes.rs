@@ -16,6 +16,7 @@ use planner_core::Point;
 
 mod autopilot;
 mod detours;
+mod homeward;
 mod landings;
 mod losses;
 mod pause;
@@ -73,6 +74,9 @@ fn every_row_has_its_scene() {
         landings::end_aside,
         losses::another_leaves,
         losses::the_others_give_it_up,
+        homeward::is_ordered,
+        homeward::is_blocked,
+        homeward::finds_no_way,
         resume::others_know_of_more,
         resume::another_plan_is_flown,
     ];

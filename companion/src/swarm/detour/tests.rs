@@ -7,7 +7,7 @@ use crate::swarm::obstacles::OBSTACLES;
 use crate::swarm::obstacles::tests::sphere;
 use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
-use planner_core::detour::Nature;
+use planner_core::detour::{KeepOff, Nature};
 use planner_core::flight::Gate;
 
 fn exclude(bench: &mut Bench, command: &Command) -> u8 {

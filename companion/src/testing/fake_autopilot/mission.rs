@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::flight::{Path, Task, VehiclePlan};
+use planner_core::flight::{Look, Path, Photographs, Task, Trigger, VehiclePlan};
 use planner_core::frames::Geodetic;
 
 use crate::{Config, RosterEntry};
@@ -34,4 +34,24 @@ pub(crate) fn plan() -> VehiclePlan<16, 8> {
     }
     let gates = heapless::Vec::new();
     VehiclePlan { task: Task::Goto(0), path, climb_m: 1.5, descent_m: 3.5, depart_s: 0.0, gates, plan_crc: 5 }
+}
+
+/// One picture of a field, and home: up to its layer, out, back, and down over its pad.
+pub(crate) fn field_plan() -> VehiclePlan<16, 8> {
+    let mut path = Path::new();
+    for point in [
+        START,
+        Point::new(10.0, 12.0, 1.5),
+        Point::new(13.0, 12.0, 1.5),
+        Point::new(16.0, 12.0, 1.5),
+        GOAL,
+        Point::new(START.x, START.y, GOAL.z),
+        START,
+    ] {
+        path.push(point, 1.2).unwrap();
+    }
+    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
+    // A single picture: on the way to it the vehicle may look anywhere.
+    photographs.mark(1, 1, 0).unwrap();
+    VehiclePlan { task: Task::Photograph(photographs), path, descent_m: 1.5, ..plan() }
 }

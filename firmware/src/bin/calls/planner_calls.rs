@@ -9,7 +9,7 @@ use heapless::Vec;
 use planner_core::Point;
 use planner_core::assignment::{self, AssignmentWorkspace};
 use planner_core::deconflict::{Advice, Method};
-use planner_core::detour::{self, DetourRequest, KeepOff, Nature};
+use planner_core::detour::{self, DetourRequest, Goal, KeepOff, Nature};
 use planner_core::flight::{Flight, Path, Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::plan::{self, Goals, SwarmPlan};
@@ -250,7 +250,7 @@ fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) 
             here,
             leg: [here, other],
             leg_clearance_m: 1.0,
-            goal: 0,
+            goal: Goal::Node(0),
             descent_m: 0.5,
             required_clearance_m: cases::CLEARANCE_M,
         };

@@ -5,7 +5,7 @@ use planner_core::flight::Gate;
 use super::State::*;
 use super::*;
 
-const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure::Unreachable));
+pub(super) const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure::Unreachable));
 
 /// Another comes to lie below the path.
 fn blocked(b: &mut Bench) {

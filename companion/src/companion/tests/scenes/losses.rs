@@ -1,7 +1,5 @@
 //! In a coverage mission another vehicle leaves, or the others have given this one up.
 
-use planner_core::flight::{Look, Photographs, Task, Trigger};
-
 use super::State::*;
 use super::*;
 use crate::Link;
@@ -14,11 +12,8 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 pub(super) fn over_a_field(state: State) -> Bench {
     let mut config = two_vehicles();
     config.division = Some(60.0);
-    let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
-    // A single picture: on the way to it the vehicle may look anywhere.
-    photographs.mark(1, 1, 0).unwrap();
     let mut bench = Bench::new(config);
-    bench.answer_plan = Some(Ok(VehiclePlan { task: Task::Photograph(photographs), ..plan() }));
+    bench.answer_plan = Some(Ok(field_plan()));
     bench.neighbour = on_pad(ON_PLAN);
     bench.until(Ready, 6.0);
     if state != Ready {
@@ -46,11 +41,13 @@ pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..n]);
 }
 
+/// The other one leaves.
+pub(super) fn leaves(b: &mut Bench) {
+    tells(b, Standing::Alive, Standing::Left);
+    b.until(Dividing, 30.0);
+}
+
 pub(super) fn another_leaves(scenes: &mut Scenes) {
-    let leaves = |b: &mut Bench| {
-        tells(b, Standing::Alive, Standing::Left);
-        b.until(Dividing, 30.0);
-    };
     scenes.play(over_a_field(Follow), leaves, Done, 120.0);
     let nothing_left = |b: &mut Bench| {
         b.answer_division = false;

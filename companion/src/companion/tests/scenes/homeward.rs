@@ -1,0 +1,75 @@
+//! Over a field: it is ordered back, or its path stays blocked, and it flies straight home.
+
+use super::State::*;
+use super::losses::over_a_field;
+use super::*;
+
+/// Over its pad it came down.
+fn is_home(b: &mut Bench) {
+    b.until(Aborted, 120.0);
+    assert!((b.enu - START).xy().norm() < 0.3, "at its pad: {:?}", b.enu);
+}
+
+pub(super) fn is_ordered(scenes: &mut Scenes) {
+    for state in [Follow, Paused, Dividing] {
+        let ordered = |b: &mut Bench| {
+            match state {
+                Paused => pause(b),
+                Dividing => {
+                    b.answer_division = false;
+                    losses::leaves(b);
+                }
+                _ => {}
+            }
+            b.until(state, 5.0);
+            back(b);
+            is_home(b);
+        };
+        scenes.play(over_a_field(Follow), ordered, Aborted, 1.0);
+    }
+}
+
+pub(super) fn is_blocked(scenes: &mut Scenes) {
+    let blocked = |b: &mut Bench| {
+        b.neighbour = below_the_path(OUT);
+        b.until(Blocked, 5.0);
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
+}
+
+/// There is no way home: it flies back as it came.
+pub(super) fn finds_no_way(scenes: &mut Scenes) {
+    let no_way = |b: &mut Bench| {
+        b.answer_detour = detours::NO_WAY;
+        back(b);
+        b.until(Blocked, 2.0);
+        b.until(Land, 60.0);
+        assert!((b.enu - START).xy().norm() < 0.5, "over its pad: {:?}", b.enu);
+    };
+    scenes.play(over_a_field(Follow), no_way, Aborted, 60.0);
+    let late = |b: &mut Bench| {
+        b.answer_detour = None;
+        back(b);
+        b.until(Replanning, 5.0);
+        b.until(Blocked, 10.0);
+        b.answer_detour = Some(Ok(()));
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), late, Aborted, 1.0);
+}
+
+/// Whatever stops it on its way home, it goes on there.
+#[test]
+fn an_interrupted_way_home_is_flown_to_its_end() {
+    for at_s in [0.2, 1.5, 3.0] {
+        let mut bench = over_a_field(Follow);
+        back(&mut bench);
+        bench.run(at_s);
+        pause(&mut bench);
+        bench.until(Paused, 5.0);
+        bench.run(3.0);
+        resume(&mut bench);
+        is_home(&mut bench);
+    }
+}

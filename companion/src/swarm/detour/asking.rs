@@ -1,0 +1,101 @@
+//! What is asked of the shell: a way around, aside or home; and what becomes of its answer.
+//!
+//! Cost: a request names everything that is known to be in the way.
+
+use planner_core::detour::{DetourRequest, Goal, KeepOff};
+
+use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
+use crate::guidance::retreat;
+use crate::swarm::view::View;
+use crate::time::{Duration, Instant};
+
+/// What is sought this near to where it was sought before is sought from the same place, metres.
+const HERE_M: f32 = 1.0;
+/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
+const MARGIN_M: f32 = 0.5;
+
+impl Detours {
+    /// A way around, or just aside, is requested of the shell.
+    pub(crate) fn request(&mut self, aim: Aim) {
+        self.aside = matches!(aim, Aim::Aside | Aim::Landing);
+        self.lands = aim == Aim::Landing;
+        self.obstacles.request();
+        self.ready = false;
+    }
+
+    /// What is requested; `None` without a plan. `tell` is given all that is to be kept off.
+    pub(crate) fn requested<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+        mut tell: impl FnMut(KeepOff),
+    ) -> Option<DetourRequest> {
+        let plan = view.mission.plan()?;
+        let points = plan.path.waypoints();
+        let along_m = view.guidance.along_m();
+        let next = points.iter().position(|w| w.along_m > along_m).unwrap_or(points.len().saturating_sub(1));
+        let ahead = points.get(next)?;
+        let behind = points.get(next.saturating_sub(1))?;
+        let apart_m = view.config.safety_distance_m;
+        self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
+        view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell);
+        if self.aside {
+            view.neighbours.landing_columns(view.now, apart_m + retreat::BESIDE_M, &mut tell);
+        }
+        if self.lands {
+            view.neighbours.lands_on(apart_m + MARGIN_M, tell);
+        }
+        let goal = match view.config.division {
+            Some(_) => view.mission.home(),
+            None => Goal::Node(plan.task.goal()?),
+        };
+        Some(DetourRequest {
+            aside: self.aside,
+            here: plan.path.point_at(along_m)?,
+            leg: [ahead.position, behind.position],
+            leg_clearance_m: ahead.clearance_m,
+            goal,
+            descent_m: plan.descent_m,
+            required_clearance_m: view.config.required_clearance_m,
+        })
+    }
+
+    /// The way around has come: it is flown from here on. `progress_m` is the progress on the plan.
+    pub(crate) fn take(&mut self, progress_m: f32, now: Instant, progress_at: Instant) {
+        if !self.flying {
+            self.left_at_m = progress_m;
+        }
+        let stuck = self.flying && now - progress_at > STUCK;
+        let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
+        self.obstacles.avoid_requested();
+        let Self { aside, lands, left_at_m, .. } = *self;
+        let home = self.home.taken(aside);
+        let obstacles = core::mem::take(&mut self.obstacles);
+        let flying = Self { left: true, flying: true, ready: true, obstacles, ..Self::default() };
+        *self = Self { aside, lands, left_at_m, fruitless, home, ..flying };
+    }
+
+    /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
+    pub(crate) fn miss(&mut self, along_m: f32, for_good: bool, now: Instant) {
+        // It is sought again.
+        if self.seeks_home() {
+            self.miss_home(now);
+            return;
+        }
+        // Where no way aside is found there may yet be one around.
+        if self.aside {
+            self.no_way_aside_at = Some(now);
+            return;
+        }
+        if (along_m - self.failed_at_m).abs() > HERE_M {
+            (self.failed_here, self.failed_at_m) = (0, along_m);
+        }
+        if self.failed_here == 0 {
+            self.failed_since = now;
+        }
+        self.failed = self.failed.saturating_add(1);
+        self.failed_here = self.failed_here.saturating_add(1);
+        let long = now - self.failed_since >= Duration::from_secs(GIVES_UP_S);
+        let often = long && self.failed_here >= DETOURS_TRIED - 1;
+        self.hopeless = often || for_good;
+    }
+}
