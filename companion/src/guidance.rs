@@ -425,6 +425,7 @@ impl Guidance {
                     let share = most / away.norm().max(most);
                     self.door.raw() + away * share
                 }
+                Some(plan) if sends && !self.settled => self.braked_raw(&plan.path),
                 _ => self.door.raw(),
             };
             self.door.push(raw);

@@ -36,20 +36,23 @@ struct Outcome {
 
 /// Why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the lost one hovers
 /// where it was to fly.
-const EXPLAINED: [&str; 4] = [
+const EXPLAINED: [&str; 6] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
+    "Yielded for 60 s: landing",
+    "Path blocked for 20 s: planning the way home",
     "No way around: landing",
     "No progress for 10 min: landing",
 ];
 
-const KINDS: [&str; 5] = ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset"];
+const KINDS: [&str; 6] =
+    ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
 
 fn drawn(seed: u64) -> (String, &'static str, u8) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
     let mut text = areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.5 } else { 0.1 });
-    let kind = KINDS[(seed / 4 % 5) as usize];
+    let kind = KINDS[(seed / 4 % 6) as usize];
     let vehicle = 1 + (random.next_u32() % count as u32) as u8;
     // Beside others, of which some are in the air and some on their pads yet.
     let at_s = 20.0 + (random.next_u32() % 220) as f32;
@@ -59,6 +62,9 @@ fn drawn(seed: u64) -> (String, &'static str, u8) {
 
 fn outcome(seed: u64) -> Option<Outcome> {
     let (text, kind, vehicle) = drawn(seed);
+    if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
+        println!("{text}");
+    }
     let (result, log) = match covered::fly_text(&text) {
         Ok(flown) => flown,
         Err(error) => {

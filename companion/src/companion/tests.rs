@@ -6,6 +6,7 @@ mod divisions;
 mod estimate;
 mod hostile;
 mod interruptions;
+mod paces;
 mod scenes;
 
 use std::vec::Vec;

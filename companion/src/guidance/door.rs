@@ -207,6 +207,12 @@ impl Door {
         self.live && self.stopping
     }
 
+    /// How far the setpoint is from its curve, metres.
+    #[cfg(test)]
+    pub(crate) fn off_curve_m(&self) -> f32 {
+        (self.curve().0 - self.motion.position).norm()
+    }
+
     /// Whether the setpoint stands.
     pub(crate) fn stands(&self) -> bool {
         self.velocity().norm_squared() < STANDS_MPS * STANDS_MPS

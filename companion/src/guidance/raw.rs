@@ -74,6 +74,19 @@ impl Guidance {
         reference.map_or(raw, |reference| reference.position)
     }
 
+    /// The next raw point of a stop: it brakes where it flies, as fast flights need more way than the curve holds.
+    pub(super) fn braked_raw<const W: usize>(&mut self, path: &Path<W>) -> Point {
+        let stop = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
+        let reference = match (self.phase, &self.leg) {
+            (Phase::Path, None) => track::advance(&self.track, path, &mut self.tracker, &stop, TICK_S),
+            (Phase::Path | Phase::Climb | Phase::Join | Phase::Descent, Some(leg)) => {
+                track::advance(&self.leg_track, leg, &mut self.leg_tracker, &stop, TICK_S)
+            }
+            _ => None,
+        };
+        reference.map_or(self.door.raw(), |reference| reference.position)
+    }
+
     /// The next raw point on the path, back from below a vehicle that comes down where it has to.
     pub(super) fn next_on_path<const V: usize, const W: usize>(
         &mut self,

@@ -72,6 +72,8 @@ pub struct Bench {
     pub never_arms: bool,
     /// No setpoint moves it.
     pub stuck: bool,
+    /// How far it moves in 50 ms, metres.
+    pub step_m: f32,
     pub never_lands: bool,
     pub events: Vec<Event>,
     pub setpoints: Vec<(Instant, Point, u16)>,
@@ -149,6 +151,7 @@ impl Bench {
             origin: EKF_ORIGIN,
             answer_plan: Some(Ok(plan())),
             answer_detour: Some(Ok(())),
+            step_m: 0.1,
             answer_division: true,
             neighbour: None,
             neighbour_clock: None,

@@ -18,7 +18,7 @@ impl Bench {
 
     /// 50 ms of flight; on the ground the motors stop by themselves.
     pub(super) fn fly(&mut self) {
-        let step = 0.1;
+        let step = self.step_m;
         let target = match self.mode {
             mode if mode == self.kind.setpoint_mode() && self.lifts() => self.target,
             mode if mode == self.kind.land_mode() && !self.never_lands => {
