@@ -20,6 +20,8 @@ const THERE_M: f32 = 0.2;
 const MISSED: Duration = Duration::from_secs(3);
 /// With its pilot for so long it has left.
 const WITH_PILOT: Duration = Duration::from_secs(20);
+/// What stands for the CRC of a plan where what is left cannot be divided.
+const UNDIVIDED: u32 = u32::MAX;
 /// A shell that has not answered for so long is asked again.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
 
@@ -191,7 +193,15 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let (division, along_m) = (fleet.division(), f32::from(fleet.held_at_dm()) / 10.0);
         match outcome {
-            Err(_) => self.links.say(true, "What is left cannot be divided"),
+            // A shell that is late is asked again.
+            Err(PlanFailure::Late) => {}
+            // All come to the same: each keeps its part, and what the lost one left is left out.
+            Err(_) if fleet.wants_hash() => {
+                fleet.take_plan_crc(UNDIVIDED);
+                self.links.say(true, "What is left cannot be divided");
+            }
+            Err(_) if may_take && division > self.mission.division() => self.mission.keep_plan(division),
+            Err(_) => {}
             Ok(plan) if fleet.wants_hash() => fleet.take_plan_crc(plan.plan_crc),
             Ok(plan) if may_take && division > self.mission.division() => {
                 let in_air = self.mission.state() == State::Dividing;

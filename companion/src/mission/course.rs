@@ -276,6 +276,11 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         begins
     }
 
+    /// Flies on as planned after so many divisions: the last one could not be planned.
+    pub(crate) fn keep_plan(&mut self, division: usize) {
+        (self.division, self.fresh) = (division, false);
+    }
+
     /// Commands what the task wants at this place of the path.
     pub(crate) fn step_task(&mut self, along: Along, now: Instant, links: &mut Links) {
         if let Some(plan) = &self.plan {

@@ -72,6 +72,8 @@ pub struct Bench {
     pub never_arms: bool,
     /// No setpoint moves it.
     pub stuck: bool,
+    /// What is left cannot be divided.
+    pub undividable: bool,
     /// How far it moves in 50 ms, metres.
     pub step_m: f32,
     pub never_lands: bool,
@@ -152,6 +154,7 @@ impl Bench {
             answer_plan: Some(Ok(plan())),
             answer_detour: Some(Ok(())),
             step_m: 0.1,
+            undividable: false,
             answer_division: true,
             neighbour: None,
             neighbour_clock: None,
@@ -257,6 +260,10 @@ impl Bench {
 
     /// Gives it all that is left: the rest of its path from where it holds.
     fn divide(&mut self) {
+        if self.undividable {
+            self.companion.handle_plan(self.now, Wanted::Division, Err(crate::PlanFailure::Capacity));
+            return;
+        }
         let rank = usize::from(self.companion.config.own().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
         let plan = self.companion.mission.plan().filter(|_| self.answer_division).cloned();

@@ -55,6 +55,12 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
         tells(b, Standing::Alive, Standing::Finished);
     };
     scenes.play(over_a_field(Follow), nothing_left, Done, 120.0);
+    let undividable = |b: &mut Bench| {
+        b.undividable = true;
+        leaves(b);
+        b.until(Follow, 5.0);
+    };
+    scenes.play(over_a_field(Follow), undividable, Done, 120.0);
     let unanswered = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);
