@@ -40,7 +40,7 @@ const EXPLAINED: [&str; 6] = [
     "Neighbours still silent: landing",
     "Vehicle on the path for 90 s: landing",
     "Yielded for 60 s: landing",
-    "Path blocked for 20 s: planning the way home",
+    "planning the way home",
     "No way around: landing",
     "No progress for 10 min: landing",
 ];

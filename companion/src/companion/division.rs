@@ -144,7 +144,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
-        let ahead_m = along_m + PROMISE_S * self.config.cruise_mps;
+        // One whose path is blocked comes no further.
+        let promise_s = if self.mission.state() == Blocked { 0.0 } else { PROMISE_S };
+        let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let clear_m = self.guidance.clear_m(&self.scene());
         let most_m = ahead_m.min(clear_m).min(self.home_m()).max(along_m);
         let stop_m = (self.guidance.stops_by_m() + SPARE_M).min(most_m);

@@ -115,6 +115,10 @@ pub enum Guard {
     ReturnOverField,
     /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
     BlockedOverField,
+    /// The same where the safety filter has made it yield for the limit.
+    YieldedOverField,
+    /// The same where the safety filter has kept it from going on for the limit.
+    HinderedOverField,
     /// It is to fly home, and stands.
     StandsToReturn,
     /// The way home has come.
@@ -129,9 +133,9 @@ pub enum Guard {
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
-    /// The safety filter has made this vehicle yield for the limit.
+    /// The safety filter has made this vehicle yield for the limit, and it does not seek its way home.
     Yielded,
-    /// The safety filter has kept this vehicle from going on for the limit.
+    /// The safety filter has kept this vehicle from going on for the limit, and it does not seek its way home.
     Hindered,
     /// The same, and it does not: a place aside may yet be sought.
     NoRoomHere,
@@ -255,8 +259,8 @@ pub struct Inputs {
     pub over_field: bool,
     /// It is to fly home, or does.
     pub homeward: bool,
-    /// For how long it has sought its way home.
-    pub sought_home: Duration,
+    /// For how long it has sought its way home, if it does.
+    pub sought_home: Option<Duration>,
     /// It stands, and may ask for its way home.
     pub stands_to_return: bool,
     /// The climb is not done: it goes on after the interruption.
@@ -348,6 +352,11 @@ pub struct Inputs {
 const BARRED: Duration = Duration::from_secs(5);
 
 impl Inputs {
+    /// Whether it may turn home over a field, and has not yet.
+    fn turns_home(&self) -> bool {
+        self.over_field && self.sought_home.is_none()
+    }
+
     /// Whether the column has not been free for `limit`, or a vehicle rests in it.
     fn no_room_for(&self, limit: Duration) -> bool {
         self.column_blocked >= limit || self.column_barred >= BARRED
@@ -416,12 +425,12 @@ impl Guard {
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::ReturnOverField => i.turn_back && i.over_field,
-            Self::BlockedOverField => {
-                i.blocked && i.over_field && i.sought_home == Duration::default() && i.in_state >= limit
-            }
+            Self::BlockedOverField => i.blocked && i.in_state >= limit && i.turns_home(),
+            Self::YieldedOverField => i.yielded >= limit && i.turns_home(),
+            Self::HinderedOverField => i.hindered >= limit && i.turns_home(),
             Self::StandsToReturn => i.stands_to_return,
             Self::WayHomeReady => i.detour_ready && i.homeward,
-            Self::NoWayHome => i.sought_home >= limit && i.can_turn_back,
+            Self::NoWayHome => i.sought_home.is_some_and(|sought| sought >= limit) && i.can_turn_back,
             Self::LandingBlocked => i.column_blocked > Duration::default() && !i.must_land,
             Self::NoRoomToLand => i.no_room_for(limit) && i.offboard && i.can_turn_back,
             Self::NoRoomHere => i.no_room_for(limit) && i.offboard && i.can_land_aside,
@@ -430,8 +439,8 @@ impl Guard {
             Self::AsideReached => i.aside_reached,
             Self::LandingClear => i.column_clear >= limit,
             Self::ColumnBlocked => i.column_blocked.min(i.in_state) >= limit,
-            Self::Yielded => i.yielded >= limit,
-            Self::Hindered => i.hindered >= limit,
+            Self::Yielded => i.yielded >= limit && i.sought_home.is_none(),
+            Self::Hindered => i.hindered >= limit && i.sought_home.is_none(),
             Self::BatteryCritical => i.battery_critical,
             Self::BatteryLow => i.battery_low && i.room_below,
             Self::OutsideGeofence => i.outside && i.room_below,

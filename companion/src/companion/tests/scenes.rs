@@ -76,6 +76,7 @@ fn every_row_has_its_scene() {
         losses::the_others_give_it_up,
         homeward::is_ordered,
         homeward::is_blocked,
+        homeward::is_in_the_way_of_another,
         homeward::finds_no_way,
         resume::others_know_of_more,
         resume::another_plan_is_flown,

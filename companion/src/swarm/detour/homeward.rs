@@ -60,8 +60,8 @@ impl Detours {
     }
 
     /// For how long it has.
-    pub(crate) fn sought_home_for(&self, now: Instant) -> Duration {
-        self.home.seeks_since.map_or(Duration::default(), |since| now - since)
+    pub(crate) fn sought_home_for(&self, now: Instant) -> Option<Duration> {
+        self.home.seeks_since.map(|since| now - since)
     }
 
     /// Whether it may ask for its way home now.

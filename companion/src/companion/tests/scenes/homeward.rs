@@ -6,8 +6,8 @@ use super::*;
 
 /// Over its pad it came down.
 fn is_home(b: &mut Bench) {
-    b.until(Aborted, 120.0);
-    assert!((b.enu - START).xy().norm() < 0.3, "at its pad: {:?}", b.enu);
+    b.until(Aborted, 240.0);
+    assert!((b.enu - START).xy().norm() < 0.3, "at its pad: {:?} {:?}", b.enu, b.texts);
 }
 
 pub(super) fn is_ordered(scenes: &mut Scenes) {
@@ -36,6 +36,25 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
         is_home(b);
     };
     scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
+}
+
+/// Another vehicle flies where it is to fly: on its way home it lets one on its plan go first.
+pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
+    let stays_in_front = |b: &mut Bench| {
+        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS);
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), stays_in_front, Aborted, 1.0);
+    let yields = |b: &mut Bench| {
+        b.run(3.0);
+        back(b);
+        b.run(3.0);
+        b.neighbour = flies(START - Point::new(1.0, 0.0, 0.0), ON_PLAN);
+        b.run(75.0);
+        b.neighbour = on_pad(ON_PLAN);
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), yields, Aborted, 1.0);
 }
 
 /// There is no way home: it flies back as it came.
