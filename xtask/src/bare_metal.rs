@@ -151,6 +151,8 @@ pub fn build(board: Board) -> Result<Built> {
     // Either would take the place of the flags above.
     building.env_remove("RUSTFLAGS").env_remove("CARGO_ENCODED_RUSTFLAGS");
     building.env("CARGO_TARGET_DIR", &products).env("DEFMT_LOG", "info");
+    // A tenth less code than level 3, for 2 % more instructions of a control step.
+    building.env("CARGO_PROFILE_RELEASE_OPT_LEVEL", "2");
     let warnings = compile(&mut building)?;
     // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
     let aside = products.join(board.name());

@@ -2,6 +2,7 @@
 //! board's capacities. What they answer is summed up bit by bit, to be compared with the desk's.
 
 use heapless::Vec;
+use planner_core::Point;
 use planner_core::coverage::area::{Area, Ring, RingKind};
 use planner_core::coverage::bound::lower_bound_s;
 use planner_core::coverage::divide;
@@ -9,11 +10,12 @@ use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use planner_core::coverage::pack::{self, Heights, Plan, Unit, Vehicle, Work};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
-use planner_core::coverage::{Flat, powell, sweep};
-use planner_core::flight::Range;
+use planner_core::coverage::{Flat, around, powell, sweep};
+use planner_core::detour::{DetourRequest, Goal, KeepOff, Nature};
+use planner_core::flight::{Range, VehiclePlan};
 
 use super::Meter;
-use crate::capacity::{AREA_CORNERS, AREA_VERTICES, LANES, VEHICLES};
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::scratch::Coverage;
 
 /// Changes of the lanes' order that are looked at.
@@ -193,6 +195,40 @@ fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &m
     sum.add(meter.call("divide::original, 32", 0, || divide::original(&done, last)));
 }
 
+/// The way home, and aside, among zones and four things of each vehicle.
+fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &mut Sum) {
+    let mut own = VehiclePlan::<WAYPOINTS, GATES>::new();
+    meter.call("transit::Transit::corners", 0, || transit.corners().len());
+    meter.call("transit::Transit::forbids", 0, || transit.forbids(&Flat::zeros()));
+    for case in 0..4 {
+        let here = Point::new(150.0, 70.0 - 20.0 * case as f32, 25.0);
+        let thing = |i: usize| {
+            let from = Point::new(-120.0 + 7.0 * (i % 32) as f32, -40.0 + 23.0 * (i / 32) as f32, 45.0);
+            let to = Point::new(from.x, from.y, if i.is_multiple_of(3) { from.z } else { 0.0 });
+            KeepOff { from, to, radius_m: 2.0, nature: Nature::Solid }
+        };
+        let mut things: Vec<KeepOff, { 4 * VEHICLES }> = (0..4 * VEHICLES).map(thing).collect();
+        let request = DetourRequest {
+            aside: case == 3,
+            here,
+            leg: [here; 2],
+            leg_clearance_m: 10.0,
+            goal: Goal::Home { over: Point::new(-150.0, -80.0, 3.0), layer_m: 40.0 },
+            descent_m: 3.0,
+            required_clearance_m: 1.2,
+        };
+        // That there is no way is an answer too.
+        let found = meter.call("around::plan, 128 things", 0, || {
+            around::plan(transit, &request, &mut things, &mut own.path)
+        });
+        sum.add(u32::from(found.is_ok()) ^ own.path.length_m().to_bits());
+        let again = meter.call("around::plan_vehicle, 128 things", 0, || {
+            around::plan_vehicle(transit, &request, &mut things, &mut own)
+        });
+        sum.add(u32::from(again.is_ok()));
+    }
+}
+
 /// An area with as many vertices as there may be, some of them of no-fly zones with as many corners.
 fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
     const ZONES: usize = AREA_CORNERS / 4;
@@ -226,6 +262,7 @@ fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
         let inside = meter.call("area::Area::forbids", 0, || area.forbids(&from));
         sum.add(far_m.to_bits() ^ corners.len() as u32 ^ u32::from(clear) ^ u32::from(inside));
     }
+    ways_home(meter, &transit, sum);
     let Coverage { tracks, build, powell, plan, .. } = lent;
     let mut hull: Vec<Flat, AREA_VERTICES> = Vec::new();
     let direction =
