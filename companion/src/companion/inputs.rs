@@ -97,6 +97,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             turn_back: self.mission.pending().turn_back
                 && !self.guidance.returning
                 && !self.detours.is_homeward(),
+            area: self.config.division.is_some(),
             over_field: self.detours.can_turn_home(&view),
             homeward: self.detours.is_homeward(),
             sought_home: self.detours.sought_home_for(now),

@@ -207,6 +207,11 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
             pending.start = true;
             return Some(ACCEPTED);
         }
+        // What others left of an area is flown from the pad that it came back to.
+        START if state == Done && inputs.area => {
+            pending.start = true;
+            return Some(ACCEPTED);
+        }
         START => (
             &mut pending.start,
             Guard::StartCommanded,

@@ -27,6 +27,8 @@ pub enum Guard {
     RoadmapBad,
     /// MISSION_START was commanded, and the estimate's bound fits into the margin.
     StartCommanded,
+    /// MISSION_START in a coverage mission.
+    StartOverField,
     /// MISSION_START, and no goal is left for this vehicle.
     StartWithoutGoal,
     /// MISSION_START, but not at the start point.
@@ -255,6 +257,8 @@ pub struct Inputs {
     pub land: bool,
     /// NAV_RETURN_TO_LAUNCH holds.
     pub turn_back: bool,
+    /// It is a coverage mission.
+    pub area: bool,
     /// In a coverage mission: the way home can be planned from here.
     pub over_field: bool,
     /// It is to fly home, or does.
@@ -380,6 +384,7 @@ impl Guard {
             Self::PlanFailed => i.plan_failed,
             Self::RoadmapBad => i.roadmap_bad,
             Self::StartCommanded => i.start && !i.imprecise,
+            Self::StartOverField => i.start && i.area,
             Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
             Self::StartElsewhere => i.start && !i.at_start,
             Self::StartArmed => i.start && i.armed,

@@ -263,4 +263,5 @@ pub static TABLE: &[Row] = &[
     warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
     warn(&[Aborted, Done],    G::Unattended,       NOW,    Land,            A::AskLand,     "Still in the air: landing"),
     info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
+    info(&[Done],             G::StartOverField,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
 ];

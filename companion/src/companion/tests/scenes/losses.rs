@@ -55,6 +55,15 @@ pub(super) fn another_leaves(scenes: &mut Scenes) {
         tells(b, Standing::Alive, Standing::Finished);
     };
     scenes.play(over_a_field(Follow), nothing_left, Done, 120.0);
+    let again = |b: &mut Bench| {
+        b.until(Done, 60.0);
+        b.start();
+        b.until(Ready, 10.0);
+        b.run(6.0);
+        b.start();
+        b.until(Follow, 20.0);
+    };
+    scenes.play(over_a_field(Follow), again, Done, 120.0);
     let undividable = |b: &mut Bench| {
         b.undividable = true;
         leaves(b);
