@@ -111,7 +111,7 @@ const ROUNDING_M: f32 = 0.05;
 const AT_GATE_M: f32 = 0.1;
 /// A vehicle that brakes comes to stand beyond its reference, by so much of the speed that it is faster than the second: 0.5 m were
 /// seen from 5.8 m/s.
-const LEADS_S: f32 = 0.15;
+const LEADS_S: f32 = 0.2;
 const SLOW_MPS: f32 = 3.0;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
