@@ -214,7 +214,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
         }
         START => (
             &mut pending.start,
-            Guard::StartCommanded,
+            if state == Aborted { Guard::StartAgain } else { Guard::StartCommanded },
             &[
                 Scheduled,
                 PadReplanning,

@@ -25,8 +25,10 @@ pub enum Guard {
     PlanFailed,
     /// There will be no plan, for want of the mission's roadmap.
     RoadmapBad,
-    /// MISSION_START was commanded, and the estimate's bound fits into the margin.
+    /// MISSION_START was commanded, there is a goal, and the estimate's bound fits into the margin.
     StartCommanded,
+    /// MISSION_START was commanded.
+    StartAgain,
     /// MISSION_START in a coverage mission.
     StartOverField,
     /// MISSION_START, and no goal is left for this vehicle.
@@ -383,7 +385,8 @@ impl Guard {
             Self::PlanReady => i.plan_ready,
             Self::PlanFailed => i.plan_failed,
             Self::RoadmapBad => i.roadmap_bad,
-            Self::StartCommanded => i.start && !i.imprecise,
+            Self::StartCommanded => i.start && !i.imprecise && i.has_goal,
+            Self::StartAgain => i.start,
             Self::StartOverField => i.start && i.area,
             Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
             Self::StartElsewhere => i.start && !i.at_start,

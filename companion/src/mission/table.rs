@@ -262,6 +262,6 @@ pub static TABLE: &[Row] = &[
     warn(&[Failsafe],         G::Disarmed,         NOW,    Aborted,         A::ForgetStart, "Landed after failsafe: mission over"),
     warn(&[Failsafe],         G::Elapsed,          s(300), Failsafe,        A::None,        "Autopilot failsafe still acts"),
     warn(&[Aborted, Done],    G::Unattended,       NOW,    Land,            A::AskLand,     "Still in the air: landing"),
-    info(&[Aborted],          G::StartCommanded,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
+    info(&[Aborted],          G::StartAgain,       NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
     info(&[Done],             G::StartOverField,   NOW,    WaitPosition,    A::ForgetStart, "Planning again: start again when ready"),
 ];

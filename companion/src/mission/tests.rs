@@ -210,6 +210,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::BlockedOverField => (i.blocked, i.over_field, i.in_state) = (true, true, long),
         G::YieldedOverField => (i.yielded, i.hindered, i.over_field) = (long, long, true),
         G::HinderedOverField => (i.hindered, i.over_field) = (long, true),
+        G::StartAgain => i.start = true,
         G::StartOverField => (i.start, i.area) = (true, true),
         G::StandsToReturn => i.stands_to_return = true,
         G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),

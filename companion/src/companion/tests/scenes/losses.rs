@@ -49,12 +49,16 @@ pub(super) fn leaves(b: &mut Bench) {
 
 pub(super) fn another_leaves(scenes: &mut Scenes) {
     scenes.play(over_a_field(Follow), leaves, Done, 120.0);
-    let nothing_left = |b: &mut Bench| {
+    // A promise binds until the division counts, whatever is heard later: others may have divided on it.
+    let had_finished = |b: &mut Bench| {
         b.answer_division = false;
         leaves(b);
         tells(b, Standing::Alive, Standing::Finished);
+        b.run(5.0);
+        assert_eq!(b.state(), Dividing);
+        b.answer_division = true;
     };
-    scenes.play(over_a_field(Follow), nothing_left, Done, 120.0);
+    scenes.play(over_a_field(Follow), had_finished, Done, 120.0);
     let again = |b: &mut Bench| {
         b.until(Done, 60.0);
         b.start();
