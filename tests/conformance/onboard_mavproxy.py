@@ -1,7 +1,9 @@
 #!/usr/bin/env python3
 """Uses a companion's files and parameters through the routing of its autopilot, by the commands a person gives MAVProxy.
 
-Usage: onboard_mavproxy.py udpout:127.0.0.1:PORT ROADMAP MISSION
+Usage: onboard_mavproxy.py udpout:127.0.0.1:PORT ROADMAP MISSION COUNT
+
+COUNT is how many parameters a companion has.
 
 Prints one `ok ...` line for each thing that held; the first that does not ends it with exit code 1. Ends itself after 150
 seconds.
@@ -65,22 +67,23 @@ def bytes_of(path):
 def main():
     signal.signal(signal.SIGALRM, lambda *_: sys.exit("too late"))
     signal.alarm(150)
-    url, roadmap, mission = sys.argv[1:]
+    url, roadmap, mission, count = sys.argv[1:]
     with tempfile.TemporaryDirectory() as directory:
         proxy = MavProxy(url, directory)
         try:
-            use(proxy, roadmap, mission, os.path.join(directory, "back.bin"))
+            use(proxy, roadmap, mission, os.path.join(directory, "back.bin"), int(count))
         finally:
             proxy.process.kill()
 
 
-def use(proxy, roadmap, mission, back):
+def use(proxy, roadmap, mission, back, count):
+    fetched = f"Received {count} parameters"
     holds = lambda name, answer: check(name, answer, proxy.said)  # noqa: E731
     holds("the companion is found", proxy.until(f"Detected vehicle {SYSTEM}:{COMPANION}"))
-    holds("parameters are fetched", proxy.until("Received 9 parameters"))
+    holds("parameters are fetched", proxy.until(fetched))
     holds("and listed", proxy.does("param show FLK*", "FLK_ACCEL        1.5", "FLK_SPEED_MAX    20.0", "FLK_SYS_ID       0.0"))
     proxy.does("param set FLK_ACCEL 2.25")
-    holds("one is set", proxy.does("param fetch", "Received 9 parameters"))
+    holds("one is set", proxy.does("param fetch", fetched))
     holds("and read back", proxy.does("param show FLK_ACCEL", "2.25"))
     holds("nothing there yet", proxy.does("ftp list /", "Total size 0.00"))
     for path in (roadmap, mission):

@@ -8,6 +8,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
+use companion::services::parameters;
 use flockmate_tests::{Guard, Profile, autopilot, free_port, host_sim, python, shared_data, workspace};
 
 const TIME_LIMIT: Duration = Duration::from_secs(160);
@@ -164,23 +165,24 @@ impl Onboard {
 }
 
 /// Runs a script on a link of the autopilot that the companion is not on.
-fn onboard(script: &str, listen: &str, address: impl Fn(&str) -> String) {
+fn onboard(script: &str, listen: &str, options: &[&str], address: impl Fn(&str) -> String) {
     let Some(python) = python() else { return };
     let port = free_port();
     let (_autopilot, at) = autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
     let companion = Onboard::new(port);
-    run(&python, script, &[&address(&at[0]), &companion.file("roadmap.bin"), &companion.file("mission.bin")]);
+    let (address, roadmap, mission) = (address(&at[0]), companion.file("roadmap.bin"), companion.file("mission.bin"));
+    run(&python, script, &[&[&address[..], &roadmap, &mission], options].concat());
 }
 
 #[test]
 fn pymavlink_uses_the_companions_files_and_parameters_through_the_autopilot() {
-    onboard("onboard_pymavlink.py", "udp-listen:127.0.0.1:0", |at| format!("udpout:{at}"));
+    onboard("onboard_pymavlink.py", "udp-listen:127.0.0.1:0", &[], |at| format!("udpout:{at}"));
 }
 
 #[test]
 fn mavsdk_uses_the_companions_files_and_parameters_through_the_autopilot() {
     let address = format!("127.0.0.1:{}", free_port());
-    onboard("onboard_mavsdk.py", &format!("udp:{address}"), |_| format!("udpin://{address}"));
+    onboard("onboard_mavsdk.py", &format!("udp:{address}"), &[], |_| format!("udpin://{address}"));
 }
 
 #[test]
@@ -190,7 +192,8 @@ fn mavproxy_uses_the_companions_files_and_parameters_through_the_autopilot() {
         println!("skipped: no MAVProxy beside {python}");
         return;
     }
-    onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", |at| format!("udpout:{at}"));
+    let count = parameters::COUNT.to_string();
+    onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", &[&count], |at| format!("udpout:{at}"));
 }
 
 #[test]
