@@ -170,7 +170,8 @@ fn onboard(script: &str, listen: &str, options: &[&str], address: impl Fn(&str) 
     let port = free_port();
     let (_autopilot, at) = autopilot(&[listen, &format!("udp:127.0.0.1:{port}")], &[]);
     let companion = Onboard::new(port);
-    let (address, roadmap, mission) = (address(&at[0]), companion.file("roadmap.bin"), companion.file("mission.bin"));
+    let (address, roadmap, mission) =
+        (address(&at[0]), companion.file("roadmap.bin"), companion.file("mission.bin"));
     run(&python, script, &[&[&address[..], &roadmap, &mission], options].concat());
 }
 

@@ -276,7 +276,7 @@ pub fn plan<
         for pad in &pads {
             let rank = pads.iter().filter(|other| other.id < pad.id).count();
             let lot = lots.get(rank).ok_or(CoverageError::Vehicles)?;
-            let fate = Fate { lives: lot.lives, along_m: f32::from(lot.along_dm) / 10.0 };
+            let fate = Fate { lives: lot.lives, along_m: lot.along_m() };
             fates.push(fate).map_err(|_| CoverageError::Vehicles)?;
         }
         let loss = Loss { work: &whole, swarm: &swarm, fates: &fates };

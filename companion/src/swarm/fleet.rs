@@ -49,8 +49,28 @@ impl Limits {
 pub struct Lot {
     /// Whether it flies on.
     pub lives: bool,
-    /// How far along its path the pictures are its own.
+    /// How far along its path the pictures are its own; [`Lot::WHOLE`] where it took all of them.
     pub along_dm: u16,
+}
+
+impl Lot {
+    /// All its path.
+    pub const WHOLE: u16 = u16::MAX;
+
+    /// What is known of a vehicle of the roster.
+    pub fn of(entry: &Entry) -> Self {
+        let along_dm = match entry.standing {
+            Standing::Alive => entry.promise_dm.unwrap_or(entry.done_dm),
+            Standing::Lost | Standing::Left => entry.done_dm,
+            Standing::Finished => Self::WHOLE,
+        };
+        Self { lives: entry.standing == Standing::Alive, along_dm }
+    }
+
+    /// The same place, metres; infinite for [`Lot::WHOLE`].
+    pub fn along_m(&self) -> f32 {
+        if self.along_dm == Self::WHOLE { f32::INFINITY } else { f32::from(self.along_dm) / 10.0 }
+    }
 }
 
 /// The lots of all vehicles by rank.
@@ -91,6 +111,8 @@ struct Member {
     in_roster: bool,
     /// When it was last heard, by this vehicle or one that this one hears.
     heard_at: Instant,
+    /// Whether this vehicle heard it lately itself.
+    heard_itself: bool,
     /// Its hash of the division under way; 0 for none.
     hash: u32,
 }
@@ -154,10 +176,11 @@ impl<const V: usize> Fleet<V> {
         // Its path may be that of the division before yet.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[self.own].entry;
-        entry.standing = entry.standing.max(of_division(own.standing, caught_up));
-        if caught_up {
+        // What it flies after it has left is not its part.
+        if caught_up && entry.standing == Standing::Alive {
             entry.done_dm = entry.done_dm.max(own.done_dm);
         }
+        entry.standing = entry.standing.max(of_division(own.standing, caught_up));
         let mut linked = 1u32 << self.own.min(31);
         for (rank, member) in self.members.iter_mut().enumerate() {
             let heard = hearing(rank);
@@ -165,6 +188,7 @@ impl<const V: usize> Fleet<V> {
             if rank == self.own || lately || heard.by_others {
                 member.heard_at = now;
             }
+            member.heard_itself = lately;
             linked |= u32::from(lately && heard.hears_us) << rank.min(31);
         }
         if self.is_majority(|rank, _| linked >> rank & 1 != 0) {
@@ -225,11 +249,8 @@ impl<const V: usize> Fleet<V> {
             self.lots.clear();
             return;
         }
-        let lot = |m: &Member| {
-            let lives = m.in_roster && m.entry.standing == Standing::Alive;
-            let promised = m.entry.promise_dm.filter(|_| lives);
-            Lot { lives, along_dm: promised.unwrap_or(m.entry.done_dm) }
-        };
+        // Who had no part in the division before has none in this one.
+        let lot = |m: &Member| if m.in_roster { Lot::of(&m.entry) } else { Lot::default() };
         if !self.members.iter().map(lot).eq(self.lots.iter().copied()) {
             self.withdraw();
             self.lots = self.members.iter().map(lot).collect();
@@ -319,7 +340,11 @@ impl<const V: usize> Fleet<V> {
             if rank == self.own {
                 self.hear_of_itself(entry, waits);
             } else if rank < self.members.len() {
-                self.merge(rank, entry, same);
+                let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
+                // It may have finished its part of a division that the sender does not know; it says so itself.
+                if !(behind && entry.standing == Standing::Left && self.members[rank].heard_itself) {
+                    self.merge(rank, entry, same);
+                }
                 if same && entry.agrees && rank != sender && roster.hash != 0 {
                     self.members[rank].hash = roster.hash;
                 }

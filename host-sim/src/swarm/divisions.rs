@@ -6,7 +6,7 @@ use std::rc::Rc;
 
 use companion::link::frame::Framer;
 use companion::link::intent::Intent;
-use companion::link::roster::{Roster, Standing};
+use companion::link::roster::Roster;
 use companion::swarm::fleet::Lot;
 use companion::time::Instant;
 use mavlink::MessageData;
@@ -77,10 +77,10 @@ impl Divisions {
         let lots = self.lots.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {
             let rank = i + usize::from(roster.first);
-            let lives = entry.standing == Standing::Alive && before.get(rank).is_none_or(|lot| lot.lives);
-            let promised = entry.promise_dm.filter(|_| lives);
             lots.resize(lots.len().max(rank + 1), Lot::default());
-            lots[rank] = Lot { lives, along_dm: promised.unwrap_or(entry.done_dm) };
+            if before.get(rank).is_none_or(|lot| lot.lives) {
+                lots[rank] = Lot::of(entry);
+            }
         }
     }
 

@@ -25,7 +25,7 @@ pub struct Fate {
     /// Whether it flies on.
     pub lives: bool,
     /// How far along its path the pictures are its own, taken or promised, metres. One that lives holds there; at 0 it still
-    /// stands on its pad. Of one that does not live the last of them is taken again: it may be missing.
+    /// stands on its pad. Of one that does not live the last of them is taken again: it may be missing. Infinite: it took all.
     pub along_m: f32,
 }
 
@@ -161,7 +161,8 @@ fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
     for (fate, flight) in fates.iter().zip(&before.flights) {
         let Task::Photograph(photographs) = &flight.task else { continue };
         let taken = photographs.taken_by(&flight.path, fate.along_m);
-        let count = if fate.lives { taken } else { taken.saturating_sub(1) };
+        let sure = fate.lives || fate.along_m.is_infinite();
+        let count = if sure { taken } else { taken.saturating_sub(1) };
         for range in photographs.first(&flight.path, count) {
             ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
