@@ -57,11 +57,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             heartbeat_age: t.heartbeat_age(now),
             position_age: t.position_age(now),
             jumped: t.is_settling(now),
-            stalled: if follow || self.mission.state() == State::Blocked {
-                now - self.guidance.progress_at()
-            } else {
-                Duration::default()
+            stalled: match self.mission.state() {
+                State::Follow => now - self.guidance.progress_at(),
+                State::Blocked => (now - self.guidance.progress_at()).max(self.detours.blocked_for(now)),
+                _ => Duration::default(),
             },
+            blocked_for: self.detours.blocked_for(now),
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {

@@ -211,6 +211,8 @@ pub struct Inputs {
     pub jumped: bool,
     /// Time without progress along the path.
     pub stalled: Duration,
+    /// Time since its path was first blocked, short of where it has come no further; clear in between or not.
+    pub blocked_for: Duration,
     /// Time in the state without any neighbour heard; zero when all have landed.
     pub neighbour_age: Duration,
     /// Whether its next gate is open, so that it flies on unheard.
@@ -433,7 +435,7 @@ impl Guard {
             Self::ReturnCommanded => i.turn_back,
             Self::ReturnInClimb => i.turn_back && i.in_climb,
             Self::ReturnOverField => i.turn_back && i.over_field,
-            Self::BlockedOverField => i.blocked && i.in_state >= limit && i.turns_home(),
+            Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.turns_home(),
             Self::YieldedOverField => i.yielded >= limit && i.turns_home(),
             Self::HinderedOverField => i.hindered >= limit && i.turns_home(),
             Self::StandsToReturn => i.stands_to_return,

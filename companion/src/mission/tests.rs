@@ -207,7 +207,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::LandCommanded => i.land = true,
         G::ReturnCommanded => i.turn_back = true,
         G::ReturnOverField => (i.turn_back, i.over_field) = (true, true),
-        G::BlockedOverField => (i.blocked, i.over_field, i.in_state) = (true, true, long),
+        G::BlockedOverField => (i.blocked, i.over_field, i.blocked_for) = (true, true, long),
         G::YieldedOverField => (i.yielded, i.hindered, i.over_field) = (long, long, true),
         G::HinderedOverField => (i.hindered, i.over_field) = (long, true),
         G::StartAgain => i.start = true,
@@ -295,6 +295,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
 fn the_pilot_outranks_everything_in_the_air() {
     let everything = Inputs {
         in_state: s(9999),
+        blocked_for: s(9999),
         stalled: s(9999),
         mode_foreign: true,
         armed: true,

@@ -62,6 +62,8 @@ const DETOURS_TRIED: u8 = 4;
 const GIVES_UP_S: u64 = 60;
 /// A way around on which there is no progress for this long is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
+/// One that was blocked and has come so much further is blocked anew, metres.
+const FURTHER_M: f32 = 2.0;
 /// What kept the vehicle from going on within this time still does; once it counts as blocked, within [`FREE`]: what sways
 /// at the edge of its way must not make it begin again and again.
 const LATELY: Duration = Duration::from_millis(500);
@@ -132,6 +134,8 @@ pub(crate) struct Detours {
     /// How far that is, and what the last one found.
     sweep: Sweep,
     in_the_way: bool,
+    /// Where along its path it was blocked, metres, and since when: it has come no further, though clear in between.
+    blocked_here: Option<(f32, Instant)>,
 }
 
 /// What a look along the path found.
@@ -172,6 +176,11 @@ impl Detours {
     /// Whether the path is blocked, or the plan was left.
     pub(crate) fn is_blocked(&self) -> bool {
         self.blocked || self.seeks_home()
+    }
+
+    /// For how long it has come no further because its path was blocked, now and again.
+    pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
+        self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
 
     /// Whether it was out once: the others do not count on it any more.
@@ -284,7 +293,7 @@ impl Detours {
         let stopped = matches!(view.mission.state(), State::Blocked | State::Replanning);
         if !on_ground && !stopped && view.mission.state() != State::Follow {
             (self.blocked, self.in_the_way) = (false, false);
-            (self.quiet_since, self.claimed_since) = (None, None);
+            (self.quiet_since, self.claimed_since, self.blocked_here) = (None, None, None);
             self.sweep.restart();
             self.look_began = None;
             return None;
@@ -327,6 +336,10 @@ impl Detours {
         let stopped = view.guidance.filter.blocked_for(now, free) > STUCK;
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.in_the_way);
+        let along_m = view.guidance.along_m();
+        if self.blocked && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + FURTHER_M) {
+            self.blocked_here = Some((along_m, now));
+        }
         if !view.neighbours.all_stand(now) {
             // Somebody moved: what blocked the path may have gone.
             (self.quiet_since, self.failed, self.hopeless) = (None, 0, false);

@@ -36,6 +36,19 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
         is_home(b);
     };
     scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
+    // It sways: the path is clear for a moment now and then.
+    let sways = |b: &mut Bench| {
+        for _ in 0..20 {
+            b.neighbour = below_the_path(OUT);
+            b.run(8.0);
+            b.neighbour = on_pad(ON_PLAN);
+            b.run(0.8);
+        }
+        let told = |text: &str| b.texts.iter().any(|told| told == text);
+        assert!(told("Path clear again") && told("Flying home"), "{:?}", b.texts);
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), sways, Aborted, 1.0);
 }
 
 /// Another vehicle flies where it is to fly: on its way home it lets one on its plan go first.
