@@ -3,7 +3,7 @@
 //! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad, and down. What is to be kept off is
 //! walked around: a visibility graph over the zones' corners ([`Transit::corners`]) and eight corners around either end of
 //! each [`KeepOff`] that reaches the layer, searched by A*. Where the layer leaves no way, the same at the height at which the
-//! vehicle hovers. Aside: the nearest of [`RINGS`] × [`DIRECTIONS`] places around it, straight there.
+//! vehicle hovers. Aside: the nearest of places on rings around it, straight there.
 //!
 //! ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
 
