@@ -71,7 +71,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let off_plan = self.guidance.returning
             || self.guidance.aside
             || self.detours.is_flying()
-            || self.detours.is_homeward()
+            || self.detours.home.is_on()
             || self.detours.has_left();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
@@ -116,7 +116,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it flies home, back, or aside, to land there.
     fn lands_elsewhere(&self) -> bool {
-        let home = self.guidance.returning || self.detours.is_homeward();
+        let home = self.guidance.returning || self.detours.home.is_on();
         home || self.guidance.aside || self.detours.lands()
     }
 

@@ -97,12 +97,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             land: self.mission.pending().land,
             turn_back: self.mission.pending().turn_back
                 && !self.guidance.returning
-                && !self.detours.is_homeward(),
+                && !self.detours.home.is_on(),
             area: self.config.division.is_some(),
-            over_field: self.detours.can_turn_home(&view),
-            homeward: self.detours.is_homeward(),
-            sought_home: self.detours.sought_home_for(now),
-            stands_to_return: standing && self.detours.may_ask_home(now),
+            over_field: self.detours.home.can_turn(&view),
+            homeward: self.detours.home.is_on(),
+            sought_home: self.detours.home.sought_for(now),
+            stands_to_return: standing && self.detours.home.may_ask(now),
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
             armed_unseen: handshake.is_armed_unseen(now),
@@ -129,7 +129,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && (self.is_linked() || self.neighbours.all_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
             path_done: follow && self.guidance.path_done(scene),
-            at_goal: self.guidance.at_goal(scene) && !self.detours.is_homeward(),
+            at_goal: self.guidance.at_goal(scene) && !self.detours.home.is_on(),
             near_path: match (beneath, self.mission.state()) {
                 // Those refer to no place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
@@ -145,9 +145,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             must_land: self.must_land(),
             can_turn_back: self.guidance.along_m() >= 0.0
                 && !self.guidance.returning
-                && (self.config.division.is_none() || self.detours.seeks_home())
+                && (self.config.division.is_none() || self.detours.home.seeks())
                 && !self.neighbours.is_deaf(now),
-            pad_taken: match follow && (self.guidance.returning || self.detours.is_homeward()) {
+            pad_taken: match follow && (self.guidance.returning || self.detours.home.is_on()) {
                 true if self.guidance.descends() => self.guidance.filter.hindered_for(now),
                 true => self.guidance.filter.barred_for(now),
                 false => Duration::default(),

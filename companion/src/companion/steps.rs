@@ -168,7 +168,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RequestHome => self.request_detour(Aim::Home),
             Action::TurnHome => {
                 self.guidance.brake();
-                self.detours.turn_home(now);
+                self.detours.home.turn(now);
             }
             Action::RequestAside => {
                 self.guidance.brake();
@@ -189,7 +189,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
-                self.detours.forget_home();
+                self.detours.home.forget();
                 let along_m = self.guidance.progress_m(from, &self.scene());
                 let guidance = &mut self.guidance;
                 self.mission.turn_back(along_m, |path| guidance.turn_back(path, now));

@@ -106,7 +106,8 @@ pub(crate) struct Detours {
     aside: bool,
     /// And it lands at the end of that.
     lands: bool,
-    home: Homeward,
+    /// Its way home over a field.
+    pub(crate) home: Homeward,
     /// Progress on the plan when it was left for a way around, metres.
     left_at_m: f32,
     /// The way around asked for has come.
@@ -175,7 +176,7 @@ impl Detours {
 
     /// Whether the path is blocked, or the plan was left.
     pub(crate) fn is_blocked(&self) -> bool {
-        self.blocked || self.seeks_home()
+        self.blocked || self.home.seeks()
     }
 
     /// For how long it has come no further because its path was blocked, now and again.

@@ -138,7 +138,7 @@ impl Watch {
         let (state, fleet) = (b.state(), b.companion.neighbours.fleet().expect("an area"));
         let guidance = &b.companion.guidance;
         let said = format!("{state:?} at {} m: {:#?} {:?}", guidance.along_m(), self.log, b.texts);
-        let homeward = guidance.returning || b.companion.detours.is_homeward();
+        let homeward = guidance.returning || b.companion.detours.home.is_on();
         let flies = state == Follow && !homeward;
         let behind = fleet.division() > b.companion.mission.division();
         let held_m = f32::from(fleet.held_at_dm()) / 10.0;

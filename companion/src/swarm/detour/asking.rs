@@ -77,8 +77,8 @@ impl Detours {
     /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
     pub(crate) fn miss(&mut self, along_m: f32, for_good: bool, now: Instant) {
         // It is sought again.
-        if self.seeks_home() {
-            self.miss_home(now);
+        if self.home.seeks() {
+            self.home.miss(now);
             return;
         }
         // Where no way aside is found there may yet be one around.

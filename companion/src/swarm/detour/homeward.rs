@@ -4,7 +4,6 @@
 //!
 //! Constant work.
 
-use super::Detours;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
@@ -15,7 +14,7 @@ const TURNS: u8 = 4;
 
 /// Where a vehicle is on its way home.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Homeward {
+pub(crate) struct Homeward {
     /// It stops and seeks its way since then.
     seeks_since: Option<Instant>,
     /// When it was last not found.
@@ -30,52 +29,50 @@ impl Homeward {
     pub(super) fn taken(self, aside: bool) -> Self {
         Self { flies: !aside && self.seeks_since.is_some(), turns: self.turns, ..Self::default() }
     }
-}
 
-impl Detours {
     /// It turns home.
-    pub(crate) fn turn_home(&mut self, now: Instant) {
-        let turns = self.home.turns.saturating_add(1);
-        self.home = Homeward { seeks_since: Some(now), turns, ..Homeward::default() };
+    pub(crate) fn turn(&mut self, now: Instant) {
+        let turns = self.turns.saturating_add(1);
+        *self = Self { seeks_since: Some(now), turns, ..Self::default() };
     }
 
     /// It flies back another way.
-    pub(crate) fn forget_home(&mut self) {
-        self.home = Homeward { turns: self.home.turns, ..Homeward::default() };
+    pub(crate) fn forget(&mut self) {
+        *self = Self { turns: self.turns, ..Self::default() };
     }
 
     /// The way home was not found.
-    pub(super) fn miss_home(&mut self, now: Instant) {
-        self.home.missed_at = Some(now);
+    pub(crate) fn miss(&mut self, now: Instant) {
+        self.missed_at = Some(now);
     }
 
     /// Whether it stops for its way home, seeks it, or flies it.
-    pub(crate) fn is_homeward(&self) -> bool {
-        self.seeks_home() || self.home.flies
+    pub(crate) fn is_on(&self) -> bool {
+        self.seeks() || self.flies
     }
 
     /// Whether it stops for its way home, or seeks it.
-    pub(crate) fn seeks_home(&self) -> bool {
-        self.home.seeks_since.is_some()
+    pub(crate) fn seeks(&self) -> bool {
+        self.seeks_since.is_some()
     }
 
     /// For how long it has.
-    pub(crate) fn sought_home_for(&self, now: Instant) -> Option<Duration> {
-        self.home.seeks_since.map(|since| now - since)
+    pub(crate) fn sought_for(&self, now: Instant) -> Option<Duration> {
+        self.seeks_since.map(|since| now - since)
     }
 
     /// Whether it may ask for its way home now.
-    pub(crate) fn may_ask_home(&self, now: Instant) -> bool {
-        self.seeks_home() && self.home.missed_at.is_none_or(|at| now - at >= AGAIN)
+    pub(crate) fn may_ask(&self, now: Instant) -> bool {
+        self.seeks() && self.missed_at.is_none_or(|at| now - at >= AGAIN)
     }
 
     /// Whether it can turn home: over a field, on a path, and not too often before.
-    pub(crate) fn can_turn_home<const V: usize, const W: usize, const G: usize>(
+    pub(crate) fn can_turn<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &View<'_, V, W, G>,
     ) -> bool {
         let flies = view.mission.plan().is_some_and(|plan| plan.task.flies());
         let on_path = view.guidance.along_m() >= 0.0 && !view.guidance.returning;
-        view.config.division.is_some() && flies && on_path && self.home.turns < TURNS
+        view.config.division.is_some() && flies && on_path && self.turns < TURNS
     }
 }
