@@ -84,10 +84,31 @@ pub struct RouteResult {
     pub layer_m: f64,
     /// When it leaves its pad, seconds.
     pub depart_s: f64,
-    /// C_k, seconds.
+    /// C_k, seconds: of all sorties and the swaps between them.
     pub cost_s: f64,
     /// The same, metres.
     pub cost_m: f64,
+    /// What is flown on each battery, in turn.
+    pub sorties: Vec<SortieResult>,
+}
+
+/// What a vehicle flies on one battery.
+#[derive(Clone, Debug, Serialize)]
+pub struct SortieResult {
+    /// Its waypoint with the lowest number.
+    pub first: u32,
+    /// Its waypoint with the highest number.
+    pub last: u32,
+    /// When its round begins, seconds.
+    pub begin_s: f64,
+    /// When it leaves its pad after that, seconds.
+    pub depart_s: f64,
+    /// C_k of it, seconds.
+    pub cost_s: f64,
+    /// The same, metres.
+    pub cost_m: f64,
+    /// From pad to pad, down to the lanes and up again too, seconds.
+    pub flown_s: f64,
 }
 
 /// What the assignment could not serve: more of one than of the other, or no way between them.

@@ -169,8 +169,8 @@ fn each_plan_is_flown_and_photographs_what_was_planned() {
             let planned = Planned::new(&scenario, Method::Binpat).expect("a plan");
             let flights = planned.flights();
             assert_eq!(flights.len(), 2);
-            for (route, stops, _) in &flights {
-                let items = export::items(&planned, route, stops);
+            for (sortie, stops, _) in &flights {
+                let items = export::items(&planned, sortie, stops);
                 let photos = fly(&planned, stops, &items, personality);
                 let wanted: Vec<&Stop> = stops.iter().filter(|s| matches!(s.act, Act::Photo(_))).collect();
                 assert!(wanted.len() > 10);

@@ -7,6 +7,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::coverage::check::{self, Findings};
+use crate::coverage::sorties::Sortie;
 use crate::coverage::{self, Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
@@ -22,7 +23,7 @@ pub struct Args {
     /// The scenario, with an `[area]`
     scenario: PathBuf,
     /// Directory for `result.json`, `timing.json`, `report.html`, `waypoints.csv`, `area.geojson`, and for each vehicle's
-    /// `vehicle-N.plan` and `vehicle-N.waypoints`
+    /// `vehicle-N.plan` and `vehicle-N.waypoints` (`vehicle-N-sortie-K` where it takes more than one battery)
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Divide the work so, whatever the scenario says: simple-binpat, binpat, powell-binpat or exact
@@ -87,13 +88,18 @@ fn files(scenario: &Scenario) -> Vec<String> {
 }
 
 fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results) -> anyhow::Result<()> {
-    for (route, stops, _) in flights {
+    for (sortie, stops, _) in flights {
+        let route = &sortie.route;
         let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
-        let items = export::items(planned, route, stops);
+        let name = match sortie.of {
+            1 => format!("vehicle-{id}"),
+            _ => format!("vehicle-{id}-sortie-{}", sortie.number),
+        };
+        let items = export::items(planned, sortie, stops);
         let plan = result::json(&export::plan(planned, route, &items))?;
-        results.add(&format!("vehicle-{id}.plan"), plan.as_bytes())?;
+        results.add(&format!("{name}.plan"), plan.as_bytes())?;
         let waypoints = export::waypoints(planned, route, &items);
-        results.add(&format!("vehicle-{id}.waypoints"), waypoints.as_bytes())?;
+        results.add(&format!("{name}.waypoints"), waypoints.as_bytes())?;
     }
     results.add("waypoints.csv", export::csv(planned, flights).as_bytes())?;
     results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())
@@ -103,8 +109,7 @@ fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results)
 pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;
-    let ends_s = routes.iter().zip(&planned.departures_s).map(|(route, depart_s)| route.cost_s + depart_s);
-    let makespan_s = ends_s.fold(0.0, f32::max);
+    let makespan_s = planned.sorties.iter().map(Sortie::end_s).fold(0.0, f32::max);
     let least_m = planned.least_separation_m;
     CoverResult {
         command: "cover",
@@ -113,7 +118,7 @@ pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResu
         method: planned.method.name(),
         complete: findings.is_clean(),
         totals: Totals {
-            path_m: rounded(routes.iter().map(|route| route.cost_m).sum()),
+            path_m: rounded(routes.iter().map(|route| planned.cost_m(route)).sum()),
             makespan_s: rounded(makespan_s),
         },
         safety: Safety {
@@ -138,9 +143,11 @@ fn vehicle_results(planned: &Planned<'_>) -> Vec<VehicleResult> {
             goal: None,
             reached: false,
             landed: false,
-            path_m: route.map_or(0.0, |route| rounded(route.cost_m)),
+            path_m: route.map_or(0.0, |route| rounded(planned.cost_m(route))),
             flown_m: 0.0,
-            flight_time_s: route.map_or(0.0, |route| rounded(route.cost_s)),
+            flight_time_s: route.map_or(0.0, |route| {
+                rounded(planned.sorties_of(route).map(|sortie| sortie.route.cost_s).sum())
+            }),
             end: if route.is_some() { "planned" } else { "stays on the ground" }.to_owned(),
         }
     });
@@ -162,6 +169,18 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
             route.cost_s,
             route.cost_m
         );
+        for (number, sortie) in (1..).zip(&route.sorties).filter(|_| route.sorties.len() > 1) {
+            let (first, last) =
+                if route.backward { (sortie.last, sortie.first) } else { (sortie.first, sortie.last) };
+            say!(
+                "  sortie {number:<4}  {:<10}  {:>7}  {:>8.1}  {:>7.1}  {:>7.1}",
+                format!("{first} to {last}"),
+                "",
+                sortie.begin_s + sortie.depart_s,
+                sortie.cost_s,
+                sortie.cost_m
+            );
+        }
     }
     for vehicle in result.vehicles.iter().filter(|v| v.flight_time_s == 0.0) {
         say!("{:>7}  {}", vehicle.id, vehicle.end);

@@ -79,8 +79,8 @@ pub fn check_plan(planned: &Planned<'_>) -> Findings {
 
 /// The flights as the checker takes them.
 pub fn flown<'f>(planned: &Planned<'_>, flights: &'f [Flight]) -> Vec<Flown<'f>> {
-    let flown = |(route, stops, times_s): &'f Flight| {
-        let vehicle = planned.scenario.vehicles[usize::from(route.vehicle)].id;
+    let flown = |(sortie, stops, times_s): &'f Flight| {
+        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         Flown { vehicle, stops, times_s }
     };
     flights.iter().map(flown).collect()

@@ -11,6 +11,7 @@ use planner_core::frames::Geodetic;
 use serde_json::{Value, json};
 
 use super::flight::{Act, Stop, heading_deg};
+use super::sorties::Sortie;
 use super::{Flight, Planned};
 use crate::scenario::Personality;
 use crate::scenario::coverage::{Heading, Trigger};
@@ -71,8 +72,8 @@ fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
 }
 
 /// All items of a flight.
-pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> {
-    let scenario = planned.scenario;
+pub fn items(planned: &Planned<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item> {
+    let (scenario, route) = (planned.scenario, &sortie.route);
     let home = home(planned, route);
     let start = scenario.vehicles[usize::from(route.vehicle)].start;
     let place = |position: &Point| {
@@ -87,11 +88,9 @@ pub fn items(planned: &Planned<'_>, route: &Route, stops: &[Stop]) -> Vec<Item> 
     };
     let speed = f64::from(planned.vehicles[usize::from(route.vehicle)].cruise_mps);
     let top = stops.get(1).map_or(0.0, |stop| f64::from(stop.position.z - start.z));
-    let index = planned.plan.routes.iter().position(|other| other == route);
-    let depart_s = index.map_or(0.0, |index| planned.departures_s[index]);
     let mut items = Vec::new();
-    if depart_s > 0.0 {
-        items.push(Item::command(NAV_DELAY, [f64::from(depart_s), -1.0, -1.0, -1.0]));
+    if sortie.depart_s > 0.0 {
+        items.push(Item::command(NAV_DELAY, [f64::from(sortie.depart_s), -1.0, -1.0, -1.0]));
     }
     items.extend([
         Item {
@@ -210,11 +209,12 @@ pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String
     text
 }
 
-/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames.
+/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie.
 pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
-    let mut text = "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m\n".to_owned();
-    for (route, stops, times) in flights {
-        let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
+    let mut text =
+        "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie\n".to_owned();
+    for (sortie, stops, times) in flights {
+        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
             let (act, number) = match stop.act {
                 Act::Pad => ("pad", String::new()),
@@ -225,8 +225,8 @@ pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
             let p = stop.position;
             let place = planned.geodetic(&p);
             text += &format!(
-                "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3}\n",
-                place.lat_deg, place.lon_deg, p.x, p.y, p.z
+                "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3},{}\n",
+                place.lat_deg, place.lon_deg, p.x, p.y, p.z, sortie.number
             );
         }
     }
@@ -252,7 +252,7 @@ pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
             }));
         }
     }
-    for (route, stops, _) in flights {
+    for (sortie, stops, _) in flights {
         let photos = stops.iter().filter(|stop| matches!(stop.act, Act::Photo(_) | Act::Lane));
         let places: Vec<Value> = photos.map(|stop| place(stop.position.x, stop.position.y)).collect();
         let geometry = match places.as_slice() {
@@ -263,7 +263,8 @@ pub fn geojson(planned: &Planned<'_>, flights: &[Flight]) -> Value {
             "type": "Feature",
             "properties": {
                 "kind": "route",
-                "vehicle": planned.scenario.vehicles[usize::from(route.vehicle)].id,
+                "vehicle": planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id,
+                "sortie": sortie.number,
             },
             "geometry": geometry,
         }));

@@ -30,8 +30,8 @@ pub fn judge<const V: usize, const W: usize>(
     pictures: Vec<Picture>,
 ) -> anyhow::Result<Judged> {
     let mut planned = Planned::flown(scenario)?;
-    for (route, depart_s) in planned.plan.routes.iter().zip(&mut planned.departures_s) {
-        *depart_s = plan.flights[usize::from(route.vehicle)].depart_s;
+    for sortie in &mut planned.sorties {
+        sortie.depart_s = plan.flights[usize::from(sortie.route.vehicle)].depart_s;
     }
     let findings: Findings = check::check_pictures(&planned, pictures);
     Ok(Judged {

@@ -13,6 +13,7 @@ pub mod parts;
 mod planned;
 pub mod result;
 pub mod separation;
+pub mod sorties;
 
 use std::time::Instant;
 
@@ -27,6 +28,7 @@ use planner_core::coverage::{CoverageError, exact, powell};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
 pub use self::planned::{CORNERS, LANES, Planned, VEHICLES};
+use self::sorties::{LaneTooLong, SWAP_S, Sortie, USABLE_CHARGE};
 use crate::area::MOST_VERTICES;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
@@ -38,8 +40,8 @@ const CLIMB_MPS: f32 = 3.0;
 /// V_d likewise.
 const DESCEND_MPS: f32 = 1.0;
 
-/// A route, its stops, and when each is passed, seconds.
-pub type Flight = (Route, Vec<flight::Stop>, Vec<f32>);
+/// A sortie, its stops, and when each is passed, seconds.
+pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
 
 impl<'a> Planned<'a> {
     /// Plans a mission.
@@ -103,14 +105,17 @@ impl<'a> Planned<'a> {
             vehicles,
             tracks,
             transit,
-            departures_s: vec![0.0; plan.routes.len()],
+            sorties: Vec::new(),
             least_separation_m: f32::INFINITY,
             plan,
             shares,
             lower_bound_s,
             seconds,
         };
-        planned.check_endurance()?;
+        planned.sorties = match wanted.batteries {
+            true => planned.cut()?,
+            false => planned.one_each()?,
+        };
         planned.set_departures()?;
         Ok(planned)
     }
@@ -128,49 +133,112 @@ impl<'a> Planned<'a> {
         found
     }
 
-    /// Each route with its stops, and when they are passed.
+    /// Each sortie with its stops, and when they are passed.
     pub fn flights(&self) -> Vec<Flight> {
-        let flight = |(route, depart_s): (&Route, &f32)| {
-            let stops = flight::stops(self, route);
-            let mut times_s = flight::times_s(self, route, &stops);
-            times_s.iter_mut().for_each(|time| *time += depart_s);
-            (*route, stops, times_s)
+        let flight = |sortie: &Sortie| {
+            let stops = flight::stops(self, &sortie.route);
+            let mut times_s = flight::times_s(self, &sortie.route, &stops);
+            times_s.iter_mut().for_each(|time| *time += sortie.begin_s + sortie.depart_s);
+            (*sortie, stops, times_s)
         };
-        self.plan.routes.iter().zip(&self.departures_s).map(flight).collect()
+        self.sorties.iter().map(flight).collect()
     }
 
-    /// Nobody leaves before it keeps the separation to the others.
+    /// The sorties of a route, in the order in which they are flown.
+    pub fn sorties_of(&self, route: &Route) -> impl Iterator<Item = &Sortie> {
+        self.sorties.iter().filter(|sortie| sortie.route.vehicle == route.vehicle)
+    }
+
+    /// What a route costs with all its sorties and the swaps between them, seconds.
+    pub fn cost_s(&self, route: &Route) -> f32 {
+        let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
+        self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>() + swaps * SWAP_S
+    }
+
+    /// The same without the swaps, metres.
+    pub fn cost_m(&self, route: &Route) -> f32 {
+        self.sorties_of(route).map(|sortie| sortie.route.cost_m).sum()
+    }
+
+    /// The largest of these costs, seconds.
+    pub fn max_cost_s(&self) -> f32 {
+        self.plan.routes.iter().map(|route| self.cost_s(route)).fold(0.0, f32::max)
+    }
+
+    /// All sorties, by round.
+    fn cut(&self) -> anyhow::Result<Vec<Sortie>> {
+        let mut sorties = Vec::new();
+        for route in &self.plan.routes {
+            let index = usize::from(route.vehicle);
+            let vehicle = &self.scenario.vehicles[index];
+            let lasts_s = sorties::lasts_s(vehicle);
+            let too_long = |error: LaneTooLong| {
+                anyhow::anyhow!(
+                    "battery too small: {}: vehicle {} would fly {:.0} s for lane {} alone; its battery lasts {lasts_s:.0} s, \
+                     and {:.0} % of that are for the landing\nhint: a place nearer to the area, another angle_deg, or a higher \
+                     cruise_mps",
+                    self.scenario.vehicle_places[index],
+                    vehicle.id,
+                    error.takes_s,
+                    error.lane + 1,
+                    100.0 * (1.0 - USABLE_CHARGE)
+                )
+            };
+            let parts = sorties::cut(self, route, USABLE_CHARGE * lasts_s).map_err(too_long)?;
+            let of = parts.len() as u16;
+            let numbered = parts.into_iter().zip(1..);
+            sorties.extend(numbered.map(|(route, number)| Sortie {
+                number,
+                of,
+                ..Sortie::whole(self, route)
+            }));
+        }
+        sorties.sort_by_key(|sortie| sortie.number);
+        Ok(sorties)
+    }
+
+    /// In each round nobody leaves before it keeps the separation to the others.
     fn set_departures(&mut self) -> anyhow::Result<()> {
         let flights = self.flights();
-        let timed: Vec<_> =
-            flights.iter().map(|(_, stops, times_s)| separation::Timed { stops, times_s }).collect();
         let separation_m = self.scenario.deconfliction.separation_m;
-        let Some(found) = separation::departures(&timed, separation_m) else {
-            bail!(
-                "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: fewer \
-                 vehicles, or places further apart",
-                self.wanted.place
-            );
-        };
-        (self.departures_s, self.least_separation_m) = found;
+        let mut begin_s = 0.0;
+        for round in flights.chunk_by(|a, b| a.0.number == b.0.number) {
+            let timed: Vec<_> =
+                round.iter().map(|(_, stops, times_s)| separation::Timed { stops, times_s }).collect();
+            let Some((departures_s, least_m)) = separation::departures(&timed, separation_m) else {
+                bail!(
+                    "cannot keep vehicles apart: {}: no order of departures keeps {separation_m} m between them\nhint: \
+                     fewer vehicles, or places further apart",
+                    self.wanted.place
+                );
+            };
+            self.least_separation_m = self.least_separation_m.min(least_m);
+            let own = self.sorties.iter_mut().filter(|sortie| sortie.number == round[0].0.number);
+            let mut end_s = begin_s;
+            for (sortie, depart_s) in own.zip(departures_s) {
+                (sortie.begin_s, sortie.depart_s) = (begin_s, depart_s);
+                end_s = sortie.end_s().max(end_s);
+            }
+            begin_s = end_s + SWAP_S;
+        }
         Ok(())
     }
 
-    /// Nobody is sent out for longer than its battery lasts.
-    fn check_endurance(&self) -> anyhow::Result<()> {
+    /// A sortie for each route. Nobody is sent out for longer than its battery lasts.
+    fn one_each(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
             let Some(endurance_s) = vehicle.endurance_s.filter(|s| *s < route.cost_s) else { continue };
             bail!(
                 "area too large: {}: vehicle {} would fly {:.0} s, its endurance_s is {endurance_s:.0}\nhint: more \
-                 vehicles, wider lanes or a higher cruise_mps take less time",
+                 vehicles, wider lanes or a higher cruise_mps take less time; area.batteries = true plans sorties",
                 self.scenario.vehicle_places[index],
                 vehicle.id,
                 route.cost_s
             );
         }
-        Ok(())
+        Ok(self.plan.routes.iter().map(|route| Sortie::whole(self, *route)).collect())
     }
 }
 

@@ -18,8 +18,10 @@ pub fn page(
 ) -> ReportData {
     let scenario = planned.scenario;
     let vehicles = scenario.vehicles.iter().enumerate().map(|(index, vehicle)| {
-        let own = flights.iter().find(|(route, _, _)| usize::from(route.vehicle) == index);
+        let own = flights.iter().filter(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
+        let passed = own.flat_map(|(_, stops, times)| stops.iter().zip(times));
         let at = |(stop, time): (&Stop, &f32)| TrackPoint { t_s: *time, position: stop.position };
+        let track: Vec<TrackPoint> = passed.map(at).collect();
         VehicleTrack {
             id: vehicle.id,
             radius_m: vehicle.radius_m,
@@ -27,8 +29,8 @@ pub fn page(
             goal_index: None,
             start: vehicle.start,
             goal: None,
-            planned: own.map_or(Vec::new(), |(_, stops, _)| stops.iter().map(|s| s.position).collect()),
-            track: own.map_or(Vec::new(), |(_, stops, times)| stops.iter().zip(times).map(at).collect()),
+            planned: track.iter().map(|point| point.position).collect(),
+            track,
         }
     });
     ReportData {

@@ -21,18 +21,22 @@ type Owners = BTreeMap<u32, u8>;
 
 /// What the page shows of a plan.
 pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
-    let part = |(route, stops, _): &Flight| {
+    let mut parts: Vec<Part> = Vec::new();
+    for (sortie, stops, _) in flights {
         let photos = |stop: &&Stop| matches!(stop.act, Act::Photo(_));
         let photos: Vec<&Stop> = stops.iter().filter(photos).collect();
         let lanes = photos.chunk_by(|a, b| a.lane == b.lane);
-        Part {
-            vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
-            waypoints: photos.len() as u32,
-            path: stops.iter().map(|stop| stop.position).collect(),
-            lanes: lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]).collect(),
-        }
-    };
-    let mut parts: Vec<Part> = flights.iter().map(part).collect();
+        let lanes = lanes.flat_map(|lane| [lane[0].position, lane[lane.len() - 1].position]);
+        let vehicle = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let index = parts.iter().position(|part| part.vehicle == vehicle).unwrap_or_else(|| {
+            parts.push(Part { vehicle, ..Part::default() });
+            parts.len() - 1
+        });
+        let part = &mut parts[index];
+        part.waypoints += photos.len() as u32;
+        part.path.extend(stops.iter().map(|stop| stop.position));
+        part.lanes.extend(lanes);
+    }
     parts.sort_by_key(|part| part.vehicle);
     let divisions = vec![Division { parts, ..Division::default() }];
     let pictures = check::pictures(planned, &check::flown(planned, flights));

@@ -5,6 +5,7 @@ use planner_core::coverage::pack::{Plan, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
 
+use super::sorties::Sortie;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
 
@@ -37,8 +38,8 @@ pub struct Planned<'a> {
     pub shares: Option<Vec<f32>>,
     /// No division can end before, seconds.
     pub lower_bound_s: f32,
-    /// When each route's vehicle leaves its pad, seconds.
-    pub departures_s: Vec<f32>,
+    /// What each vehicle flies on each battery, by round: without `batteries`, each route.
+    pub sorties: Vec<Sortie>,
     /// The least distance between two vehicles, as planned; infinite for one.
     pub least_separation_m: f32,
     /// What lanes, ways and routes took of the clock, seconds.

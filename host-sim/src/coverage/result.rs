@@ -4,13 +4,14 @@ use planner_core::coverage::pack::Route;
 
 use super::Planned;
 use super::check::Findings;
-use crate::result::{CoverageResult, RouteResult, rounded};
+use super::sorties::Sortie;
+use crate::result::{CoverageResult, RouteResult, SortieResult, rounded};
 
 /// The plan, and what was found of its pictures.
 pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
     let routes = &planned.plan.routes;
-    let max_cost_s = planned.plan.max_cost_s();
-    let costs: Vec<f64> = routes.iter().map(|route| f64::from(route.cost_s)).collect();
+    let max_cost_s = planned.max_cost_s();
+    let costs: Vec<f64> = routes.iter().map(|route| f64::from(planned.cost_s(route))).collect();
     let (mean, sd) = mean_and_sd(&costs);
     let along = planned.tracks.along();
     CoverageResult {
@@ -23,7 +24,7 @@ pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
         max_cost_s: rounded(max_cost_s),
         mean_cost_s: rounded(mean as f32),
         sd_cost_s: rounded(sd as f32),
-        max_cost_m: rounded(routes.iter().map(|route| route.cost_m).fold(0.0, f32::max)),
+        max_cost_m: rounded(routes.iter().map(|route| planned.cost_m(route)).fold(0.0, f32::max)),
         lower_bound_s: rounded(planned.lower_bound_s),
         gap: rounded(max_cost_s / planned.lower_bound_s - 1.0),
         photos: findings.photos,
@@ -35,17 +36,27 @@ pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
 
 fn route_results(planned: &Planned<'_>) -> Vec<RouteResult> {
     let heights = planned.wanted.heights;
-    let route = |(route, depart_s): (&Route, &f32)| RouteResult {
-        depart_s: rounded(*depart_s),
+    let sortie = |sortie: &Sortie| SortieResult {
+        first: sortie.route.first,
+        last: sortie.route.end - 1,
+        begin_s: rounded(sortie.begin_s),
+        depart_s: rounded(sortie.depart_s),
+        cost_s: rounded(sortie.route.cost_s),
+        cost_m: rounded(sortie.route.cost_m),
+        flown_s: rounded(sortie.flown_s),
+    };
+    let route = |route: &Route| RouteResult {
+        depart_s: planned.sorties_of(route).next().map_or(0.0, |sortie| rounded(sortie.depart_s)),
         vehicle: planned.scenario.vehicles[usize::from(route.vehicle)].id,
         first: route.first,
         last: route.end - 1,
         backward: route.ends().0 != route.first,
         layer_m: rounded(heights.mission_m + f32::from(route.layer) * heights.layer_m),
-        cost_s: rounded(route.cost_s),
-        cost_m: rounded(route.cost_m),
+        cost_s: rounded(planned.cost_s(route)),
+        cost_m: rounded(planned.cost_m(route)),
+        sorties: planned.sorties_of(route).map(sortie).collect(),
     };
-    planned.plan.routes.iter().zip(&planned.departures_s).map(route).collect()
+    planned.plan.routes.iter().map(route).collect()
 }
 
 /// Mean, and the sample's standard deviation: 0 for one value.

@@ -19,8 +19,8 @@ use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
 use super::ready::{Mission, OwnPlan, SwarmPlan, schedule_config};
 use crate::area::MOST_VERTICES;
-use crate::autopilot::VehicleLimits;
 use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
+use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::map;
 use crate::scenario::Scenario;
@@ -32,9 +32,6 @@ const OVER_PAD_M: f32 = 3.0;
 const AROUND_M: f32 = 30.0;
 /// Clearance beyond their hulls that vehicles are taken to have, metres: over fields there is room for the worst estimate.
 const MARGIN_M: f32 = 1.2;
-
-/// Share of its charge that a vehicle flies with: then it lands (`FLK_BATT_LOW`).
-const USABLE_CHARGE: f32 = 0.85;
 
 type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
@@ -86,17 +83,22 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     Ok(mission)
 }
 
-/// Nobody is sent out for longer than its simulated battery lasts until it has to land.
+/// Nobody is sent out for longer than its simulated battery lasts until it has to land: companions fly a route whole.
 fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
-        let lasts_s = vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s);
+        let lasts_s = sorties::lasts_s(vehicle);
         if route.cost_s > USABLE_CHARGE * lasts_s {
+            let hint = match planned.wanted.batteries {
+                true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
+                false => {
+                    "endurance_s says how long a battery lasts, area.batteries = true has `cover` plan sorties"
+                }
+            };
             bail!(
                 "area too large: {}: vehicle {} would fly {:.0} s; its battery lasts {lasts_s:.0} s, and {:.0} % of that are \
-                 for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; endurance_s says \
-                 how long a battery lasts",
+                 for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
                 planned.scenario.vehicle_places[index],
                 vehicle.id,
                 route.cost_s,

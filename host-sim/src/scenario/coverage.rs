@@ -30,6 +30,8 @@ pub struct Area {
     pub angle_deg: Option<f32>,
     /// Lanes begin and end so far beyond the edge.
     pub margin_m: f32,
+    /// Whether a route may take more than one battery.
+    pub batteries: bool,
     /// How work is divided.
     pub method: Method,
     /// Where vehicles look.

@@ -136,6 +136,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
         heights: Heights { mission_m: height_m, layer_m },
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
+        batteries: table.get("batteries").map(|v| v.boolean()).transpose()?.unwrap_or(false),
         method: method.unwrap_or(Method::PowellBinpat),
         heading: table.word(
             "heading",
@@ -148,7 +149,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
             &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
         )?,
     };
-    for key in ["terrain", "terrain_tolerance_m", "batteries"] {
+    for key in ["terrain", "terrain_tolerance_m"] {
         if let Some(value) = table.get(key) {
             return Err(value.error("is not available yet"));
         }

@@ -1,0 +1,155 @@
+//! Sorties: a route that takes longer than a battery lasts is cut between its lanes, and each part is flown from the pad
+//! and home again, in the route's layer.
+//!
+//! Of all cuts with the fewest sorties, the one that takes least time (dynamic programming over the lanes). A part costs
+//! no less than what it holds: ways are the shortest, so a detour over the pad never is. So the search for the first lane
+//! of a sortie ends at the first one that is too far back: n lanes, at most m a sortie: n · m.
+//!
+//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`SWAP_S`] after the last one of the round before
+//! is home. So departures keep vehicles apart, however long a swap really takes. Seconds, metres.
+//!
+//! C_k has one climb and one descent, as in the paper. A battery has to last for what is flown: down to the lanes from the
+//! layer, and up again, too.
+
+use planner_core::coverage::pack::Route;
+
+use super::Planned;
+use crate::autopilot::VehicleLimits;
+use crate::scenario;
+
+/// Share of its charge that a vehicle flies with: then it lands (`FLK_BATT_LOW`).
+pub const USABLE_CHARGE: f32 = 0.85;
+/// From landing to the next start with another battery, seconds.
+pub const SWAP_S: f32 = 120.0;
+
+/// What a vehicle flies on one battery.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sortie {
+    /// Its part of the vehicle's route.
+    pub route: Route,
+    /// Which one of its vehicle, from 1; also its round.
+    pub number: u16,
+    /// How many its vehicle flies.
+    pub of: u16,
+    /// When its round begins, seconds.
+    pub begin_s: f32,
+    /// When it leaves its pad, seconds after that.
+    pub depart_s: f32,
+    /// From pad to pad, seconds.
+    pub flown_s: f32,
+}
+
+impl Sortie {
+    /// The whole of a route.
+    pub(super) fn whole(planned: &Planned<'_>, route: Route) -> Self {
+        Self { route, number: 1, of: 1, begin_s: 0.0, depart_s: 0.0, flown_s: flown_s(planned, &route) }
+    }
+
+    /// When its vehicle has landed, seconds.
+    pub fn end_s(&self) -> f32 {
+        self.begin_s + self.depart_s + self.flown_s
+    }
+}
+
+/// How long a vehicle's battery lasts, seconds.
+pub fn lasts_s(vehicle: &scenario::Vehicle) -> f32 {
+    vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
+}
+
+/// What a route takes from pad to pad, seconds: at cruise speed, without turns.
+pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
+    let index = usize::from(route.vehicle);
+    let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
+    let over_lanes_m = f32::from(route.layer) * heights.layer_m;
+    let top_m = heights.mission_m + over_lanes_m;
+    let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
+    route.ground_m / vehicle.cruise_mps + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
+}
+
+/// A lane that takes longer than a battery lasts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LaneTooLong {
+    /// Index of the lane.
+    pub lane: usize,
+    /// There, along it and home, seconds.
+    pub takes_s: f32,
+}
+
+/// Cuts a route into as few parts as there can be that take at most `most_s` each, in the order in which they are flown.
+///
+/// # Errors
+/// A lane that takes longer alone.
+pub fn cut(planned: &Planned<'_>, route: &Route, most_s: f32) -> Result<Vec<Route>, LaneTooLong> {
+    if flown_s(planned, route) <= most_s {
+        return Ok(vec![*route]);
+    }
+    let lanes = Lanes::new(planned, route);
+    let count = lanes.ways_m.len();
+    // Sorties and seconds up to a lane, and where the last of these sorties begins.
+    let mut best = vec![(0u32, 0.0f64, 0usize)];
+    for end in 1..=count {
+        let parts = (0..end).rev().map(|first| (first, flown_s(planned, &lanes.part(first, end))));
+        let fitting = parts.take_while(|(_, own_s)| *own_s <= most_s);
+        let all = fitting.map(|(first, own_s)| (best[first].0 + 1, best[first].1 + f64::from(own_s), first));
+        let found = all.min_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        best.push(found.ok_or_else(|| LaneTooLong {
+            lane: planned.tracks.lane_of(lanes.bounds[end - 1]),
+            takes_s: flown_s(planned, &lanes.part(end - 1, end)),
+        })?);
+    }
+    let (mut parts, mut end) = (Vec::new(), count);
+    while end > 0 {
+        let first = best[end].2;
+        parts.push(lanes.part(first, end));
+        end = first;
+    }
+    // Now the last of the path comes first.
+    if route.ends().0 == route.first {
+        parts.reverse();
+    }
+    Ok(parts)
+}
+
+/// The lanes of a route, each as far as it belongs to it.
+struct Lanes<'a> {
+    planned: &'a Planned<'a>,
+    route: &'a Route,
+    /// The first waypoint of each, and what follows the last one.
+    bounds: Vec<u32>,
+    /// From the pad to the first waypoint of each, and to its last, metres.
+    ways_m: Vec<[f32; 2]>,
+}
+
+impl<'a> Lanes<'a> {
+    fn new(planned: &'a Planned<'a>, route: &'a Route) -> Self {
+        let tracks = &planned.tracks;
+        let [from, to] = [route.first, route.end - 1].map(|number| tracks.lane_of(number));
+        let inner = tracks.lanes()[from + 1..=to].iter().map(|lane| lane.first);
+        let bounds: Vec<u32> = std::iter::once(route.first).chain(inner).chain([route.end]).collect();
+        let pad = planned.vehicles[usize::from(route.vehicle)].place;
+        let way_m = |number: u32| {
+            tracks.waypoint(number).map_or(0.0, |place| planned.transit.distance_m(&pad, &place))
+        };
+        let ways_m = bounds.windows(2).map(|pair| [way_m(pair[0]), way_m(pair[1] - 1)]).collect();
+        Self { planned, route, bounds, ways_m }
+    }
+
+    /// Lanes `first` up to before `end` as a route of their own.
+    fn part(&self, first: usize, end: usize) -> Route {
+        let (planned, heights) = (self.planned, self.planned.wanted.heights);
+        let vehicle = &planned.vehicles[usize::from(self.route.vehicle)];
+        let (from, to) = (self.bounds[first], self.bounds[end]);
+        let inside_m = planned.tracks.along_m(to - 1) - planned.tracks.along_m(from);
+        let ground_m = self.ways_m[first][0] + inside_m + self.ways_m[end - 1][1];
+        let top_m = heights.mission_m + f32::from(self.route.layer) * heights.layer_m;
+        let delay_s = top_m / vehicle.climb_mps + top_m / vehicle.descend_mps;
+        Route {
+            first: from,
+            end: to,
+            ground_m,
+            cost_m: ground_m + 2.0 * top_m,
+            cost_s: ground_m / vehicle.cruise_mps + delay_s,
+            ..*self.route
+        }
+    }
+}

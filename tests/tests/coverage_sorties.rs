@@ -1,0 +1,213 @@
+//! Areas that take more than one battery: each sortie comes home in time, and together they photograph everything once.
+
+use flockmate_tests::areas::{self, Shape};
+use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::sorties::{SWAP_S, Sortie, USABLE_CHARGE};
+use host_sim::coverage::{Flight, Planned, export, flight};
+use host_sim::scenario::coverage::Method;
+use host_sim::scenario::{self, Scenario};
+use planner_core::coverage::pack::Route;
+use rand_core::SeedableRng as _;
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+/// Times are summed in another order here.
+const ROUNDING: f32 = 1.0002;
+/// Routes of more lanes are not cut in every way.
+const MOST_LANES: usize = 10;
+
+/// The same scenario with batteries that last so long.
+fn with_batteries(text: &str, endurance_s: f32) -> String {
+    let text = text.replace("[area]\n", "[area]\nbatteries = true\n");
+    text.replace("speed_max_mps", &format!("endurance_s = {endurance_s}\nspeed_max_mps"))
+}
+
+/// From pad to pad.
+fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
+    let stops = flight::stops(planned, route);
+    flight::times_s(planned, route, &stops).last().copied().expect("a flight has stops")
+}
+
+/// The lanes of a route, each with what of it belongs to the route, in the order of the path.
+fn lanes(planned: &Planned<'_>, route: &Route) -> Vec<Route> {
+    let numbers: Vec<u32> = (route.first..route.end).collect();
+    let lanes = numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b));
+    lanes.map(|lane| Route { first: lane[0], end: lane[lane.len() - 1] + 1, ..*route }).collect()
+}
+
+/// The fewest sorties within this time, one lane after the other as long as it fits: no part takes longer than what it
+/// is a part of. None where a lane alone does not fit.
+fn fewest(planned: &Planned<'_>, route: &Route, most_s: f32) -> Option<usize> {
+    let (mut count, mut first) = (1, route.first);
+    for lane in lanes(planned, route) {
+        if flown_s(planned, &Route { first, end: lane.end, ..*route }) > most_s {
+            (count, first) = (count + 1, lane.first);
+            if flown_s(planned, &lane) > most_s {
+                return None;
+            }
+        }
+    }
+    Some(count)
+}
+
+/// The least time of so many sorties, by trying every cut.
+fn least_s(planned: &Planned<'_>, route: &Route, count: usize, most_s: f32) -> f32 {
+    let lanes = lanes(planned, route);
+    let cuts = (0..1u32 << (lanes.len() - 1)).filter(|cut| cut.count_ones() as usize == count - 1);
+    let total_s = |cut: u32| {
+        let (mut sum_s, mut first) = (0.0, route.first);
+        for (i, lane) in lanes.iter().enumerate() {
+            if i + 1 == lanes.len() || cut & (1 << i) != 0 {
+                let own_s = flown_s(planned, &Route { first, end: lane.end, ..*route });
+                sum_s += if own_s <= most_s { own_s } else { f32::INFINITY };
+                first = lane.end;
+            }
+        }
+        sum_s
+    };
+    cuts.map(total_s).fold(f32::INFINITY, f32::min)
+}
+
+/// What one area was good for.
+#[derive(Clone, Copy, Debug, Default)]
+struct Seen {
+    planned: usize,
+    refused: usize,
+    single: usize,
+    several: usize,
+    every_cut: usize,
+}
+
+fn judge_route(planned: &Planned<'_>, route: &Route, most_s: f32, seen: &mut Seen) {
+    let sorties: Vec<_> = planned.sorties_of(route).collect();
+    let flown: Vec<u32> = sorties.iter().flat_map(|sortie| sortie.route.waypoints()).collect();
+    assert_eq!(flown, route.waypoints().collect::<Vec<_>>(), "the route's waypoints in their order");
+    for (sortie, number) in sorties.iter().zip(1..) {
+        assert_eq!((sortie.number, usize::from(sortie.of)), (number, sorties.len()));
+        assert_eq!((sortie.route.layer, sortie.route.heading), (route.layer, route.heading));
+        let own_s = flown_s(planned, &sortie.route);
+        assert!(own_s <= most_s * ROUNDING, "{own_s} s of {most_s}");
+        assert!((own_s - sortie.flown_s).abs() <= own_s * (ROUNDING - 1.0), "{own_s} {sortie:?}");
+    }
+    let few = [most_s * ROUNDING, most_s / ROUNDING].map(|most_s| fewest(planned, route, most_s));
+    assert!(few[0].is_some_and(|few| few <= sorties.len()), "{few:?} {}", sorties.len());
+    assert!(few[1].is_none_or(|few| few >= sorties.len()), "{few:?} {}", sorties.len());
+    if sorties.len() == 1 {
+        assert_eq!(sorties[0].route, *route);
+        seen.single += 1;
+        return;
+    }
+    seen.several += 1;
+    if few[0] == few[1] && lanes(planned, route).len() <= MOST_LANES {
+        let own_s: f32 = sorties.iter().map(|sortie| sortie.flown_s).sum();
+        let least_s = least_s(planned, route, sorties.len(), most_s * ROUNDING);
+        assert!(own_s <= least_s * ROUNDING, "{own_s} s instead of {least_s}");
+        seen.every_cut += 1;
+    }
+}
+
+/// In each round all begin together, when the last one is back.
+fn judge_rounds(planned: &Planned<'_>) {
+    let rounds: Vec<_> = planned.sorties.chunk_by(|a, b| a.number == b.number).collect();
+    let mut begin_s = 0.0;
+    for round in rounds {
+        assert!(round.iter().all(|sortie| sortie.begin_s == begin_s), "{round:?}");
+        assert!(round.iter().any(|sortie| sortie.depart_s == 0.0), "{round:?}");
+        begin_s = round.iter().map(Sortie::end_s).fold(0.0, f32::max) + SWAP_S;
+    }
+}
+
+fn written(planned: &Planned<'_>, flights: &[Flight]) -> Vec<String> {
+    let plan = |(sortie, stops, _): &Flight| {
+        let items = export::items(planned, sortie, stops);
+        export::plan(planned, &sortie.route, &items).to_string()
+    };
+    flights.iter().map(plan).chain([export::csv(planned, flights)]).collect()
+}
+
+fn judge(seed: u64) -> Option<Seen> {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
+    let text = areas::scenario(&mut random, shape, 1 + (seed % 5) as usize);
+    let methods = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
+    let method = methods[(seed % 3) as usize];
+    let plain = scenario::parse(&text, "plain").ok()?;
+    let whole = Planned::new(&plain, method).ok()?;
+    // From a little less than the longest lane takes alone to more than the longest route takes.
+    let routes = &whole.plan.routes;
+    let alone = routes.iter().flat_map(|route| lanes(&whole, route));
+    let least_s = 0.95 * alone.map(|lane| flown_s(&whole, &lane)).fold(0.0, f32::max);
+    let longest_s = routes.iter().map(|route| flown_s(&whole, route)).fold(0.0, f32::max);
+    let between_s = least_s + (1.1 * longest_s - least_s) * areas::unit(&mut random) as f32;
+    let endurance_s = (between_s / USABLE_CHARGE * 10.0).round() / 10.0;
+    let most_s = endurance_s * USABLE_CHARGE;
+    let scenario: Scenario =
+        scenario::parse(&with_batteries(&text, endurance_s), "batteries").expect("only batteries are new");
+    let mut seen = Seen::default();
+    let planned = match Planned::new(&scenario, method) {
+        Ok(planned) => planned,
+        Err(error) => {
+            let error = format!("{error:#}");
+            assert!(error.contains("battery too small"), "seed {seed}: {error}");
+            let short = |route: &&Route| fewest(&whole, route, most_s / ROUNDING).is_none();
+            let routes: Vec<_> = whole.plan.routes.iter().filter(short).collect();
+            let named = |route: &&Route| {
+                error
+                    .contains(&format!("vehicle {} would fly", plain.vehicles[usize::from(route.vehicle)].id))
+            };
+            assert!(routes.iter().any(named), "seed {seed}: {error}");
+            return Some(Seen { refused: 1, ..seen });
+        }
+    };
+    assert_eq!(planned.plan, whole.plan, "seed {seed}: who flies what does not change");
+    let findings = check_plan(&planned);
+    assert!(findings.is_clean(), "seed {seed}: {:?}", Findings { over_time: Vec::new(), ..findings });
+    for route in &planned.plan.routes {
+        judge_route(&planned, route, most_s, &mut seen);
+    }
+    judge_rounds(&planned);
+    if whole.sorties.iter().all(|sortie| sortie.flown_s <= most_s) {
+        let both = [&whole, &planned].map(|planned| written(planned, &planned.flights()));
+        assert_eq!(both[0], both[1], "seed {seed}: one battery suffices");
+        assert!(planned.sorties.iter().all(|sortie| sortie.of == 1));
+    }
+    Some(Seen { planned: 1, ..seen })
+}
+
+/// More with `FLOCKMATE_SORTIES=N`.
+#[test]
+fn each_sortie_comes_home_in_time_and_nothing_is_left_out() {
+    let count = std::env::var("FLOCKMATE_SORTIES").ok().and_then(|n| n.parse().ok()).unwrap_or(300);
+    let all: Vec<Seen> = (0..count).into_par_iter().filter_map(judge).collect();
+    let sum = |of: fn(&Seen) -> usize| all.iter().map(of).sum::<usize>() as u64;
+    let (planned, refused) = (sum(|s| s.planned), sum(|s| s.refused));
+    let (single, several, every_cut) = (sum(|s| s.single), sum(|s| s.several), sum(|s| s.every_cut));
+    println!(
+        "{planned} areas planned, {refused} refused; {single} routes of one sortie, {several} of several, {every_cut} of \
+         these beside every cut"
+    );
+    assert!(planned * 2 > count && refused > 0, "{planned} {refused}");
+    assert!(
+        single > count / 5 && several > count / 2 && every_cut > count / 5,
+        "{single} {several} {every_cut}"
+    );
+}
+
+#[test]
+fn without_batteries_a_route_that_takes_longer_is_refused() {
+    let text = "[area]\npolygon = [[0, 0], [300, 0], [300, 150], [0, 150]]\nlane_m = 10.0\nwaypoint_m = 8.0\n\
+                [mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 7\nstart = [-10, 0, 0]\nspeed_max_mps = 9.0\n\
+                endurance_s = 500\n";
+    let sorties = |text: &str| -> Result<usize, String> {
+        let scenario = scenario::parse(text, "one battery").expect("a scenario");
+        let planned = Planned::new(&scenario, Method::PowellBinpat).map_err(|error| format!("{error:#}"))?;
+        judge_route(&planned, &planned.plan.routes[0], 500.0 * USABLE_CHARGE, &mut Seen::default());
+        Ok(planned.sorties.len())
+    };
+    let error = sorties(text).expect_err("it takes longer");
+    assert!(error.contains("vehicle 7") && error.contains("batteries = true"), "{error}");
+    assert_eq!(sorties(&text.replace("[area]\n", "[area]\nbatteries = true\n")), Ok(4));
+    let short = text.replace("[area]\n", "[area]\nbatteries = true\n").replace("= 500", "= 100");
+    let error = sorties(&short).expect_err("no lane fits");
+    assert!(error.contains("battery too small") && error.contains("vehicle 7"), "{error}");
+}
