@@ -96,6 +96,7 @@ fn report() -> ReportData {
             event(3.0, Some(7), Level::Warning, "holds for UAV 1"),
             event(12.0, None, Level::Error, "<img src=x onerror=alert(1)>"),
         ],
+        figures: Vec::new(),
         plots: vec![
             plot("Smallest separation", limit, vec![curve("separation", None)]),
             plot("Speed", None, vec![curve("UAV 1", Some(1)), curve("UAV 7", Some(7))]),
@@ -341,4 +342,52 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     assert_eq!((now(&before), now(&later)), (false, true));
     let changed = before.pixels.iter().zip(&later.pixels).filter(|(a, b)| a != b).count();
     assert!(changed > 20_000, "{changed} pixels differ");
+}
+
+/// What the page draws is what the tables say.
+#[test]
+fn page_of_a_paper_draws_its_figures() {
+    let dir = tempfile::tempdir().expect("a directory");
+    host_sim::paper::cpp::run(dir.path()).expect("the paper's plans");
+    let page = dir.path().join("report.html");
+    let text = fs::read_to_string(&page).expect("the page is there");
+    let (_, data) = text.split_once("type=\"application/json\">").expect("its data");
+    let (data, _) = data.split_once("</script>").expect("their end");
+    let data: serde_json::Value = serde_json::from_str(data).expect("JSON");
+    let figures = data["figures"].as_array().expect("figures");
+    let names: Vec<_> = figures.iter().map(|figure| figure["name"].as_str().expect("a name")).collect();
+    assert_eq!(names, ["Fig. 8", "Fig. 9", "Fig. 10", "Fig. 12", "Fig. 13"]);
+    let tables = fs::read(dir.path().join("tables.json")).expect("the tables are there");
+    let tables: serde_json::Value = serde_json::from_slice(&tables).expect("JSON");
+    let rows: Vec<_> = tables
+        .as_array()
+        .expect("rows")
+        .iter()
+        .filter(|row| row["table"].as_str().expect("a name").starts_with('A'))
+        .collect();
+    for (figure, value) in [(3, "mean"), (4, "cv_percent")] {
+        let panels = figures[figure]["panels"].as_array().expect("panels").iter();
+        let series = panels.flat_map(|panel| panel["series"].as_array().expect("series"));
+        let values = series.flat_map(|series| series["values"].as_array().expect("values"));
+        let mut drawn: Vec<f64> = values.map(|value| value.as_f64().expect("a number")).collect();
+        let both = rows.iter().flat_map(|row| [&row["ours_summary"], &row["theirs_summary"]]);
+        let mut told: Vec<f64> = both.map(|summary| summary[value].as_f64().expect("a number")).collect();
+        assert_eq!(told.len(), 2 * 12 * 6);
+        drawn.sort_by(f64::total_cmp);
+        told.sort_by(f64::total_cmp);
+        assert_eq!(drawn, told, "{value}");
+    }
+    let paths = figures[2]["panels"].as_array().expect("panels").iter().map(|panel| {
+        let routes = panel["routes"].as_array().expect("routes").iter();
+        routes.filter(|route| route["path"] != "").count()
+    });
+    assert_eq!(paths.collect::<Vec<_>>(), [3, 2], "POWELL-BINPAT leaves one on the ground");
+    let Some(chromium) = chromium() else { return };
+    let opened = open(&chromium, &page, "");
+    assert_eq!(opened.count("figures"), 5.0);
+    let drawn = |what: &str| opened.dom.matches(what).count();
+    assert_eq!((drawn("<rect "), drawn("class=\"curve\"")), (144, 24));
+    // Twelve maps of three UAVs; in one of them none flies, and in one two do.
+    let empty = drawn("<polyline points=\"\" class=\"route\"");
+    assert_eq!((drawn("class=\"route\""), empty), (36, 4));
 }

@@ -15,6 +15,8 @@ function reportWithoutScene(host) {
   return null;
 }
 
+// First: what stands below the scene brings the page's scroll bar.
+buildFigures();
 buildHeader();
 buildSummary();
 const markRow = buildVehicleTable((id) => select(state.selected === id ? null : id));

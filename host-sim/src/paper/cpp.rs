@@ -1,7 +1,7 @@
-//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs.
+//! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs; Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in [`SHORT_TRACK`],
-//! [`LONG_TRACK`], [`CONVEX`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
+//! [`LONG_TRACK`], [`CONVEX`], [`COMPARED`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
 //! A12 were flown in Gazebo; ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
 
 use std::path::Path;
@@ -11,10 +11,12 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT};
+use super::cpp_figures;
 use crate::commands::cover;
 use crate::coverage::check::check_plan;
 use crate::coverage::{Planned, page};
 use crate::files::Results;
+use crate::report::Figure;
 use crate::result::{self, Timing, rounded};
 use crate::say;
 use crate::scenario::coverage::Method;
@@ -27,33 +29,41 @@ const SHORT_TRACK: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
 const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
 /// Of Table 2: convex, five vertices.
 const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
+/// Of Fig. 9: two more that are convex.
+const COMPARED: [&str; 2] =
+    ["[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]", "[[0, 0], [200, -15], [260, 120], [90, 200]]"];
 /// Of Table 4: small, so that the way there counts.
 const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
+/// Where the UAVs of Table 4 stand: one is far away.
+const FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
 /// Plans of each kind that are timed.
 const RUNS: usize = 51;
 
 /// One line of a table.
 #[derive(Debug, Serialize)]
-struct Row {
+pub(super) struct Row {
     table: String,
-    method: &'static str,
-    lane_m: f64,
-    height_m: f64,
+    /// Which track, of A1 to A12.
+    #[serde(skip)]
+    pub(super) track: Option<&'static str>,
+    pub(super) method: &'static str,
+    pub(super) lane_m: f64,
+    pub(super) height_m: f64,
     unit: &'static str,
-    ours: Vec<f64>,
+    pub(super) ours: Vec<f64>,
     theirs: Vec<f64>,
-    ours_summary: Option<Summary>,
-    theirs_summary: Option<Summary>,
+    pub(super) ours_summary: Option<Summary>,
+    pub(super) theirs_summary: Option<Summary>,
 }
 
 /// Max, Av, SD and CV.
 #[derive(Clone, Copy, Debug, Serialize)]
-struct Summary {
+pub(super) struct Summary {
     max: f64,
-    mean: f64,
+    pub(super) mean: f64,
     sd: f64,
-    cv_percent: f64,
+    pub(super) cv_percent: f64,
 }
 
 impl Summary {
@@ -126,6 +136,7 @@ impl Tables {
         let summary = |values: &[f64]| (values.len() > 1).then(|| Summary::of(values));
         self.rows.push(Row {
             table: table.to_owned(),
+            track: None,
             method: method.name(),
             lane_m: spacing.0,
             height_m: spacing.1,
@@ -166,12 +177,24 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let planned = Planned::new(&scenario, Method::PowellBinpat)?;
     let findings = check_plan(&planned);
     let result = serde_json::to_value(cover::described(&planned, &findings))?;
-    let page = page::page(&planned, &planned.flights(), &findings, result);
+    let mut page = page::page(&planned, &planned.flights(), &findings, result);
+    page.figures = figures(&tables)?;
     results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
     results.keep()?;
     say!();
     say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+/// What the paper draws of our plans.
+fn figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
+    let convex = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
+    let compared =
+        [scenario(COMPARED[0], &in_a_row(3), 10.0, 35.0)?, scenario(COMPARED[1], &in_a_row(3), 10.0, 35.0)?];
+    let small = scenario(SMALL, &FAR, 10.0, 35.0)?;
+    let [fig_8, fig_9, fig_10] = cpp_figures::routes(&convex, &compared, &small)?;
+    let [fig_12, fig_13] = cpp_figures::spreads(&tables.rows);
+    Ok(vec![fig_8, fig_9, fig_10, fig_12, fig_13])
 }
 
 fn table_2(tables: &mut Tables) -> anyhow::Result<()> {
@@ -202,8 +225,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
 
 /// One vehicle stands so far away that the others are done sooner without it.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
-    let places = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
-    let scenario = scenario(SMALL, &places, 10.0, 35.0)?;
+    let scenario = scenario(SMALL, &FAR, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {
         let ours = tables.costs(&scenario, *method, "m")?;
         tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
@@ -222,6 +244,9 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
             let index = METHODS.iter().position(|m| *m == method).unwrap_or(0);
             mean_max[usize::from(table.long)][index] += ours.iter().copied().fold(0.0, f64::max) / 12.0;
             tables.add(table.name, method, spacing, "s", [ours, theirs.to_vec()]);
+            if let Some(row) = tables.rows.last_mut() {
+                row.track = Some(if table.long { "long" } else { "short" });
+            }
         }
     }
     for ((track, ours), theirs) in ["5, short", "5, long"].into_iter().zip(mean_max).zip(MEAN_MAX_S) {

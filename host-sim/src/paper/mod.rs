@@ -2,3 +2,4 @@
 
 pub mod cpp;
 mod cpp_data;
+mod cpp_figures;

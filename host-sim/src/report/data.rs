@@ -4,6 +4,7 @@ use planner_core::Point;
 use serde::Serialize;
 
 use super::coverage::CoverageLayers;
+use super::figures::Figure;
 use super::pack;
 use super::surface::MapSurface;
 use super::track::TrackPoint;
@@ -35,6 +36,8 @@ pub struct ReportData {
     pub events: Vec<Event>,
     /// Plots over time, in order.
     pub plots: Vec<Plot>,
+    /// Figures of a paper, below all that.
+    pub figures: Vec<Figure>,
     /// What `result.json` holds.
     pub result: serde_json::Value,
     /// What `timing.json` holds.

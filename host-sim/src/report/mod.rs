@@ -7,6 +7,7 @@
 
 mod coverage;
 mod data;
+mod figures;
 mod pack;
 mod page;
 mod surface;
@@ -19,6 +20,7 @@ pub use data::{
     Curve, Event, Level, Limit, Outline, OutlineKind, Plot, ReportData, RoadmapLines, SphereObstacle,
     VehicleTrack, vehicle_color,
 };
+pub use figures::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 pub use surface::{FACE_LIMIT, MapSurface};
 pub use track::{Footprint, TrackPoint};
 
@@ -40,6 +42,13 @@ fn check(data: &ReportData) -> anyhow::Result<()> {
     for curve in data.plots.iter().flat_map(|plot| &plot.curves) {
         let (times, values) = (curve.t_s.len(), curve.values.len());
         anyhow::ensure!(times == values, "plot curve {:?}: {times} times but {values} values", curve.name);
+    }
+    for figure in &data.figures {
+        for panel in &figure.panels {
+            let (Panel::Bars(chart) | Panel::Lines(chart)) = panel else { continue };
+            let odd = chart.series.iter().find(|series| series.values.len() != chart.cases.len());
+            anyhow::ensure!(odd.is_none(), "{}: {odd:?} beside {} cases", figure.name, chart.cases.len());
+        }
     }
     Ok(())
 }

@@ -22,6 +22,7 @@ const SCRIPT: &str = concat!(
     include_str!("../../assets/report/view.js"),
     include_str!("../../assets/report/panels.js"),
     include_str!("../../assets/report/plots.js"),
+    include_str!("../../assets/report/figures.js"),
     include_str!("../../assets/report/main.js"),
     "})();\n"
 );

@@ -1,0 +1,188 @@
+//! CPP's Figs. 8, 9, 10, 12 and 13 with our plans. Theirs are pictures: the figures 12 and 13 beside ours are drawn from
+//! the times in their Tables A1 to A12. The areas of Figs. 8 to 10 are not stated; ours are in `cpp.rs`.
+
+use planner_core::Point;
+use planner_core::coverage::area::RingKind;
+
+use super::cpp::{Row, Summary};
+use crate::coverage::Planned;
+use crate::report::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
+use crate::result::rounded;
+use crate::scenario::Scenario;
+use crate::scenario::coverage::Method;
+
+/// Numbers of UAVs, a part of Fig. 12 each.
+const FLEETS: [usize; 2] = [3, 5];
+/// Tracks, a part of Fig. 13 each.
+const TRACKS: [&str; 2] = ["short", "long"];
+
+/// Fig. 8: an area with its UAVs, and the routes of three methods; Fig. 9 without the works of others, one area after the
+/// other; Fig. 10: fewer UAVs finish sooner.
+///
+/// # Errors
+/// As [`Planned::new`].
+pub(super) fn routes(
+    convex: &Scenario,
+    others: &[Scenario; 2],
+    small: &Scenario,
+) -> anyhow::Result<[Figure; 3]> {
+    let three = [
+        (Method::SimpleBinpat, "SIMPLE-BINPAT"),
+        (Method::Binpat, "BINPAT"),
+        (Method::PowellBinpat, "POWELL-BINPAT"),
+    ];
+    let mut fig_8 = vec![map("(a) area and UAVs".to_owned(), &Planned::new(convex, Method::Binpat)?, false)];
+    for ((method, name), letter) in three.iter().zip('b'..) {
+        fig_8.push(map(format!("({letter}) {name}"), &Planned::new(convex, *method)?, true));
+    }
+    let mut fig_9 = Vec::new();
+    for ((method, name), letters) in three.iter().zip([['c', 'd'], ['e', 'f'], ['g', 'h']]) {
+        for (scenario, letter) in others.iter().zip(letters) {
+            fig_9.push(map(format!("({letter}) {name}"), &Planned::new(scenario, *method)?, true));
+        }
+    }
+    let mut fig_10 = Vec::new();
+    for ((method, name), letter) in three[1..].iter().zip('a'..) {
+        fig_10.push(map(format!("({letter}) {name}"), &Planned::new(small, *method)?, true));
+    }
+    let figure = |name: &str, caption: &str, panels| Figure {
+        name: name.to_owned(),
+        caption: caption.to_owned(),
+        panels,
+    };
+    Ok([
+        figure(
+            "Fig. 8",
+            "Routes of the three methods in the area of Table 2 (ours: theirs is not stated).",
+            fig_8,
+        ),
+        figure(
+            "Fig. 9",
+            "The same with two more areas (ours). (a) and (b) of the paper are routes of other works, which are not drawn again.",
+            fig_9,
+        ),
+        figure(
+            "Fig. 10",
+            "Table 4's case: POWELL-BINPAT leaves the UAV that is far away on the ground, and all is done sooner.",
+            fig_10,
+        ),
+    ])
+}
+
+/// A plan from above; without its routes, area and UAVs alone.
+fn map(title: String, planned: &Planned<'_>, shown: bool) -> Panel {
+    let corners = planned.wanted.rings_of(RingKind::Outer).flatten();
+    let flights = planned.flights();
+    let (mut costs, mut most_s) = (Vec::new(), 0.0f32);
+    let vehicles = planned.scenario.vehicles.iter().enumerate();
+    let route = |(index, vehicle): (usize, &crate::scenario::Vehicle)| {
+        let own = flights.iter().find(|(sortie, _, _)| usize::from(sortie.route.vehicle) == index);
+        let own = own.filter(|_| shown);
+        let (cost_m, cost_s) =
+            own.map_or((0.0, 0.0), |(sortie, _, _)| (sortie.route.cost_m, sortie.route.cost_s));
+        costs.push(cost_m);
+        most_s = most_s.max(cost_s);
+        let path = own.map_or(Vec::new(), |(_, stops, _)| stops.iter().map(|stop| stop.position).collect());
+        MapRoute { vehicle: vehicle.id, start: vehicle.start, path }
+    };
+    let routes = vehicles.map(route).collect();
+    let most_m = costs.iter().copied().fold(0.0, f32::max);
+    let all: Vec<String> = costs.iter().map(|cost_m| format!("{cost_m:.0}")).collect();
+    Panel::Map(RouteMap {
+        title,
+        note: if shown {
+            format!("{} m; at most {most_m:.1} m, {most_s:.1} s", all.join(", "))
+        } else {
+            String::new()
+        },
+        area: corners.map(|corner| Point::new(corner.x, corner.y, 0.0)).collect(),
+        routes,
+    })
+}
+
+/// What is drawn of a row.
+#[derive(Clone, Copy)]
+enum Figures {
+    Ours,
+    Theirs,
+}
+
+impl Figures {
+    const BOTH: [(Self, &'static str); 2] =
+        [(Self::Ours, "ours, planned"), (Self::Theirs, "theirs, flown in Gazebo")];
+
+    fn of(self, row: &Row) -> Option<Summary> {
+        match self {
+            Self::Ours => row.ours_summary,
+            Self::Theirs => row.theirs_summary,
+        }
+    }
+}
+
+/// Fig. 12: average times by case, for three and five UAVs; Fig. 13: CV by case, on the short and the long track.
+pub(super) fn spreads(rows: &[Row]) -> [Figure; 2] {
+    let rows: Vec<&Row> = rows.iter().filter(|row| row.track.is_some()).collect();
+    let (mut times, mut spreads) = (Vec::new(), Vec::new());
+    for (fleet, letter) in FLEETS.into_iter().zip('a'..) {
+        for (whose, name) in Figures::BOTH {
+            let title = format!("({letter}) {fleet} UAVs: {name}");
+            let own = |row: &&&Row| row.ours.len() == fleet;
+            let value = |row: &Row| whose.of(row).map(|summary| summary.mean);
+            let own: Vec<&Row> = rows.iter().filter(own).copied().collect();
+            times.push(Panel::Bars(chart(title, ("Av, s", "average"), &own, value)));
+        }
+    }
+    for (track, letter) in TRACKS.into_iter().zip('a'..) {
+        for (whose, name) in Figures::BOTH {
+            let title = format!("({letter}) {track} track: {name}");
+            let own: Vec<&Row> = rows.iter().filter(|row| row.track == Some(track)).copied().collect();
+            let value = |row: &Row| whose.of(row).map(|summary| summary.cv_percent);
+            spreads.push(Panel::Lines(chart(title, ("CV, %", "spread"), &own, value)));
+        }
+    }
+    [
+        Figure {
+            name: "Fig. 12".to_owned(),
+            caption: "Average time of the UAVs in Tables A1 to A12: track, lane spacing and height. Ours are planned costs, \
+                      without turns."
+                .to_owned(),
+            panels: times,
+        },
+        Figure {
+            name: "Fig. 13".to_owned(),
+            caption: "CV = 100 · SD / Av of the same. Theirs from their printed times: the CV printed in A1 to A3 was divided \
+                      by UAV 3's time."
+                .to_owned(),
+            panels: spreads,
+        },
+    ]
+}
+
+/// Rows as a chart: a series for each method, and number of UAVs where it differs; a case for each track, spacing and height.
+fn chart(
+    title: String,
+    (unit, scale): (&str, &'static str),
+    rows: &[&Row],
+    value: impl Fn(&Row) -> Option<f64>,
+) -> Chart {
+    let fleets = rows.iter().any(|row| row.ours.len() != rows[0].ours.len());
+    let tracks = rows.iter().any(|row| row.track != rows[0].track);
+    let (mut cases, mut series) = (Vec::<String>::new(), Vec::<Series>::new());
+    for row in rows {
+        let track = if tracks { row.track.unwrap_or_default() } else { "" };
+        let case = format!("{track} {}/{}", row.lane_m, row.height_m).trim().to_owned();
+        if !cases.contains(&case) {
+            cases.push(case);
+        }
+        let fleet = if fleets { format!(", {} UAVs", row.ours.len()) } else { String::new() };
+        let name = format!("{}{fleet}", row.method);
+        if !series.iter().any(|own| own.name == name) {
+            series.push(Series { name: name.clone(), values: Vec::new() });
+        }
+        // Rows of a series come in the order of the cases.
+        if let (Some(own), Some(value)) = (series.iter_mut().find(|own| own.name == name), value(row)) {
+            own.values.push(rounded(value as f32));
+        }
+    }
+    Chart { title, unit: unit.to_owned(), cases, series, scale }
+}
