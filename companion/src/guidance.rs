@@ -287,8 +287,12 @@ impl Guidance {
 
     /// Whether the setpoint stands, and is not on its way down.
     pub fn stands(&self) -> bool {
-        let limit = STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS;
-        self.door.velocity().norm_squared() < limit && self.phase != Phase::Descent
+        self.pauses() && self.phase != Phase::Descent
+    }
+
+    /// Whether the setpoint stands, if only on its way down.
+    pub(crate) fn pauses(&self) -> bool {
+        self.door.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
     /// Whether it stands where its path leaves the geofence.

@@ -239,7 +239,8 @@ impl Detours {
     fn is_held<const V: usize, const W: usize, const G: usize>(&self, view: &View<'_, V, W, G>) -> bool {
         let now = view.now;
         let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
-        let stands = view.guidance.stands() && view.telemetry.velocity.norm() < STANDING_MPS;
+        let rests = view.telemetry.velocity.norm() < STANDING_MPS;
+        let stands = view.guidance.stands() && rests;
         match view.mission.state() {
             State::Scheduled | State::PadReplanning => {
                 self.blocked
@@ -251,7 +252,8 @@ impl Detours {
             State::Climb => {
                 view.guidance.filter.is_stopped() && view.telemetry.velocity.norm() < STANDING_MPS
             }
-            State::Blocked => stands,
+            // Blocked on its way down it stays there.
+            State::Blocked => view.guidance.pauses() && rests,
             // It goes on by itself only once its column is free.
             State::LandingHeld => view.telemetry.velocity.norm() < STANDING_MPS,
             _ => false,

@@ -155,6 +155,7 @@ impl<const V: usize> Neighbours<V> {
             other_plan: false,
             moved_at: Instant::ZERO,
             furthest: None,
+            pad: None,
             avoided: None,
             state,
         };
@@ -273,6 +274,9 @@ impl<const V: usize> Neighbours<V> {
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
+        if contact.tells(GROUNDED) && !contact.tells(LANDED | OUT) && contact.position_at.is_some() {
+            contact.pad = Some(contact.state.position);
+        }
         let out = contact.tells(OUT) && contact.position_at.is_some();
         contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not reported.

@@ -85,6 +85,40 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.until(State::Follow, 5.0);
 }
 
+#[test]
+fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
+    let mut config = two_vehicles();
+    config.roster[1].system_id = 7;
+    config.roster.sort_unstable_by_key(|entry| entry.system_id);
+    let mut bench = Bench::accompanied(config);
+    bench.until(State::Follow, 20.0);
+    while bench.companion.guidance.stands() || bench.enu.z > 1.2 {
+        bench.run(0.05);
+    }
+    assert_eq!(bench.state(), State::Follow);
+    let at = Point::new(bench.enu.x + 0.3, bench.enu.y, 0.2);
+    exclude(&mut bench, &sphere(at, 0.5));
+    bench.neighbour = Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | BLOCKED, 0.0, 5));
+    bench.until(State::Blocked, 3.0);
+    bench.run(8.0);
+    assert!(bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked);
+}
+
+#[test]
+fn who_died_may_have_been_flown_back_to_its_pad() {
+    let mut bench = Bench::accompanied(two_vehicles());
+    let pad = Point::new(8.0, 40.0, 0.2);
+    bench.neighbour = Some((pad, GROUNDED | ON_PLAN, 0.0, 5));
+    bench.run(1.0);
+    bench.neighbour = Some((pad + Point::new(9.0, 0.0, 3.0), FLYING | ON_PLAN, 9.0, 5));
+    bench.run(1.0);
+    bench.neighbour = None;
+    bench.run(60.0);
+    let mut told = Vec::new();
+    bench.companion.neighbours.places(bench.now, 1.5, |place| told.push(place));
+    assert!(told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5), "{told:?}");
+}
+
 /// What is kept off vehicle 77 half a minute on.
 fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
     let mut bench = Bench::accompanied(two_vehicles());

@@ -59,6 +59,8 @@ pub(super) struct Contact {
     pub(super) moved_at: Instant,
     /// The furthest it can have come, metres along its path, and when that was.
     pub(super) furthest: Option<(f32, Instant)>,
+    /// Where it stood before it took off: its autopilot may fly it back there.
+    pub(super) pad: Option<Point>,
     /// Where it rested when a way around was planned.
     pub(super) avoided: Option<Point>,
     pub(super) state: Neighbour,
@@ -260,6 +262,9 @@ impl Contact {
         } else if self.is_dead(now) && self.flies_on() {
             // Where the plan has it.
         } else if self.is_dead(now) {
+            if let Some(pad) = self.pad {
+                tell(KeepOff { from: pad, to: pad, ..place(apart_m) });
+            }
             let down = !self.heard_within(now, DOWN);
             if down && over_field && !self.floor_m.is_nan() {
                 let low = |at: Point| Point::new(at.x, at.y, self.floor_m);
