@@ -34,6 +34,8 @@ pub enum PathError {
     PathFull,
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
+    /// Longer than vehicles that share an area tell each other of: [`crate::coverage::flights::FURTHEST_M`].
+    TooLong,
 }
 
 /// A polyline through free space, from the point above the pad to the goal. Arc length runs from 0 at the first

@@ -193,6 +193,11 @@ fn plan_and_fly(
     output::add(&mut results, &flight.result, &mission.timing, page)?;
     results.keep()?;
     output::print_summary(&flight.result, out);
+    let aloft = flight.result.vehicles.iter().filter(|vehicle| !vehicle.landed).count();
+    let limit_s = mission.scenario.simulation.time_limit_s;
+    if aloft > 0 && flight.simulated_s >= f64::from(limit_s) {
+        say!("given up   at simulation.time_limit_s = {limit_s} s, {aloft} not landed");
+    }
     for incident in flight.log.iter().filter(|event| event.level == Level::Error) {
         let id = incident.vehicle.map_or(String::new(), |id| format!(" vehicle {id}"));
         say!("           {:.2} s{id}: {}", incident.t_s, incident.text);

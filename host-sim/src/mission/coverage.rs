@@ -10,6 +10,7 @@ use companion::storage::mission_file::{Block, Kind};
 use companion::swarm::fleet::Lot;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
+use planner_core::coverage::flights::FURTHEST_M;
 use planner_core::coverage::pack::Unit;
 use planner_core::coverage::transit::Transit;
 use planner_core::detour::{DetourRequest, KeepOff};
@@ -242,6 +243,10 @@ impl Mission {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
                 "the route of vehicle {id} has too many corners: {path}: a path holds at most {WAYPOINTS} waypoints, two \
                  a lane\nhint: more vehicles, or wider lanes"
+            ),
+            Error::Plan(PlanError::Path(id, PathError::TooLong)) => anyhow!(
+                "the route of vehicle {id} is too long: {path}: vehicles that share an area fly at most {FURTHEST_M} m \
+                 each\nhint: more vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone"
             ),
             Error::Plan(PlanError::Schedule(id, ScheduleError::Blocked)) => anyhow!(
                 "vehicle {id} cannot pass the others: {path}: no departure keeps it apart from them\nhint: pads further \

@@ -18,6 +18,8 @@ use crate::sort;
 
 /// Braking and accelerating that is planned with, m/s².
 const ACCEL_MPS2: f32 = 1.5;
+/// Longest path of a vehicle that shares the area with others, metres: they tell each other their places in 16 bits, decimetres.
+pub const FURTHEST_M: f32 = 6_553.0;
 
 /// A vehicle of the mission, beside what it is packed by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +69,7 @@ pub struct Swarm<'a> {
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there.
 ///
 /// # Errors
-/// [`PlanError::Path`] for a route with more than `W` corners, [`PlanError::Schedule`] for a vehicle that cannot be kept
+/// [`PlanError::Path`] for a route with more than `W` corners or longer than [`FURTHEST_M`], [`PlanError::Schedule`] for a vehicle that cannot be kept
 /// apart from the others, [`PlanError::Terminals`] where pads and vehicles do not belong together.
 pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     work: &Work<'_, L, N>,
@@ -93,6 +95,9 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
             None => grounded(pad),
         };
         let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
+        if swarm.pads.len() > 1 && flight.path.length_m() > FURTHEST_M {
+            return Err(PlanError::Path(pad.id, PathError::TooLong));
+        }
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     depart(swarm, ws, out)?;
