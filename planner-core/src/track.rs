@@ -36,7 +36,8 @@ pub struct TrackConfig {
     /// Largest deviation to allow for in the open, metres.
     pub deviation_max_m: f32,
     /// The reference is to slow from half this distance ahead of the vehicle and stop at it, metres; between walls it is
-    /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner.
+    /// four times the deviation allowed there, so that a vehicle that lags does not cut the corner. In the open it grows with
+    /// the speed.
     pub lead_max_m: f32,
 }
 
@@ -105,6 +106,10 @@ pub struct Reference {
 
 /// The reference may always be this far ahead: what an autopilot lags at walking speed, metres.
 const LEAD_LEAST_M: f32 = 0.4;
+/// In the open, faster than it walks, it lags so much further: what is sent, answered and reported late, seconds, and twice
+/// that before the reference slows.
+const LEAD_S: f32 = 0.8;
+const WALKS_MPS: f32 = 2.0;
 /// This near its end the path is flown, metres.
 const END_M: f32 = 0.01;
 
@@ -239,9 +244,18 @@ pub fn advance<const W: usize>(
     Some(Reference {
         position: path.point_at(tracker.along_m)?,
         along_m: tracker.along_m,
-        lead_m: fminf(cfg.lead_max_m, fmaxf(4.0 * deviation(cfg, clearance_m), LEAD_LEAST_M)),
+        lead_m: lead_m(cfg, clearance_m, tracker.speed_mps),
         finished: tracker.along_m >= length_m,
     })
+}
+
+/// How far behind the vehicle may be on a leg of this clearance at this speed of the reference, metres.
+fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
+    let deviation_m = deviation(cfg, clearance_m);
+    let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, LEAD_LEAST_M));
+    // Between walls a vehicle that lags may cut a corner, however fast it is.
+    let open = deviation_m >= cfg.deviation_max_m;
+    if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKS_MPS, 0.0) } else { lead_m }
 }
 
 /// Slower than this the reference is about to stop, m/s.
