@@ -83,6 +83,17 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
+/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m.
+pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let text = flown(random, shape, vehicles);
+    let drawn = |line: &str| match line.split(" = ").next() {
+        Some("cruise_mps") => format!("cruise_mps = {:.1}\n", between(random, 8.0, 15.0)),
+        Some("height_m") => format!("height_m = {:.1}\n", between(random, 40.0, 120.0)),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(drawn).collect()
+}
+
 /// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes of work for each.
 pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     let mut text = flown(random, Shape::Convex, vehicles);

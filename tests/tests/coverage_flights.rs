@@ -14,11 +14,20 @@ const NO_FLIGHT: [&str; 5] =
 /// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
 #[test]
 fn random_areas_are_photographed_whole() {
+    are_photographed_whole(areas::flown);
+}
+
+#[test]
+fn random_areas_are_photographed_whole_fast_and_from_high() {
+    are_photographed_whole(areas::fast);
+}
+
+fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String) {
     let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
     let outcome = |seed: u64| -> Result<Option<&str>, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
-        let text = areas::flown(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
+        let text = draw(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
         match covered::fly_text(&text) {
             Ok((result, log)) => match covered::faults(&result) {
                 None => Ok(None),

@@ -7,6 +7,7 @@
 
 use heapless::Vec;
 
+use super::lanes::Lane;
 use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{Flat, divide};
@@ -204,6 +205,26 @@ fn leg_s(length_m: f32, most_mps: f32) -> f32 {
     }
 }
 
+/// The first and the last waypoint of a lane that are the route's.
+fn part_of(lane: &Lane, route: &Route) -> (u32, u32) {
+    (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
+}
+
+/// Where a vehicle looks on this route. A lane of one waypoint has no direction of its own: who is to look ahead on one looks
+/// along the other lanes all the way.
+fn look<const L: usize, const N: usize>(work: &Work<'_, L, N>, route: &Route, swarm: &Swarm<'_>) -> Look {
+    let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
+    let alone = |lane: usize| {
+        let lane = work.tracks.lanes().get(lane);
+        lane.is_some_and(|lane| matches!(part_of(lane, route), (begin, end) if begin == end))
+    };
+    let along = work.tracks.along();
+    match swarm.manner.look {
+        Look::Ahead if lanes.into_iter().any(alone) => Look::Fixed(libm::atan2f(along.y, along.x)),
+        look => look,
+    }
+}
+
 /// The flight of one route.
 fn flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
@@ -212,7 +233,8 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
-    let Manner { waypoint_m, look, trigger } = swarm.manner;
+    let Manner { waypoint_m, trigger, .. } = swarm.manner;
+    let look = look(work, route, swarm);
     let done: u32 = swarm.done.iter().map(|range| range.end - range.first).sum();
     let area = work.tracks.waypoint_count() + done;
     let backward = route.heading == Heading::Backward;
@@ -232,7 +254,7 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     for lane in lanes {
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
-        let (begin, end) = (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1);
+        let (begin, end) = part_of(lane, route);
         let number = begin;
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let from = draft.around(&here, &place(begin)?, mission_m)?;
