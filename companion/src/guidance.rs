@@ -290,11 +290,6 @@ impl Guidance {
         self.pauses() && self.phase != Phase::Descent
     }
 
-    /// Whether the setpoint stands, if only on its way down.
-    pub(crate) fn pauses(&self) -> bool {
-        self.door.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
-    }
-
     /// Whether it stands where its path leaves the geofence.
     pub fn stands_at_fence(&self) -> bool {
         self.fenced && self.stands()

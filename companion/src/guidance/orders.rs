@@ -4,7 +4,7 @@ use super::door::TICK_S;
 use super::nearest::nearest_m;
 use super::phase::Phase;
 use super::waypoints::Waypoints;
-use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M};
+use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, STANDING_SETPOINT_MPS};
 use crate::time::Instant;
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
@@ -42,6 +42,11 @@ impl Guidance {
     /// Whether the raw point is where the setpoint stands: another path may begin beside it.
     pub(crate) fn is_settled(&self) -> bool {
         self.settled
+    }
+
+    /// Whether the setpoint stands, if only on its way down.
+    pub(crate) fn pauses(&self) -> bool {
+        self.door.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
     /// Where along its path it could stop now, metres.

@@ -13,6 +13,10 @@ use planner_core::file::CRC32;
 use crate::link::roster::{ENTRIES, Entry, Roster, Standing};
 use crate::time::{Duration, Instant};
 
+mod lots;
+
+pub use lots::{Lot, Lots};
+
 /// A vehicle photographs for so long after a majority last said that it hears it.
 pub const LEASE: Duration = Duration::from_secs(20);
 /// What was heard within this time counts for the lease.
@@ -43,38 +47,6 @@ impl Limits {
         Self { lease: LEASE, heard: HEARD, silent: SILENT, down }
     }
 }
-
-/// What a division follows from, of one vehicle: as [`planner_core::coverage::losses::Fate`], in decimetres.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
-pub struct Lot {
-    /// Whether it flies on.
-    pub lives: bool,
-    /// How far along its path the pictures are its own; [`Lot::WHOLE`] where it took all of them.
-    pub along_dm: u16,
-}
-
-impl Lot {
-    /// All its path.
-    pub const WHOLE: u16 = u16::MAX;
-
-    /// What is known of a vehicle of the roster.
-    pub fn of(entry: &Entry) -> Self {
-        let along_dm = match entry.standing {
-            Standing::Alive => entry.promise_dm.unwrap_or(entry.done_dm),
-            Standing::Lost | Standing::Left => entry.done_dm,
-            Standing::Finished => Self::WHOLE,
-        };
-        Self { lives: entry.standing == Standing::Alive, along_dm }
-    }
-
-    /// The same place, metres; infinite for [`Lot::WHOLE`].
-    pub fn along_m(&self) -> f32 {
-        if self.along_dm == Self::WHOLE { f32::INFINITY } else { f32::from(self.along_dm) / 10.0 }
-    }
-}
-
-/// The lots of all vehicles by rank.
-pub type Lots<const V: usize> = Vec<Lot, V>;
 
 /// What a vehicle says of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

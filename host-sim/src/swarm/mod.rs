@@ -142,10 +142,9 @@ fn simulate(
     progress: &Progress,
 ) -> anyhow::Result<Flight> {
     let mut run = Run::new(mission, plan, gateway)?;
-    let scenario = &mission.scenario;
-    let settings = &scenario.simulation;
+    let settings = &mission.scenario.simulation;
     // The time of a board behind links is the clock's.
-    let by_clock = scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
+    let by_clock = mission.scenario.vehicles.iter().any(|v| matches!(v.companion, Companion::Url { .. }));
     let steps = (f64::from(settings.time_limit_s) * 1e6 / STEP_US as f64) as u64;
     let bar = progress.steps("flight", settings.time_limit_s as u64);
     let began = Clock::now();

@@ -60,13 +60,19 @@ fn a_turn_is_claimed_before_it_is_taken_and_only_by_one() {
     bench.until(State::Follow, 1.0);
 }
 
-#[test]
-fn who_hears_a_lower_system_id_claim_waits_again() {
+/// On its path, beside a vehicle with a lower system id.
+fn beside_a_lower_id() -> Bench {
     let mut config = two_vehicles();
     config.roster[1].system_id = 7;
     config.roster.sort_unstable_by_key(|entry| entry.system_id);
     let mut bench = Bench::accompanied(config);
     bench.until(State::Follow, 20.0);
+    bench
+}
+
+#[test]
+fn who_hears_a_lower_system_id_claim_waits_again() {
+    let mut bench = beside_a_lower_id();
     exclude(&mut bench, &sphere(Point::new(14.0, 12.0, 1.5), 0.5));
     let other = |flags: u8| Some((Point::new(8.0, 40.0, 9.0), FLYING | ON_PLAN | flags, 0.0, 5));
     bench.neighbour = other(BLOCKED);
@@ -87,11 +93,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
 
 #[test]
 fn who_is_stopped_on_its_way_down_lets_others_fly_around() {
-    let mut config = two_vehicles();
-    config.roster[1].system_id = 7;
-    config.roster.sort_unstable_by_key(|entry| entry.system_id);
-    let mut bench = Bench::accompanied(config);
-    bench.until(State::Follow, 20.0);
+    let mut bench = beside_a_lower_id();
     while bench.companion.guidance.stands() || bench.enu.z > 1.2 {
         bench.run(0.05);
     }
