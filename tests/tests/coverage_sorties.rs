@@ -22,10 +22,19 @@ fn with_batteries(text: &str, endurance_s: f32) -> String {
     text.replace("speed_max_mps", &format!("endurance_s = {endurance_s}\nspeed_max_mps"))
 }
 
-/// From pad to pad.
+/// From pad to pad, with stops at both ends of each lane and over the pad.
 fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let stops = flight::stops(planned, route);
-    flight::times_s(planned, route, &stops).last().copied().expect("a flight has stops")
+    let steady_s = flight::times_s(planned, route, &stops).last().copied().expect("a flight has stops");
+    let (speed, accel) = (planned.vehicles[usize::from(route.vehicle)].cruise_mps, 1.5f32);
+    // Over a leg from rest to rest.
+    let lost_s = |leg_m: f32| match leg_m < speed * speed / accel {
+        true => 2.0 * (leg_m / accel).sqrt() - leg_m / speed,
+        false => speed / accel,
+    };
+    let count = lanes(planned, route).len();
+    let steps_s = (1..count).map(|_| lost_s(planned.wanted.spacing.lane_m)).sum::<f32>();
+    steady_s + (count + 2) as f32 * lost_s(f32::INFINITY) + steps_s
 }
 
 /// The lanes of a route, each with what of it belongs to the route, in the order of the path.

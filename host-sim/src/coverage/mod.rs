@@ -190,7 +190,7 @@ impl<'a> Planned<'a> {
             sorties.extend(numbered.map(|(route, number)| Sortie {
                 number,
                 of,
-                ..Sortie::whole(self, route)
+                ..sorties::whole(self, route)
             }));
         }
         sorties.sort_by_key(|sortie| sortie.number);
@@ -238,7 +238,7 @@ impl<'a> Planned<'a> {
                 route.cost_s
             );
         }
-        Ok(self.plan.routes.iter().map(|route| Sortie::whole(self, *route)).collect())
+        Ok(self.plan.routes.iter().map(|route| sorties::whole(self, *route)).collect())
     }
 }
 

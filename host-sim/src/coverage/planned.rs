@@ -1,11 +1,10 @@
 //! What a coverage plan holds.
 
 use planner_core::coverage::area::Area;
-use planner_core::coverage::pack::{Plan, Vehicle};
+use planner_core::coverage::pack::{Plan, Route, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
 
-use super::sorties::Sortie;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
 
@@ -15,6 +14,30 @@ pub const VEHICLES: usize = 32;
 pub const LANES: usize = 8192;
 /// Most outward corners of no-fly zones on the desk.
 pub const CORNERS: usize = 256;
+
+/// What a vehicle flies on one battery.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sortie {
+    /// Its part of the vehicle's route.
+    pub route: Route,
+    /// Which one of its vehicle, from 1; also its round.
+    pub number: u16,
+    /// How many its vehicle flies.
+    pub of: u16,
+    /// When its round begins, seconds.
+    pub begin_s: f32,
+    /// When it leaves its pad, seconds after that.
+    pub depart_s: f32,
+    /// From pad to pad, seconds.
+    pub flown_s: f32,
+}
+
+impl Sortie {
+    /// When its vehicle has landed, seconds.
+    pub fn end_s(&self) -> f32 {
+        self.begin_s + self.depart_s + self.flown_s
+    }
+}
 
 /// A planned coverage mission.
 pub struct Planned<'a> {

@@ -8,12 +8,14 @@
 //! Sorties are flown in rounds: the k-th of all vehicles begin together, [`SWAP_S`] after the last one of the round before
 //! is home. So departures keep vehicles apart, however long a swap really takes. Seconds, metres.
 //!
-//! C_k has one climb and one descent, as in the paper. A battery has to last for what is flown: down to the lanes from the
-//! layer, and up again, too.
+//! C_k has one climb and one descent and no turns, as in the paper. A battery has to last for what is flown: down to the
+//! lanes from the layer, up again, and turns from rest to rest, too.
 
+use planner_core::coverage::flights::ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
 
 use super::Planned;
+pub use super::planned::Sortie;
 use crate::autopilot::VehicleLimits;
 use crate::scenario;
 
@@ -22,33 +24,9 @@ pub const USABLE_CHARGE: f32 = 0.85;
 /// From landing to the next start with another battery, seconds.
 pub const SWAP_S: f32 = 120.0;
 
-/// What a vehicle flies on one battery.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sortie {
-    /// Its part of the vehicle's route.
-    pub route: Route,
-    /// Which one of its vehicle, from 1; also its round.
-    pub number: u16,
-    /// How many its vehicle flies.
-    pub of: u16,
-    /// When its round begins, seconds.
-    pub begin_s: f32,
-    /// When it leaves its pad, seconds after that.
-    pub depart_s: f32,
-    /// From pad to pad, seconds.
-    pub flown_s: f32,
-}
-
-impl Sortie {
-    /// The whole of a route.
-    pub(super) fn whole(planned: &Planned<'_>, route: Route) -> Self {
-        Self { route, number: 1, of: 1, begin_s: 0.0, depart_s: 0.0, flown_s: flown_s(planned, &route) }
-    }
-
-    /// When its vehicle has landed, seconds.
-    pub fn end_s(&self) -> f32 {
-        self.begin_s + self.depart_s + self.flown_s
-    }
+/// The whole of a route.
+pub(super) fn whole(planned: &Planned<'_>, route: Route) -> Sortie {
+    Sortie { route, number: 1, of: 1, begin_s: 0.0, depart_s: 0.0, flown_s: flown_s(planned, &route) }
 }
 
 /// How long a vehicle's battery lasts, seconds.
@@ -56,14 +34,28 @@ pub fn lasts_s(vehicle: &scenario::Vehicle) -> f32 {
     vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
 }
 
-/// What a route takes from pad to pad, seconds: at cruise speed, without turns.
+/// What a route takes from pad to pad, seconds: at cruise speed, from rest to rest on each leg across.
 pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle);
     let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
     let over_lanes_m = f32::from(route.layer) * heights.layer_m;
     let top_m = heights.mission_m + over_lanes_m;
     let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
-    route.ground_m / vehicle.cruise_mps + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
+    let level_s = route.ground_m / vehicle.cruise_mps + turns_s(planned, route);
+    level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
+}
+
+/// What stops at both ends of each lane, and over the pad, take beyond that, seconds: a lane, and a way from or to the pad, is
+/// taken to be long enough for the cruise speed.
+fn turns_s(planned: &Planned<'_>, route: &Route) -> f32 {
+    let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
+    let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
+    let lanes = (to - from + 1) as f32;
+    let stop_s = cruise_mps / ACCEL_MPS2;
+    // From one lane to the next it may be too short for that.
+    let step_m = planned.wanted.spacing.lane_m.min(cruise_mps * stop_s);
+    let step_s = 2.0 * (step_m / ACCEL_MPS2).sqrt() - step_m / cruise_mps;
+    (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
 }
 
 /// A lane that takes longer than a battery lasts.

@@ -89,8 +89,8 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
-        let lasts_s = sorties::lasts_s(vehicle);
-        if route.cost_s > USABLE_CHARGE * lasts_s {
+        let (lasts_s, takes_s) = (sorties::lasts_s(vehicle), sorties::flown_s(planned, route));
+        if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.wanted.batteries {
                 true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
                 false => {
@@ -102,7 +102,7 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
                  for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
                 planned.scenario.vehicle_places[index],
                 vehicle.id,
-                route.cost_s,
+                takes_s,
                 100.0 * (1.0 - USABLE_CHARGE)
             );
         }

@@ -8,10 +8,9 @@ use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use serde::Serialize;
-
 use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT};
 use super::cpp_figures;
+use super::cpp_rows::{Row, Summary};
 use crate::commands::cover;
 use crate::coverage::check::check_plan;
 use crate::coverage::{Planned, page};
@@ -39,44 +38,6 @@ const FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
 /// Plans of each kind that are timed.
 const RUNS: usize = 51;
-
-/// One line of a table.
-#[derive(Debug, Serialize)]
-pub(super) struct Row {
-    table: String,
-    /// Which track, of A1 to A12.
-    #[serde(skip)]
-    pub(super) track: Option<&'static str>,
-    pub(super) method: &'static str,
-    pub(super) lane_m: f64,
-    pub(super) height_m: f64,
-    unit: &'static str,
-    pub(super) ours: Vec<f64>,
-    theirs: Vec<f64>,
-    pub(super) ours_summary: Option<Summary>,
-    pub(super) theirs_summary: Option<Summary>,
-}
-
-/// Max, Av, SD and CV.
-#[derive(Clone, Copy, Debug, Serialize)]
-pub(super) struct Summary {
-    max: f64,
-    pub(super) mean: f64,
-    sd: f64,
-    pub(super) cv_percent: f64,
-}
-
-impl Summary {
-    fn of(values: &[f64]) -> Self {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        let sd = (squares / (count - 1.0)).sqrt();
-        let short = |value: f64| rounded(value as f32);
-        let max = values.iter().copied().fold(0.0, f64::max);
-        Self { max, mean: short(mean), sd: short(sd), cv_percent: short(100.0 * sd / mean) }
-    }
-}
 
 /// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
 fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Scenario> {

@@ -4,7 +4,7 @@
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
 
-use super::cpp::{Row, Summary};
+use super::cpp_rows::{Row, Summary};
 use crate::coverage::Planned;
 use crate::report::{Chart, Figure, MapRoute, Panel, RouteMap, Series};
 use crate::result::rounded;

@@ -3,3 +3,4 @@
 pub mod cpp;
 mod cpp_data;
 mod cpp_figures;
+mod cpp_rows;

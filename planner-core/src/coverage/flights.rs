@@ -18,7 +18,7 @@ use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWork
 use crate::sort;
 
 /// Braking and accelerating that is planned with, m/s².
-const ACCEL_MPS2: f32 = 1.5;
+pub const ACCEL_MPS2: f32 = 1.5;
 /// Longest path of a vehicle that shares the area with others, metres: they tell each other their places in 16 bits, decimetres.
 pub const FURTHEST_M: f32 = 6_553.0;
 

@@ -1,0 +1,43 @@
+//! The lines of CPP's tables: what it printed beside ours.
+
+use serde::Serialize;
+
+use crate::result::rounded;
+
+/// One line of a table.
+#[derive(Debug, Serialize)]
+pub(super) struct Row {
+    pub(super) table: String,
+    /// Which track, of A1 to A12.
+    #[serde(skip)]
+    pub(super) track: Option<&'static str>,
+    pub(super) method: &'static str,
+    pub(super) lane_m: f64,
+    pub(super) height_m: f64,
+    pub(super) unit: &'static str,
+    pub(super) ours: Vec<f64>,
+    pub(super) theirs: Vec<f64>,
+    pub(super) ours_summary: Option<Summary>,
+    pub(super) theirs_summary: Option<Summary>,
+}
+
+/// Max, Av, SD and CV.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(super) struct Summary {
+    pub(super) max: f64,
+    pub(super) mean: f64,
+    pub(super) sd: f64,
+    pub(super) cv_percent: f64,
+}
+
+impl Summary {
+    pub(super) fn of(values: &[f64]) -> Self {
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        let sd = (squares / (count - 1.0)).sqrt();
+        let short = |value: f64| rounded(value as f32);
+        let max = values.iter().copied().fold(0.0, f64::max);
+        Self { max, mean: short(mean), sd: short(sd), cv_percent: short(100.0 * sd / mean) }
+    }
+}
