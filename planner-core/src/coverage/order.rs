@@ -1,6 +1,7 @@
 //! The order in which lanes are flown, and each one's direction: the shortest way from lane to lane.
 //!
-//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1). Elsewhere a first order takes the
+//! A convex area has one lane a strip, and they are flown back and forth (CPP §3.2.1), from the end where that joins them by
+//! less. Elsewhere a first order takes the
 //! nearest end each time; then parts are turned round (2-opt) and up to three lanes moved (Or-opt) as long as that
 //! shortens the way, or until the looks are used up. Both ends of the way are free. O(n²) distances a round, bounded by
 //! `looks`.
@@ -17,7 +18,8 @@ const MOVED: usize = 3;
 /// Sorts lanes into the order and the directions in which they are flown.
 pub(super) fn sort<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>, looks: u32) {
     if lanes.windows(2).all(|pair| pair[0].strip < pair[1].strip) {
-        for lane in lanes.iter_mut().skip(1).step_by(2) {
+        let first = usize::from(!first_turned(lanes));
+        for lane in lanes.iter_mut().skip(first).step_by(2) {
             lane.turn();
         }
         return;
@@ -25,6 +27,16 @@ pub(super) fn sort<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>,
     nearest_first(lanes, transit);
     let mut search = Search { transit, looks };
     while search.turn_parts(lanes) | search.move_lanes(lanes) {}
+}
+
+/// Whether lanes in a row, flown back and forth, are joined by less if the first one is turned.
+fn first_turned(lanes: &[Lane]) -> bool {
+    let mut gain_m = 0.0;
+    for (i, pair) in lanes.windows(2).enumerate() {
+        let longer_m = (pair[1].to - pair[0].to).norm() - (pair[1].from - pair[0].from).norm();
+        gain_m += if i % 2 == 0 { longer_m } else { -longer_m };
+    }
+    gain_m > GAIN_M
 }
 
 /// From the first lane on, always the nearest end.
@@ -157,3 +169,6 @@ fn turn(lanes: &mut [Lane]) {
         lane.turn();
     }
 }
+
+#[cfg(test)]
+mod tests;
