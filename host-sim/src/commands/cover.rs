@@ -1,9 +1,11 @@
 //! `host-sim cover`: a fleet's plan to photograph an area; no flight.
 
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::time::Instant;
 
+use anyhow::Context;
 use serde::Serialize;
 
 use crate::coverage::check::{self, Findings};
@@ -11,6 +13,7 @@ use crate::coverage::sorties::Sortie;
 use crate::coverage::{self, Flight, Planned, export, page};
 use crate::files::Results;
 use crate::output;
+use crate::quote::quoted_path;
 use crate::report;
 use crate::result::{self, CoverageResult, RoadmapSize, Safety, Timing, Totals, VehicleResult, rounded};
 use crate::say;
@@ -62,7 +65,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let flights = planned.flights();
     let findings = check::check(&planned, &check::flown(&planned, &flights));
     let result = described(&planned, &findings);
-    add_flights(&planned, &flights, &mut results)?;
+    let written = add_flights(&planned, &flights, &mut results)?;
     results.add(output::NAMES[0], result::json(&result)?.as_bytes())?;
     let timing = Timing {
         search_s: planned.seconds[0] + planned.seconds[1],
@@ -76,6 +79,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     page.timing = Some(serde_json::to_value(&timing)?);
     results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
     results.keep()?;
+    remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -87,7 +91,13 @@ fn files(scenario: &Scenario) -> Vec<String> {
     scenario.vehicles.iter().flat_map(|vehicle| own(vehicle.id)).chain(shared).collect()
 }
 
-fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results) -> anyhow::Result<()> {
+/// Adds the plans of all flights and what is beside them; returns the names of the plans.
+fn add_flights(
+    planned: &Planned<'_>,
+    flights: &[Flight],
+    results: &mut Results,
+) -> anyhow::Result<Vec<String>> {
+    let mut written = Vec::new();
     for (sortie, stops, _) in flights {
         let route = &sortie.route;
         let id = planned.scenario.vehicles[usize::from(route.vehicle)].id;
@@ -97,12 +107,36 @@ fn add_flights(planned: &Planned<'_>, flights: &[Flight], results: &mut Results)
         };
         let items = export::items(planned, sortie, stops);
         let plan = result::json(&export::plan(planned, route, &items))?;
-        results.add(&format!("{name}.plan"), plan.as_bytes())?;
         let waypoints = export::waypoints(planned, route, &items);
-        results.add(&format!("{name}.waypoints"), waypoints.as_bytes())?;
+        for (kind, text) in [("plan", plan), ("waypoints", waypoints)] {
+            written.push(format!("{name}.{kind}"));
+            results.add(&format!("{name}.{kind}"), text.as_bytes())?;
+        }
     }
     results.add("waypoints.csv", export::csv(planned, flights).as_bytes())?;
-    results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())
+    results.add("area.geojson", result::json(&export::geojson(planned, flights))?.as_bytes())?;
+    Ok(written)
+}
+
+/// Removes the plans of an earlier run that this one did not write: nobody is to upload one of them with the others.
+fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
+    let number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
+    let is_plan = |name: &str| {
+        let stem = name.strip_suffix(".plan").or_else(|| name.strip_suffix(".waypoints"));
+        stem.and_then(|stem| stem.strip_prefix("vehicle-")).is_some_and(|ids| {
+            ids.split_once("-sortie-").map_or(number(ids), |(id, sortie)| number(id) && number(sortie))
+        })
+    };
+    for entry in fs::read_dir(dir)? {
+        let entry = entry?;
+        let name = entry.file_name();
+        let stale = |name: &str| is_plan(name) && !written.iter().any(|own| own == name);
+        if entry.file_type()?.is_file() && name.to_str().is_some_and(stale) {
+            let path = entry.path();
+            fs::remove_file(&path).with_context(|| format!("cannot remove: {}", quoted_path(&path)))?;
+        }
+    }
+    Ok(())
 }
 
 /// What `result.json` says of a plan.
@@ -210,4 +244,29 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
         result.method
     );
     say!("report     {}", dir.join("report.html").display());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn plans_of_an_earlier_run_are_removed_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let kept = [
+            "vehicle-1-sortie-1.plan",
+            "vehicle-1-sortie-1.waypoints",
+            "vehicle-x.plan",
+            "my.plan",
+            "vehicle-1.txt",
+        ];
+        let stale = ["vehicle-1.plan", "vehicle-1.waypoints", "vehicle-2-sortie-3.plan"];
+        for name in kept.iter().chain(&stale) {
+            fs::write(folder.path().join(name), name).unwrap();
+        }
+        let written: Vec<String> = kept[..2].iter().map(|name| (*name).to_owned()).collect();
+        remove_stale(folder.path(), &written).unwrap();
+        let there = |name: &&str| folder.path().join(name).exists();
+        assert!(kept.iter().all(|name| there(name)) && !stale.iter().any(|name| there(name)));
+    }
 }
