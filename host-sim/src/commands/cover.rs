@@ -267,6 +267,6 @@ mod tests {
         let written: Vec<String> = kept[..2].iter().map(|name| (*name).to_owned()).collect();
         remove_stale(folder.path(), &written).unwrap();
         let there = |name: &&str| folder.path().join(name).exists();
-        assert!(kept.iter().all(|name| there(name)) && !stale.iter().any(|name| there(name)));
+        assert!(kept.iter().all(&there) && !stale.iter().any(there));
     }
 }
