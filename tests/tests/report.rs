@@ -292,7 +292,7 @@ start = [10, -20, 0]
 id = 3
 start = [20, -20, 0]
 [[faults]]
-at_s = 70.0
+at_s = 90.0
 kind = "kill"
 vehicle = 2
 "#;
@@ -324,7 +324,7 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     let all: u64 = waypoints(plan).iter().map(|(_, count)| count).sum();
     assert_eq!(all, data["result"]["coverage"]["waypoints"].as_u64().expect("a number"));
     // The loss is seen no sooner than 45 s after it; what the lost one left has others now.
-    assert!(after["t_s"].as_f64().expect("a time") > 70.0 + 45.0);
+    assert!(after["t_s"].as_f64().expect("a time") > 90.0 + 45.0);
     assert_eq!((&plan["lost"], &after["lost"]), (&json!([]), &json!([2])));
     let taken = after["taken"].as_array().expect("what changed hands").iter();
     let of_lost = taken.filter(|taken| taken["from"] == 2).map(|taken| taken["waypoints"].as_u64());
@@ -332,7 +332,7 @@ fn page_of_a_coverage_flight_shows_who_photographs_what_after_a_loss() {
     assert!(of_lost > 20 && of_lost < waypoints(plan)[1].1, "{of_lost}");
     let Some(chromium) = chromium() else { return };
     let (before, later) =
-        (open(&chromium, &page, "#t=60&view=top"), open(&chromium, &page, "#t=200&view=top"));
+        (open(&chromium, &page, "#t=60&view=top"), open(&chromium, &page, "#t=220&view=top"));
     assert_eq!((before.count("divisions"), before.count("paths")), (2.0, 5.0));
     assert_eq!(before.count("footprints"), data["result"]["coverage"]["photos"].as_f64().expect("a number"));
     let now = |opened: &Opened| {
