@@ -24,4 +24,5 @@ pub mod roadmap;
 pub mod scenario;
 pub mod shortage;
 pub mod swarm;
+pub mod terrain;
 pub mod upload;

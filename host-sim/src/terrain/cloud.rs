@@ -1,0 +1,124 @@
+//! Point clouds: the highest return of a cell.
+//!
+//! Cells hold four returns on average, so that few have none; those between others take the highest near them. Returns
+//! that are marked as noise or withheld do not count.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+use las::{Header, PointDataBuilder, Reader};
+use planner_core::coverage::Flat;
+
+use super::crs::{Crs, System, wkt_height_unit_m};
+use super::geokeys::GeoKeys;
+use super::{Frame, HeightGrid, MOST_BYTES, TerrainError, claims, guard};
+use crate::files;
+
+const FORMAT: &str = "a point cloud";
+/// Returns in a cell, on average.
+const RETURNS: f64 = 4.0;
+/// Least side of a cell, metres.
+const LEAST_CELL_M: f64 = 0.5;
+/// Cells without returns are bridged over this many.
+const REACH: usize = 3;
+/// Returns read at a time.
+const BATCH: u64 = 4096;
+/// Classes of returns that are errors: low points and high noise.
+const NOISE: [u8; 2] = [7, 18];
+
+pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+    let length = files::regular(path)?;
+    if length > MOST_BYTES {
+        return Err(TerrainError::TooLong(length));
+    }
+    decode(BufReader::new(File::open(path)?), frame)
+}
+
+fn bad(why: &impl ToString) -> TerrainError {
+    TerrainError::malformed(FORMAT, why)
+}
+
+pub(super) fn decode<R>(mut file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
+where
+    R: Read + Seek + Send + Sync + 'static,
+{
+    claims::check(&mut file)?.map_err(|why| bad(&why))?;
+    let decoded = guard::caught(|| returns(file, frame));
+    decoded.unwrap_or_else(|| Err(bad(&"its returns are damaged")))
+}
+
+fn returns<R>(file: R, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError>
+where
+    R: Read + Seek + Send + Sync + 'static,
+{
+    let mut reader = Reader::new(file).map_err(|error| bad(&error))?;
+    let (crs, unit_m) = system(reader.header())?;
+    crs.check(frame.metres)?;
+    let mut grid = empty(reader.header(), &crs, frame)?;
+    let mut points = PointDataBuilder::new().for_header(reader.header()).build();
+    let most = reader.header().number_of_points();
+    let mut count = 0;
+    while count < most {
+        let read = reader.fill_points(BATCH.min(most - count), &mut points).map_err(|error| bad(&error))?;
+        if read == 0 {
+            return Err(bad(&format!("it has {count} returns, its header says {most}")));
+        }
+        count += read;
+        let places = points.x().zip(points.y()).zip(points.z()).zip(points.classification());
+        for (((x, y), z), class) in places {
+            if NOISE.contains(&class) || !z.is_finite() {
+                continue;
+            }
+            if let Some(place) = crs.to_mission(frame.origin, [x, y]) {
+                grid.raise(&place, (z * unit_m) as f32);
+            }
+        }
+    }
+    grid.bridge(REACH);
+    Ok(grid)
+}
+
+/// Where its numbers are, and metres in a unit of height: heights without a unit of their own are in that of the places.
+fn system(header: &Header) -> Result<(Crs, f64), TerrainError> {
+    let record = |id: u16| {
+        let found =
+            header.all_vlrs().find(|vlr| vlr.user_id.starts_with("LASF_Projection") && vlr.record_id == id);
+        found.map(|vlr| &vlr.data[..])
+    };
+    let text = record(2112).map(|bytes| String::from_utf8_lossy(bytes).trim_end_matches('\0').to_owned());
+    let directory =
+        record(34735).unwrap_or_default().chunks_exact(2).map(|b| u16::from_le_bytes([b[0], b[1]]));
+    let keys = GeoKeys::new(&directory.collect::<Vec<_>>());
+    let crs = match (&text, header.has_wkt_crs()) {
+        (Some(text), true) => Crs::Said(Box::new(System::wkt(text)?)),
+        _ => keys.crs(text.as_deref())?,
+    };
+    let said = match text.as_deref().and_then(wkt_height_unit_m) {
+        Some(unit_m) => Some(unit_m),
+        None => keys.height_unit_m()?,
+    };
+    let unit_m = said.unwrap_or(crs.height_unit_m());
+    if !(1e-3..=1e3).contains(&unit_m) {
+        return Err(TerrainError::system("heights in a unit of no length"));
+    }
+    Ok((crs, unit_m))
+}
+
+/// The grid that returns fall into.
+fn empty(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+    let bounds = header.bounds();
+    let (low, high) = ([bounds.min.x, bounds.min.y], [bounds.max.x, bounds.max.y]);
+    let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    let corners = corners.iter().filter_map(|corner| crs.to_mission(frame.origin, *corner));
+    let whole = corners.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])]);
+    let count = header.number_of_points();
+    let Some([low, high]) = whole.filter(|_| count > 0) else {
+        return HeightGrid::new([Flat::zeros(); 2], 1.0);
+    };
+    let sides = high - low;
+    let cell_m = (f64::from(sides.x) * f64::from(sides.y) * RETURNS / count as f64).sqrt().max(LEAST_CELL_M);
+    // The last return is in a cell too.
+    let beyond = Flat::repeat(cell_m as f32 / 2.0);
+    HeightGrid::new(frame.window.unwrap_or([low - beyond, high + beyond]), cell_m as f32)
+}

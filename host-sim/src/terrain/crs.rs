@@ -1,0 +1,170 @@
+//! Coordinate systems: from a file's numbers to the mission frame and back.
+
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
+use proj4rs::Proj;
+use proj4rs::transform::transform;
+
+use super::TerrainError;
+use super::error::WARP;
+
+/// Metres in a foot.
+pub(super) const FOOT_M: f64 = 0.3048;
+/// Metres in a foot of the US survey.
+pub(super) const US_FOOT_M: f64 = 1200.0 / 3937.0;
+
+/// What a file's numbers are.
+#[derive(Debug)]
+pub(super) enum Crs {
+    /// It does not say.
+    Unsaid,
+    /// What it says.
+    Said(Box<System>),
+}
+
+/// A coordinate system.
+#[derive(Debug)]
+pub(super) struct System {
+    own: Proj,
+    wgs84: Proj,
+    /// Metres in a unit of length across; none of degrees.
+    pub unit_m: Option<f64>,
+}
+
+impl System {
+    /// By its number in the EPSG register.
+    pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
+        let name = format!("EPSG:{code}");
+        let Some(found) = crs_definitions::from_code(code) else { return Err(TerrainError::system(&name)) };
+        Self::proj(found.proj4, &name)
+    }
+
+    /// Written out.
+    pub(super) fn wkt(text: &str) -> Result<Self, TerrainError> {
+        let name: String = text.split('"').nth(1).unwrap_or("an unnamed system").to_owned();
+        let unusable = || TerrainError::system(&name);
+        // What is said of heights stands beside it: only what is said of places is parsed.
+        let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
+        let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
+        let proj = proj4wkt::wkt_to_projstring(balanced(&text[start..])).map_err(|_| unusable())?;
+        Self::proj(&proj, &name)
+    }
+
+    fn proj(definition: &str, name: &str) -> Result<Self, TerrainError> {
+        let unusable = || TerrainError::system(name);
+        // A shift by a grid that is not here would be left out in silence.
+        if ["+datum=NAD27", "+nadgrids=@", "+geoidgrids"].iter().any(|shift| definition.contains(shift))
+            && !definition.contains("+nadgrids=@null")
+        {
+            return Err(unusable());
+        }
+        let own = Proj::from_proj_string(definition).map_err(|_| unusable())?;
+        let wgs84 = Proj::from_proj_string("+proj=longlat +datum=WGS84 +no_defs").map_err(|_| unusable())?;
+        if own.is_geocent() || !own.is_normalized_axis() || !own.has_inverse() {
+            return Err(unusable());
+        }
+        let unit_m = (!own.is_latlong()).then(|| own.to_meter());
+        Ok(Self { own, wgs84, unit_m })
+    }
+
+    pub(super) fn to_degrees(&self, [x, y]: [f64; 2]) -> Option<[f64; 2]> {
+        let mut place = match self.unit_m {
+            Some(_) => (x, y, 0.0),
+            None => (x.to_radians(), y.to_radians(), 0.0),
+        };
+        transform(&self.own, &self.wgs84, &mut place).ok()?;
+        let found = [place.0.to_degrees(), place.1.to_degrees()];
+        found.iter().all(|degrees| degrees.is_finite()).then_some(found)
+    }
+
+    fn of_degrees(&self, [lon, lat]: [f64; 2]) -> Option<[f64; 2]> {
+        let mut place = (lon.to_radians(), lat.to_radians(), 0.0);
+        transform(&self.wgs84, &self.own, &mut place).ok()?;
+        let found = match self.unit_m {
+            Some(_) => [place.0, place.1],
+            None => [place.0.to_degrees(), place.1.to_degrees()],
+        };
+        found.iter().all(|number| number.is_finite()).then_some(found)
+    }
+}
+
+impl Crs {
+    /// Refuses what cannot be placed.
+    pub(super) fn check(&self, metres: bool) -> Result<(), TerrainError> {
+        match self {
+            Self::Unsaid if !metres => Err(TerrainError::Nowhere(
+                "a .prj beside an .asc or gdal_translate -a_srs say it; in a mission with coordinates = \"metres\" its numbers \
+                 are metres about the origin",
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Metres in a unit of height, where the file gives heights no unit of their own: the unit across, or metres beside degrees.
+    pub(super) fn height_unit_m(&self) -> f64 {
+        match self {
+            Self::Unsaid => 1.0,
+            Self::Said(system) => system.unit_m.unwrap_or(1.0),
+        }
+    }
+
+    /// A place in the mission frame, metres; none where the system does not reach.
+    pub(super) fn to_mission(&self, origin: &Geodetic, place: [f64; 2]) -> Option<Flat> {
+        match self {
+            Self::Unsaid => Some(Flat::new(place[0] as f32, place[1] as f32)),
+            Self::Said(system) => {
+                let [lon_deg, lat_deg] = system.to_degrees(place)?;
+                let place = Geodetic { lat_deg, lon_deg, alt_m: origin.alt_m };
+                place.is_valid().then(|| geodetic_to_enu(origin, &place).xy())
+            }
+        }
+    }
+
+    /// The file's numbers of a place in the mission frame.
+    pub(super) fn of_mission(&self, origin: &Geodetic, place: &Flat) -> Option<[f64; 2]> {
+        match self {
+            Self::Unsaid => Some([f64::from(place.x), f64::from(place.y)]),
+            Self::Said(system) => {
+                // At the origin's altitude there, not on the plane that touches the earth at the origin.
+                let mut up_m = 0.0;
+                let mut found = *origin;
+                for _ in 0..3 {
+                    found = enu_to_geodetic(origin, &Point::new(place.x, place.y, up_m));
+                    up_m -= (found.alt_m - origin.alt_m) as f32;
+                }
+                system.of_degrees([found.lon_deg, found.lat_deg])
+            }
+        }
+    }
+}
+
+/// Metres in a unit, by its number in the EPSG register.
+pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
+    match code {
+        9001 => Ok(1.0),
+        9002 => Ok(FOOT_M),
+        9003 => Ok(US_FOOT_M),
+        other => Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP }),
+    }
+}
+
+/// Metres in a unit of height, as well-known text says it: none where it says nothing.
+pub(super) fn wkt_height_unit_m(text: &str) -> Option<f64> {
+    let start = ["VERT_CS", "VERTCS", "VERTCRS"].iter().find_map(|word| text.find(word))?;
+    let part = balanced(&text[start..]);
+    let unit = &part[part.rfind("UNIT[")?..];
+    unit.split(',').nth(1)?.trim_matches([']', ' ']).parse().ok()
+}
+
+/// A text up to the bracket that closes its first one.
+fn balanced(text: &str) -> &str {
+    let mut depth = 0;
+    for (at, c) in text.char_indices() {
+        depth += i32::from(c == '[') - i32::from(c == ']');
+        if c == ']' && depth == 0 {
+            return &text[..=at];
+        }
+    }
+    text
+}

@@ -1,0 +1,82 @@
+//! The keys by which GeoTIFF, and point clouds before LAS 1.4, say where their numbers are.
+
+use super::TerrainError;
+use super::crs::{Crs, System, unit_m};
+use super::error::WARP;
+
+const MODEL: u16 = 1024;
+const RASTER: u16 = 1025;
+const GEOGRAPHIC: u16 = 2048;
+const PROJECTED: u16 = 3072;
+const LENGTH_UNIT: u16 = 3076;
+const VERTICAL: u16 = 4096;
+const HEIGHT_UNIT: u16 = 4099;
+/// "Written out in other keys".
+const OWN: u16 = 32767;
+/// Heights above sea level in metres, as countries and the earth have them.
+const METRES: [u16; 18] = [
+    3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647, 7837,
+    9274,
+];
+/// The same in feet, international and of the US survey.
+const FEET: [u16; 1] = [8228];
+const US_FEET: [u16; 1] = [6360];
+
+/// What the keys say.
+#[derive(Debug)]
+pub(super) struct GeoKeys(Vec<(u16, u16)>);
+
+impl GeoKeys {
+    /// From the directory: four numbers, then four a key. Keys whose values stand elsewhere are passed over: none of those
+    /// used do.
+    pub(super) fn new(directory: &[u16]) -> Self {
+        let entries = directory.chunks_exact(4).skip(1);
+        Self(entries.filter(|entry| entry[1] == 0).map(|entry| (entry[0], entry[3])).collect())
+    }
+
+    fn get(&self, key: u16) -> Option<u16> {
+        self.0.iter().find(|(own, _)| *own == key).map(|(_, value)| *value)
+    }
+
+    /// Whether a raster's place is that of its first cell's middle.
+    pub(super) fn points(&self) -> bool {
+        self.get(RASTER) == Some(2)
+    }
+
+    /// The coordinate system. One that is written out in keys is in `wkt` too, or not used.
+    pub(super) fn crs(&self, wkt: Option<&str>) -> Result<Crs, TerrainError> {
+        let (projected, geographic) = (self.get(PROJECTED), self.get(GEOGRAPHIC));
+        let system = match (self.get(MODEL), projected, geographic) {
+            (Some(1), Some(code), _) if code != OWN => System::epsg(code)?,
+            (Some(2), _, Some(code)) if code != OWN => System::epsg(code)?,
+            (Some(3), ..) => return Err(TerrainError::system("coordinates about the middle of the earth")),
+            _ => match wkt {
+                Some(wkt) => System::wkt(wkt)?,
+                None if self.0.is_empty() => return Ok(Crs::Unsaid),
+                None => return Err(TerrainError::system("a system of its own")),
+            },
+        };
+        let said = self.get(LENGTH_UNIT).filter(|code| *code != OWN).map(unit_m).transpose()?;
+        if let (Some(said), Some(known)) = (said, system.unit_m)
+            && (said - known).abs() > 1e-6
+        {
+            let what = format!("units of {said} m, its coordinate system in units of {known} m");
+            return Err(TerrainError::System { what, hint: WARP });
+        }
+        Ok(Crs::Said(Box::new(system)))
+    }
+
+    /// Metres in a unit of height, where the keys say it.
+    pub(super) fn height_unit_m(&self) -> Result<Option<f64>, TerrainError> {
+        if let Some(code) = self.get(HEIGHT_UNIT) {
+            return unit_m(code).map(Some);
+        }
+        match self.get(VERTICAL) {
+            None => Ok(None),
+            Some(code) if METRES.contains(&code) => Ok(Some(1.0)),
+            Some(code) if FEET.contains(&code) => Ok(Some(super::crs::FOOT_M)),
+            Some(code) if US_FEET.contains(&code) => Ok(Some(super::crs::US_FOOT_M)),
+            Some(code) => Err(TerrainError::system(&format!("heights of EPSG:{code} without their unit"))),
+        }
+    }
+}

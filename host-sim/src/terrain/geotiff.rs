@@ -1,0 +1,156 @@
+//! GeoTIFF: one band of heights, in strips or tiles, raw, deflate or LZW.
+
+use std::fs::File;
+use std::io::{BufReader, Read, Seek};
+use std::path::Path;
+
+use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::tags::Tag;
+use tiff::{ColorType, TiffError};
+
+use super::crs::Crs;
+use super::geokeys::GeoKeys;
+use super::raster::Raster;
+use super::{MOST_BYTES, MOST_CELLS, TerrainError};
+use crate::files;
+
+const FORMAT: &str = "a GeoTIFF";
+/// Longest strip or tile, bytes.
+const MOST_CHUNK: usize = 1 << 27;
+
+pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
+    let length = files::regular(path)?;
+    if length > MOST_BYTES {
+        return Err(TerrainError::TooLong(length));
+    }
+    decode(BufReader::new(File::open(path)?))
+}
+
+fn bad(why: &impl ToString) -> TerrainError {
+    TerrainError::malformed(FORMAT, why)
+}
+
+fn malformed(error: TiffError) -> TerrainError {
+    match error {
+        TiffError::IoError(error) if error.kind() != std::io::ErrorKind::UnexpectedEof => error.into(),
+        other => bad(&other),
+    }
+}
+
+pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
+    let mut limits = Limits::default();
+    limits.decoding_buffer_size = MOST_CHUNK;
+    limits.intermediate_buffer_size = MOST_CHUNK;
+    limits.ifd_value_size = 1 << 24;
+    let mut decoder = Decoder::new(file).map_err(malformed)?.with_limits(limits);
+    let (columns, rows) = decoder.dimensions().map_err(malformed)?;
+    let (columns, rows) = (columns as usize, rows as usize);
+    if columns.saturating_mul(rows) > MOST_CELLS {
+        return Err(TerrainError::TooManyCells(columns as u128 * rows as u128));
+    }
+    if columns == 0 || rows == 0 {
+        return Err(bad(&"it has no cells"));
+    }
+    match decoder.colortype().map_err(malformed)? {
+        ColorType::Gray(_) => {}
+        other => return Err(bad(&format!("it has colours ({other:?}), not one height a cell"))),
+    }
+    let keys = decoder.find_tag_unsigned_vec(Tag::GeoKeyDirectoryTag).map_err(malformed)?;
+    let keys = GeoKeys::new(&keys.unwrap_or_default());
+    let crs = keys.crs(None)?;
+    let unit_m = match (keys.height_unit_m()?, &crs) {
+        (Some(unit_m), _) => unit_m,
+        (None, Crs::Said(system)) if system.unit_m.is_some_and(|unit_m| unit_m != 1.0) => {
+            let hint = "gdal_edit.py -a_srs EPSG:2994+8228, with your numbers, says the unit of its heights";
+            return Err(TerrainError::System {
+                what: "feet, and does not say whether its heights are".to_owned(),
+                hint,
+            });
+        }
+        (None, _) => 1.0,
+    };
+    let missing = decoder.find_tag(Tag::GdalNodata).map_err(malformed)?;
+    let missing = missing.and_then(|value| value.into_string().ok());
+    let missing: Option<f64> = missing.and_then(|text| text.trim_matches(['\0', ' ']).parse().ok());
+    let (corner, cell) = georeference(&mut decoder, keys.points())?;
+    let value_m = |value: f64| match missing.is_some_and(|missing| same(value, missing)) || !value.is_finite()
+    {
+        true => f32::NAN,
+        false => (value * unit_m) as f32,
+    };
+    let mut heights_m = vec![f32::NAN; columns * rows];
+    let (wide, tall) = decoder.chunk_dimensions();
+    let (wide, tall) = (wide.max(1) as usize, tall.max(1) as usize);
+    let across = columns.div_ceil(wide);
+    for chunk in 0..across * rows.div_ceil(tall) {
+        let (own_wide, own_tall) = decoder.chunk_data_dimensions(chunk as u32);
+        let (own_wide, own_tall) = (own_wide as usize, own_tall as usize);
+        let values = decoder.read_chunk(chunk as u32).map_err(malformed)?;
+        let (left, top) = (chunk % across * wide, chunk / across * tall);
+        let mut values = numbers(values)?;
+        for row in top..(top + own_tall).min(rows) {
+            for column in left..left + own_wide {
+                let Some(value) = values.next() else { return Err(bad(&"a part of it ends early")) };
+                if column < columns {
+                    heights_m[row * columns + column] = value_m(value);
+                }
+            }
+        }
+    }
+    Ok(Raster { crs, columns, rows, corner, cell, heights_m })
+}
+
+/// A float's missing value is written in decimals.
+fn same(value: f64, missing: f64) -> bool {
+    value == missing || value as f32 == missing as f32
+}
+
+/// Where the first cell's corner is, and how large cells are.
+fn georeference<R: Read + Seek>(
+    decoder: &mut Decoder<R>,
+    points: bool,
+) -> Result<([f64; 2], [f64; 2]), TerrainError> {
+    let mut tag = |tag: Tag| -> Result<Option<Vec<f64>>, TerrainError> {
+        let found = decoder.find_tag(tag).map_err(malformed)?;
+        found.map(|value| value.into_f64_vec().map_err(malformed)).transpose()
+    };
+    let scale = tag(Tag::ModelPixelScaleTag)?;
+    let tie = tag(Tag::ModelTiepointTag)?;
+    let (mut corner, cell) = match (scale.as_deref(), tie.as_deref()) {
+        (Some([dx, dy, ..]), Some([column, row, _, x, y, ..])) => {
+            ([x - column * dx, y + row * dy], [*dx, *dy])
+        }
+        _ => match tag(Tag::ModelTransformationTag)?.as_deref() {
+            Some([a, b, _, x, c, d, _, y, ..]) => {
+                if *b != 0.0 || *c != 0.0 || *d > 0.0 {
+                    return Err(TerrainError::system("rows that do not run from west to east"));
+                }
+                ([*x, *y], [*a, -d])
+            }
+            _ => {
+                return Err(TerrainError::Nowhere("gdal_translate -a_ullr -a_srs says it"));
+            }
+        },
+    };
+    if !cell.iter().all(|side| *side > 0.0 && side.is_finite()) || !corner.iter().all(|at| at.is_finite()) {
+        return Err(bad(&"its cells have no size or place"));
+    }
+    if points {
+        corner = [corner[0] - cell[0] / 2.0, corner[1] + cell[1] / 2.0];
+    }
+    Ok((corner, cell))
+}
+
+fn numbers(values: DecodingResult) -> Result<Box<dyn Iterator<Item = f64>>, TerrainError> {
+    Ok(match values {
+        DecodingResult::U8(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::I8(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::U16(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::I16(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::U32(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::I32(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::F32(v) => Box::new(v.into_iter().map(f64::from)),
+        DecodingResult::F64(v) => Box::new(v.into_iter()),
+        _ => return Err(bad(&"its heights are no numbers of 8, 16, 32 or 64 bits")),
+    })
+}

@@ -1,0 +1,168 @@
+//! Heights in the mission frame: cells of a grid, each with one height or none.
+
+use planner_core::coverage::Flat;
+
+use super::{MOST_CELLS, TerrainError};
+
+/// Heights of the ground. Cell (0, 0) has the least east and north.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightGrid {
+    low: Flat,
+    cell_m: f32,
+    size: [usize; 2],
+    /// Row by row, metres; NaN in holes.
+    heights_m: Vec<f32>,
+}
+
+/// What the cells of a box hold.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Heights {
+    /// The greatest height, metres, where there is one.
+    pub highest_m: Option<f32>,
+    /// Whether a cell has none, or the box is wider than the grid.
+    pub holes: bool,
+}
+
+impl HeightGrid {
+    /// A grid over a box, all holes.
+    ///
+    /// # Errors
+    /// It has more cells than are held, or the box is none.
+    pub fn new([low, high]: [Flat; 2], cell_m: f32) -> Result<Self, TerrainError> {
+        let sides = high - low;
+        let sound = cell_m > 0.0 && cell_m.is_finite() && sides.x >= 0.0 && sides.y >= 0.0;
+        if !sound || !sides.x.is_finite() || !sides.y.is_finite() {
+            return Err(TerrainError::malformed("a height map", &"its cells have no size"));
+        }
+        let count = |side: f32| (f64::from(side) / f64::from(cell_m)).ceil().max(1.0);
+        let (columns, rows) = (count(sides.x), count(sides.y));
+        if columns * rows > MOST_CELLS as f64 {
+            return Err(TerrainError::TooManyCells((columns * rows) as u128));
+        }
+        let size = [columns as usize, rows as usize];
+        Ok(Self { low, cell_m, size, heights_m: vec![f32::NAN; size[0] * size[1]] })
+    }
+
+    /// Side of a cell, metres.
+    pub fn cell_m(&self) -> f32 {
+        self.cell_m
+    }
+
+    /// Cells east and north.
+    pub fn size(&self) -> [usize; 2] {
+        self.size
+    }
+
+    /// Its least and its greatest corner, metres.
+    pub fn bounds(&self) -> [Flat; 2] {
+        let sides = Flat::new(self.size[0] as f32, self.size[1] as f32) * self.cell_m;
+        [self.low, self.low + sides]
+    }
+
+    /// The middle of a cell.
+    pub fn middle(&self, [column, row]: [usize; 2]) -> Flat {
+        self.low + Flat::new(column as f32 + 0.5, row as f32 + 0.5) * self.cell_m
+    }
+
+    /// Its height.
+    pub fn height(&self, [column, row]: [usize; 2]) -> Option<f32> {
+        let height_m = *self.heights_m.get(row * self.size[0] + column)?;
+        (column < self.size[0] && !height_m.is_nan()).then_some(height_m)
+    }
+
+    /// Number of cells with a height.
+    pub fn count(&self) -> usize {
+        self.heights_m.iter().filter(|height_m| !height_m.is_nan()).count()
+    }
+
+    /// The lowest and the highest of all.
+    pub fn range_m(&self) -> Option<[f32; 2]> {
+        let known = || self.heights_m.iter().copied().filter(|height_m| !height_m.is_nan());
+        Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
+    }
+
+    /// The height at a place, metres: that of the cell it is in; none in holes and outside.
+    pub fn height_at(&self, place: &Flat) -> Option<f32> {
+        self.cell_of(place).and_then(|cell| self.height(cell))
+    }
+
+    /// What the cells hold that a box touches.
+    pub fn highest(&self, low: &Flat, high: &Flat) -> Heights {
+        let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
+        let mut found = Heights::default();
+        let mut ranges = [(0, 0); 2];
+        for axis in 0..2 {
+            let (from, to) = (index(low[axis], self.low[axis]), index(high[axis], self.low[axis]));
+            let most = self.size[axis] as f32 - 1.0;
+            // The last place of the grid is in its last cell.
+            let over = high[axis] > self.bounds()[1][axis];
+            found.holes |= from < 0.0 || over || from > most;
+            if to < 0.0 || from > most || from > to {
+                return Heights { highest_m: None, holes: true };
+            }
+            ranges[axis] = (from.max(0.0) as usize, to.min(most) as usize);
+        }
+        for row in ranges[1].0..=ranges[1].1 {
+            for column in ranges[0].0..=ranges[0].1 {
+                match self.height([column, row]) {
+                    Some(height_m) => {
+                        let highest_m = found.highest_m.map_or(height_m, |other| other.max(height_m));
+                        found.highest_m = Some(highest_m);
+                    }
+                    None => found.holes = true,
+                }
+            }
+        }
+        found
+    }
+
+    /// The same heights above another zero.
+    pub fn above(mut self, zero_m: f64) -> Self {
+        for height_m in &mut self.heights_m {
+            *height_m = (f64::from(*height_m) - zero_m) as f32;
+        }
+        self
+    }
+
+    fn cell_of(&self, place: &Flat) -> Option<[usize; 2]> {
+        let cell = (place - self.low) / self.cell_m;
+        let inside = (0..2).all(|axis| cell[axis] >= 0.0 && cell[axis] < self.size[axis] as f32);
+        inside.then(|| [cell.x as usize, cell.y as usize])
+    }
+
+    /// Raises the cell of a place to a height; whether the place is in the grid.
+    pub(super) fn raise(&mut self, place: &Flat, height_m: f32) -> bool {
+        let Some([column, row]) = self.cell_of(place) else { return false };
+        let own = &mut self.heights_m[row * self.size[0] + column];
+        // The greater, and a hole takes any.
+        *own = own.max(height_m);
+        true
+    }
+
+    /// Gives holes that lie between cells with heights, at most `reach` away on both sides, the greatest height so near.
+    pub(super) fn bridge(&mut self, reach: usize) {
+        let before = self.clone();
+        let [columns, rows] = self.size;
+        for row in 0..rows {
+            for column in 0..columns {
+                if before.height([column, row]).is_some() {
+                    continue;
+                }
+                let known = |range: std::ops::RangeInclusive<usize>, fixed: usize, across: bool| {
+                    range
+                        .into_iter()
+                        .any(|k| before.height(if across { [k, fixed] } else { [fixed, k] }).is_some())
+                };
+                let (left, right) = (column.saturating_sub(reach), (column + reach).min(columns - 1));
+                let (down, up) = (row.saturating_sub(reach), (row + reach).min(rows - 1));
+                let across = known(left..=column, row, true) && known(column..=right, row, true);
+                let along = known(down..=row, column, false) && known(row..=up, column, false);
+                if across || along {
+                    let near = (down..=up).flat_map(|r| (left..=right).map(move |c| [c, r]));
+                    let highest = near.filter_map(|cell| before.height(cell)).reduce(f32::max);
+                    self.heights_m[row * columns + column] = highest.unwrap_or(f32::NAN);
+                }
+            }
+        }
+    }
+}

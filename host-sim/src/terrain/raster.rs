@@ -1,0 +1,121 @@
+//! Rows of cells in a file's own coordinates, laid out in the mission frame.
+//!
+//! A cell of the grid has the height of the file's cell at its middle, or a greater one of a file's cell whose middle is in
+//! it. So no height is lost where the grids are turned against each other, and the highest in a box that is a cell wider
+//! each way is never less than in the file.
+
+use planner_core::coverage::Flat;
+use planner_core::frames::Geodetic;
+
+use super::crs::Crs;
+use super::{Frame, HeightGrid, TerrainError};
+
+/// Heights as a file has them.
+#[derive(Debug)]
+pub(super) struct Raster {
+    pub crs: Crs,
+    pub columns: usize,
+    pub rows: usize,
+    /// The corner of the first cell, which is the north-western one.
+    pub corner: [f64; 2],
+    /// Sides of a cell in the file's units, both positive.
+    pub cell: [f64; 2],
+    /// Row by row from the north, metres; NaN in holes.
+    pub heights_m: Vec<f32>,
+}
+
+impl Raster {
+    /// The file's numbers of a place in cells from the north-western corner.
+    fn place(&self, column: f64, row: f64) -> [f64; 2] {
+        [self.corner[0] + column * self.cell[0], self.corner[1] - row * self.cell[1]]
+    }
+
+    fn cells(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [(x - self.corner[0]) / self.cell[0], (self.corner[1] - y) / self.cell[1]]
+    }
+
+    /// The heights in the mission frame, in cells of about the file's size.
+    pub(super) fn laid_out(&self, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
+        self.crs.check(frame.metres)?;
+        let origin = frame.origin;
+        let window = match frame.window {
+            Some(window) => window,
+            None => {
+                self.bounds(origin).ok_or_else(|| TerrainError::system("a system that ends before it"))?
+            }
+        };
+        let Some([columns, rows]) = self.touched(origin, window) else {
+            return HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
+        };
+        let middle = [columns, rows].map(|(from, to)| (from + to) as f64 / 2.0);
+        let cell_m = self
+            .cell_m(origin, middle)
+            .ok_or_else(|| TerrainError::system("a system that ends before it"))?;
+        let mut grid = HeightGrid::new(window, cell_m)?;
+        let [across, up] = grid.size();
+        for row in 0..up {
+            for column in 0..across {
+                let place = grid.middle([column, row]);
+                if let Some(height_m) = self.height_at(origin, &place) {
+                    grid.raise(&place, height_m);
+                }
+            }
+        }
+        for row in rows.0..rows.1 {
+            for column in columns.0..columns.1 {
+                let height_m = self.heights_m[row * self.columns + column];
+                let place = self.place(column as f64 + 0.5, row as f64 + 0.5);
+                if let Some(place) = self.crs.to_mission(origin, place).filter(|_| !height_m.is_nan()) {
+                    grid.raise(&place, height_m);
+                }
+            }
+        }
+        Ok(grid)
+    }
+
+    /// The height of the file's cell that a place is in.
+    pub(super) fn height_at(&self, origin: &Geodetic, place: &Flat) -> Option<f32> {
+        let [column, row] = self.cells(self.crs.of_mission(origin, place)?);
+        let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
+        let height_m = inside.then(|| self.heights_m[row as usize * self.columns + column as usize])?;
+        (!height_m.is_nan()).then_some(height_m)
+    }
+
+    /// The box around all cells.
+    fn bounds(&self, origin: &Geodetic) -> Option<[Flat; 2]> {
+        let (columns, rows) = (self.columns as f64, self.rows as f64);
+        let shares = || (0..=8).map(|k| f64::from(k) / 8.0);
+        let border = shares().flat_map(|s| shares().map(move |t| (s, t)));
+        let places =
+            border.filter_map(|(s, t)| self.crs.to_mission(origin, self.place(s * columns, t * rows)));
+        places.map(|place| [place, place]).reduce(|a, b| [a[0].inf(&b[0]), a[1].sup(&b[1])])
+    }
+
+    /// Columns and rows that a box may touch, from and to; none where it touches none.
+    fn touched(&self, origin: &Geodetic, [low, high]: [Flat; 2]) -> Option<[(usize, usize); 2]> {
+        let shares = || (0..=8).map(|k| k as f32 / 8.0);
+        let places =
+            shares().flat_map(|s| shares().map(move |t| low + (high - low).component_mul(&Flat::new(s, t))));
+        let cells = places.filter_map(|place| Some(self.cells(self.crs.of_mission(origin, &place)?)));
+        let [from, to] = cells.map(|cell| [cell, cell]).reduce(|a, b| {
+            let pick = |f: fn(f64, f64) -> f64, i: usize| [f(a[i][0], b[i][0]), f(a[i][1], b[i][1])];
+            [pick(f64::min, 0), pick(f64::max, 1)]
+        })?;
+        let range = |axis: usize, most: usize| {
+            // A line that is straight here is bent there, a little.
+            let beyond = 2.0 + 0.01 * (to[axis] - from[axis]);
+            let first = (from[axis] - beyond).floor().clamp(0.0, most as f64) as usize;
+            let end = (to[axis] + beyond).ceil().clamp(0.0, most as f64) as usize;
+            (first < end).then_some((first, end))
+        };
+        Some([range(0, self.columns)?, range(1, self.rows)?])
+    }
+
+    /// The shorter side of a cell, metres.
+    fn cell_m(&self, origin: &Geodetic, [column, row]: [f64; 2]) -> Option<f32> {
+        let at = |column: f64, row: f64| self.crs.to_mission(origin, self.place(column, row));
+        let here = at(column, row)?;
+        let sides = [(at(column + 1.0, row)? - here).norm(), (at(column, row + 1.0)? - here).norm()];
+        Some(sides[0].min(sides[1]))
+    }
+}

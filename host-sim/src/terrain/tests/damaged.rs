@@ -1,0 +1,140 @@
+//! Cut, flipped and overblown files: an error or heights, never a panic.
+
+use las::{Builder, Color, Point as Return, Transform, Vector, Writer};
+use rand_core::Rng as _;
+use rand_pcg::Pcg32;
+
+use super::*;
+
+/// A small cloud in metres of zone 30, compressed or not.
+fn returns(compressed: bool, format: u8) -> Vec<u8> {
+    let mut builder = Builder::from((1, 4));
+    builder.point_format = las::point::Format::new(format).unwrap();
+    builder.point_format.is_compressed = compressed;
+    let axis = |offset| Transform { scale: 0.01, offset };
+    builder.transforms = Vector { x: axis(500_000.0), y: axis(4_794_000.0), z: axis(0.0) };
+    let directory: Vec<u8> = keys(1, 32630).iter().flat_map(|n| n.to_le_bytes()).collect();
+    builder.vlrs.push(las::Vlr {
+        user_id: "LASF_Projection".to_owned(),
+        record_id: 34735,
+        description: String::new(),
+        data: directory,
+    });
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(if compressed { "returns.laz" } else { "returns.las" });
+    let mut writer = Writer::from_path(&path, builder.into_header().unwrap()).unwrap();
+    for k in 0..400 {
+        let (x, y) = (f64::from(k % 20), f64::from(k / 20));
+        let point = Return {
+            x: 500_000.0 + x,
+            y: 4_794_000.0 + y,
+            z: x + 2.0 * y,
+            gps_time: Some(0.0),
+            color: (format == 3).then(Color::default),
+            ..Return::default()
+        };
+        writer.write_point(point).unwrap();
+    }
+    // The last one is noise, and higher than all.
+    let noise = las::point::Classification::LowPoint;
+    let (gps_time, color) = (Some(0.0), (format == 3).then(Color::default));
+    writer
+        .write_point(Return {
+            x: 500_005.0,
+            y: 4_794_005.0,
+            z: 900.0,
+            gps_time,
+            color,
+            classification: noise,
+            ..Return::default()
+        })
+        .unwrap();
+    writer.close().unwrap();
+    drop(writer);
+    std::fs::read(path).unwrap()
+}
+
+fn decode_tiff(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
+    geotiff::decode(Cursor::new(bytes.to_vec()))?.laid_out(&anywhere(&ORIGIN))
+}
+
+fn decode_cloud(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
+    super::cloud::decode(Cursor::new(bytes.to_vec()), &anywhere(&ORIGIN))
+}
+
+fn decode_asc(bytes: &[u8]) -> Result<HeightGrid, TerrainError> {
+    let text = String::from_utf8_lossy(bytes);
+    asc::parse(&text, Crs::Unsaid)?.laid_out(&Frame { metres: true, ..anywhere(&ORIGIN) })
+}
+
+#[test]
+fn a_cloud_is_the_same_compressed() {
+    let (plain, small) =
+        (decode_cloud(&returns(false, 3)).unwrap(), decode_cloud(&returns(true, 3)).unwrap());
+    assert_eq!(plain.range_m(), Some([plain.range_m().unwrap()[0], 57.0]));
+    assert_eq!(plain.count(), small.count());
+    assert_eq!(plain.range_m(), small.range_m());
+}
+
+#[test]
+fn damaged_files_end_in_an_error_or_in_heights() {
+    let values: Vec<i16> = (0..300).collect();
+    let image = tiff([20, 15], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 5.0);
+    let grid = b"ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 5\nNODATA_value -1\n1 2 3\n4 -1 6\n";
+    type Decode = fn(&[u8]) -> Result<HeightGrid, TerrainError>;
+    let files: [(&str, Vec<u8>, Decode); 5] = [
+        ("tif", image, decode_tiff),
+        ("las", returns(false, 3), decode_cloud),
+        ("laz", returns(true, 3), decode_cloud),
+        ("laz in layers", returns(true, 6), decode_cloud),
+        ("asc", grid.to_vec(), decode_asc),
+    ];
+    let tries = std::env::var("FLOCKMATE_DAMAGED").ok().and_then(|n| n.parse().ok()).unwrap_or(300u32);
+    let mut random = Pcg32::new(12, 34);
+    for (name, whole, decode) in files {
+        decode(&whole).unwrap();
+        let (mut refused, mut cuts) = (0, 0);
+        for k in 0..tries {
+            let mut bytes = whole.clone();
+            let at = random.next_u32() as usize % bytes.len();
+            match k % 3 {
+                0 => {
+                    bytes.truncate(at);
+                    cuts += u32::from(decode(&bytes).is_ok());
+                }
+                1 => {
+                    // The header counts most.
+                    let at = if random.next_u32().is_multiple_of(2) { at % 400 % bytes.len() } else { at };
+                    bytes[at] = random.next_u32() as u8;
+                    refused += u32::from(decode(&bytes).is_err());
+                }
+                _ => {
+                    for byte in bytes.iter_mut().skip(at).take(4) {
+                        *byte = if k % 2 == 0 { 0xff } else { 0x7f };
+                    }
+                    refused += u32::from(decode(&bytes).is_err());
+                }
+            }
+        }
+        // A return may be flipped to another one.
+        assert!(refused > 0, "{name}: {refused} refused");
+        assert!(cuts <= tries / 30, "{name}: {cuts} cut files were read");
+    }
+}
+
+#[test]
+fn files_that_say_that_they_are_vast_are_refused() {
+    let vast = "ncols 100000\nnrows 100000\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n";
+    assert!(matches!(decode_asc(vast.as_bytes()), Err(TerrainError::TooManyCells(10_000_000_000))));
+    let few = "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n";
+    assert!(
+        decode_asc(few.as_bytes()).unwrap_err().to_string().contains("it has 3 heights, its header says 4")
+    );
+    // Two cells of a file far apart in a frame of small ones: a box of 100 km in cells of 1 m.
+    let values = vec![5i16; 4];
+    let bytes = tiff([2, 2], &values, &keys(1, 32630), [500_000.0, 4_794_000.0], 1.0);
+    let window = Some([Flat::repeat(-50_000.0), Flat::repeat(50_000.0)]);
+    let raster = geotiff::decode(Cursor::new(bytes)).unwrap();
+    let laid = raster.laid_out(&Frame { window, ..anywhere(&ORIGIN) });
+    assert!(matches!(laid, Err(TerrainError::TooManyCells(_))));
+}
