@@ -78,6 +78,8 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
+/// However wide the margin, a descent leads so far down before the autopilot lands by itself, metres over the ground.
+const LOW_MOST_M: f32 = 1.2;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -228,7 +230,7 @@ impl Guidance {
             nowhere: false,
             trapped_since: None,
             aside: false,
-            low_m: config.required_clearance_m - config.radius_m,
+            low_m: libm::fminf(config.required_clearance_m - config.radius_m, LOW_MOST_M),
             sent_acceleration: Point::zeros(),
         }
     }

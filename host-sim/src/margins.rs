@@ -20,6 +20,8 @@ use crate::scenario::{Estimator, Personality, Simulation, Vehicle};
 
 /// What two vehicles together may stray from their paths, beyond the safety distance, metres.
 pub const STRAY_M: f32 = 0.5;
+/// The same over fields, where there is room, and receivers without RTK.
+pub const STRAY_OVER_FIELDS_M: f32 = 2.4;
 /// What one vehicle may stray beside another that stands on the ground, metres.
 pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
 /// How much further gusts carry one vehicle, for each m/s of their peak, seconds. Two are not carried towards each other

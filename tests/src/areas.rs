@@ -83,12 +83,17 @@ pub fn flown(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     )
 }
 
-/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m.
+/// The same, as far and as fast as surveys are flown: up to 15 m/s and 120 m, and in places wide apart.
 pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     let text = flown(random, shape, vehicles);
     let drawn = |line: &str| match line.split(" = ").next() {
         Some("cruise_mps") => format!("cruise_mps = {:.1}\n", between(random, 8.0, 15.0)),
         Some("height_m") => format!("height_m = {:.1}\n", between(random, 40.0, 120.0)),
+        Some("separation_m") => match random.next_u32() % 3 {
+            0 => format!("{line}\n"),
+            1 => String::new(),
+            _ => format!("separation_m = {:.1}\n", between(random, 4.0, 9.0)),
+        },
         _ => format!("{line}\n"),
     };
     text.lines().map(drawn).collect()

@@ -1,9 +1,13 @@
 //! Coverage missions flown whole: companions plan from the mission file, the autopilots trigger their cameras, and the
 //! pictures are judged by where they were truly taken.
 
+use companion::margins::{self, TRACKING_M};
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::{covered, number};
-use rand_core::SeedableRng as _;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario;
+use rand_core::{Rng as _, SeedableRng as _};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
@@ -54,4 +58,28 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String) {
     let flown = ended(None);
     println!("{flown} of {count} areas flown, {} wrong", wrong.len());
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
+}
+
+/// Two vehicles that each err by as much as stops none of them stay apart by the safety distance, whatever the separation.
+#[test]
+fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
+    let mut random = Pcg32::seed_from_u64(7);
+    for _ in 0..40 {
+        let mut between =
+            |low: f32, high: f32| low + (high - low) * (random.next_u32() as f32 / u32::MAX as f32);
+        let safety_m = between(0.8, 2.0);
+        let separation_m = safety_m + 2.0 * TRACKING_M + between(0.0, 8.0);
+        let text = format!(
+            "[area]\npolygon = [[0, 0], [90, 0], [90, 70]]\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\nheight_m = 30.0\n\
+             [mission]\ncruise_mps = 12.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\nspeed_max_mps = 15.0\n\
+             [deconfliction]\nsafety_distance_m = {safety_m}\nseparation_m = {separation_m}\n"
+        );
+        let scenario = scenario::parse(&text, "area").expect("a scenario");
+        let mission = Mission::prepare(scenario, &Progress::hidden()).expect("a mission");
+        let radius_m = mission.scenario.vehicles[0].radius_m;
+        let pace = |bound_m: f32| margins::pace(bound_m, mission.tasks[0].required_clearance_m, radius_m);
+        let room_m = (separation_m - safety_m) / 2.0 - TRACKING_M;
+        assert_eq!(pace(room_m - 0.01), 1.0, "{separation_m} m beyond {safety_m} m");
+        assert!(pace(room_m + 0.01) < 1.0, "{separation_m} m beyond {safety_m} m");
+    }
 }

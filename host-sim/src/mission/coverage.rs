@@ -31,8 +31,6 @@ use crate::scenario::coverage::Method;
 const OVER_PAD_M: f32 = 3.0;
 /// The ground reaches so far beyond area and pads, and the air so far over the highest layer, metres.
 const AROUND_M: f32 = 30.0;
-/// Clearance beyond their hulls that vehicles are taken to have, metres: over fields there is room for the worst estimate.
-const MARGIN_M: f32 = 1.2;
 
 type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
@@ -59,12 +57,14 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
     }
+    // Over fields there is nothing but the others to keep clear of: each may stray half of what lies between.
+    let stray_m = scenario.deconfliction.separation_m - scenario.deconfliction.safety_distance_m;
     let tasks = scenario
         .vehicles
         .iter()
         .map(|v| VehicleTask {
             id: v.id,
-            required_clearance_m: v.radius_m + MARGIN_M,
+            required_clearance_m: v.radius_m + stray_m / 2.0,
             climb_m: top_m,
             goal: None,
         })

@@ -28,6 +28,7 @@ use crate::files;
 use crate::kinds::Personality;
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTIONS_M, Source, Unknown};
+use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
 /// Most faults of a scenario.
@@ -64,7 +65,7 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
 /// The scenario of a mission with goals.
 pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
-    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
+    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root, margins::STRAY_M)?;
     let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -128,10 +129,11 @@ struct Common {
     estimator_span: Option<Span>,
 }
 
-fn common(text: Text<'_>, root: &Table<'_>) -> Result<Common> {
+fn common(text: Text<'_>, root: &Table<'_>, stray_m: f32) -> Result<Common> {
     let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
-    let deconfliction = self::deconfliction(&deconfliction.unwrap_or_else(|| empty(text, "deconfliction")))?;
+    let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
+    let deconfliction = self::deconfliction(&deconfliction, stray_m)?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
     let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
     let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")))?;

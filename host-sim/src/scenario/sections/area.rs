@@ -33,7 +33,8 @@ enum Coordinates {
 
 /// The scenario of a coverage mission.
 pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
-    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root)?;
+    let Common { seed, deconfliction, simulation, estimator_span } =
+        common(text, root, margins::STRAY_OVER_FIELDS_M)?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let mut area = area(&root.need("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";

@@ -4,19 +4,16 @@ use planner_core::deconflict::Method;
 
 use super::values::{MAX_ID, point};
 use crate::kinds::Estimator;
-use crate::margins;
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 
-pub(super) fn deconfliction(table: &Table<'_>) -> Result<Deconfliction> {
+/// The table of a mission in which vehicles stray from their paths by `stray_m` together, unless it says otherwise.
+pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.word("method", Method::Priority, &methods)?;
     let safety_distance_m = table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?;
-    let separation_m = table.f32(
-        "separation_m",
-        safety_distance_m + margins::STRAY_M,
-        f64::from(safety_distance_m)..=1000.0,
-    )?;
+    let separation_m =
+        table.f32("separation_m", safety_distance_m + stray_m, f64::from(safety_distance_m)..=1000.0)?;
     let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
     table.finish()?;
     Ok(deconfliction)
