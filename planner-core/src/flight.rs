@@ -34,7 +34,7 @@ pub enum PathError {
     PathFull,
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
-    /// Longer than vehicles that share an area tell each other of: [`crate::coverage::flights::FURTHEST_M`].
+    /// Longer than vehicles can tell each other of: [`crate::coverage::flights::FURTHEST_M`].
     TooLong,
 }
 

@@ -2,6 +2,7 @@
 //! links, bursts, delays. Vehicles are points on numbered waypoints; what they agree by is the code that flies.
 //!
 //! - No waypoint has two owners at a time, whatever happens.
+//! - What does not fit into a path is asked for, and photographed in the end as well.
 //! - Nothing is left out while a majority lives and hears each other in the end.
 //! - Without loss of messages an agreement takes seconds, and no vehicle's part is given away while it is heard.
 //!
@@ -39,6 +40,8 @@ type Whole = Fleet<8>;
 struct Vehicle {
     fleet: Whole,
     part: Vec<u32>,
+    /// So many waypoints of its part are its path: of a longer one that is the first stretch.
+    most: usize,
     /// Divisions whose part it flies.
     division: usize,
     along_dm: u16,
@@ -56,6 +59,11 @@ struct Vehicle {
 }
 
 impl Vehicle {
+    /// The waypoints of its path, and whether its part goes on after them.
+    fn path(&self) -> (&[u32], bool) {
+        (&self.part[..self.part.len().min(self.most)], self.part.len() > self.most)
+    }
+
     /// Once it has photographed its part it flies home along its path, and down.
     fn fly_home(&mut self, done: bool) {
         if self.home_s > 0.0 || (done && !self.fleet.is_dividing() && self.fleet.division() == self.division)
@@ -116,6 +124,8 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             )
         })
         .collect();
+    // Every third fleet has more to photograph than fits into its paths.
+    let most = if seed.is_multiple_of(3) { whole.len().div_ceil(count) * 3 / 5 } else { usize::MAX };
     let zero = Instant::ZERO;
     let mut vehicles: Vec<Vehicle> = (0..count)
         .map(|own| {
@@ -125,6 +135,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
             Vehicle {
                 fleet,
                 part,
+                most,
                 division: 0,
                 along_dm: 0,
                 unheld_s: 0.0,
@@ -173,20 +184,25 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 hears_us: bits[rank] >> own & 1 != 0,
                 by_others: (0..count).any(|j| j != rank && fresh(heard_at[j]) && bits[j] >> rank & 1 != 0),
             };
-            let done = usize::from(vehicle.along_dm / WAYPOINT_DM) >= vehicle.part.len();
+            let at = usize::from(vehicle.along_dm / WAYPOINT_DM);
+            let (path, goes_on) = vehicle.path();
+            let length = path.len();
+            let (done, asks) = (at >= length, goes_on && at + 5 >= length);
             // Of the others each waits at the end of its part.
             if (seed / 2).is_multiple_of(2) {
                 vehicle.fly_home(done);
             }
             let ends = vehicle.left_by || vehicle.down || vehicle.fleet.is_excluded();
-            let standing = match (ends, done) {
+            let standing = match (ends, done && !goes_on) {
                 (false, _) => Standing::Alive,
                 (true, false) => Standing::Left,
                 (true, true) => Standing::Finished,
             };
             vehicle.down |= ends;
             let stop_dm = vehicle.along_dm.saturating_add((STOP_S * PER_S * f32::from(WAYPOINT_DM)) as u16);
-            let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM);
+            // On its way home it promises a place beyond its waypoints.
+            let last_dm = if goes_on { length as u16 * WAYPOINT_DM } else { u16::MAX };
+            let promise_dm = stop_dm.next_multiple_of(WAYPOINT_DM).min(last_dm);
             let holds = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along_dm >= dm || done);
             let own_view = Own {
                 standing,
@@ -195,6 +211,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 done_dm: vehicle.along_dm,
                 promise_dm: Some(promise_dm),
                 holds,
+                asks,
             };
             vehicle.fleet.step(now, &own_view, hearing);
             if vehicle.fleet.is_dividing() {
@@ -218,7 +235,7 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
                 let most = vehicle.fleet.promise_dm().unwrap_or(u16::MAX);
                 let next = (vehicle.along_dm + (PER_S * STEP_S * f32::from(WAYPOINT_DM)) as u16).min(most);
                 for k in vehicle.along_dm / WAYPOINT_DM..next / WAYPOINT_DM {
-                    if let Some(waypoint) = vehicle.part.get(usize::from(k)) {
+                    if let Some(waypoint) = vehicle.path().0.get(usize::from(k)) {
                         taken[*waypoint as usize] = true;
                     }
                 }
@@ -280,14 +297,15 @@ fn fly(seed: u64, lease: Lease) -> Outcome {
     let lost = |rank: usize| losses.iter().any(|(_, who, _)| *who == rank);
     Outcome {
         wrong,
-        agreed_s: agreed_s.filter(|_| clean && losses.len() == 1),
+        agreed_s: agreed_s.filter(|_| clean && losses.len() == 1 && most == usize::MAX),
         loss,
         left_out: taken.iter().filter(|taken| !**taken).count(),
         majority: alive > 0,
         needless: vehicles.iter().enumerate().filter(|_| clean).find_map(|(rank, vehicle)| {
             let given_away = vehicle.fleet.is_excluded() && !lost(rank);
             // Where half of the messages are lost, what others said may be known before what a vehicle said of itself.
-            let needless = given_away || (loss < 0.5 && vehicle.fleet.division() > losses.len());
+            let needless =
+                given_away || (loss < 0.5 && most == usize::MAX && vehicle.fleet.division() > losses.len());
             needless
                 .then(|| format!("seed {seed}, vehicle {rank}: given away {given_away}, {:?}", vehicle.fleet))
         }),
@@ -315,7 +333,7 @@ fn owned_twice(vehicles: &[Vehicle], whole: &[u32], lease: Lease, now: Instant) 
         }
         let end = vehicle.fleet.promise_dm().map_or(usize::MAX, |dm| usize::from(dm / WAYPOINT_DM));
         let from = usize::from(vehicle.along_dm / WAYPOINT_DM);
-        for waypoint in vehicle.part.iter().take(end).skip(from) {
+        for waypoint in vehicle.path().0.iter().take(end).skip(from) {
             if let Some(other) = owner[*waypoint as usize].replace(rank) {
                 return Some(format!("waypoint {waypoint} is vehicle {other}'s and vehicle {rank}'s"));
             }

@@ -96,7 +96,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             done_dm: if flies { (along_m * 10.0).clamp(0.0, f32::from(u16::MAX)) as u16 } else { 0 },
             promise_dm: if on_pad { Some(0) } else { self.promise_dm().filter(|_| flies) },
             holds: on_pad || state == Dividing,
+            asks: flies && self.asks_division(),
         }
+    }
+
+    /// Whether all are to divide what is left, since its path ends soon, and before its route.
+    fn asks_division(&self) -> bool {
+        let Some(plan) = self.mission.plan() else { return false };
+        let Task::Photograph(photographs) = &plan.task else { return false };
+        let soon_m = self.guidance.along_m() + PROMISE_S * self.config.cruise_mps;
+        photographs.goes_on && photographs.end_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
     /// Whether it has not been started: it may take part as a vehicle that is new.
@@ -138,7 +147,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
         let moves = matches!(self.mission.state(), Follow | Paused | Alone | Blocked | Replanning);
-        if !moves || !fleet.is_dividing() || fleet.promise_dm().is_some() {
+        if !moves || !(fleet.is_dividing() || self.asks_division()) || fleet.promise_dm().is_some() {
             return None;
         }
         let plan = self.mission.plan()?;

@@ -324,11 +324,11 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.failure = Some(failure);
     }
 
-    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it left that.
+    /// Whether all pictures of its part were taken, `along_m` metres along its path or before it left that. A stretch is not all.
     pub(crate) fn has_all_pictures(&self, along_m: f32) -> bool {
         self.left_with_all.unwrap_or_else(|| match self.plan.as_ref().map(|plan| (&plan.task, &plan.path)) {
             Some((Task::Photograph(photographs), path)) => {
-                photographs.taken_by(path, along_m) == photographs.count(path)
+                !photographs.goes_on && photographs.taken_by(path, along_m) == photographs.count(path)
             }
             Some((Task::Stay | Task::Goto(_), _)) => true,
             None => false,

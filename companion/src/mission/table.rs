@@ -202,7 +202,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Follow, Blocked],  G::Yielded,          s(60),  Stopping,        A::BrakeOnPath, "Yielded for 60 s: landing"),
     warn(&[Follow, Blocked],  G::Hindered,         s(90),  Stopping,        A::BrakeOnPath, "Vehicle on the path for 90 s: landing"),
     info(&[Follow],           G::PathDone,         NOW,    Land,            A::AskLand,     "At the goal: landing"),
-    info(&[Follow, Blocked],  G::HoldsToDivide,    NOW,    Dividing,        A::BrakeOnPath, "Vehicle lost: waits for the division"),
+    info(&[Follow, Blocked],  G::HoldsToDivide,    NOW,    Dividing,        A::BrakeOnPath, "Area is divided again: waits"),
     info(&[Dividing],         G::DivisionReady,    NOW,    Follow,          A::FlyDivision, "Area divided again: flying on"),
     info(&[Dividing],         G::NothingToDivide,  NOW,    Follow,          A::RunPath,     "Nothing to divide: flying on"),
     warn(&[Dividing],         G::Elapsed,          s(300), Stopping,        A::BrakeOnPath, "No division for 5 min: landing"),

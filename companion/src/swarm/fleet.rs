@@ -24,7 +24,7 @@ pub const HEARD: Duration = Duration::from_secs(1);
 /// After this silence a vehicle's part is the others'.
 pub const SILENT: Duration = Duration::from_secs(45);
 /// Most divisions of a mission; after them what a vehicle leaves stays undone.
-pub const DIVISIONS: usize = 5;
+pub const DIVISIONS: usize = 12;
 /// Incarnations that can be told apart: 3 bits.
 const INCARNATIONS: u8 = 8;
 
@@ -63,6 +63,8 @@ pub struct Own {
     pub promise_dm: Option<u16>,
     /// Whether it stands where it promised.
     pub holds: bool,
+    /// Whether its path, a stretch of its route, ends soon: all are to divide what is left.
+    pub asks: bool,
 }
 
 /// What it hears of another vehicle.
@@ -172,7 +174,9 @@ impl<const V: usize> Fleet<V> {
                 member.entry.standing = member.entry.standing.max(Standing::Lost);
             }
         }
-        if self.is_dividing() && caught_up {
+        let asks = own.asks && self.lives(self.own) && !self.divisions.is_full();
+        if (self.is_dividing() || asks) && caught_up {
+            // Others see by a promise that it asks.
             let entry = &mut self.members[self.own].entry;
             entry.promise_dm = entry.promise_dm.or(own.promise_dm);
             entry.holds |= own.holds && entry.promise_dm.is_some();
@@ -374,12 +378,14 @@ impl<const V: usize> Fleet<V> {
 
     /// The vehicles from rank `first` on, as they are to be reported.
     pub fn message(&self, first: usize) -> Roster {
-        let entry = |m: &Member| Entry { agrees: self.hash != 0 && m.hash == self.hash, ..m.entry };
+        // Who has left computes no more, so what it knows of the division under way gets old.
+        let hash = if self.lives(self.own) { self.hash } else { 0 };
+        let entry = |m: &Member| Entry { agrees: hash != 0 && m.hash == hash, ..m.entry };
         Roster {
             divisions: self.divisions.len() as u8,
             first: first as u8,
             counted: self.counted,
-            hash: self.hash,
+            hash,
             entries: self.members.iter().skip(first).take(ENTRIES).map(entry).collect(),
             ..Roster::default()
         }

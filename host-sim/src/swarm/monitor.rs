@@ -292,6 +292,11 @@ impl<'a> Monitor<'a> {
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
+        // Progress does not fall: it is that along another path.
+        let anew = now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - AWAY_M);
+        if let Some(progress_m) = anew {
+            vehicle.best_progress_m = progress_m - AWAY_M;
+        }
         let moved = match now.progress_m {
             Some(progress_m) => progress_m > vehicle.best_progress_m + PROGRESS_M,
             None => (now.position - vehicle.progressed_at).norm() > AWAY_M,

@@ -19,7 +19,7 @@ use crate::sort;
 
 /// Braking and accelerating that is planned with, m/s².
 pub const ACCEL_MPS2: f32 = 1.5;
-/// Longest path of a vehicle that shares the area with others, metres: they tell each other their places in 16 bits, decimetres.
+/// Longest path, metres: vehicles tell each other their places in 16 bits, decimetres.
 pub const FURTHEST_M: f32 = 6_553.0;
 
 /// A vehicle of the mission, beside what it is packed by.
@@ -67,10 +67,12 @@ pub struct Swarm<'a> {
     pub done: &'a [Range],
 }
 
-/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there.
+/// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
+/// with more than `W` corners, or longer than [`FURTHEST_M`], a flight is the first stretch ([`Photographs::goes_on`]): as many lanes as leave
+/// room for the way home. What is left is for the next division ([`super::losses`]).
 ///
 /// # Errors
-/// [`PlanError::Path`] for a route with more than `W` corners or longer than [`FURTHEST_M`], [`PlanError::Schedule`] for a vehicle that cannot be kept
+/// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a vehicle that cannot be kept
 /// apart from the others, [`PlanError::Terminals`] where pads and vehicles do not belong together.
 pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     work: &Work<'_, L, N>,
@@ -96,9 +98,6 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
             None => grounded(pad),
         };
         let flight = flight.map_err(|e| PlanError::Path(pad.id, e))?;
-        if swarm.pads.len() > 1 && flight.path.length_m() > FURTHEST_M {
-            return Err(PlanError::Path(pad.id, PathError::TooLong));
-        }
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
     depart(swarm, ws, out)?;
@@ -225,12 +224,39 @@ fn look<const L: usize, const N: usize>(work: &Work<'_, L, N>, route: &Route, sw
     }
 }
 
-/// The flight of one route.
+/// The flight of one route, or of its first stretch.
 fn flight<const L: usize, const N: usize, const W: usize>(
     work: &Work<'_, L, N>,
     route: &Route,
     swarm: &Swarm<'_>,
     pad: &Pad,
+) -> Result<Flight<W>, PathError> {
+    let mut most = work.tracks.lane_of(route.end - 1) - work.tracks.lane_of(route.first) + 1;
+    loop {
+        let mut laid = 0;
+        let error = match stretch(work, route, swarm, pad, (most, &mut laid)) {
+            Ok(flight) if flight.path.length_m() <= FURTHEST_M => return Ok(flight),
+            Ok(flight) => {
+                laid = (most as f32 * FURTHEST_M / flight.path.length_m()) as usize;
+                PathError::TooLong
+            }
+            Err(error) => error,
+        };
+        // The way home takes room as well.
+        most = laid.min(most - 1);
+        if most == 0 || error == PathError::NotFinite {
+            return Err(error);
+        }
+    }
+}
+
+/// The flight along so many lanes of a route. `laid` becomes how many of them had room, if not the way home.
+fn stretch<const L: usize, const N: usize, const W: usize>(
+    work: &Work<'_, L, N>,
+    route: &Route,
+    swarm: &Swarm<'_>,
+    pad: &Pad,
+    (most, laid): (usize, &mut usize),
 ) -> Result<Flight<W>, PathError> {
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
     let Manner { waypoint_m, trigger, .. } = swarm.manner;
@@ -242,16 +268,15 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let (first, last) = route.ends();
-    let (first, last) = (place(first)?, place(last)?);
+    let mut here = place(route.ends().0)?;
     let mut draft = Draft { path: Path::new(), transit: work.transit, clearance_m: swarm.clearance_m };
     draft.to(pad.start)?;
     draft.to(at(&vehicle.place, layer_m))?;
-    draft.around(&vehicle.place, &first, layer_m)?;
-    let mut here = first;
+    draft.around(&vehicle.place, &here, layer_m)?;
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
-    for lane in lanes {
+    photographs.goes_on = most <= high - low;
+    for lane in lanes.take(most) {
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
         let (begin, end) = part_of(lane, route);
@@ -261,9 +286,10 @@ fn flight<const L: usize, const N: usize, const W: usize>(
         here = place(end)?;
         let to = draft.to(at(&here, mission_m))?;
         photographs.mark(from, to, divide::original(swarm.done, number))?;
+        *laid += 1;
     }
-    draft.to(at(&last, layer_m))?;
-    let way_home = WayHome { from: last, layer_m, vehicle, photographs };
+    draft.to(at(&here, layer_m))?;
+    let way_home = WayHome { from: here, layer_m, vehicle, photographs };
     land(draft, &way_home, swarm, pad)
 }
 

@@ -79,6 +79,8 @@ pub struct Photographs {
     pub look: Look,
     /// What takes the pictures.
     pub trigger: Trigger,
+    /// Whether the route has more lanes than the path: a stretch of it, after which all divide what is left.
+    pub goes_on: bool,
 }
 
 impl Photographs {
@@ -90,7 +92,7 @@ impl Photographs {
     /// None yet; pictures are to be `spacing_m` apart at most (positive).
     pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
         let numbers = [0; Self::WAYPOINTS];
-        Self { begins: 0, ends: 0, numbers, backward: false, area: 0, spacing_m, look, trigger }
+        Self { begins: 0, ends: 0, numbers, backward: false, area: 0, spacing_m, look, trigger, goes_on: false }
     }
 
     /// The same of an area with so many waypoints, along its path or back.
@@ -145,6 +147,12 @@ impl Photographs {
     /// The same, but for one that it has not come a spacing further than yet: that one may be missing.
     pub fn passed_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_by(path, along_m - self.spacing_m)
+    }
+
+    /// Where the last picture of all is taken; none where there is none.
+    pub fn end_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
+        let last = Self::WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
+        path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
     /// Where the last picture is taken no further than `along_m` metres along the path; none before the first.
@@ -210,6 +218,8 @@ mod tests {
             assert_eq!(photographs.taken_by(&path, along_m), taken, "{along_m}");
             assert_eq!(photographs.last_by(&path, along_m), last_m, "{along_m}");
         }
+        assert_eq!(photographs.end_m(&path), Some(80.0));
+        assert_eq!(Photographs::new(9.0, Look::Ahead, Trigger::Distance).end_m(&path), None);
     }
 
     #[test]

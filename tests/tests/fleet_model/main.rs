@@ -73,6 +73,24 @@ fn four_vehicles_with_partitions() {
     }
 }
 
+/// Paths hold half of each part: the rest is asked for.
+#[test]
+fn stretches_with_any_messages_lost() {
+    let stretches = |count, radio, losses, slow| {
+        let model = FleetModel { losses, slow, most: 1, ..FleetModel::new(count, radio, Planted::Nothing) };
+        assert_eq!(search(model), Vec::<&str>::new());
+    };
+    for slow in [None, Some(0), Some(1)] {
+        stretches(2, Radio::Any, 1, slow);
+    }
+    stretches(3, Radio::Parts(0), 1, None);
+    if searches_all() {
+        stretches(3, Radio::Links(1), 1, None);
+        stretches(3, Radio::Parts(1), 1, None);
+        stretches(4, Radio::Parts(0), 1, None);
+    }
+}
+
 #[test]
 fn planted_errors_are_found() {
     let cases = [

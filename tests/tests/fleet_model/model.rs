@@ -136,6 +136,8 @@ pub struct FleetModel {
     /// Whose clock may be slow.
     pub slow: Option<usize>,
     pub planted: Planted,
+    /// So many waypoints of its part are a vehicle's path: of a longer one that is the first stretch.
+    pub most: usize,
     pub limits: Limits,
     /// What the links may change to.
     pub all_links: Vec<Links>,
@@ -154,6 +156,7 @@ impl FleetModel {
             losses: 2,
             slow: None,
             planted,
+            most: usize::MAX,
             limits,
             all_links: match radio {
                 Radio::Any => Vec::new(),
@@ -164,8 +167,12 @@ impl FleetModel {
         }
     }
 
-    fn part(&self, vehicle: &Vehicle) -> Vec<u32> {
-        parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank)
+    /// The waypoints of its path, and whether its part goes on after them.
+    fn path(&self, vehicle: &Vehicle) -> (Vec<u32>, bool) {
+        let mut part = parts(&self.whole, &vehicle.fleet, self.count).0.swap_remove(vehicle.rank);
+        let goes_on = part.len() > self.most;
+        part.truncate(self.most);
+        (part, goes_on)
     }
 
     /// Whether it may photograph: it has its lease, or has not come to a stop since.
@@ -186,8 +193,8 @@ impl FleetModel {
         if !self.flies(vehicle) {
             return 0;
         }
-        let part = self.part(vehicle);
-        let yet = part.iter().take(usize::from(self.end(vehicle))).skip(usize::from(vehicle.along));
+        let yet = self.path(vehicle).0;
+        let yet = yet.iter().take(usize::from(self.end(vehicle))).skip(usize::from(vehicle.along));
         yet.fold(0, |bits, waypoint| bits | 1 << waypoint)
     }
 
@@ -214,9 +221,10 @@ impl FleetModel {
             hears_us: heard.iter().any(|(from, m)| *from == rank && bit(m.hears, vehicle.rank)),
             by_others: heard.iter().any(|(from, m)| *from != rank && bit(m.hears, rank)),
         };
-        let done = usize::from(vehicle.along) >= self.part(&vehicle).len();
+        let (path, goes_on) = self.path(&vehicle);
+        let done = usize::from(vehicle.along) >= path.len();
         let lands = choice.leaves || vehicle.flight == Flight::Down || vehicle.fleet.is_excluded();
-        let standing = match (lands, done) {
+        let standing = match (lands, done && !goes_on) {
             (false, _) => Standing::Alive,
             (true, false) => Standing::Left,
             (true, true) => Standing::Finished,
@@ -227,8 +235,9 @@ impl FleetModel {
             waits: false,
             division: vehicle.division,
             done_dm: vehicle.along * WAYPOINT_DM,
-            promise_dm: Some((vehicle.along + 1) * WAYPOINT_DM),
+            promise_dm: Some((vehicle.along + 1).min(path.len() as u16) * WAYPOINT_DM),
             holds: done || promise.is_some_and(|dm| vehicle.along * WAYPOINT_DM >= dm),
+            asks: done && goes_on,
         };
         vehicle.fleet.step(now, &own, hearing);
         if vehicle.fleet.wants_hash() {
@@ -244,8 +253,8 @@ impl FleetModel {
             vehicle.flight = Flight::Down;
         }
         vehicle.fleet.set_clock(now, NOW);
-        let part = self.part(&vehicle);
-        let waypoint = part.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
+        let waypoint = self.path(&vehicle).0;
+        let waypoint = waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
         let promised = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
         let advances = choice.advances || !vehicle.stands || promised;
         if let Some(waypoint) = waypoint.filter(|_| advances && self.flies(&vehicle)) {
