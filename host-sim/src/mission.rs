@@ -3,6 +3,7 @@
 mod coverage;
 mod places;
 mod ready;
+pub mod stretches;
 
 use std::time::Instant;
 

@@ -99,6 +99,18 @@ pub fn fast(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
     text.lines().map(drawn).collect()
 }
 
+/// The same with so many lanes that paths do not hold them: flown in stretches.
+pub fn large(random: &mut impl Rng, shape: Shape, vehicles: usize) -> String {
+    let text = fast(random, shape, vehicles);
+    let drawn = |line: &str| match line.split(" = ").next() {
+        Some("height_m") => format!("height_m = {:.1}\n", between(random, 12.0, 20.0)),
+        Some("overlap_side") => format!("overlap_side = {:.2}\n", between(random, 0.6, 0.85)),
+        Some("cruise_mps") => format!("cruise_mps = {:.1}\n", between(random, 4.0, 12.0)),
+        _ => format!("{line}\n"),
+    };
+    text.lines().map(drawn).collect()
+}
+
 /// A random convex area for so many vehicles, of which the radio loses a share of messages: minutes of work for each.
 pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     let mut text = flown(random, Shape::Convex, vehicles);

@@ -13,7 +13,7 @@ use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, Ro
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
-use planner_core::flight::{Look, Path, Photographs, Task, Trigger};
+use planner_core::flight::{self, Look, Path, Photographs, Task, Trigger};
 use planner_core::frames::{self, Geodetic};
 
 use crate::meeting::autopilot::Autopilot;
@@ -98,7 +98,7 @@ fn plan(over_area: bool) -> Plan16 {
     }
     let gates = heapless::Vec::new();
     let mut photographs = Photographs::new(3.0, Look::Ahead, Trigger::Distance);
-    photographs.mark(1, 1, 0).expect("room for one");
+    photographs.mark(1, 1, flight::Range { first: 0, end: 1 }).expect("room for one");
     let task = if over_area { Task::Photograph(photographs) } else { Task::Goto(0) };
     Plan16 { task, path, climb_m: 3.0, descent_m: 6.0, depart_s: 0.0, gates, plan_crc: 5 }
 }

@@ -1,6 +1,8 @@
 //! Coverage missions flown whole: companions plan from the mission file, the autopilots trigger their cameras, and the
 //! pictures are judged by where they were truly taken.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use companion::margins::{self, TRACKING_M};
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::{covered, number};
@@ -18,23 +20,34 @@ const NO_FLIGHT: [&str; 5] =
 /// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
 #[test]
 fn random_areas_are_photographed_whole() {
-    are_photographed_whole(areas::flown);
+    are_photographed_whole(areas::flown, 0);
 }
 
 #[test]
 fn random_areas_are_photographed_whole_fast_and_from_high() {
-    are_photographed_whole(areas::fast);
+    are_photographed_whole(areas::fast, 0);
 }
 
-fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String) {
+#[test]
+fn large_random_areas_are_photographed_whole_in_stretches() {
+    are_photographed_whole(areas::large, 1);
+}
+
+/// At least `stretched` of them are flown in stretches.
+fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretched: usize) {
     let (from, count) = (number("FLOCKMATE_FLOWN_FROM", 0), number("FLOCKMATE_FLOWN", 16));
+    let in_stretches = AtomicUsize::new(0);
     let outcome = |seed: u64| -> Result<Option<&str>, String> {
         let mut random = Pcg32::seed_from_u64(seed);
         let shape = if seed.is_multiple_of(2) { Shape::Any } else { Shape::Convex };
         let text = draw(&mut random, shape, [1, 3, 5][(seed % 3) as usize]);
         match covered::fly_text(&text) {
             Ok((result, log)) => match covered::faults(&result) {
-                None => Ok(None),
+                None => {
+                    let divided = log.contains("Area divided again");
+                    in_stretches.fetch_add(usize::from(divided), Ordering::Relaxed);
+                    Ok(None)
+                }
                 Some(faults) => Err(format!(
                     "seed {seed}: {faults}
 {log}{text}"
@@ -56,7 +69,9 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String) {
         println!("{known}: {}", ended(Some(known)));
     }
     let flown = ended(None);
-    println!("{flown} of {count} areas flown, {} wrong", wrong.len());
+    let in_stretches = in_stretches.into_inner();
+    println!("{flown} of {count} areas flown, {in_stretches} of them in stretches, {} wrong", wrong.len());
+    assert!(in_stretches >= stretched);
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }
 

@@ -3,9 +3,12 @@
 //! `FLOCKMATE_LOSSES=N` flies N missions in place of [`MISSIONS`], `FLOCKMATE_LOSSES_FROM` others.
 
 use companion::swarm::fleet::Lot;
+use flockmate_tests::areas::Shape;
 use flockmate_tests::{areas, covered, number};
 use host_sim::capacity::WAYPOINTS;
+use host_sim::coverage::Planned;
 use host_sim::mission::Mission;
+use host_sim::mission::stretches::next_lots;
 use host_sim::progress::Progress;
 use host_sim::result::{MissionResult, VehicleResult};
 use host_sim::scenario;
@@ -203,4 +206,41 @@ fn divisions_leave_nothing_out_and_give_nothing_twice() {
     let divided: usize = (0..count).into_par_iter().map(one).sum();
     println!("{divided} divisions of {count} areas");
     assert!(divided as u64 > count);
+}
+
+/// Routes that take more than one path each: nobody is lost, and all hold again and again.
+#[test]
+fn stretches_leave_nothing_out_and_give_nothing_twice() {
+    let one = |seed: u64| -> usize {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let text = areas::large(&mut random, Shape::Convex, 1 + (seed % 3) as usize);
+        let Ok(scenario) = scenario::parse(&text, "area") else { return 0 };
+        let Ok(mut mission) = Mission::prepare(scenario, &Progress::hidden()) else { return 0 };
+        let mut plan = mission.plan().expect("it was planned");
+        let planned = Planned::flown(&mission.scenario).expect("it was planned");
+        let whole = (0..planned.tracks.waypoint_count()).filter_map(|number| planned.tracks.waypoint(number));
+        let (mut kept, mut losses) = (Vec::new(), Vec::<Vec<Lot>>::new());
+        while let Some(lots) = next_lots(&plan) {
+            for (flight, lot) in plan.flights.iter().zip(&lots) {
+                kept.extend(pictures(flight, lot.along_m()));
+            }
+            losses.push(lots);
+            plan =
+                mission.plan_rest(&[], losses.iter().map(|lots| &lots[..])).expect("it was divided before");
+        }
+        kept.extend(plan.flights.iter().flat_map(|flight| pictures(flight, f32::INFINITY)));
+        let mut count = 0;
+        for place in whole {
+            count += 1;
+            let taken = kept.iter().filter(|p| (p.xy() - place).norm() < 0.02).count();
+            assert_eq!(taken, 1, "seed {seed}: {place:?}");
+        }
+        assert_eq!(kept.len(), count, "seed {seed}");
+        losses.len()
+    };
+    let count = number("FLOCKMATE_DIVIDED", 40);
+    let divided: Vec<usize> = (0..count).into_par_iter().map(one).collect();
+    let all: usize = divided.iter().sum();
+    println!("{all} divisions of {count} areas, at most {:?}", divided.iter().max());
+    assert!(all >= count as usize / 4);
 }

@@ -7,11 +7,9 @@ use crate::config::PlanFailure;
 use crate::events::{Event, Wanted};
 use crate::link::roster::Standing;
 use crate::mission::State;
-use crate::swarm::fleet::{Fleet, Lot, Own};
+use crate::swarm::fleet::{Fleet, Lot, Own, PROMISE_S};
 use crate::time::Duration;
 
-/// A vehicle promises to fly on for so long, seconds, to the last picture that it takes by then.
-const PROMISE_S: f32 = 10.0;
 /// So much further than it needs to stop, metres.
 const SPARE_M: f32 = 0.3;
 /// This near where it promised to hold it is there, metres.

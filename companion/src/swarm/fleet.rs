@@ -23,6 +23,9 @@ pub const LEASE: Duration = Duration::from_secs(20);
 pub const HEARD: Duration = Duration::from_secs(1);
 /// After this silence a vehicle's part is the others'.
 pub const SILENT: Duration = Duration::from_secs(45);
+/// A vehicle promises to fly on for so long, seconds, to the last picture that it takes by then; and as long before its path
+/// ends it asks for a division where its route goes on.
+pub const PROMISE_S: f32 = 10.0;
 /// Most divisions of a mission; after them what a vehicle leaves stays undone.
 pub const DIVISIONS: usize = 12;
 /// Incarnations that can be told apart: 3 bits.

@@ -344,13 +344,13 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
 /// Pictures along a path, whatever their spacing.
 fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
+    let waypoints = Range { first: Photographs::NUMBERS - 1, end: Photographs::NUMBERS };
     for spacing_m in HARD {
         let new = || Photographs::new(spacing_m, Look::Ahead, Trigger::Distance);
         let mut photographs = to.call("photographs::Photographs::new", new);
         for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::WAYPOINTS), (62, 63)] {
-            let marked = to.call("photographs::Photographs::mark", || {
-                photographs.mark(from, until, Photographs::NUMBERS - 1)
-            });
+            let marked =
+                to.call("photographs::Photographs::mark", || photographs.mark(from, until, waypoints));
             assert_eq!(marked.is_ok(), from <= until && until < Photographs::WAYPOINTS);
         }
         let photographs =

@@ -74,13 +74,14 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
     mission.encode_area(&climbs)?;
     let mut ws = on_heap(DeskWorkspace::new);
-    mission.plan_area(&[], iter::empty(), &mut ws)?;
+    let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
     if ws.routes() != &routes {
         bail!(
             "cannot be flown: {}: companions would divide the area in another way\nhint: please report it, with the scenario",
             mission.scenario.path
         );
     }
+    mission.check_stretches(&plan)?;
     Ok(mission)
 }
 
@@ -241,12 +242,12 @@ impl Mission {
         let path = &self.scenario.path;
         match error {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
-                "the route of vehicle {id} has too many corners: {path}: a path holds at most {WAYPOINTS} waypoints, two \
-                 a lane\nhint: more vehicles, or wider lanes"
+                "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {WAYPOINTS} \
+                 waypoints\nhint: no-fly zones with fewer corners"
             ),
             Error::Plan(PlanError::Path(id, PathError::TooLong)) => anyhow!(
-                "the route of vehicle {id} is too long: {path}: vehicles that share an area fly at most {FURTHEST_M} m \
-                 each\nhint: more vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone"
+                "the route of vehicle {id} is too long: {path}: a flight there, along one lane and home takes more than \
+                 {FURTHEST_M} m\nhint: pads nearer to the area, or lanes at another angle_deg"
             ),
             Error::Plan(PlanError::Schedule(id, ScheduleError::Blocked)) => anyhow!(
                 "vehicle {id} cannot pass the others: {path}: no departure keeps it apart from them\nhint: pads further \

@@ -210,7 +210,8 @@ impl<'a> Run<'a> {
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
         let mut monitor =
             Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
-        monitor.waits_end = !scenario.faults.is_empty();
+        // Lanes of two vehicles may lie side by side: one waits for as long as the other is on them.
+        monitor.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
             mission,
             plan,

@@ -280,12 +280,13 @@ fn stretch<const L: usize, const N: usize, const W: usize>(
         let lane = if backward { high - (lane - low) } else { lane };
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
         let (begin, end) = part_of(lane, route);
-        let number = begin;
+        let first = divide::original(swarm.done, begin);
+        let waypoints = Range { first, end: first + (end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let from = draft.around(&here, &place(begin)?, mission_m)?;
         here = place(end)?;
         let to = draft.to(at(&here, mission_m))?;
-        photographs.mark(from, to, divide::original(swarm.done, number))?;
+        photographs.mark(from, to, waypoints)?;
         *laid += 1;
     }
     draft.to(at(&here, layer_m))?;

@@ -1,6 +1,6 @@
 //! What a vehicle photographs along its path.
 
-use libm::{ceilf, fmaxf};
+use libm::fmaxf;
 
 use super::{Path, PathError, Range};
 
@@ -68,7 +68,9 @@ pub struct Photographs {
     /// Bit `i`: it ends at waypoint `i`.
     ends: u64,
     /// Of each stretch in its order, the lowest number that one of its waypoints has in the area.
-    numbers: [u16; Self::WAYPOINTS],
+    numbers: [u16; Self::STRETCHES],
+    /// Of each stretch, how many pictures it has.
+    counts: [u16; Self::STRETCHES],
     /// Whether numbers fall along the path.
     backward: bool,
     /// Waypoints of the whole area.
@@ -86,13 +88,26 @@ pub struct Photographs {
 impl Photographs {
     /// Most waypoints of a path that is photographed along.
     pub const WAYPOINTS: usize = 64;
+    /// Most stretches of a path.
+    pub const STRETCHES: usize = 32;
     /// Most waypoints of an area.
     pub const NUMBERS: u32 = u16::MAX as u32 + 1;
 
-    /// None yet; pictures are to be `spacing_m` apart at most (positive).
+    /// None yet; pictures are to be `spacing_m` apart at most.
     pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
-        let numbers = [0; Self::WAYPOINTS];
-        Self { begins: 0, ends: 0, numbers, backward: false, area: 0, spacing_m, look, trigger, goes_on: false }
+        let (numbers, counts) = ([0; Self::STRETCHES], [0; Self::STRETCHES]);
+        Self {
+            begins: 0,
+            ends: 0,
+            numbers,
+            counts,
+            backward: false,
+            area: 0,
+            spacing_m,
+            look,
+            trigger,
+            goes_on: false,
+        }
     }
 
     /// The same of an area with so many waypoints, along its path or back.
@@ -105,17 +120,21 @@ impl Photographs {
         self.area
     }
 
-    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before. `number` is
-    /// the lowest that one of the waypoints between has in the area.
+    /// Photographs from waypoint `from` to waypoint `to` of the path, which come after all that was marked before: these waypoints
+    /// of the area, evenly from one end to the other.
     ///
     /// # Errors
-    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`], and for a number beyond [`Self::NUMBERS`].
-    pub fn mark(&mut self, from: usize, to: usize, number: u32) -> Result<(), PathError> {
-        let number = u16::try_from(number).map_err(|_| PathError::PathFull)?;
-        if from > to || to >= Self::WAYPOINTS {
+    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`] and [`Self::STRETCHES`], for numbers beyond [`Self::NUMBERS`], and for no
+    /// waypoint.
+    pub fn mark(&mut self, from: usize, to: usize, waypoints: Range) -> Result<(), PathError> {
+        let number = u16::try_from(waypoints.first).map_err(|_| PathError::PathFull)?;
+        let count = waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
+        let count = count.filter(|count| *count > 0).ok_or(PathError::PathFull)?;
+        let stretch = self.begins.count_ones() as usize;
+        if from > to || to >= Self::WAYPOINTS || stretch >= Self::STRETCHES {
             return Err(PathError::PathFull);
         }
-        self.numbers[self.begins.count_ones() as usize & (Self::WAYPOINTS - 1)] = number;
+        (self.numbers[stretch], self.counts[stretch]) = (number, count);
         self.begins |= 1 << from;
         self.ends |= 1 << to;
         Ok(())
@@ -123,18 +142,16 @@ impl Photographs {
 
     /// The stretches, in their order along the path they were marked on.
     pub fn stretches<const W: usize>(&self, path: &Path<W>) -> impl Iterator<Item = Shots> {
-        let (mut begins, mut ends, spacing_m) = (self.begins, self.ends, self.spacing_m);
+        let (mut begins, mut ends) = (self.begins, self.ends);
         let waypoints = path.waypoints();
-        core::iter::from_fn(move || {
+        self.counts.into_iter().map_while(move |count| {
             let (from, to) = (begins.trailing_zeros() as usize, ends.trailing_zeros() as usize);
             let (from_m, to_m) = (waypoints.get(from)?.along_m, waypoints.get(to)?.along_m);
             begins &= begins - 1;
             ends &= ends - 1;
-            let length_m = fmaxf(to_m - from_m, 0.0);
-            // A stretch that is cut from a longer one is a multiple of its spacing, but for a rounding.
-            let steps = if from < to { fmaxf(ceilf(length_m / spacing_m - 1e-3), 1.0) } else { 0.0 };
-            let step_m = if steps > 0.0 { length_m / steps } else { 0.0 };
-            Some(Shots { from_m, to_m, step_m, count: (steps as u32).saturating_add(1) })
+            let count = u32::from(count);
+            let step_m = if count > 1 { fmaxf(to_m - from_m, 0.0) / (count - 1) as f32 } else { 0.0 };
+            Some(Shots { from_m, to_m, step_m, count })
         })
     }
 
@@ -194,12 +211,16 @@ mod tests {
         path
     }
 
+    fn mark_three(photographs: &mut Photographs) {
+        for (from, to, first, end) in [(0, 1, 7, 12), (2, 3, 30, 35), (4, 4, 40, 41)] {
+            photographs.mark(from, to, Range { first, end }).unwrap();
+        }
+    }
+
     #[test]
     fn pictures_stand_at_both_ends_of_a_stretch_and_evenly_between() {
         let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        photographs.mark(0, 1, 7).unwrap();
-        photographs.mark(2, 3, 30).unwrap();
-        photographs.mark(4, 4, 40).unwrap();
+        mark_three(&mut photographs);
         let path = path();
         let mut stretches = photographs.stretches(&path);
         assert_eq!(stretches.next(), Some(Shots { from_m: 0.0, to_m: 30.0, step_m: 7.5, count: 5 }));
@@ -226,9 +247,7 @@ mod tests {
     fn pictures_have_the_numbers_of_their_waypoints_both_ways() {
         for (backward, [part, whole]) in [(false, [(30, 33), (30, 35)]), (true, [(32, 35), (30, 35)])] {
             let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance).of_area(50, backward);
-            photographs.mark(0, 1, 7).unwrap();
-            photographs.mark(2, 3, 30).unwrap();
-            photographs.mark(4, 4, 40).unwrap();
+            mark_three(&mut photographs);
             let path = path();
             let numbers = |count| -> std::vec::Vec<_> {
                 photographs.first(&path, count).map(|range| (range.first, range.end)).collect()
@@ -244,10 +263,17 @@ mod tests {
     #[test]
     fn waypoints_beyond_the_bits_are_refused() {
         let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        assert_eq!(photographs.mark(63, 64, 0), Err(PathError::PathFull));
-        assert_eq!(photographs.mark(3, 2, 0), Err(PathError::PathFull));
+        let two = Range { first: 0, end: 2 };
+        assert_eq!(photographs.mark(63, 64, two), Err(PathError::PathFull));
+        assert_eq!(photographs.mark(3, 2, two), Err(PathError::PathFull));
+        assert_eq!(photographs.mark(2, 3, Range { first: 2, end: 2 }), Err(PathError::PathFull));
         // On a path that is shorter than what was marked there is nothing to photograph.
-        photographs.mark(62, 63, 0).unwrap();
+        photographs.mark(62, 63, two).unwrap();
         assert_eq!(photographs.stretches(&path()).next(), None);
+        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
+        for at in 0..Photographs::STRETCHES {
+            photographs.mark(at, at, Range { first: 0, end: 1 }).unwrap();
+        }
+        assert_eq!(photographs.mark(40, 41, two), Err(PathError::PathFull));
     }
 }

@@ -254,7 +254,8 @@ impl FleetModel {
         }
         vehicle.fleet.set_clock(now, NOW);
         let waypoint = self.path(&vehicle).0;
-        let waypoint = waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
+        let waypoint =
+            waypoint.get(usize::from(vehicle.along)).filter(|_| vehicle.along < self.end(&vehicle));
         let promised = vehicle.fleet.promise_dm().is_some_and(|dm| vehicle.along < dm / WAYPOINT_DM);
         let advances = choice.advances || !vehicle.stands || promised;
         if let Some(waypoint) = waypoint.filter(|_| advances && self.flies(&vehicle)) {

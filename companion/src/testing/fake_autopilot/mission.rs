@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
-use planner_core::flight::{Look, Path, Photographs, Task, Trigger, VehiclePlan};
+use planner_core::flight::{Look, Path, Photographs, Range, Task, Trigger, VehiclePlan};
 use planner_core::frames::Geodetic;
 
 use crate::{Config, RosterEntry};
@@ -52,6 +52,6 @@ pub(crate) fn field_plan() -> VehiclePlan<16, 8> {
     }
     let mut photographs = Photographs::new(2.0, Look::Ahead, Trigger::Distance);
     // A single picture: on the way to it the vehicle may look anywhere.
-    photographs.mark(1, 1, 0).unwrap();
+    photographs.mark(1, 1, Range { first: 0, end: 1 }).unwrap();
     VehiclePlan { task: Task::Photograph(photographs), path, descent_m: 1.5, ..plan() }
 }

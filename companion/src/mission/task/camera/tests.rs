@@ -6,6 +6,7 @@ use std::vec::Vec;
 
 use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
 use planner_core::Point;
+use planner_core::flight::Range;
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -31,9 +32,9 @@ fn path() -> Path<16> {
 
 fn photographs(trigger: Trigger) -> Photographs {
     let mut photographs = Photographs::new(8.0, Look::Ahead, trigger);
-    photographs.mark(1, 2, 0).unwrap();
-    photographs.mark(3, 4, 0).unwrap();
-    photographs.mark(5, 5, 0).unwrap();
+    photographs.mark(1, 2, Range { first: 0, end: 9 }).unwrap();
+    photographs.mark(3, 4, Range { first: 0, end: 9 }).unwrap();
+    photographs.mark(5, 5, Range { first: 0, end: 1 }).unwrap();
     photographs
 }
 
@@ -164,6 +165,6 @@ fn a_vehicle_looks_along_the_next_lane_or_one_way() {
     let fixed = Photographs::new(8.0, Look::Fixed(1.0), Trigger::Distance);
     assert_eq!(heading(&fixed, &path, 75.0), Some(1.0));
     let mut point = Photographs::new(8.0, Look::Ahead, Trigger::Distance);
-    point.mark(5, 5, 0).unwrap();
+    point.mark(5, 5, Range { first: 0, end: 1 }).unwrap();
     assert_eq!(heading(&point, &path, 3.0), None, "one picture leads no way");
 }

@@ -1,0 +1,69 @@
+//! Routes with more lanes than a path holds: how often all divide what is left, if nobody is lost.
+
+use anyhow::bail;
+use companion::swarm::fleet::{DIVISIONS, Lot, PROMISE_S};
+use planner_core::flight::{Flight, Task};
+
+use super::ready::{Mission, SwarmPlan};
+use crate::capacity::WAYPOINTS;
+
+/// Divisions that are kept for losses.
+const FOR_LOSSES: usize = 3;
+
+/// When a flight asks for a division, seconds after the plan began by its labels; none where it is the whole route.
+fn asks_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
+    let Task::Photograph(photographs) = &flight.task else { return None };
+    let end_m = photographs.end_m(&flight.path).filter(|_| photographs.goes_on)?;
+    let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
+    Some(flight.depart_s + end.at_s - PROMISE_S)
+}
+
+/// What is agreed about a flight if all are to hold so many seconds after the plan began.
+fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
+    let waypoints = flight.path.waypoints();
+    let flown_s = t_s - flight.depart_s;
+    let Some(next) = waypoints.iter().position(|waypoint| waypoint.at_s > flown_s) else {
+        return Lot {
+            lives: !flight.task.flies(),
+            along_dm: if flight.task.flies() { Lot::WHOLE } else { 0 },
+        };
+    };
+    let on_pad = flight.climb_m > 0.0 && (next == 0 || flown_s <= 0.0);
+    if !flight.task.flies() || on_pad {
+        return Lot { lives: true, along_dm: 0 };
+    }
+    let along_m = match next.checked_sub(1).map(|before| (waypoints[before], waypoints[next])) {
+        Some((a, b)) => a.along_m + (b.along_m - a.along_m) * (flown_s - a.at_s) / (b.at_s - a.at_s),
+        None => 0.0,
+    };
+    Lot { lives: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
+}
+
+/// What is agreed when the first vehicle of a plan asks for a division, by rank; none where no route goes on.
+pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
+    let hold_s = plan.flights.iter().filter_map(asks_s).min_by(f32::total_cmp)? + PROMISE_S;
+    let mut flights: Vec<_> = plan.flights.iter().collect();
+    flights.sort_by_key(|flight| flight.id);
+    Some(flights.into_iter().map(|flight| lot(flight, hold_s)).collect())
+}
+
+impl Mission {
+    /// The divisions that routes need if nobody is lost are fewer than vehicles may agree on.
+    pub(super) fn check_stretches(&self, plan: &SwarmPlan) -> anyhow::Result<()> {
+        let mut losses: Vec<Vec<Lot>> = Vec::new();
+        let mut next = next_lots(plan);
+        while let Some(lots) = next {
+            losses.push(lots);
+            if losses.len() > DIVISIONS - FOR_LOSSES {
+                bail!(
+                    "area too large: {}: its routes take more than {} stretches of {WAYPOINTS} corners each\nhint: more \
+                     vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone",
+                    self.scenario.path,
+                    DIVISIONS - FOR_LOSSES
+                );
+            }
+            next = next_lots(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);
+        }
+        Ok(())
+    }
+}
