@@ -4,8 +4,9 @@
 use std::path::Path;
 
 use super::crs::{Crs, System};
+use super::error::TerrainError;
+use super::limits::{MOST_BYTES, MOST_CELLS};
 use super::raster::Raster;
-use super::{MOST_BYTES, MOST_CELLS, TerrainError};
 use crate::files;
 
 const FORMAT: &str = "an ESRI grid";

@@ -11,8 +11,12 @@ use las::{Header, PointDataBuilder, Reader};
 use planner_core::coverage::Flat;
 
 use super::crs::{Crs, System, wkt_height_unit_m};
+use super::error::TerrainError;
+use super::frame::Frame;
 use super::geokeys::GeoKeys;
-use super::{Frame, HeightGrid, MOST_BYTES, TerrainError, claims, guard};
+use super::grid::HeightGrid;
+use super::limits::MOST_BYTES;
+use super::{claims, guard};
 use crate::files;
 
 const FORMAT: &str = "a point cloud";

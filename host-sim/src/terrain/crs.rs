@@ -6,8 +6,7 @@ use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
-use super::TerrainError;
-use super::error::WARP;
+use super::error::{TerrainError, WARP};
 
 /// Metres in a foot.
 pub(super) const FOOT_M: f64 = 0.3048;

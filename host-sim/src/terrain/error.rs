@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::{MOST_BYTES, MOST_CELLS};
+use super::limits::{MOST_BYTES, MOST_CELLS};
 use crate::quote::quoted;
 
 /// Why a file gives no heights.

@@ -1,8 +1,7 @@
 //! The keys by which GeoTIFF, and point clouds before LAS 1.4, say where their numbers are.
 
-use super::TerrainError;
 use super::crs::{Crs, System, unit_m};
-use super::error::WARP;
+use super::error::{TerrainError, WARP};
 
 const MODEL: u16 = 1024;
 const RASTER: u16 = 1025;

@@ -9,9 +9,10 @@ use tiff::tags::Tag;
 use tiff::{ColorType, TiffError};
 
 use super::crs::Crs;
+use super::error::TerrainError;
 use super::geokeys::GeoKeys;
+use super::limits::{MOST_BYTES, MOST_CELLS};
 use super::raster::Raster;
-use super::{MOST_BYTES, MOST_CELLS, TerrainError};
 use crate::files;
 
 const FORMAT: &str = "a GeoTIFF";

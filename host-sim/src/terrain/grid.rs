@@ -2,7 +2,8 @@
 
 use planner_core::coverage::Flat;
 
-use super::{MOST_CELLS, TerrainError};
+use super::error::TerrainError;
+use super::limits::MOST_CELLS;
 
 /// Heights of the ground. Cell (0, 0) has the least east and north.
 #[derive(Clone, Debug, PartialEq)]

@@ -12,38 +12,23 @@ mod claims;
 mod cloud;
 mod crs;
 mod error;
+mod frame;
 mod geokeys;
 mod geotiff;
 mod grid;
 mod guard;
+mod limits;
 mod raster;
 #[cfg(test)]
 mod tests;
 
 use std::path::Path;
 
-use planner_core::coverage::Flat;
-use planner_core::frames::Geodetic;
-
 pub use self::error::TerrainError;
+pub use self::frame::Frame;
 pub use self::grid::{HeightGrid, Heights};
+pub use self::limits::{MOST_BYTES, MOST_CELLS};
 use crate::quote::quoted_path;
-
-/// Longest file read, bytes.
-pub const MOST_BYTES: u64 = 1 << 28;
-/// Most cells of a file or a grid: 128 MB of heights.
-pub const MOST_CELLS: usize = 1 << 25;
-
-/// Where heights are asked for.
-#[derive(Clone, Copy, Debug)]
-pub struct Frame<'a> {
-    /// Origin of the mission frame. Heights stay above sea level whatever its altitude.
-    pub origin: &'a Geodetic,
-    /// Whether numbers that name no coordinate system are metres about the origin.
-    pub metres: bool,
-    /// The box that is wanted, metres: its least and its greatest corner. All of the file where absent.
-    pub window: Option<[Flat; 2]>,
-}
 
 /// Reads a file of heights.
 ///

@@ -8,7 +8,9 @@ use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
 
 use super::crs::Crs;
-use super::{Frame, HeightGrid, TerrainError};
+use super::error::TerrainError;
+use super::frame::Frame;
+use super::grid::HeightGrid;
 
 /// Heights as a file has them.
 #[derive(Debug)]

@@ -1,0 +1,15 @@
+//! Where heights are asked for.
+
+use planner_core::coverage::Flat;
+use planner_core::frames::Geodetic;
+
+/// Where heights are asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame<'a> {
+    /// Origin of the mission frame. Heights stay above sea level whatever its altitude.
+    pub origin: &'a Geodetic,
+    /// Whether numbers that name no coordinate system are metres about the origin.
+    pub metres: bool,
+    /// The box that is wanted, metres: its least and its greatest corner. All of the file where absent.
+    pub window: Option<[Flat; 2]>,
+}
