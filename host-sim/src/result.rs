@@ -65,8 +65,26 @@ pub struct CoverageResult {
     pub twice: u64,
     /// Waypoints photographed by nobody.
     pub left: u64,
+    /// Heights above the ground, where there is terrain.
+    #[serde(flatten)]
+    pub terrain: Option<TerrainResult>,
     /// One for each vehicle that flies.
     pub routes: Vec<RouteResult>,
+}
+
+/// How lanes lie above terrain, as the checker found it.
+#[derive(Clone, Debug, Serialize)]
+pub struct TerrainResult {
+    /// The least height above the ground of any lane or way between, metres.
+    pub ground_least_m: f64,
+    /// The greatest, metres.
+    pub ground_most_m: f64,
+    /// The steepest leg among them, metres for each metre over ground.
+    pub steepest: f64,
+    /// Legs that come too near to the ground.
+    pub too_low: u64,
+    /// Legs steeper than their vehicle flies.
+    pub too_steep: u64,
 }
 
 /// One route.

@@ -32,6 +32,7 @@ pub mod assignment;
 pub mod coverage;
 pub mod deconflict;
 pub mod detour;
+pub mod field;
 pub mod file;
 pub mod flight;
 pub mod frames;

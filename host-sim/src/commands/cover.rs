@@ -233,6 +233,7 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
     if let Some([x, y]) = findings.missing {
         say!("left out   the first cell is at [{x:.1}, {y:.1}]");
     }
+    print_terrain(coverage);
     if findings.forbidden > 0 {
         say!("no-fly     {} legs enter a no-fly zone", findings.forbidden);
     }
@@ -244,6 +245,20 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
         result.method
     );
     say!("report     {}", dir.join("report.html").display());
+}
+
+fn print_terrain(coverage: &CoverageResult) {
+    if let Some(terrain) = &coverage.terrain {
+        say!(
+            "terrain    lanes {:.1} to {:.1} m above the ground, at most {:.0} % steep",
+            terrain.ground_least_m,
+            terrain.ground_most_m,
+            100.0 * terrain.steepest
+        );
+        if terrain.too_low + terrain.too_steep > 0 {
+            say!("terrain    {} legs too low, {} too steep", terrain.too_low, terrain.too_steep);
+        }
+    }
 }
 
 #[cfg(test)]

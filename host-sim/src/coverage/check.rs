@@ -10,7 +10,9 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::RingKind;
 
+pub use super::flight::Flown;
 use super::flight::{Act, Stop};
+use super::heights::{self, HeightFindings};
 use super::{Flight, Planned};
 
 /// Most cells looked at; larger areas are looked at in larger cells.
@@ -37,6 +39,8 @@ pub struct Findings {
     pub broken: u64,
     /// Legs that enter a no-fly zone.
     pub forbidden: u64,
+    /// What was found of the heights above terrain.
+    pub heights: Option<HeightFindings>,
     /// When each picture first showed a cell: time and number of cells, by rising time.
     pub over_time: Vec<(f32, u64)>,
 }
@@ -44,18 +48,10 @@ pub struct Findings {
 impl Findings {
     /// Whether nothing is wrong.
     pub fn is_clean(&self) -> bool {
-        self.covered_share >= 1.0 && self.left + self.twice + self.broken + self.forbidden == 0
+        self.covered_share >= 1.0
+            && self.left + self.twice + self.broken + self.forbidden == 0
+            && self.heights.as_ref().is_none_or(HeightFindings::is_clean)
     }
-}
-
-/// One vehicle's flight: its stops, and when it passes each.
-pub struct Flown<'a> {
-    /// MAVLink system id.
-    pub vehicle: u8,
-    /// The stops.
-    pub stops: &'a [Stop],
-    /// Seconds.
-    pub times_s: &'a [f32],
 }
 
 /// A picture: when, where, and how.
@@ -94,6 +90,7 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
         let enters = |pair: &&[Stop]| enters_zone(planned, &pair[0].position.xy(), &pair[1].position.xy());
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
+    findings.heights = heights::check(planned, flights);
     Cells::new(planned).judge(planned, pictures(planned, flights), &mut findings);
     findings
 }
@@ -260,13 +257,14 @@ impl Cells {
     /// Half of what a picture shows along and across the lanes. Of one that is taken askew, as large a rectangle of the same
     /// sides' ratio as lies within it.
     fn half(&self, planned: &Planned<'_>, picture: &Picture) -> [f64; 2] {
-        let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.heights.mission_m);
+        let (footprint, height_m) = (planned.wanted.spacing.footprint, planned.wanted.height_m);
+        let above_m = picture.position.z - planned.wanted.ground_m(&picture.position.xy());
         let half = [f64::from(footprint.along_m) / 2.0, f64::from(footprint.across_m) / 2.0];
         let askew = f64::from(picture.heading) - self.along[1].atan2(self.along[0]);
         let (cos, sin) = (askew.cos().abs(), askew.sin().abs());
         let fits = |own: f64, other: f64| own / (own * cos + other * sin);
         let share = fits(half[0], half[1]).min(fits(half[1], half[0])).min(1.0);
-        half.map(|side| side * share * f64::from(picture.position.z) / f64::from(height_m))
+        half.map(|side| side * share * f64::from(above_m) / f64::from(height_m))
     }
 
     /// Corners of what a picture is judged to show, in turn, metres east and north.

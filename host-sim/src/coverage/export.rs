@@ -2,7 +2,7 @@
 //!
 //! A flight is NAV_DELAY (93) where it leaves later than others, NAV_TAKEOFF (22), DO_CHANGE_SPEED (178), waypoints (16), the camera's trigger, and
 //! NAV_RETURN_TO_LAUNCH (20) above the pad. Heights are relative to the vehicle's home (frame 3), so that neither map nor
-//! geoid matters. Between both ends of a lane nothing is written where the autopilot triggers by distance.
+//! geoid matters; terrain is relative to the vehicle's home too, as the height map has both. Between both ends of a lane nothing is written where the autopilot triggers by distance.
 
 use planner_core::Point;
 use planner_core::coverage::area::RingKind;
@@ -61,7 +61,8 @@ fn yaw_deg(planned: &Planned<'_>, stops: &[Stop], index: usize) -> f64 {
     let neighbours = [index.checked_sub(1).map(|i| (i, index)), Some((index, index + 1))];
     let step = neighbours.into_iter().flatten().find_map(|(a, b)| {
         let (from, to) = (stops.get(a)?, stops.get(b)?);
-        (own.is_some() && from.lane == own && to.lane == own)
+        let apart = (to.position - from.position).xy().norm() > 1e-3;
+        (apart && own.is_some() && from.lane == own && to.lane == own)
             .then(|| heading_deg(&from.position, &to.position))
     });
     let yaw = match planned.wanted.heading {
@@ -120,9 +121,10 @@ pub fn items(planned: &Planned<'_>, sortie: &Sortie, stops: &[Stop]) -> Vec<Item
                     items.push(waypoint(index));
                 }
                 if trigger == Trigger::Distance && begins && !ends {
-                    let next = stops.get(index + 1).filter(|next| next.lane == stop.lane);
+                    let mut later = stops[index + 1..].iter().take_while(|next| next.lane == stop.lane);
+                    let next = later.find(|next| matches!(next.act, Act::Photo(_)));
                     let step = next.map_or(planned.wanted.spacing.waypoint_m, |next| {
-                        (next.position - stop.position).norm()
+                        (next.position - stop.position).xy().norm()
                     });
                     // The first picture at once, the others each so far from the last.
                     let trigger = [round(f64::from(step), 1e3), 0.0, 1.0, 0.0];
@@ -209,10 +211,11 @@ pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String
     text
 }
 
-/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie.
+/// Every point of every flight: vehicle, order, waypoint number where a picture is taken, place in both frames, sortie,
+/// the ground there.
 pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
     let mut text =
-        "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie\n".to_owned();
+        "vehicle,order,time_s,act,waypoint,lat_deg,lon_deg,east_m,north_m,up_m,sortie,ground_m\n".to_owned();
     for (sortie, stops, times) in flights {
         let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
         for (order, (stop, time)) in stops.iter().zip(times).enumerate() {
@@ -225,8 +228,14 @@ pub fn csv(planned: &Planned<'_>, flights: &[Flight]) -> String {
             let p = stop.position;
             let place = planned.geodetic(&p);
             text += &format!(
-                "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3},{}\n",
-                place.lat_deg, place.lon_deg, p.x, p.y, p.z, sortie.number
+                "{id},{order},{time:.2},{act},{number},{:.9},{:.9},{:.3},{:.3},{:.3},{},{:.3}\n",
+                place.lat_deg,
+                place.lon_deg,
+                p.x,
+                p.y,
+                p.z,
+                sortie.number,
+                planned.wanted.ground_m(&p.xy())
             );
         }
     }

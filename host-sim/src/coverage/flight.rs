@@ -1,6 +1,9 @@
 //! The flight of one vehicle: up to its layer, over to the first waypoint, down, along the lanes, up, home, down.
 //!
-//! Metres, ENU in the mission frame. The height of the pictures is above the mission's origin.
+//! Metres, ENU in the mission frame. The height of the pictures is above the mission's origin, or above terrain: then lanes
+//! and the ways between them have corners where they rise and fall.
+
+use std::convert::Infallible;
 
 use heapless::Vec as Fixed;
 use planner_core::Point;
@@ -8,6 +11,10 @@ use planner_core::coverage::Flat;
 use planner_core::coverage::pack::Route;
 
 use super::{CORNERS, Planned};
+use crate::scenario::coverage::Trigger;
+
+/// A corner so near to a picture is at its place, metres.
+const SAME_M: f32 = 0.01;
 
 /// What a vehicle does at a point of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,6 +40,16 @@ pub struct Stop {
     pub lane: Option<u16>,
 }
 
+/// One vehicle's flight: its stops, and when it passes each.
+pub struct Flown<'a> {
+    /// MAVLink system id.
+    pub vehicle: u8,
+    /// The stops.
+    pub stops: &'a [Stop],
+    /// Seconds.
+    pub times_s: &'a [f32],
+}
+
 /// The whole flight of a route, from pad to pad.
 pub fn stops(planned: &Planned<'_>, route: &Route) -> Vec<Stop> {
     let (vehicle, pad) = {
@@ -50,24 +67,95 @@ pub fn stops(planned: &Planned<'_>, route: &Route) -> Vec<Stop> {
         corners(planned, &vehicle.place, &ends[0]).iter().map(|c| stop(at(c, layer_m), Act::Transit)),
     );
     stops.push(stop(at(&ends[0], layer_m), Act::Transit));
-    let mut before: Option<(usize, Flat)> = None;
-    for number in route.waypoints() {
-        let lane = planned.tracks.lane_of(number);
-        let Some(place) = planned.tracks.waypoint(number) else { continue };
-        if let Some((_, from)) = before.filter(|(other, _)| *other != lane) {
-            let around = corners(planned, &from, &place);
-            stops.extend(around.iter().map(|c| stop(at(c, heights.mission_m), Act::Lane)));
-        }
-        let position = at(&place, heights.mission_m);
-        stops.push(Stop { position, act: Act::Photo(number), lane: Some(lane as u16) });
-        before = Some((lane, place));
-    }
+    low(planned, route, &mut stops);
     stops.push(stop(at(&ends[1], layer_m), Act::Transit));
     stops
         .extend(corners(planned, &ends[1], &vehicle.home).iter().map(|c| stop(at(c, layer_m), Act::Transit)));
     stops.push(stop(at(&vehicle.home, layer_m), Act::Transit));
     stops.push(stop(Point::new(vehicle.home.x, vehicle.home.y, pad.z), Act::Pad));
     stops
+}
+
+/// The lanes of a route and the ways between them.
+fn low(planned: &Planned<'_>, route: &Route, stops: &mut Vec<Stop>) {
+    let numbers: Vec<u32> = route.waypoints().collect();
+    let mut here: Option<Point> = None;
+    for own in numbers.chunk_by(|a, b| planned.tracks.lane_of(*a) == planned.tracks.lane_of(*b)) {
+        let lane = Some(planned.tracks.lane_of(own[0]) as u16);
+        let places: Vec<(u32, Flat)> =
+            own.iter().filter_map(|number| Some((*number, planned.tracks.waypoint(*number)?))).collect();
+        let (Some((_, begin)), Some((_, end))) = (places.first(), places.last()) else { continue };
+        let from = match here {
+            None => begins(planned, begin, end),
+            Some(mut from) => {
+                let mut between = Vec::new();
+                for corner in corners(planned, &from.xy(), begin).iter().chain([begin]) {
+                    between.extend(legs(planned, &from, corner));
+                    from = between.last().copied().unwrap_or(from);
+                }
+                between.pop();
+                let stop = |position: Point| Stop { position, act: Act::Lane, lane: None };
+                stops.extend(between.into_iter().map(stop));
+                from
+            }
+        };
+        let path: Vec<Point> = std::iter::once(from).chain(legs(planned, &from, end)).collect();
+        photographed(planned, &path, &places, lane, stops);
+        here = path.last().copied();
+    }
+}
+
+/// Where the first lane begins.
+fn begins(planned: &Planned<'_>, begin: &Flat, end: &Flat) -> Point {
+    match &planned.following {
+        Some(following) => following.begin(begin, end),
+        None => Point::new(begin.x, begin.y, planned.wanted.heights.mission_m),
+    }
+}
+
+/// The corners of a straight way from a point above the ground, the last of them its end.
+fn legs(planned: &Planned<'_>, from: &Point, to: &Flat) -> Vec<Point> {
+    let mut corners = Vec::new();
+    let Some(following) = &planned.following else { return vec![Point::new(to.x, to.y, from.z)] };
+    let followed: Result<(), Infallible> = following.to(from, to, |corner| {
+        corners.push(corner);
+        Ok(())
+    });
+    match followed {
+        Ok(()) => corners,
+        Err(never) => match never {},
+    }
+}
+
+/// Pictures along a lane's path, and its corners between them.
+fn photographed(
+    planned: &Planned<'_>,
+    path: &[Point],
+    places: &[(u32, Flat)],
+    lane: Option<u16>,
+    stops: &mut Vec<Stop>,
+) {
+    let along_m = |place: &Flat| (place - path[0].xy()).norm();
+    let by_waypoint = planned.wanted.trigger == Trigger::Waypoint;
+    let mut leg = 0;
+    for (number, place) in places {
+        let at_m = along_m(place);
+        while leg + 2 < path.len() && along_m(&path[leg + 1].xy()) <= at_m + SAME_M {
+            leg += 1;
+            let corner = path[leg];
+            // Where each picture is a waypoint, the corner is one already.
+            if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_M {
+                stops.push(Stop { position: corner, act: Act::Lane, lane });
+            }
+        }
+        let end = path[(leg + 1).min(path.len() - 1)];
+        let length_m = (end - path[leg]).xy().norm();
+        let share =
+            if length_m > 0.0 { ((at_m - along_m(&path[leg].xy())) / length_m).clamp(0.0, 1.0) } else { 0.0 };
+        let height_m = path[leg].z + (end.z - path[leg].z) * share;
+        let position = Point::new(place.x, place.y, height_m);
+        stops.push(Stop { position, act: Act::Photo(*number), lane });
+    }
 }
 
 /// The corners of the way between two places.

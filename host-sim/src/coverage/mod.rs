@@ -7,6 +7,7 @@ pub mod check;
 pub mod export;
 pub mod flight;
 pub mod flown;
+pub mod heights;
 pub mod kept;
 pub mod page;
 pub mod parts;
@@ -35,10 +36,6 @@ use crate::scenario::coverage::{self, Method};
 
 /// Changes of the lanes' order that the desk looks at.
 pub const LOOKS: u32 = 20_000_000;
-/// V_a where a vehicle has none of its own, metres a second.
-const CLIMB_MPS: f32 = 3.0;
-/// V_d likewise.
-const DESCEND_MPS: f32 = 1.0;
 
 /// A sortie, its stops, and when each is passed, seconds.
 pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
@@ -97,9 +94,12 @@ impl<'a> Planned<'a> {
         let routes = began.elapsed().as_secs_f64();
         let lower_bound_s = lower_bound_s(&work).map_err(failed)?;
         let seconds = [lanes, ways, routes];
+        let following = wanted.terrain.as_ref().map(|terrain| terrain.following(wanted.height_m)).transpose();
+        let following = following.map_err(|error| anyhow::anyhow!("bad field: {}: {error}", wanted.place))?;
         let mut planned = Self {
             scenario,
             wanted,
+            following,
             area,
             method,
             vehicles,
@@ -254,12 +254,13 @@ fn check_places(scenario: &Scenario, area: &Area<'_>, vehicles: &[Vehicle]) -> a
 /// A vehicle as the planner sees it.
 fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     let place = vehicle.start.xy();
+    let [climb_mps, descend_mps] = vehicle.climbs_mps();
     Vehicle {
         place,
         home: place,
         cruise_mps: scenario.mission.cruise_mps.min(vehicle.speed_max_mps),
-        climb_mps: vehicle.climb_mps.unwrap_or(CLIMB_MPS),
-        descend_mps: vehicle.descend_mps.unwrap_or(DESCEND_MPS),
+        climb_mps,
+        descend_mps,
         weight: vehicle.weight.unwrap_or(1.0),
     }
 }

@@ -9,6 +9,9 @@ use super::flight::Stop;
 use super::{Flight, Planned, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
+/// From point to point of a profile, metres.
+const PROFILE_M: f32 = 5.0;
+
 /// What the page shows.
 pub fn page(
     planned: &Planned<'_>,
@@ -41,10 +44,43 @@ pub fn page(
         vehicles: vehicles.collect(),
         outlines: outlines(planned),
         coverage: Some(parts::planned(planned, flights)),
-        plots: vec![photographed(findings)],
+        plots: plots(planned, flights, findings),
         result,
         ..ReportData::default()
     }
+}
+
+/// The share photographed, and above terrain the heights.
+fn plots(planned: &Planned<'_>, flights: &[Flight], findings: &Findings) -> Vec<Plot> {
+    let mut plots = vec![photographed(findings)];
+    if planned.following.is_some() {
+        plots.push(profile(planned, flights));
+    }
+    plots
+}
+
+/// Heights along each path, and of the ground below it.
+fn profile(planned: &Planned<'_>, flights: &[Flight]) -> Plot {
+    let mut curves = Vec::new();
+    for (sortie, stops, times_s) in flights {
+        let id = planned.scenario.vehicles[usize::from(sortie.route.vehicle)].id;
+        let mut path = Curve { name: format!("vehicle {id}"), vehicle: Some(id), ..Curve::default() };
+        let mut ground = Curve { name: format!("ground below {id}"), ..Curve::default() };
+        for (leg, times) in stops.windows(2).zip(times_s.windows(2)) {
+            let step = leg[1].position - leg[0].position;
+            let parts = (step.xy().norm() / PROFILE_M).ceil().max(1.0) as usize;
+            for share in (0..=parts).map(|part| part as f32 / parts as f32) {
+                let (at, t_s) = (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
+                for (curve, height_m) in [(&mut path, at.z), (&mut ground, planned.wanted.ground_m(&at.xy()))]
+                {
+                    curve.t_s.push(t_s);
+                    curve.values.push(height_m);
+                }
+            }
+        }
+        curves.extend([path, ground]);
+    }
+    Plot { title: "Height along the path".to_owned(), unit: "m".to_owned(), limit: None, curves }
 }
 
 /// Borders of the area.
@@ -56,7 +92,7 @@ pub(super) fn outlines(planned: &Planned<'_>) -> Vec<Outline> {
     ];
     let outline = |ring: &[Flat], kind| Outline {
         kind,
-        points: ring.iter().map(|v| Point::new(v.x, v.y, 0.0)).collect(),
+        points: ring.iter().map(|v| Point::new(v.x, v.y, planned.wanted.ground_m(v))).collect(),
     };
     let shown = |(kind, shown)| planned.wanted.rings_of(kind).map(move |ring| outline(ring, shown));
     kinds.into_iter().flat_map(shown).collect()

@@ -4,6 +4,7 @@ use planner_core::coverage::area::Area;
 use planner_core::coverage::pack::{Plan, Route, Vehicle};
 use planner_core::coverage::tracks::Tracks;
 use planner_core::coverage::transit::Transit;
+use planner_core::field::follow::Following;
 
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
@@ -45,6 +46,8 @@ pub struct Planned<'a> {
     pub scenario: &'a Scenario,
     /// Its `[area]`.
     pub wanted: &'a coverage::Area,
+    /// What vehicles follow above terrain.
+    pub following: Option<Following<'a>>,
     /// Its area.
     pub area: Area<'a>,
     /// How work was divided.

@@ -5,7 +5,7 @@ use planner_core::coverage::pack::Route;
 use super::Planned;
 use super::check::Findings;
 use super::sorties::Sortie;
-use crate::result::{CoverageResult, RouteResult, SortieResult, rounded};
+use crate::result::{CoverageResult, RouteResult, SortieResult, TerrainResult, rounded};
 
 /// The plan, and what was found of its pictures.
 pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
@@ -30,6 +30,13 @@ pub fn of(planned: &Planned<'_>, findings: &Findings) -> CoverageResult {
         photos: findings.photos,
         twice: findings.twice,
         left: findings.left,
+        terrain: findings.heights.as_ref().map(|heights| TerrainResult {
+            ground_least_m: rounded(heights.least_m),
+            ground_most_m: rounded(heights.most_m),
+            steepest: rounded(heights.steepest),
+            too_low: heights.too_low,
+            too_steep: heights.too_steep,
+        }),
         routes: route_results(planned),
     }
 }

@@ -15,6 +15,7 @@ use planner_core::coverage::flights::ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
 
 use super::Planned;
+use super::flight::Act;
 pub use super::planned::Sortie;
 use crate::autopilot::VehicleLimits;
 use crate::scenario;
@@ -42,7 +43,23 @@ pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let top_m = heights.mission_m + over_lanes_m;
     let up_m = (top_m - planned.scenario.vehicles[index].start.z).abs() + over_lanes_m;
     let level_s = route.ground_m / vehicle.cruise_mps + turns_s(planned, route);
+    if planned.following.is_some() {
+        return level_s + over_terrain_s(planned, route);
+    }
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
+}
+
+/// What all ways up and down take where the ground rises and falls, as if each were flown alone, and stops at the corners
+/// that follow it, seconds.
+fn over_terrain_s(planned: &Planned<'_>, route: &Route) -> f32 {
+    let vehicle = &planned.vehicles[usize::from(route.vehicle)];
+    let stops = super::flight::stops(planned, route);
+    let ups = stops.windows(2).map(|pair| match pair[1].position.z - pair[0].position.z {
+        up_m if up_m > 0.0 => up_m / vehicle.climb_mps,
+        down_m => -down_m / vehicle.descend_mps,
+    });
+    let corners = stops.iter().filter(|stop| stop.act == Act::Lane).count() as f32;
+    ups.sum::<f32>() + corners * vehicle.cruise_mps / ACCEL_MPS2
 }
 
 /// What stops at both ends of each lane, and over the pad, take beyond that, seconds: a lane, and a way from or to the pad, is

@@ -36,6 +36,14 @@ type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
 /// The mission up to its files.
 pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
+    let area = scenario.area.as_ref();
+    if let Some(area) = area.filter(|area| area.terrain.is_some()) {
+        bail!(
+            "cannot be flown: {}: companions know no terrain yet\nhint: `cover` writes plans that follow it, which autopilots \
+             fly without a companion",
+            area.place
+        );
+    }
     let planned = Planned::flown(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(

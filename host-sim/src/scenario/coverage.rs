@@ -1,11 +1,18 @@
 //! What `[area]` says: the scenario of a coverage mission.
 
+use std::sync::Arc;
+
 pub use companion::storage::mission_file::coverage::Heading;
 use planner_core::coverage::area::{Ring, RingKind};
 use planner_core::coverage::footprint::{Camera, Spacing};
 use planner_core::coverage::{Flat, pack::Heights};
+use planner_core::field::FieldView;
+use planner_core::field::follow::Following;
+use planner_core::file::FileError;
 pub use planner_core::flight::Trigger;
 use planner_core::frames::Geodetic;
+
+use crate::terrain::HeightGrid;
 
 /// `[area]`
 #[derive(Clone, Debug)]
@@ -24,8 +31,12 @@ pub struct Area {
     pub spacing: Spacing,
     /// The same with what of a picture is planned with.
     pub usable: Spacing,
-    /// Height of the pictures, and of the layers.
+    /// Height of the pictures above the origin, or above the ground.
+    pub height_m: f32,
+    /// The greatest height of the pictures, and of the layers over that.
     pub heights: Heights,
+    /// The ground, where it is not level.
+    pub terrain: Option<Terrain>,
     /// Direction of the lanes, where it is given: degrees from east to the left.
     pub angle_deg: Option<f32>,
     /// Lanes begin and end so far beyond the edge.
@@ -40,7 +51,36 @@ pub struct Area {
     pub trigger: Trigger,
 }
 
+/// The ground below an area.
+#[derive(Clone, Debug)]
+pub struct Terrain {
+    /// Its heights, metres above the mission's origin.
+    pub grid: Arc<HeightGrid>,
+    /// What vehicles follow: the bytes of a field.
+    pub field: Arc<[u8]>,
+    /// Vehicles fly at most so much higher above the field than [`Area::height_m`], metres.
+    pub tolerance_m: f32,
+    /// Metres up or down for each metre over ground, at most.
+    pub slope: f32,
+}
+
+impl Terrain {
+    /// What paths keep at this height above the ground.
+    ///
+    /// # Errors
+    /// The bytes are no field.
+    pub fn following(&self, height_m: f32) -> Result<Following<'_>, FileError> {
+        let field = FieldView::parse(&self.field)?;
+        Ok(Following { field, height_m, tolerance_m: self.tolerance_m, slope: self.slope })
+    }
+}
+
 impl Area {
+    /// The ground at a place, metres above the origin: level ground where there is no terrain, and beyond its map.
+    pub fn ground_m(&self, place: &Flat) -> f32 {
+        self.terrain.as_ref().and_then(|terrain| terrain.grid.height_at(place)).unwrap_or(0.0)
+    }
+
     /// Vertices of the rings of one kind.
     pub fn rings_of(&self, kind: RingKind) -> impl Iterator<Item = &[Flat]> {
         let starts = std::iter::once(0).chain(self.rings.iter().map(|ring| usize::from(ring.end)));

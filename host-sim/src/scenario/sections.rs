@@ -3,6 +3,7 @@
 pub(super) mod area;
 mod checks;
 mod simulation;
+mod terrain;
 mod values;
 
 use std::path::Path;

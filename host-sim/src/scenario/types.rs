@@ -192,6 +192,18 @@ pub struct Vehicle {
     pub descend_mps: Option<f32>,
 }
 
+/// V_a where a vehicle has none of its own, metres a second.
+const CLIMB_MPS: f32 = 3.0;
+/// V_d likewise.
+const DESCEND_MPS: f32 = 1.0;
+
+impl Vehicle {
+    /// V_a and V_d, metres a second.
+    pub fn climbs_mps(&self) -> [f32; 2] {
+        [self.climb_mps.unwrap_or(CLIMB_MPS), self.descend_mps.unwrap_or(DESCEND_MPS)]
+    }
+}
+
 /// Where a companion runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Companion {

@@ -12,7 +12,7 @@ use planner_core::coverage::Flat;
 
 use super::crs::{Crs, System, wkt_height_unit_m};
 use super::error::TerrainError;
-use super::frame::Frame;
+use super::frame::{Frame, beside};
 use super::geokeys::GeoKeys;
 use super::grid::HeightGrid;
 use super::limits::MOST_BYTES;
@@ -122,7 +122,9 @@ fn empty(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, Te
     };
     let sides = high - low;
     let cell_m = (f64::from(sides.x) * f64::from(sides.y) * RETURNS / count as f64).sqrt().max(LEAST_CELL_M);
+    let cell_m = cell_m as f32;
     // The last return is in a cell too.
-    let beyond = Flat::repeat(cell_m as f32 / 2.0);
-    HeightGrid::new(frame.window.unwrap_or([low - beyond, high + beyond]), cell_m as f32)
+    let half = Flat::repeat(cell_m / 2.0);
+    let window = frame.window.map_or([low - half, high + half], |window| beside(window, cell_m));
+    HeightGrid::new(window, cell_m)
 }

@@ -10,6 +10,16 @@ pub struct Frame<'a> {
     pub origin: &'a Geodetic,
     /// Whether numbers that name no coordinate system are metres about the origin.
     pub metres: bool,
-    /// The box that is wanted, metres: its least and its greatest corner. All of the file where absent.
+    /// The box that is wanted, metres: its least and its greatest corner; some cells around it are read too. All of the
+    /// file where absent.
     pub window: Option<[Flat; 2]>,
+}
+
+/// Cells read around a window.
+const BESIDE: f32 = 5.0;
+
+/// A window and the cells around it.
+pub(super) fn beside([low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
+    let beyond = Flat::repeat(BESIDE * cell_m);
+    [low - beyond, high + beyond]
 }

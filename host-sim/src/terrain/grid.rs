@@ -13,6 +13,8 @@ pub struct HeightGrid {
     size: [usize; 2],
     /// Row by row, metres; NaN in holes.
     heights_m: Vec<f32>,
+    /// Likewise, what the file has at the middle of each cell; empty where that is the same.
+    middles_m: Vec<f32>,
 }
 
 /// What the cells of a box hold.
@@ -41,7 +43,7 @@ impl HeightGrid {
             return Err(TerrainError::TooManyCells((columns * rows) as u128));
         }
         let size = [columns as usize, rows as usize];
-        Ok(Self { low, cell_m, size, heights_m: vec![f32::NAN; size[0] * size[1]] })
+        Ok(Self { low, cell_m, size, heights_m: vec![f32::NAN; size[0] * size[1]], middles_m: Vec::new() })
     }
 
     /// Side of a cell, metres.
@@ -82,9 +84,18 @@ impl HeightGrid {
         Some([known().reduce(f32::min)?, known().reduce(f32::max)?])
     }
 
-    /// The height at a place, metres: that of the cell it is in; none in holes and outside.
+    /// The height at a place, metres: what the file has at the middle of the cell it is in; none in holes and outside.
     pub fn height_at(&self, place: &Flat) -> Option<f32> {
-        self.cell_of(place).and_then(|cell| self.height(cell))
+        let [column, row] = self.cell_of(place)?;
+        match self.middles_m.get(row * self.size[0] + column) {
+            Some(height_m) => (!height_m.is_nan()).then_some(*height_m),
+            None => self.height([column, row]),
+        }
+    }
+
+    /// The heights so far are those at the middles; cells may be raised beyond them.
+    pub(super) fn keep_middles(&mut self) {
+        self.middles_m.clone_from(&self.heights_m);
     }
 
     /// What the cells hold that a box touches.
@@ -119,7 +130,7 @@ impl HeightGrid {
 
     /// The same heights above another zero.
     pub fn above(mut self, zero_m: f64) -> Self {
-        for height_m in &mut self.heights_m {
+        for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;
         }
         self

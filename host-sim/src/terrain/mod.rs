@@ -12,6 +12,7 @@ mod claims;
 mod cloud;
 mod crs;
 mod error;
+mod field;
 mod frame;
 mod geokeys;
 mod geotiff;
@@ -25,6 +26,7 @@ mod tests;
 use std::path::Path;
 
 pub use self::error::TerrainError;
+pub use self::field::{FieldConfig, FieldError, field};
 pub use self::frame::Frame;
 pub use self::grid::{HeightGrid, Heights};
 pub use self::limits::{MOST_BYTES, MOST_CELLS};

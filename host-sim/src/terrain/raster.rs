@@ -9,7 +9,7 @@ use planner_core::frames::Geodetic;
 
 use super::crs::Crs;
 use super::error::TerrainError;
-use super::frame::Frame;
+use super::frame::{Frame, beside};
 use super::grid::HeightGrid;
 
 /// Heights as a file has them.
@@ -46,13 +46,17 @@ impl Raster {
                 self.bounds(origin).ok_or_else(|| TerrainError::system("a system that ends before it"))?
             }
         };
-        let Some([columns, rows]) = self.touched(origin, window) else {
-            return HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
-        };
-        let middle = [columns, rows].map(|(from, to)| (from + to) as f64 / 2.0);
+        let nothing = |window: [Flat; 2]| HeightGrid::new(window, (window[1] - window[0]).amax().max(1.0));
+        let Some(touched) = self.touched(origin, window) else { return nothing(window) };
+        let middle = touched.map(|(from, to)| (from + to) as f64 / 2.0);
         let cell_m = self
             .cell_m(origin, middle)
             .ok_or_else(|| TerrainError::system("a system that ends before it"))?;
+        let window = match frame.window {
+            Some(window) => self.aligned(origin, beside(window, cell_m), cell_m),
+            None => window,
+        };
+        let Some([columns, rows]) = self.touched(origin, window) else { return nothing(window) };
         let mut grid = HeightGrid::new(window, cell_m)?;
         let [across, up] = grid.size();
         for row in 0..up {
@@ -63,6 +67,7 @@ impl Raster {
                 }
             }
         }
+        grid.keep_middles();
         for row in rows.0..rows.1 {
             for column in columns.0..columns.1 {
                 let height_m = self.heights_m[row * self.columns + column];
@@ -81,6 +86,17 @@ impl Raster {
         let inside = column >= 0.0 && row >= 0.0 && column < self.columns as f64 && row < self.rows as f64;
         let height_m = inside.then(|| self.heights_m[row as usize * self.columns + column as usize])?;
         (!height_m.is_nan()).then_some(height_m)
+    }
+
+    /// A box that begins at the corner of one of the file's cells: where both grids lie alike their cells are the same.
+    fn aligned(&self, origin: &Geodetic, [low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
+        let corner = self.crs.to_mission(origin, self.place(0.0, self.rows as f64));
+        let Some(corner) = corner.filter(|corner| corner.amax() < 1e6) else { return [low, high] };
+        let down = |axis: usize| {
+            let cells = ((f64::from(low[axis]) - f64::from(corner[axis])) / f64::from(cell_m)).floor();
+            (f64::from(corner[axis]) + cells * f64::from(cell_m)) as f32
+        };
+        [Flat::new(down(0), down(1)), high]
     }
 
     /// The box around all cells.

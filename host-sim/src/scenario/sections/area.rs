@@ -9,6 +9,7 @@ use planner_core::coverage::{CoverageError, Flat, area as core_area};
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 
 use super::checks::{VehicleSpans, check_margins};
+use super::terrain::TerrainFile;
 use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
@@ -36,16 +37,19 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let Common { seed, deconfliction, simulation, estimator_span } =
         common(text, root, margins::STRAY_OVER_FIELDS_M)?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-    let mut area = area(&root.need("area", hint)?.table()?, folder)?;
+    let (mut area, terrain) = area(&root.need("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     // What goals missions leave to coverage.
     let mut unsupported = Vec::new();
-    let vehicles = vehicles(&root.need("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    let mut vehicles = vehicles(&root.need("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
     let mission = self::mission(&mission.unwrap_or_else(|| empty(text, "mission")), &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
     let faults = faults(root, &vehicles)?;
+    if let Some(terrain) = &terrain {
+        terrain.lay(text, &mut area, &mut vehicles, &mission, &simulation)?;
+    }
     let vehicle_places = vehicles.iter().map(|(_, spans)| text.line(&spans.start)).collect();
     let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
     let apart_m = margins::pads_m(&simulation, deconfliction.safety_distance_m, &vehicles);
@@ -53,8 +57,7 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
-    let height_m = area.heights.mission_m;
-    area.usable = margins::usable(&area.spacing, height_m, mission.cruise_mps, &simulation, &vehicles);
+    area.usable = margins::usable(&area.spacing, area.height_m, mission.cruise_mps, &simulation, &vehicles);
     Ok(Scenario {
         path: text.file.to_owned(),
         text: text.text.to_owned(),
@@ -113,14 +116,19 @@ fn mission(table: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Mi
     Ok(mission)
 }
 
-fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
+/// The area, and the file of the ground below it.
+fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)> {
     let (polygons, coordinates, source) = polygons(table, folder)?;
     let given = table.get("origin").map(|v| geodetic(&v)).transpose()?;
     let first = polygons.outers[0][0];
-    let origin = given.unwrap_or(match coordinates {
+    let mut origin = given.unwrap_or(match coordinates {
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
         Coordinates::Metres => ORIGIN,
     });
+    let terrain = TerrainFile::of(table, folder, coordinates == Coordinates::Metres)?;
+    if let (Some(terrain), None) = (&terrain, given) {
+        origin.alt_m = terrain.altitude_m(table.text, &origin)?;
+    }
     let (vertices, rings) = flat(table, &source, &polygons, coordinates, &origin)?;
     let camera = table.get("camera").map(|v| camera(&v)).transpose()?;
     let (height_m, spacing) = spacing(table, camera.as_ref())?;
@@ -134,7 +142,9 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
         camera,
         spacing,
         usable: spacing,
+        height_m,
         heights: Heights { mission_m: height_m, layer_m },
+        terrain: None,
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
         batteries: table.get("batteries").map(|v| v.boolean()).transpose()?.unwrap_or(false),
@@ -150,13 +160,8 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<Area> {
             &[("distance", Trigger::Distance), ("waypoint", Trigger::Waypoint), ("none", Trigger::None)],
         )?,
     };
-    for key in ["terrain", "terrain_tolerance_m"] {
-        if let Some(value) = table.get(key) {
-            return Err(value.error("is not available yet"));
-        }
-    }
     table.finish()?;
-    Ok(area)
+    Ok((area, terrain))
 }
 
 /// The polygons of the table, what their numbers are, and where they stand.

@@ -1,0 +1,82 @@
+//! The checker's part on heights: the ground is the height map itself, not the field that the planner follows.
+
+use planner_core::Point;
+
+use super::Planned;
+use super::flight::{Act, Flown, Stop};
+
+/// Samples of a leg lie no further apart, metres; over fine maps a quarter of a cell.
+const SAMPLE_M: f32 = 1.0;
+/// Rounding, metres.
+const ROUNDING_M: f32 = 0.02;
+
+/// What was found of the heights above terrain.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HeightFindings {
+    /// The least height of lanes and of ways between them above the ground, metres.
+    pub least_m: f32,
+    /// The greatest.
+    pub most_m: f32,
+    /// The steepest of them, metres for each metre over ground.
+    pub steepest: f32,
+    /// Legs, above pads or not, that come nearer to the ground than the height of the pictures.
+    pub too_low: u64,
+    /// Lanes and ways between that are steeper than their vehicle climbs or descends at cruise speed.
+    pub too_steep: u64,
+}
+
+impl HeightFindings {
+    /// Whether nothing is wrong.
+    pub fn is_clean(&self) -> bool {
+        self.too_low + self.too_steep == 0
+    }
+}
+
+/// Checks flights against the ground; none where it is level.
+pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindings> {
+    let terrain = planned.wanted.terrain.as_ref()?;
+    let sample_m = (terrain.grid.cell_m() / 4.0).min(SAMPLE_M);
+    let mut findings =
+        HeightFindings { least_m: f32::INFINITY, most_m: 0.0, steepest: 0.0, too_low: 0, too_steep: 0 };
+    for flight in flights {
+        let index = planned.scenario.vehicles.iter().position(|vehicle| vehicle.id == flight.vehicle)?;
+        let vehicle = &planned.vehicles[index];
+        for leg in flight.stops.windows(2) {
+            if leg.iter().any(|stop| stop.act == Act::Pad) {
+                continue;
+            }
+            let (from, to) = (leg[0].position, leg[1].position);
+            let [least_m, most_m] = above_ground(planned, &from, &to, sample_m);
+            findings.too_low += u64::from(least_m < planned.wanted.height_m - ROUNDING_M);
+            if leg.iter().any(|stop| stop.act == Act::Transit) {
+                continue;
+            }
+            findings.least_m = findings.least_m.min(least_m);
+            findings.most_m = findings.most_m.max(most_m);
+            let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
+            let most_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
+            let allowed_m = most_mps / vehicle.cruise_mps * way_m;
+            findings.too_steep += u64::from(up_m.abs() > allowed_m * 1.01 + ROUNDING_M);
+            if way_m > SAMPLE_M {
+                findings.steepest = findings.steepest.max(up_m.abs() / way_m);
+            }
+        }
+    }
+    Some(findings)
+}
+
+/// The least and the greatest height of a leg above the ground.
+fn above_ground(planned: &Planned<'_>, from: &Point, to: &Point, sample_m: f32) -> [f32; 2] {
+    let step = to - from;
+    let parts = (step.xy().norm() / sample_m).ceil().max(1.0) as usize;
+    let heights = (0..=parts).map(|part| {
+        let at = from + step * (part as f32 / parts as f32);
+        at.z - planned.wanted.ground_m(&at.xy())
+    });
+    heights.fold([f32::INFINITY, f32::NEG_INFINITY], |[least, most], h| [least.min(h), most.max(h)])
+}
+
+/// Whether a stop lies on a lane or on a way between two.
+pub fn is_low(stop: &Stop) -> bool {
+    matches!(stop.act, Act::Photo(_) | Act::Lane)
+}

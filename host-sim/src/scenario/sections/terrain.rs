@@ -1,0 +1,137 @@
+//! The ground below an area: `terrain` and `terrain_tolerance_m` of `[area]`.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use planner_core::coverage::Flat;
+use planner_core::coverage::pack::Heights;
+use planner_core::frames::Geodetic;
+
+use super::checks::VehicleSpans;
+use crate::margins;
+use crate::quote::quoted_path;
+use crate::scenario::coverage::{Area, Terrain};
+use crate::scenario::error::ScenarioError;
+use crate::scenario::reader::{Result, Span, Table, Text};
+use crate::scenario::{Mission, Simulation, Vehicle};
+use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError};
+
+/// A pad is on the ground; a height that is given beside that may differ by so much, metres.
+const PAD_M: f32 = 5.0;
+/// Ways beside lanes, around corners, metres.
+const AROUND_M: f32 = 5.0;
+
+/// What the table says of the ground.
+pub(super) struct TerrainFile {
+    path: PathBuf,
+    span: Span,
+    tolerance_m: f32,
+    metres: bool,
+}
+
+impl TerrainFile {
+    /// From `[area]`; `metres` where its coordinates are.
+    pub(super) fn of(table: &Table<'_>, folder: &Path, metres: bool) -> Result<Option<Self>> {
+        let tolerance = table.get("terrain_tolerance_m");
+        let Some(file) = table.get("terrain") else {
+            return match tolerance {
+                Some(value) => Err(value.error("needs area.terrain")),
+                None => Ok(None),
+            };
+        };
+        let tolerance_m = table.f32("terrain_tolerance_m", 3.0, 0.1..=1000.0)?;
+        Ok(Some(Self { path: folder.join(file.str()?), span: file.span.clone(), tolerance_m, metres }))
+    }
+
+    fn read(&self, text: Text<'_>, origin: &Geodetic, window: [Flat; 2]) -> Result<HeightGrid> {
+        let frame = Frame { origin, metres: self.metres, window: Some(window) };
+        terrain::read(&self.path, &frame).map_err(|error| self.refused(text, &error))
+    }
+
+    fn refused(&self, text: Text<'_>, error: &TerrainError) -> ScenarioError {
+        let path = quoted_path(&self.path);
+        match error {
+            TerrainError::System { what, hint } => text.with_hint(
+                &self.span,
+                format!("area.terrain: {path} is in {what}, which cannot be used"),
+                *hint,
+            ),
+            TerrainError::Nowhere(hint) => {
+                text.with_hint(&self.span, format!("area.terrain: {path} does not say where it is"), *hint)
+            }
+            other => text.error(&self.span, format!("area.terrain: {path} {other}")),
+        }
+    }
+
+    /// The ground at the origin, metres above sea level.
+    pub(super) fn altitude_m(&self, text: Text<'_>, origin: &Geodetic) -> Result<f64> {
+        let grid = self.read(text, origin, [Flat::repeat(-1.0), Flat::repeat(1.0)])?;
+        let height_m = grid.height_at(&Flat::zeros());
+        let hint = "another area.origin, or a file that holds it";
+        height_m.map(f64::from).ok_or_else(|| {
+            text.with_hint(&self.span, "area.terrain has no height at the mission's origin".to_owned(), hint)
+        })
+    }
+
+    /// Lays the area above the ground, and the vehicles on it.
+    pub(super) fn lay(
+        &self,
+        text: Text<'_>,
+        area: &mut Area,
+        vehicles: &mut [(Vehicle, VehicleSpans)],
+        mission: &Mission,
+        simulation: &Simulation,
+    ) -> Result<()> {
+        let pads: Vec<Flat> = vehicles.iter().map(|(vehicle, _)| vehicle.start.xy()).collect();
+        let [low, high] =
+            area.vertices.iter().chain(&pads).fold(
+                [Flat::repeat(f32::INFINITY), Flat::repeat(f32::NEG_INFINITY)],
+                |[low, high], place| [low.inf(place), high.sup(place)],
+            );
+        // Lanes may begin beyond the border, by the margin and half of what a picture shows.
+        let beyond = Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_M);
+        let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
+        let slope = own.iter().map(|vehicle| {
+            let [climb_mps, descend_mps] = vehicle.climbs_mps();
+            climb_mps.min(descend_mps) / mission.cruise_mps.min(vehicle.speed_max_mps)
+        });
+        let slope = slope.fold(f32::INFINITY, f32::min);
+        let reach_m = margins::needed(simulation, 0.0, &own).margin_m;
+        let config = FieldConfig { area: [low - beyond, high + beyond], reach_m, slope };
+        let grid = self.read(text, &area.origin, config.window())?.above(area.origin.alt_m);
+        let field = terrain::field(&grid, &config).map_err(|error| {
+            let why = format!("area.terrain: {}: {error}", quoted_path(&self.path));
+            let hint = match error {
+                FieldError::High(_) => "area.origin needs an alt_m near the ground",
+                _ => "the file must hold the area, all pads and some metres around them",
+            };
+            text.with_hint(&self.span, why, hint)
+        })?;
+        for (vehicle, spans) in vehicles {
+            let ground_m = grid.height_at(&vehicle.start.xy()).unwrap_or(0.0);
+            if (vehicle.start.z - ground_m).abs() > PAD_M {
+                let why = format!(
+                    "vehicle {} starts {:.1} m from the ground of area.terrain",
+                    vehicle.id,
+                    vehicle.start.z - ground_m
+                );
+                let up = format!(
+                    "there the ground is {ground_m:.1} m above the origin, alt_m = {:.1}",
+                    area.origin.alt_m + f64::from(ground_m)
+                );
+                return Err(text.with_hint(&spans.start, why, up));
+            }
+            vehicle.start.z = ground_m;
+        }
+        let terrain =
+            Terrain { grid: Arc::new(grid), field: field.into(), tolerance_m: self.tolerance_m, slope };
+        let top_m = terrain.following(area.height_m).map_or(0.0, |following| following.top_m());
+        if top_m <= 0.0 {
+            let hint = format!("area.origin alt_m = {:.1} is above it", area.origin.alt_m);
+            return Err(text.with_hint(&self.span, "area.terrain lies below the origin".to_owned(), hint));
+        }
+        area.heights = Heights { mission_m: top_m, ..area.heights };
+        area.terrain = Some(terrain);
+        Ok(())
+    }
+}

@@ -1,0 +1,184 @@
+//! The field that vehicles follow, made of a height map: `field.bin`.
+//!
+//! A node is the highest ground within [`STEPS`] of a cell and of what a vehicle may be beside its path; then nodes are
+//! raised until none is steeper than vehicles climb and descend at cruise speed. All of the box must have heights.
+
+use planner_core::coverage::Flat;
+use planner_core::field::{self, FieldShape, MAX_NODES, STEP_M};
+use thiserror::Error;
+
+use super::grid::HeightGrid;
+
+/// A path's samples are half a cell apart, and nodes of a sample a cell around it.
+pub const STEPS: f32 = 1.5;
+/// Least side of a cell, metres.
+const LEAST_CELL_M: f32 = 2.0;
+/// Nodes beside each other may differ by so many of their steps at least: fewer would round the slope away.
+const LEAST_RISE: f32 = 5.0;
+
+/// Why there is no field.
+#[derive(Clone, Copy, Debug, Error, PartialEq)]
+pub enum FieldError {
+    /// Somewhere the map has no height: the place, metres east and north.
+    #[error("it has no height at [{0:.0}, {1:.0}], metres east and north of the origin")]
+    Hole(f32, f32),
+    /// A height does not fit into the file.
+    #[error("a height of {0:.0} m is more than 3276 m from the mission's origin")]
+    High(f32),
+    /// The box has no nodes.
+    #[error("the area is too large or too small for it")]
+    Shape,
+}
+
+/// What a field follows from, beside the heights.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldConfig {
+    /// The box that is flown over, metres.
+    pub area: [Flat; 2],
+    /// How far beside its path a vehicle may be, metres.
+    pub reach_m: f32,
+    /// Metres up or down for each metre over ground, at most.
+    pub slope: f32,
+}
+
+impl FieldConfig {
+    /// How far beyond the box heights are looked at where nodes are so far apart, metres.
+    fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
+        // A height map's cell holds what is within one of its cells.
+        STEPS * cell_m + self.reach_m + own_cell_m
+    }
+
+    /// From node to node, metres, over a map of fine cells.
+    fn least_cell_m(&self) -> f32 {
+        let sides = self.area[1] - self.area[0];
+        let rise = LEAST_RISE * STEP_M * std::f32::consts::SQRT_2 / self.slope;
+        let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
+        // A long and narrow box has a border of nodes more.
+        let long = sides.amax() / (MAX_NODES as f32 / 8.0);
+        LEAST_CELL_M.max(rise).max(fits).max(long)
+    }
+
+    /// The box of heights that a field needs, but for the map's cells that are read around any box.
+    pub fn window(&self) -> [Flat; 2] {
+        let beyond = Flat::repeat((STEPS + 1.0) * self.least_cell_m() + self.reach_m);
+        [self.area[0] - beyond, self.area[1] + beyond]
+    }
+}
+
+/// The bytes of the field.
+///
+/// # Errors
+/// The map has a hole there, or heights that do not fit.
+pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldError> {
+    let cell_m = config.least_cell_m().max(grid.cell_m());
+    let [low, high] = config.area;
+    let count = |side: f32| ((side / cell_m).ceil() + 1.0).max(2.0) as u16;
+    let shape = FieldShape { low, cell_m, columns: count(high.x - low.x), rows: count(high.y - low.y) };
+    if shape.node_count() > MAX_NODES {
+        return Err(FieldError::Shape);
+    }
+    let around = Flat::repeat(config.around_m(cell_m, grid.cell_m()));
+    let (columns, rows) = (usize::from(shape.columns), usize::from(shape.rows));
+    let mut nodes_dm = Vec::with_capacity(columns * rows);
+    for row in 0..rows {
+        for column in 0..columns {
+            let place = low + Flat::new(column as f32, row as f32) * cell_m;
+            let found = grid.highest(&(place - around), &(place + around));
+            let height_m = match found.highest_m {
+                Some(height_m) if !found.holes => height_m,
+                _ => return Err(FieldError::Hole(place.x, place.y)),
+            };
+            let node_dm = (height_m / STEP_M - 1e-3).ceil();
+            if node_dm.abs() > f32::from(i16::MAX) {
+                return Err(FieldError::High(height_m));
+            }
+            nodes_dm.push(node_dm as i16);
+        }
+    }
+    // Along one of the axes: a slope across both is steeper by the square root of two.
+    let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / STEP_M + 1e-3) as i32;
+    flatten(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
+    let mut bytes = vec![0; shape.encoded_len()];
+    field::write(&shape, &nodes_dm, &mut bytes).map_err(|_| FieldError::Shape)?;
+    Ok(bytes)
+}
+
+/// Raises nodes until no two beside each other differ by more than `most`: a distance transform, in two passes.
+fn flatten(nodes_dm: &mut [i16], columns: usize, most: i32) {
+    let raise = |nodes_dm: &mut [i16], own: usize, other: usize| {
+        let least = (i32::from(nodes_dm[other]) - most).max(i32::from(i16::MIN)) as i16;
+        nodes_dm[own] = nodes_dm[own].max(least);
+    };
+    let count = nodes_dm.len();
+    for own in 0..count {
+        if own % columns > 0 {
+            raise(nodes_dm, own, own - 1);
+        }
+        if own >= columns {
+            raise(nodes_dm, own, own - columns);
+        }
+    }
+    for own in (0..count).rev() {
+        if (own + 1) % columns > 0 {
+            raise(nodes_dm, own, own + 1);
+        }
+        if own + columns < count {
+            raise(nodes_dm, own, own + columns);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use planner_core::field::FieldView;
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        #[test]
+        fn a_field_is_above_the_ground_and_no_steeper_than_it_may_be(
+            heights in prop::collection::vec(-30f32..90.0, 40 * 40),
+            (reach_m, slope) in (0f32..3.0, 0.1f32..2.0),
+            places in prop::collection::vec([0f32..1.0, 0f32..1.0, -1f32..1.0, -1f32..1.0], 40),
+        ) {
+            let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
+            for (index, height_m) in heights.iter().enumerate() {
+                grid.raise(&grid.middle([index % 40, index / 40]), *height_m);
+            }
+            let area = [Flat::new(-30.0, -20.0), Flat::new(35.0, 28.0)];
+            let config = FieldConfig { area, reach_m, slope };
+            if config.window()[0].amin() < -75.0 || config.window()[1].amax() > 75.0 {
+                return Ok(());
+            }
+            let bytes = field(&grid, &config).unwrap();
+            let view = FieldView::parse(&bytes).unwrap();
+            for [x, y, east, north] in places {
+                let at = area[0] + (area[1] - area[0]).component_mul(&Flat::new(x, y));
+                // Beside it by what a vehicle may be, and half a cell of the path's samples.
+                let beside = at + Flat::new(east, north) * (reach_m + view.shape().cell_m / 2.0);
+                prop_assert!(view.height_at(&at) >= grid.height_at(&beside).unwrap() - 1e-3);
+                let step = Flat::new(east, north);
+                let rise_m = (view.height_at(&(at + step)) - view.height_at(&at)).abs();
+                prop_assert!(rise_m <= slope * step.norm() + 2e-3, "{} {}", rise_m, slope * step.norm());
+            }
+        }
+    }
+
+    #[test]
+    fn holes_are_refused_by_their_place() {
+        let mut grid = HeightGrid::new([Flat::repeat(-100.0), Flat::repeat(100.0)], 5.0).unwrap();
+        for index in 0..1600 {
+            if index != 20 * 40 + 22 {
+                grid.raise(&grid.middle([index % 40, index / 40]), 10.0);
+            }
+        }
+        let area = [Flat::repeat(-20.0), Flat::repeat(20.0)];
+        let config = FieldConfig { area, reach_m: 0.5, slope: 0.5 };
+        assert!(matches!(field(&grid, &config), Err(FieldError::Hole(..))));
+        grid.raise(&grid.middle([22, 20]), 4000.0);
+        assert_eq!(field(&grid, &config), Err(FieldError::High(4000.0)));
+    }
+}

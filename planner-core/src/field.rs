@@ -1,0 +1,168 @@
+//! Heights that vehicles fly above: the field, a grid of nodes read in place from `field.bin`.
+//!
+//! Little endian: magic `FLKFIELD`, version u16, columns u16, rows u16, 0 u16, east and north of the first node f32, metres from
+//! node to node f32, then one i16 a node, decimetres up in the mission frame, rows from south to north, and a CRC-32 of all
+//! before it. Between nodes heights are bilinear, beyond the border they are those of the border. The desk raises nodes to the
+//! highest ground that a vehicle's error and half a step of [`follow`] may reach, and flattens what is too steep; so a
+//! path that keeps above the field at samples half a node apart keeps above the ground everywhere.
+
+pub mod follow;
+
+use libm::{floorf, fmaxf, fminf};
+
+use crate::coverage::Flat;
+use crate::file::{CRC32, FileError};
+
+/// What the bytes begin with.
+pub const MAGIC: [u8; 8] = *b"FLKFIELD";
+/// The version written and read.
+pub const VERSION: u16 = 1;
+/// Bytes before the first node.
+pub const HEADER_LEN: usize = 28;
+/// Most nodes: their bytes fit where a roadmap does.
+pub const MAX_NODES: usize = 1 << 16;
+/// Nodes are in these, metres.
+pub const STEP_M: f32 = 0.1;
+const CRC_LEN: usize = 4;
+
+/// Where nodes are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FieldShape {
+    /// The south-western node.
+    pub low: Flat,
+    /// From one node to the next, metres.
+    pub cell_m: f32,
+    /// Nodes from west to east, at least 2.
+    pub columns: u16,
+    /// Nodes from south to north, at least 2.
+    pub rows: u16,
+}
+
+impl FieldShape {
+    /// Number of nodes.
+    pub fn node_count(&self) -> usize {
+        usize::from(self.columns) * usize::from(self.rows)
+    }
+
+    /// Bytes of the file.
+    pub fn encoded_len(&self) -> usize {
+        HEADER_LEN + 2 * self.node_count() + CRC_LEN
+    }
+
+    fn check(&self) -> Result<(), FileError> {
+        if self.columns < 2 || self.rows < 2 || self.node_count() > MAX_NODES {
+            return Err(FileError::Header("number of nodes"));
+        }
+        let sound = |value: f32| libm::fabsf(value) <= 1e6;
+        if !(self.cell_m >= 0.1 && self.cell_m <= 1e4 && sound(self.low.x) && sound(self.low.y)) {
+            return Err(FileError::Header("place of nodes"));
+        }
+        Ok(())
+    }
+}
+
+/// A checked field over borrowed bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct FieldView<'a> {
+    shape: FieldShape,
+    nodes: &'a [[u8; 2]],
+    highest_dm: i16,
+    crc: u32,
+}
+
+impl<'a> FieldView<'a> {
+    /// Reads a file, which has its length.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn parse(bytes: &'a [u8]) -> Result<Self, FileError> {
+        let Some((header, rest)) = bytes.split_first_chunk::<HEADER_LEN>() else {
+            return Err(FileError::Truncated);
+        };
+        if header[..8] != MAGIC {
+            return Err(FileError::Magic);
+        }
+        let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
+        let number = |at: usize| f32::from_bits(u32::from(word(at)) | u32::from(word(at + 2)) << 16);
+        if word(8) != VERSION {
+            return Err(FileError::Version(word(8)));
+        }
+        let low = Flat::new(number(16), number(20));
+        let shape = FieldShape { low, cell_m: number(24), columns: word(10), rows: word(12) };
+        shape.check()?;
+        if bytes.len() != shape.encoded_len() {
+            return Err(if bytes.len() < shape.encoded_len() {
+                FileError::Truncated
+            } else {
+                FileError::Length
+            });
+        }
+        let Some((nodes, crc)) = rest.split_last_chunk::<CRC_LEN>() else { return Err(FileError::Truncated) };
+        let crc = u32::from_le_bytes(*crc);
+        if CRC32.checksum(&bytes[..bytes.len() - CRC_LEN]) != crc {
+            return Err(FileError::Crc);
+        }
+        let nodes = nodes.as_chunks().0;
+        let highest_dm = nodes.iter().map(|node| i16::from_le_bytes(*node)).max().unwrap_or(0);
+        Ok(Self { shape, nodes, highest_dm, crc })
+    }
+
+    /// Where its nodes are.
+    pub fn shape(&self) -> &FieldShape {
+        &self.shape
+    }
+
+    /// The CRC-32 in the file.
+    pub fn crc(&self) -> u32 {
+        self.crc
+    }
+
+    /// The highest node, metres.
+    pub fn highest_m(&self) -> f32 {
+        f32::from(self.highest_dm) * STEP_M
+    }
+
+    /// The height at a place, metres.
+    pub fn height_at(&self, place: &Flat) -> f32 {
+        let axis = |at: f32, low: f32, count: u16| {
+            let most = f32::from(count - 1);
+            let cells = fmaxf(fminf((at - low) / self.shape.cell_m, most), 0.0);
+            let first = fminf(floorf(cells), most - 1.0);
+            (first as usize, cells - first)
+        };
+        let (column, east) = axis(place.x, self.shape.low.x, self.shape.columns);
+        let (row, north) = axis(place.y, self.shape.low.y, self.shape.rows);
+        let node = |column: usize, row: usize| {
+            let index = row * usize::from(self.shape.columns) + column;
+            self.nodes.get(index).map_or(0.0, |node| f32::from(i16::from_le_bytes(*node)))
+        };
+        let across = |row: usize| node(column, row) * (1.0 - east) + node(column + 1, row) * east;
+        (across(row) * (1.0 - north) + across(row + 1) * north) * STEP_M
+    }
+}
+
+/// Writes a file: nodes in decimetres, rows from the south; returns its bytes.
+///
+/// # Errors
+/// The shape is none, or does not fit the nodes or the memory.
+pub fn write(shape: &FieldShape, nodes_dm: &[i16], out: &mut [u8]) -> Result<usize, FileError> {
+    shape.check()?;
+    let length = shape.encoded_len();
+    if nodes_dm.len() != shape.node_count() || out.len() < length {
+        return Err(FileError::Length);
+    }
+    let words = [VERSION, shape.columns, shape.rows, 0];
+    let numbers = [shape.low.x, shape.low.y, shape.cell_m];
+    let head = MAGIC.into_iter().chain(words.into_iter().flat_map(u16::to_le_bytes));
+    let head = head.chain(numbers.into_iter().flat_map(f32::to_le_bytes));
+    let body = nodes_dm.iter().flat_map(|node| node.to_le_bytes());
+    for (to, byte) in out.iter_mut().zip(head.chain(body)) {
+        *to = byte;
+    }
+    let crc = CRC32.checksum(&out[..length - CRC_LEN]);
+    out[length - CRC_LEN..length].copy_from_slice(&crc.to_le_bytes());
+    Ok(length)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,111 @@
+//! A path above the field, with few corners: between the field and a tolerance above it, no steeper than vehicles fly.
+//!
+//! Method: the cone of slopes that stay between both at each sample so far; where the next sample closes it, a corner
+//! before that one, as high as can be where the ground rises and as low where it falls. Each corner lies in the tunnel,
+//! and the field is nowhere steeper than the path may be: so the next sample can always be reached. Samples are half a
+//! node apart. Cost: one look at the field a sample.
+
+use libm::{ceilf, fmaxf, fminf};
+
+use super::FieldView;
+use crate::Point;
+use crate::coverage::Flat;
+
+/// More samples of one leg are not taken: they are further apart then.
+const MOST_SAMPLES: f32 = 65_536.0;
+
+/// What a path keeps from the field.
+#[derive(Clone, Copy, Debug)]
+pub struct Following<'a> {
+    /// The field.
+    pub field: FieldView<'a>,
+    /// At least so high above it, metres.
+    pub height_m: f32,
+    /// At most so much higher, metres.
+    pub tolerance_m: f32,
+    /// Metres up or down for each metre over ground, at most.
+    pub slope: f32,
+}
+
+impl Following<'_> {
+    /// The least height of a path at a place, metres.
+    pub fn lowest_m(&self, place: &Flat) -> f32 {
+        self.field.height_at(place) + self.height_m
+    }
+
+    /// The least height that is above all of the field, metres, with the tolerance.
+    pub fn top_m(&self) -> f32 {
+        self.field.highest_m() + self.height_m + self.tolerance_m
+    }
+
+    /// Where a path begins that goes to `to` with the fewest corners, and of those the lowest.
+    pub fn begin(&self, from: &Flat, to: &Flat) -> Point {
+        let low_m = self.lowest_m(from);
+        let mut best = (usize::MAX, low_m);
+        for share in [0.0, 0.5, 1.0] {
+            let height_m = low_m + share * self.tolerance_m;
+            let mut count = 0;
+            let counted: Result<(), ()> = self.to(&Point::new(from.x, from.y, height_m), to, |_| {
+                count += 1;
+                Ok(())
+            });
+            if counted.is_ok() && count < best.0 {
+                best = (count, height_m);
+            }
+        }
+        Point::new(from.x, from.y, best.1)
+    }
+
+    /// The corners of a path from a point between the field and the tolerance, the last of them at `to`.
+    ///
+    /// # Errors
+    /// What `corner` says.
+    pub fn to<E>(
+        &self,
+        from: &Point,
+        to: &Flat,
+        mut corner: impl FnMut(Point) -> Result<(), E>,
+    ) -> Result<(), E> {
+        let (start, way) = (from.xy(), to - from.xy());
+        let length_m = way.norm();
+        let wanted = ceilf(length_m * 2.0 / self.field.shape().cell_m);
+        let count = fmaxf(fminf(wanted, MOST_SAMPLES), 1.0) as u32;
+        let step_m = length_m / count as f32;
+        if step_m < 1e-3 {
+            return corner(Point::new(to.x, to.y, from.z));
+        }
+        let place =
+            |sample: u32| if sample == count { *to } else { start + way * (sample as f32 / count as f32) };
+        let steep = self.slope;
+        let (mut last, mut z_m) = (0, from.z);
+        let (mut cone, mut floor_m) = ((-steep, steep), from.z);
+        let mut sample = 1;
+        while sample <= count {
+            let low_m = self.lowest_m(&place(sample));
+            let far_m = (sample - last) as f32 * step_m;
+            let own = ((low_m - z_m) / far_m, (low_m + self.tolerance_m - z_m) / far_m);
+            let next = (fmaxf(cone.0, own.0), fminf(cone.1, own.1));
+            if next.0 <= next.1 || sample == last + 1 {
+                // A step that rounding closes is taken nevertheless, above the field.
+                cone = if next.0 <= next.1 { next } else { (own.0, own.0) };
+                floor_m = low_m;
+                sample += 1;
+                continue;
+            }
+            let slope = if own.0 > cone.1 { cone.1 } else { cone.0 };
+            let at = sample - 1;
+            z_m = self.between(z_m + slope * (at - last) as f32 * step_m, floor_m);
+            let place = place(at);
+            corner(Point::new(place.x, place.y, z_m))?;
+            (last, cone) = (at, (-steep, steep));
+        }
+        // The lowest end there is.
+        z_m = self.between(z_m + cone.0 * (count - last) as f32 * step_m, floor_m);
+        corner(Point::new(to.x, to.y, z_m))
+    }
+
+    /// A height in the tunnel: rounding leaves it by little.
+    fn between(&self, z_m: f32, low_m: f32) -> f32 {
+        fminf(fmaxf(z_m, low_m), low_m + self.tolerance_m)
+    }
+}

@@ -1,0 +1,291 @@
+//! Coverage plans above terrain, random and real, judged by what is not the planner: never nearer to the ground than the height
+//! of the pictures, never higher than the tolerance above what must be flown over, no steeper than vehicles fly, all
+//! photographed.
+
+use std::fmt::Write as _;
+
+use flockmate_tests::areas::{self, Shape};
+use flockmate_tests::shared_data;
+use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::{Planned, heights};
+use host_sim::margins;
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
+use host_sim::scenario::{self, Scenario};
+use host_sim::terrain::HeightGrid;
+use planner_core::coverage::Flat;
+use planner_core::field::FieldView;
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+/// How many random areas: more with `FLOCKMATE_TERRAINS=N`, from seed `FLOCKMATE_TERRAINS_FROM` on.
+fn seeds() -> std::ops::Range<u64> {
+    let number = |name: &str| std::env::var(name).ok().and_then(|n| n.parse::<u64>().ok());
+    let from = number("FLOCKMATE_TERRAINS_FROM").unwrap_or(0);
+    from..from + number("FLOCKMATE_TERRAINS").unwrap_or(60)
+}
+
+/// Half the side of a random map, metres.
+const HALF_M: f64 = 600.0;
+
+/// Hills, and noise from cell to cell.
+struct Hills {
+    cell_m: f64,
+    side: usize,
+    heights_m: Vec<f64>,
+}
+
+impl Hills {
+    fn new(random: &mut Pcg32) -> Self {
+        let cell_m = 2.0 + (18.0 * areas::unit(random)).round();
+        let side = (2.0 * HALF_M / cell_m).ceil() as usize;
+        let hills: Vec<[f64; 4]> = (0..random.next_u32() % 12)
+            .map(|_| {
+                let at = || 2.0 * HALF_M;
+                let place = [areas::unit(random) * at() - HALF_M, areas::unit(random) * at() - HALF_M];
+                let (wide, high) = (20.0 + 200.0 * areas::unit(random), 80.0 * (areas::unit(random) - 0.3));
+                [place[0], place[1], wide, high]
+            })
+            .collect();
+        let tilt = [0, 1].map(|_| 0.2 * (areas::unit(random) - 0.5));
+        // Level, trees here and there, or all rough.
+        let (share, rough) = [(0.0, 0.0), (0.02, 15.0), (1.0, 2.0)][random.next_u32() as usize % 3];
+        let mut heights_m = Vec::with_capacity(side * side);
+        for row in 0..side {
+            for column in 0..side {
+                let at = [column, row].map(|k| (k as f64 + 0.5) * cell_m - HALF_M);
+                let hill = |[x, y, wide, high]: &[f64; 4]| {
+                    high * (-((at[0] - x).powi(2) + (at[1] - y).powi(2)) / (wide * wide)).exp()
+                };
+                let noise = if areas::unit(random) < share { rough * areas::unit(random) } else { 0.0 };
+                let smooth: f64 = hills.iter().map(hill).sum();
+                let height = 300.0 + smooth + tilt[0] * at[0] + tilt[1] * at[1] + noise;
+                heights_m.push((height * 100.0).round() / 100.0);
+            }
+        }
+        Self { cell_m, side, heights_m }
+    }
+
+    fn at(&self, x: f64, y: f64) -> f64 {
+        let [column, row] = [x, y].map(|at| ((at + HALF_M) / self.cell_m) as usize);
+        self.heights_m[row * self.side + column]
+    }
+
+    fn asc(&self) -> String {
+        let mut text = format!(
+            "ncols {0}\nnrows {0}\nxllcorner {1}\nyllcorner {1}\ncellsize {2}\n",
+            self.side, -HALF_M, self.cell_m
+        );
+        for row in self.heights_m.chunks_exact(self.side).rev() {
+            for height in row {
+                let _ = write!(text, "{height} ");
+            }
+            text.push('\n');
+        }
+        text
+    }
+}
+
+/// A random area on random hills, as a user would write it.
+fn drawn(seed: u64, folder: &std::path::Path) -> String {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let hills = Hills::new(&mut random);
+    let path = folder.join(format!("hills-{seed}.asc"));
+    std::fs::write(&path, hills.asc()).unwrap();
+    let mut text = areas::scenario(&mut random, Shape::Any, 1 + (seed % 4) as usize);
+    let tolerance = 0.5 + 5.0 * areas::unit(&mut random);
+    let trigger = ["distance", "waypoint", "none"][(seed % 3) as usize];
+    text = text.replace(
+        "camera = ",
+        &format!(
+            "terrain = \"{}\"\nterrain_tolerance_m = {tolerance:.1}\ntrigger = \"{trigger}\"\ncamera = ",
+            path.display()
+        ),
+    );
+    let [climb, descend] = [0, 1].map(|_| 0.5 + 4.0 * areas::unit(&mut random));
+    let speeds =
+        format!("climb_mps = {climb:.1}\ndescend_mps = {descend:.1}\nendurance_s = 36000.0\nspeed_max_mps");
+    text = text.replace("speed_max_mps", &speeds);
+    let origin = hills.at(0.0, 0.0);
+    let stand = |line: &str| {
+        let place: Option<Vec<f64>> = line
+            .strip_prefix("start = [")
+            .map(|numbers| numbers.trim_end_matches(']').split(", ").map(|n| n.parse().unwrap()).collect());
+        match place {
+            Some(p) => format!("start = [{}, {}, {:.2}]\n", p[0], p[1], hills.at(p[0], p[1]) - origin),
+            None => format!("{line}\n"),
+        }
+    };
+    text.lines().map(stand).collect()
+}
+
+/// The rule: no higher than the tolerance above the highest ground near, or what the slope from higher ground allows.
+struct Ceiling<'a> {
+    grid: &'a HeightGrid,
+    near_m: f32,
+    /// Along east or north; both add up. The field's steps of 0.1 m make it up to a fifth less steep than vehicles fly.
+    slope: f32,
+}
+
+impl<'a> Ceiling<'a> {
+    fn of(planned: &Planned<'a>) -> Self {
+        let terrain = planned.wanted.terrain.as_ref().unwrap();
+        let field = FieldView::parse(&terrain.field).unwrap();
+        let margin_m =
+            margins::needed(&planned.scenario.simulation, 0.0, &planned.scenario.vehicles).margin_m;
+        let near_m = 3.0 * field.shape().cell_m + margin_m + 2.0 * terrain.grid.cell_m();
+        Self { grid: &terrain.grid, near_m, slope: terrain.slope * 0.8 / std::f32::consts::SQRT_2 }
+    }
+
+    fn over(&self, place: &Flat) -> f32 {
+        let [columns, rows] = self.grid.size();
+        let mut over = f32::NEG_INFINITY;
+        for row in 0..rows {
+            for column in 0..columns {
+                let cell = [column, row];
+                let Some(height_m) = self.grid.height(cell).filter(|height_m| *height_m > over) else {
+                    continue;
+                };
+                let away = (self.grid.middle(cell) - place).abs();
+                let far_m = (away.x - self.near_m).max(0.0) + (away.y - self.near_m).max(0.0);
+                over = over.max(height_m - self.slope * far_m);
+            }
+        }
+        over
+    }
+}
+
+/// What is wrong with a plan.
+fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
+    let method = scenario.area.as_ref().unwrap().method;
+    let planned = Planned::new(scenario, method).map_err(|error| format!("{error:#}"))?;
+    let findings = check_plan(&planned);
+    if !findings.is_clean() {
+        return Err(format!("{:?}", Findings { over_time: Vec::new(), ..findings }));
+    }
+    let (ceiling, area) = (Ceiling::of(&planned), planned.wanted);
+    let tolerance_m = area.terrain.as_ref().unwrap().tolerance_m;
+    let flights = planned.flights();
+    let low: Vec<_> = flights.iter().flat_map(|(_, stops, _)| stops).filter(|s| heights::is_low(s)).collect();
+    for stop in low.iter().step_by(1 + low.len() / looks) {
+        let most_m = ceiling.over(&stop.position.xy()) + area.height_m + tolerance_m + 0.2;
+        if stop.position.z > most_m {
+            return Err(format!("too high: {:?}, not {most_m}", stop.position));
+        }
+    }
+    Ok(findings)
+}
+
+#[test]
+fn plans_above_random_terrain_keep_their_heights() {
+    let folder = tempfile::tempdir().unwrap();
+    let outcome = |seed: u64| -> Result<bool, String> {
+        let text = drawn(seed, folder.path());
+        let scenario = match scenario::parse(&text, "random") {
+            Ok(scenario) => scenario,
+            Err(error) if error.to_string().contains("area.terrain") => {
+                return Err(format!("{seed}: {error}"));
+            }
+            Err(_) => return Ok(false),
+        };
+        match judge(&scenario, 60) {
+            Ok(findings) => Ok(findings.heights.is_some()),
+            Err(error) if error.contains("no-fly zone") => Ok(false),
+            Err(error) => Err(format!("seed {seed}: {error}")),
+        }
+    };
+    let all: Vec<_> = seeds().into_par_iter().map(outcome).collect();
+    let wrong: Vec<_> = all.iter().filter_map(|outcome| outcome.as_ref().err()).collect();
+    for wrong in wrong.iter().take(20) {
+        println!("{}\n", wrong.chars().take(600).collect::<String>());
+    }
+    let planned = all.iter().filter(|outcome| matches!(outcome, Ok(true))).count();
+    println!("{planned} of {} areas planned, {} wrong", all.len(), wrong.len());
+    assert!(wrong.is_empty() && planned * 2 >= all.len(), "{planned} planned, {} wrong", wrong.len());
+}
+
+#[test]
+fn plans_above_real_terrain_keep_their_heights() {
+    // Hills north of Bilbao, its roofs above level ground, and trees in Oregon.
+    let places = [
+        ("height/bilbao_DEM.tif", 43.2980, -2.9860, [400.0, 300.0], 40.0),
+        ("height/bilbao_BDSM.tif", 43.3050, -2.9900, [300.0, 200.0], 40.0),
+        ("height/autzen_trim.las", 44.05039, -123.07233, [30.0, 24.0], 20.0),
+    ];
+    for (name, lat, lon, [wide, tall], height_m) in places {
+        let Some(path) = shared_data(name) else { continue };
+        let area = format!(
+            "[area]\npolygon = [[0, 0], [{wide}, 0], [{wide}, {tall}], [0, {tall}]]\nterrain = \"{}\"\n\
+             origin = {{ lat_deg = {lat}, lon_deg = {lon}, alt_m = ALT }}\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
+             height_m = {height_m:.1}\n[mission]\ncruise_mps = 5.0\n",
+            path.display()
+        );
+        let vehicle = |id: usize, up_m: f64| {
+            format!(
+                "[[vehicles]]\nid = {id}\nendurance_s = 7200.0\ndescend_mps = 2.0\nstart = [{}, 2, {up_m}]\n",
+                4 * id
+            )
+        };
+        // What the program says of the heights of the pads is what it takes then.
+        let mut heights_m = [0.0, 0.0];
+        let mut altitude_m = 0.0;
+        let mut scenario = None;
+        for _ in 0..4 {
+            let pads: String = (0..2).map(|k| vehicle(k + 1, heights_m[k])).collect();
+            let text = area.replace("ALT", &format!("{altitude_m:.1}")) + &pads;
+            match scenario::parse(&text, name) {
+                Ok(found) => {
+                    scenario = Some(found);
+                    break;
+                }
+                Err(error) => {
+                    let hint = error.hint.unwrap_or_else(|| panic!("{name}: {}", error.why));
+                    let number = |after: &str| -> Option<f64> {
+                        let text = &hint[hint.find(after)? + after.len()..];
+                        text.split([',', ' ', 'm']).find(|word| !word.is_empty())?.parse().ok()
+                    };
+                    let up_m = number("the ground is ").unwrap_or_else(|| panic!("{name}: {hint}"));
+                    altitude_m += up_m;
+                    heights_m = [0.0, 0.0];
+                }
+            }
+        }
+        let findings = judge(&scenario.expect(name), 200).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let heights = findings.heights.unwrap();
+        println!("{name}: {heights:?}");
+        assert!(heights.least_m >= height_m - 0.02 && heights.most_m > height_m + 3.0, "{name}: {heights:?}");
+    }
+}
+
+#[test]
+fn what_cannot_be_planned_or_flown_is_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    // A tenth of the seeds are no areas: the first that is one.
+    let texts = (100..140).map(|seed| drawn(seed, folder.path()));
+    let (text, found) = texts
+        .into_iter()
+        .find_map(|text| scenario::parse(&text, "random").ok().map(|found| (text, found)))
+        .expect("an area");
+    let error = Mission::prepare(found, &Progress::hidden()).map(|_| ()).unwrap_err().to_string();
+    assert!(error.contains("companions know no terrain yet\nhint: `cover` writes plans"), "{error}");
+    let line = |start: &str| text.lines().find(|line| line.starts_with(start)).unwrap().to_owned();
+    let first = line("start = ");
+    let place = &first[..first.rfind(", ").unwrap()];
+    for (from, to, why) in [
+        (line("terrain = "), "terrain = \"none.asc\"".to_owned(), "cannot be read"),
+        (line("terrain = "), "terrain = \"none.png\"".to_owned(), "no known format"),
+        (line("terrain = ") + "\n", String::new(), "needs area.terrain"),
+        (first.clone(), format!("{place}, 900.0]"), "from the ground of area.terrain"),
+        (line("terrain_tol"), "terrain_tolerance_m = 0.0".to_owned(), "terrain_tolerance_m"),
+        (first.clone(), "start = [5000, 0, 0]".to_owned(), "it has no height at"),
+        (
+            line("camera"),
+            line("camera") + "\norigin = { lat_deg = 0, lon_deg = 0, alt_m = 9000 }",
+            "alt_m near the ground",
+        ),
+    ] {
+        let error = scenario::parse(&text.replacen(&from, &to, 1), "random").unwrap_err().to_string();
+        assert!(error.contains(why), "{why}: {error}");
+    }
+}
