@@ -132,7 +132,7 @@ fn judge(flight: &Flight, struck: u8) -> Outcome {
     for e in &flight.log {
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
         outcome.log.push(text.clone());
-        let by_struck = e.vehicle == Some(struck) || e.text.ends_with(&format!("vehicle no. {struck}"));
+        let by_struck = e.vehicle == Some(struck) || e.text.ends_with(&format!(" vehicle {struck}"));
         let own_wall = e.text.contains("touches an obstacle") && e.vehicle == Some(struck);
         if e.text.contains("nearer than") && by_struck {
             outcome.near_struck.push(text);

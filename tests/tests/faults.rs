@@ -154,7 +154,7 @@ fn judge(case: &Case, flight: &Flight, at_s: f32, struck: &[u8]) -> Outcome {
         let by_or_at_struck = struck
             .iter()
             .chain(now_struck)
-            .any(|id| e.vehicle == Some(*id) || e.text.ends_with(&format!("vehicle no. {id}")));
+            .any(|id| e.vehicle == Some(*id) || e.text.ends_with(&format!(" vehicle {id}")));
         let own_wall = e.text.contains("touches an obstacle") && is_struck(e);
         let text = format!("{:.1} s vehicle {:?} {}", e.t_s, e.vehicle, e.text);
         let is_wrong = if e.text.contains("nearer than") {

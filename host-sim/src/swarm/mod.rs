@@ -206,10 +206,10 @@ impl<'a> Run<'a> {
         if gateway.is_some() || scenario.area.is_some() {
             radio.overhear();
         }
-        let radii: Vec<f32> = scenario.vehicles.iter().map(|v| v.radius_m).collect();
+        let vehicles: Vec<(u8, f32)> = scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
         let mut monitor =
-            Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &radii);
+            Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &vehicles);
         // Lanes of two vehicles may lie side by side: one waits for as long as the other is on them.
         monitor.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {

@@ -62,6 +62,7 @@ pub struct Sample {
 
 #[derive(Clone, Debug)]
 struct Watched {
+    id: u8,
     radius_m: f32,
     last: Option<Point>,
     flown_m: f64,
@@ -108,14 +109,15 @@ pub struct Monitor<'a> {
 }
 
 impl<'a> Monitor<'a> {
-    /// Watches vehicles of these radii.
+    /// Watches vehicles with these ids and radii.
     pub fn new(
         grid: VoxelGrid<'a>,
         field: &'a ClearanceField,
         safety_distance_m: f32,
-        radii_m: &[f32],
+        vehicles: &[(u8, f32)],
     ) -> Self {
-        let watched = |&radius_m: &f32| Watched {
+        let watched = |&(id, radius_m): &(u8, f32)| Watched {
+            id,
             radius_m,
             last: None,
             flown_m: 0.0,
@@ -131,9 +133,9 @@ impl<'a> Monitor<'a> {
             grid,
             field,
             safety_distance_m,
-            vehicles: radii_m.iter().map(watched).collect(),
-            too_near: vec![false; radii_m.len() * radii_m.len()],
-            touching: vec![false; radii_m.len() * radii_m.len()],
+            vehicles: vehicles.iter().map(watched).collect(),
+            too_near: vec![false; vehicles.len() * vehicles.len()],
+            touching: vec![false; vehicles.len() * vehicles.len()],
             recorded_s: f64::NEG_INFINITY,
             window: NOTHING,
             waits_end: false,
@@ -265,13 +267,13 @@ impl<'a> Monitor<'a> {
                 let was_near = std::mem::replace(&mut self.too_near[i * n + j], near);
                 if near && !was_near {
                     self.violations += 1;
-                    let text = format!("nearer than the safety distance to vehicle no. {}", j + 1);
+                    let text = format!("nearer than the safety distance to vehicle {}", self.vehicles[j].id);
                     self.incidents.push((t_s, i, text));
                 }
                 let touches = apart < self.vehicles[i].radius_m + self.vehicles[j].radius_m;
                 let was_touching = std::mem::replace(&mut self.touching[i * n + j], touches);
                 if touches && !was_touching {
-                    self.incidents.push((t_s, i, format!("touches vehicle no. {}", j + 1)));
+                    self.incidents.push((t_s, i, format!("touches vehicle {}", self.vehicles[j].id)));
                 }
             }
         }
@@ -287,7 +289,7 @@ impl<'a> Monitor<'a> {
         }
         self.wall_contacts += 1;
         let what = if phase == Phase::Falling { "is hit by falling" } else { "touches the wreck of" };
-        self.incidents.push((t_s, flier, format!("{what} vehicle no. {}", wreck + 1)));
+        self.incidents.push((t_s, flier, format!("{what} vehicle {}", self.vehicles[wreck].id)));
     }
 
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
@@ -352,7 +354,7 @@ mod tests {
         }
         let grid = VoxelGrid::new(shape, Outside::Free, &words).unwrap();
         let field = ClearanceField::new(&grid);
-        test(Monitor::new(grid, &field, 1.5, &[0.5, 0.5]));
+        test(Monitor::new(grid, &field, 1.5, &[(7, 0.5), (9, 0.5)]));
     }
 
     fn at(x: f32, y: f32, z: f32, phase: Phase) -> Observation {
@@ -395,6 +397,11 @@ mod tests {
             monitor.observe(0.1, &pair(1.4, Phase::Flying));
             monitor.observe(0.2, &pair(1.3, Phase::Flying));
             assert_eq!(monitor.violations, 1);
+            // Of the two it names the other one, by its id.
+            assert_eq!(
+                (monitor.incidents[0].1, &*monitor.incidents[0].2),
+                (1, "nearer than the safety distance to vehicle 7")
+            );
             assert!((monitor.min_separation_m - 1.3).abs() < 1e-6);
         });
     }
