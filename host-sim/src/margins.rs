@@ -9,6 +9,7 @@
 //! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`STRAY_M`] are measured with it |
 //! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, seldom and not beside an error of tracking |
 //! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
+//! | touchdown, PX4 | 0.5 m, and [`STRAY_PER_GUST_S`] × `gust_mps` | pads: up to 0.7 m beside them without wind, 1.1 m in gusts of 3 m/s, seldom two towards each other |
 //! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_S`] at cruise is along the lanes | the camera is not where the waypoint is |
 //! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m | a lower camera shows less |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |
@@ -63,8 +64,20 @@ pub const TRIGGER_S: f32 = 0.15;
 
 /// How far apart pads have to be, metres: a vehicle comes down beside one that came down, and both err.
 pub fn pads_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
-    let estimates = vehicles.iter().map(|v| estimate_m(simulation.estimator, v.personality));
-    parked_separation_m(simulation, safety_distance_m, vehicles) + estimates.fold(0.0, f32::max)
+    let own = |v: &Vehicle| {
+        estimate_m(simulation.estimator, v.personality) + touchdown_m(simulation.gust_mps, v.personality)
+    };
+    parked_separation_m(simulation, safety_distance_m, vehicles)
+        + vehicles.iter().map(own).fold(0.0, f32::max)
+}
+
+/// How much further than it flies beside its path a vehicle touches down beside its pad, metres. A PX4 that comes over its
+/// pad fast, or is blown, has its integrator against it, which carries it on once the companion no longer holds it.
+fn touchdown_m(gust_mps: f32, autopilot: Personality) -> f32 {
+    match autopilot {
+        Personality::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
+        Personality::Ardupilot => 0.0,
+    }
 }
 
 /// How much lower than it believes a vehicle may be, metres.

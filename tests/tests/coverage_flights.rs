@@ -98,3 +98,49 @@ fn over_fields_estimates_have_the_room_that_the_separation_leaves() {
         assert!(pace(room_m + 0.01) < 1.0, "{separation_m} m beyond {safety_m} m");
     }
 }
+
+/// Pads as near as a scenario may have them, low and fast flights, gusts: a vehicle comes over its pad with what it flew, and
+/// down beside one that stands there.
+#[test]
+fn vehicles_land_on_pads_as_near_as_they_may_be() {
+    let outcome = |seed: u64| -> Result<(), String> {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let mut one_of = |choices: &[f32]| choices[random.next_u32() as usize % choices.len()];
+        let (height_m, cruise_mps) = (one_of(&[5.0, 8.0, 12.0, 20.0]), one_of(&[5.0, 8.0, 12.0]));
+        let (gust_mps, side_m) = (one_of(&[0.0, 1.0, 3.0]), one_of(&[35.0, 42.0, 50.0]));
+        let mut text = format!(
+            "seed = {seed}\n[area]\npolygon = [[0, 0], [60, 0], [60, {side_m}], [0, {side_m}]]\ncamera = {{ fov_deg = 73.7 }}\n\
+             height_m = {height_m}\n[mission]\ncruise_mps = {cruise_mps}\n[simulation]\ngust_mps = {gust_mps}\n"
+        );
+        let mut accepted = None;
+        for centimetres in (150..400).step_by(5) {
+            let apart_m = centimetres as f32 / 100.0;
+            let pads = (0..3).map(|k| {
+                format!(
+                    "[[vehicles]]\nid = {}\nspeed_max_mps = 15.0\nstart = [{:.2}, -20, 0]\n",
+                    k + 1,
+                    20.0 + k as f32 * apart_m
+                )
+            });
+            let all = text.clone() + &pads.collect::<String>();
+            match scenario::parse(&all, "pads") {
+                Ok(_) => {
+                    text = all;
+                    accepted = Some(centimetres);
+                    break;
+                }
+                Err(error) => assert!(error.why.contains("to land beside each other"), "{error}"),
+            }
+        }
+        let apart_cm = accepted.ok_or("no pads are far enough apart")?;
+        let (result, log) = covered::fly_text(&text)?;
+        match covered::faults(&result) {
+            None => Ok(()),
+            Some(faults) => Err(format!("seed {seed}, pads {apart_cm} cm apart: {faults}\n{log}{text}")),
+        }
+    };
+    let count = number("FLOCKMATE_PADS", 16);
+    let wrong: Vec<_> = (0..count).into_par_iter().filter_map(|seed| outcome(seed).err()).collect();
+    println!("{count} flown, {} wrong", wrong.len());
+    assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(3000).collect::<String>());
+}
