@@ -12,6 +12,8 @@ use super::flight::Stop;
 const STEP_S: f32 = 0.25;
 /// Departures that are tried, seconds apart.
 const DELAY_S: f32 = 2.0;
+/// A vehicle that is no further from its pad, seen from above, is over it, metres.
+const OVER_PAD_M: f32 = 0.01;
 /// Nobody waits longer on the ground, seconds.
 const LONGEST_S: f32 = 900.0;
 
@@ -37,14 +39,7 @@ pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>,
             let others = order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
             let mut least_m = f32::INFINITY;
             for other in others {
-                let own = (&tracks[own][..], delay);
-                // Pads may be nearer than that; nothing can be done about it here.
-                let enough_m = separation_m.min((own.0[0] - other.0[0]).norm());
-                let gap_m = nearest_m(own, other);
-                if gap_m < enough_m * 0.999 {
-                    return None;
-                }
-                least_m = least_m.min(gap_m);
+                least_m = least_m.min(nearest_m((&tracks[own][..], delay), other, separation_m)?);
             }
             Some(least_m)
         };
@@ -72,14 +67,30 @@ fn sampled(flight: &Timed<'_>) -> Vec<Point> {
     (0..=(end_s / STEP_S).ceil() as usize).map(place).collect()
 }
 
-/// The least distance between two flights that begin with these delays, while one of them is in the air.
-fn nearest_m(a: (&[Point], usize), b: (&[Point], usize)) -> f32 {
+/// The least distance between two flights that begin with these delays, while one of them is in the air. None where it is less
+/// than the separation. Pads may be nearer than that, which nothing here can change: it is all that is kept while both
+/// vehicles are over theirs, or one stands on its own.
+fn nearest_m(a: (&[Point], usize), b: (&[Point], usize), separation_m: f32) -> Option<f32> {
     let at = |(track, delay): (&[Point], usize), step: usize| {
         track[step.saturating_sub(delay).min(track.len() - 1)]
     };
+    let (pad_a, pad_b) = (a.0[0], b.0[0]);
+    let pads_m = separation_m.min((pad_a - pad_b).xy().norm());
+    let over = |place: &Point, pad: &Point| (place - pad).xy().norm() < OVER_PAD_M;
     let end = (a.0.len() + a.1).max(b.0.len() + b.1);
-    let from = a.1.min(b.1);
-    (from..end).map(|step| (at(a, step) - at(b, step)).norm_squared()).fold(f32::INFINITY, f32::min).sqrt()
+    let mut least_m = f32::INFINITY;
+    for step in a.1.min(b.1)..end {
+        let (place_a, place_b) = (at(a, step), at(b, step));
+        let gap_m = (place_a - place_b).norm();
+        let stands = place_a == pad_a || place_b == pad_b;
+        let both_over = over(&place_a, &pad_a) && over(&place_b, &pad_b);
+        let enough_m = if stands || both_over { pads_m } else { separation_m };
+        if gap_m < enough_m * 0.999 {
+            return None;
+        }
+        least_m = least_m.min(gap_m);
+    }
+    Some(least_m)
 }
 
 #[cfg(test)]
@@ -106,6 +117,18 @@ mod tests {
         let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 2.0).expect("they can wait");
         assert!(departures_s[1] == 0.0 && departures_s[0] > 0.0, "{departures_s:?}");
         assert!((2.0 * 0.999..3.1).contains(&least_m), "{least_m}");
+        // Pads 2 m apart are no reason to come as near over the lanes.
+        let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 8.0).expect("they can wait");
+        assert!(departures_s[0] > 0.0 && least_m < 3.1, "{departures_s:?}, {least_m}");
+        let places = |flight: &Timed<'_>, delay_s: f32| (sampled(flight), (delay_s / STEP_S) as usize);
+        let (long_places, beside_places) =
+            (places(&timed(long), 0.0), places(&timed(beside), departures_s[0]));
+        for step in 0..long_places.0.len() {
+            let other = beside_places.0[step.saturating_sub(beside_places.1).min(beside_places.0.len() - 1)];
+            let own = long_places.0[step];
+            let in_the_air = own.z > 29.0 && other.z > 29.0;
+            assert!(!in_the_air || (own - other).norm() >= 8.0 * 0.999, "{own} {other}");
+        }
         let apart = flight(&[[0.0, 30.0, 0.0], [0.0, 30.0, 30.0], [90.0, 30.0, 30.0]]);
         let apart = &*Box::leak(Box::new(apart));
         assert_eq!(departures(&[timed(long), timed(apart)], 2.0).expect("apart").0, [0.0, 0.0]);
