@@ -20,6 +20,7 @@ use planner_core::search::SearchWorkspace;
 pub use self::ready::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
 use self::ready::{planner_mode, schedule_config};
 use crate::capacity::{Board, DeskCompanion, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
+use crate::coverage::check_ground;
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
 use crate::result::{Left, Timing};
@@ -62,6 +63,7 @@ impl Mission {
         progress: &Progress,
     ) -> anyhow::Result<Self> {
         if scenario.area.is_some() {
+            check_ground(&scenario)?;
             return coverage::prepare(scenario, board);
         }
         let mut timing = Timing::default();

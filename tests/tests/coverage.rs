@@ -4,6 +4,8 @@ use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::shared_data;
 use host_sim::coverage::Planned;
 use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::mission::Mission;
+use host_sim::progress::Progress;
 use host_sim::scenario::coverage::Method;
 use host_sim::scenario::{self, Scenario};
 use planner_core::coverage::Flat;
@@ -239,6 +241,19 @@ fn bad_areas_are_refused_by_name_or_covered() {
         ("[[0, 0], [0.004, 0], [0.004, 0.003]]", "", "area is 0.004"),
         (square, "holes = [[[200, 0], [210, 0], [210, 10]]]", "lies outside every polygon"),
         (square, "holes = [[[90, 10], [120, 10], [120, 20]]]", "cross"),
+        (
+            square,
+            "holes = [[[20, 20], [50, 20], [50, 50]], [[20, 20], [50, 20], [50, 50]]]",
+            "hole 0 and hole 1 overlap",
+        ),
+        (
+            square,
+            "holes = [[[20, 20], [60, 20], [60, 70]], [[40, 25], [55, 25], [55, 35]]]",
+            "hole 0 and hole 1 overlap",
+        ),
+        (square, "holes = [[[-20, 0], [20, 0], [20, 80], [-20, 80]]]", "reaches out of its polygon"),
+        (square, "holes = [[[-20, -20], [120, -20], [120, 100], [-20, 100]]]", "reaches out of its polygon"),
+        (square, "holes = [[[0, 0], [100, 0], [100, 80], [0, 80]]]", "holes leave nothing"),
         (square, "holes = [[[10, 10], [20, 20], [20, 10], [10, 20]]]", "crosses another one"),
         (square, "no_fly = [[[-10, -10], [-10, 90], [110, 90], [110, -10]]]", "hold the whole area"),
         (
@@ -248,6 +263,12 @@ fn bad_areas_are_refused_by_name_or_covered() {
         ),
         ("[[0, 0], [100, 0], [100, 99], [0, 99]]", "coordinates = \"wgs84\"", "no place on earth"),
         (square, "", ""),
+        ("[[0, 0], [400, 0], [400, 0.05], [0, 0.05]]", "", ""),
+        (
+            square,
+            "holes = [[[20, 20], [50, 20], [50, 50], [20, 50]], [[50, 20], [60, 20], [60, 50], [50, 50]]]",
+            "",
+        ),
         ("[[0, 0], [0, 0], [100, 0], [100, 0], [100, 80], [0, 80], [0, 0]]", "", ""),
         ("[[0, 0], [50, 0], [100, 0], [100, 80], [0, 80]]", "", ""),
         ("[[0, 0], [100, 0], [100, 3], [0, 3]]", "", ""),
@@ -270,10 +291,58 @@ fn bad_areas_are_refused_by_name_or_covered() {
         };
         match found {
             Ok(found) if why.is_empty() => {
-                assert!(found.is_clean(), "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
+                let judged = found.cells > 0 && found.is_clean();
+                assert!(judged, "{shown}: {:?}", Findings { over_time: Vec::new(), ..found });
             }
             Err(error) if !why.is_empty() => assert!(error.contains(why), "{shown} {more}: {error}"),
             other => panic!("{shown} {more}: {other:?}, expected {why:?}"),
         }
+    }
+}
+
+/// What is asked of the vehicles and cannot be flown: the error says why, for `cover` and `fly`.
+#[test]
+fn what_cannot_be_flown_is_refused_by_name() {
+    let start = "start = [6, -10, 0]";
+    let plan = |mission: &str, first: &str, more: &str| {
+        let text = format!(
+            "[area]\npolygon = [[0, 0], [120, 0], [120, 80], [0, 80]]\ncamera = {{ fov_deg = 73.7 }}\nheight_m = 35.0\n\
+             [mission]\ncruise_mps = 5.0\n{mission}\n[[vehicles]]\nid = 7\n{first}\n[[vehicles]]\nid = 9\n\
+             start = [0, -10, 0]\n{more}\n"
+        );
+        let scenario = scenario::parse(&text, "asked").map_err(|error| error.to_string())?;
+        let planned = Planned::new(&scenario, Method::PowellBinpat).map_err(|error| error.to_string())?;
+        let longest_s = planned.sorties.iter().map(|sortie| sortie.flown_s).fold(0.0, f32::max);
+        let costs_s = planned.max_cost_s();
+        drop(planned);
+        Mission::prepare(scenario, &Progress::hidden()).map_err(|error| format!("flown: {error}"))?;
+        Ok::<_, String>((longest_s, costs_s))
+    };
+    let (longest_s, costs_s) = plan("", start, "").expect("nothing is wrong");
+    // Enough for the costs, which leave out turns, and not for the flight.
+    assert!(costs_s < longest_s);
+    let endurance = |seconds: f32| {
+        let endurance = format!("endurance_s = {seconds:.2}");
+        plan("", &format!("{start}\n{endurance}"), &endurance)
+    };
+    let error = endurance(0.5 * (costs_s + longest_s) / 0.85).expect_err("the battery is too small");
+    assert!(error.contains("of that are for the landing"), "{error}");
+    endurance(longest_s / 0.84).expect("the battery lasts");
+    // Layers end at 45 m, lanes at 120 m.
+    let fence = |max: &str| plan(&format!("geofence = {{ min = [-50, -50, -10], max = {max} }}"), start, "");
+    for max in ["[60, 200, 200]", "[200, 200, 20]", "[200, 200, 44]"] {
+        let error = fence(max).expect_err(max);
+        assert!(error.contains("outside mission.geofence"), "{max}: {error}");
+    }
+    fence("[121, 100, 46]").expect("it is around all that is flown");
+    for (first, why) in [
+        ("start = [6, -10, 35]", "pictures are taken at 35.0 m"),
+        ("start = [6, -10, 20]", "flown: bad vehicle: asked:10: vehicle 7 starts 20.0 m above the ground"),
+        ("start = [6, -10, -20]", "flown: bad vehicle: asked:10: vehicle 7 starts -20.0 m above the ground"),
+        ("start = [0, -10, 20]", "vehicles 7 and 9 start 0.00 m apart"),
+        ("start = [6, -10, 0]\nweight = 0", "weight must be a number from"),
+    ] {
+        let error = plan("", first, "").expect_err(first);
+        assert!(error.contains(why), "{first}: {error}");
     }
 }

@@ -5,6 +5,7 @@
 
 mod geojson;
 mod kml;
+pub mod overlap;
 mod plan;
 mod polygons;
 #[cfg(test)]

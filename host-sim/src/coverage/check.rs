@@ -91,7 +91,7 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Findings {
         findings.forbidden += flight.stops.windows(2).filter(enters).count() as u64;
     }
     findings.heights = heights::check(planned, flights);
-    Cells::new(planned).judge(planned, pictures(planned, flights), &mut findings);
+    Cells::that_count(planned).judge(planned, pictures(planned, flights), &mut findings);
     findings
 }
 
@@ -121,7 +121,7 @@ pub fn check_pictures(planned: &Planned<'_>, pictures: Vec<Picture>) -> Findings
         findings.left += u64::from(taken == 0);
         findings.twice += u64::from(taken > 1);
     }
-    Cells::new(planned).judge(planned, pictures, &mut findings);
+    Cells::that_count(planned).judge(planned, pictures, &mut findings);
     findings
 }
 
@@ -206,6 +206,17 @@ impl Cells {
         let lane_m = f64::from(planned.wanted.spacing.lane_m);
         cells.side = (lane_m / 10.0).max((wide * tall / MOST_CELLS).sqrt());
         cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
+        cells
+    }
+
+    /// Cells of which some count, so that an area narrower than one is judged too.
+    fn that_count(planned: &Planned<'_>) -> Self {
+        let mut cells = Self::new(planned);
+        let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MOST_CELLS;
+        while !cells.held(planned, cells.size, 0.5).contains(&true) && most(cells.size) {
+            cells.side /= 2.0;
+            cells.size = cells.size.map(|count| 2 * count);
+        }
         cells
     }
 

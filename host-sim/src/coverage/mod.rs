@@ -32,10 +32,13 @@ pub use self::planned::{CORNERS, LANES, Planned, VEHICLES};
 use self::sorties::{LaneTooLong, SWAP_S, Sortie, USABLE_CHARGE};
 use crate::area::MOST_VERTICES;
 use crate::scenario::Scenario;
-use crate::scenario::coverage::{self, Method};
+use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
 
 /// Changes of the lanes' order that the desk looks at.
 pub const LOOKS: u32 = 20_000_000;
+
+/// No start may be further above or below the ground, metres.
+const MOST_OFF_GROUND_M: f32 = 1.5;
 
 /// A sortie, its stops, and when each is passed, seconds.
 pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
@@ -116,6 +119,7 @@ impl<'a> Planned<'a> {
             true => planned.cut()?,
             false => planned.one_each()?,
         };
+        planned.check_fence()?;
         planned.set_departures()?;
         Ok(planned)
     }
@@ -224,22 +228,65 @@ impl<'a> Planned<'a> {
         Ok(())
     }
 
-    /// A sortie for each route. Nobody is sent out for longer than its battery lasts.
+    /// Nobody is sent out of the geofence: companions, and autopilots that have it, would land there.
+    fn check_fence(&self) -> anyhow::Result<()> {
+        let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
+        for sortie in &self.sorties {
+            let stops = flight::stops(self, &sortie.route);
+            let Some(stop) = stops.iter().find(|stop| !fence.holds(&stop.position)) else { continue };
+            let (place, index) = (stop.position, usize::from(sortie.route.vehicle));
+            bail!(
+                "outside mission.geofence: {}: vehicle {} would fly to [{:.1}, {:.1}, {:.1}]\nhint: a geofence around area \
+                 and pads, up to the highest layer, or a smaller area",
+                self.scenario.vehicle_places[index],
+                self.scenario.vehicles[index].id,
+                place.x,
+                place.y,
+                place.z
+            );
+        }
+        Ok(())
+    }
+
+    /// A sortie for each route. Nobody is sent out for longer than its battery lasts, where that is known.
     fn one_each(&self) -> anyhow::Result<Vec<Sortie>> {
         for route in &self.plan.routes {
             let index = usize::from(route.vehicle);
             let vehicle = &self.scenario.vehicles[index];
-            let Some(endurance_s) = vehicle.endurance_s.filter(|s| *s < route.cost_s) else { continue };
+            let takes_s = sorties::flown_s(self, route);
+            let too_long = |endurance_s: &f32| takes_s > USABLE_CHARGE * endurance_s;
+            let Some(endurance_s) = vehicle.endurance_s.filter(too_long) else { continue };
             bail!(
-                "area too large: {}: vehicle {} would fly {:.0} s, its endurance_s is {endurance_s:.0}\nhint: more \
-                 vehicles, wider lanes or a higher cruise_mps take less time; area.batteries = true plans sorties",
+                "area too large: {}: vehicle {} would fly {takes_s:.0} s; its endurance_s is {endurance_s:.0}, and {:.0} % of \
+                 that are for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; \
+                 area.batteries = true plans sorties",
                 self.scenario.vehicle_places[index],
                 vehicle.id,
-                route.cost_s
+                100.0 * (1.0 - USABLE_CHARGE)
             );
         }
         Ok(self.plan.routes.iter().map(|route| sorties::whole(self, *route)).collect())
     }
+}
+
+/// Companions start within 2 m of where they are to: on the ground.
+///
+/// # Errors
+/// A vehicle does not stand there, by name.
+pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
+    let Some(area) = &scenario.area else { return Ok(()) };
+    let above_m = |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
+    let stray = |vehicle: &crate::scenario::Vehicle| above_m(vehicle).abs() > MOST_OFF_GROUND_M;
+    if let Some(index) = scenario.vehicles.iter().position(stray) {
+        let vehicle = &scenario.vehicles[index];
+        bail!(
+            "bad vehicle: {}: vehicle {} starts {:.1} m above the ground\nhint: {ORIGIN_HINT}",
+            scenario.vehicle_places[index],
+            vehicle.id,
+            above_m(vehicle)
+        );
+    }
+    Ok(())
 }
 
 /// No vehicle starts inside a no-fly zone.

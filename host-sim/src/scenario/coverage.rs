@@ -14,6 +14,10 @@ use planner_core::frames::Geodetic;
 
 use crate::terrain::HeightGrid;
 
+/// What helps where a vehicle does not stand on the ground.
+pub const ORIGIN_HINT: &str =
+    "area.origin = { lat_deg = …, lon_deg = …, alt_m = … } says how high the ground is";
+
 /// `[area]`
 #[derive(Clone, Debug)]
 pub struct Area {

@@ -468,7 +468,7 @@ fn vehicle(
         home: table.get("home").map(|v| geodetic(&v)).transpose()?,
         ekf_origin: table.get("ekf_origin").map(|v| geodetic(&v)).transpose()?,
         companion,
-        weight: table.optional_f32("weight", 0.0..=1000.0)?,
+        weight: table.optional_f32("weight", 0.001..=1000.0)?,
         climb_mps: table.optional_f32("climb_mps", 0.01..=100.0)?,
         descend_mps: table.optional_f32("descend_mps", 0.01..=100.0)?,
     };

@@ -11,11 +11,12 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
 use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
+use crate::area::overlap::{self, Overlap};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
 use crate::quote::quoted_path;
-use crate::scenario::coverage::{Area, Heading, Method, Trigger};
+use crate::scenario::coverage::{Area, Heading, Method, ORIGIN_HINT, Trigger};
 use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
@@ -54,6 +55,7 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let (vehicles, spans): (Vec<Vehicle>, Vec<VehicleSpans>) = vehicles.into_iter().unzip();
     let apart_m = margins::pads_m(&simulation, deconfliction.safety_distance_m, &vehicles);
     check_pads(text, &vehicles, &spans, apart_m)?;
+    check_heights(text, &vehicles, &spans, area.heights.mission_m)?;
     if let Some(span) = &estimator_span {
         check_margins(text, span, None, &deconfliction, &simulation, &vehicles)?;
     }
@@ -81,21 +83,34 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     })
 }
 
-/// Pads have to be so far apart.
+/// Pads have to be so far apart, however high they lie: no vehicle climbs through another one.
 fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apart_m: f32) -> Result<()> {
     for (index, (vehicle, spans)) in vehicles.iter().zip(spans).enumerate() {
-        let near = |other: &&Vehicle| (vehicle.start - other.start).norm() < apart_m;
+        let apart = |other: &Vehicle| (vehicle.start - other.start).xy().norm();
+        let near = |other: &&Vehicle| apart(other) < apart_m;
         if let Some(other) = vehicles[..index].iter().find(near) {
             let why = format!(
                 "vehicles {} and {} start {:.2} m apart: to land beside each other they need {apart_m:.2} m",
                 other.id,
                 vehicle.id,
-                (vehicle.start - other.start).norm()
+                apart(other)
             );
             return Err(text.error(&spans.start, why));
         }
     }
     Ok(())
+}
+
+/// Nobody starts as high as pictures are taken, or higher.
+fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], height_m: f32) -> Result<()> {
+    let Some((vehicle, spans)) = vehicles.iter().zip(spans).find(|(v, _)| v.start.z >= height_m) else {
+        return Ok(());
+    };
+    let why = format!(
+        "vehicle {} stands {:.1} m above the origin, pictures are taken at {height_m:.1} m",
+        vehicle.id, vehicle.start.z
+    );
+    Err(text.with_hint(&spans.start, why, ORIGIN_HINT))
 }
 
 /// `[mission]` of a coverage mission: it has no goals.
@@ -295,14 +310,29 @@ fn flat(
         let why = format!("area is {:.6} by {:.6} m", wide(0), wide(1));
         return bad(why, "degrees need `coordinates = \"wgs84\"`");
     }
-    match core_area::Area::new(&vertices, &rings) {
-        Ok(_) => Ok((vertices, rings)),
+    match core_area::Area::new(&vertices, &rings).map(|area| overlapping(&area)) {
+        Ok(None) => Ok((vertices, rings)),
+        Ok(Some((why, hint))) => bad(format!("area: {why}"), hint),
         Err(error) => {
             let far = matches!(error, core_area::AreaError::TooFar { .. });
             let near = "metres are about area.origin, and origin must be near the area";
             bad(format!("area: {}", reason(error, &rings)), if far { near } else { "" })
         }
     }
+}
+
+/// Why rings that do not cross are no area all the same, and what would help.
+fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
+    let of = |kind: RingKind| {
+        let indices = 0..area.rings().len();
+        indices.filter(|i| area.rings()[*i].kind == kind).map(|i| area.ring(i)).collect::<Vec<_>>()
+    };
+    Some(match overlap::find(&of(RingKind::Outer), &of(RingKind::Hole))? {
+        Overlap::Outers(i, j) => (format!("polygon {i} and polygon {j} overlap"), "draw them as one"),
+        Overlap::Holes(i, j) => (format!("hole {i} and hole {j} overlap"), "draw them as one"),
+        Overlap::HoleOut(i) => (format!("hole {i} reaches out of its polygon"), ""),
+        Overlap::NothingLeft(i) => (format!("holes leave nothing of polygon {i}"), ""),
+    })
 }
 
 /// What is wrong with an area, for a person.

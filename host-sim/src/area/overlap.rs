@@ -1,0 +1,231 @@
+//! Rings that share ground although their edges do not cross: one inside another, the same one twice, or two whose edges lie
+//! on each other. What is inside an odd number of rings is photographed, so that two holes over each other are none.
+//!
+//! Each edge is cut where the other ring meets it; the middle of every piece lies inside the other ring, outside or on its
+//! border. f64, metres; cost n · m for rings whose boxes meet.
+
+use planner_core::coverage::Flat;
+
+/// So near to a border is on it, metres: neighbouring fields share borders, and coordinates are rounded.
+const BORDER_M: f64 = 0.01;
+
+/// How rings lie to each other that share ground where they must not.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overlap {
+    /// Two polygons.
+    Outers(usize, usize),
+    /// Two holes.
+    Holes(usize, usize),
+    /// A hole that reaches out of its polygon.
+    HoleOut(usize),
+    /// A polygon of which holes leave nothing.
+    NothingLeft(usize),
+}
+
+/// What is wrong with rings that do not cross.
+pub fn find(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
+    let (outers, holes) = (wide(outers), wide(holes));
+    if let Some((i, j)) = sharing(&outers) {
+        return Some(Overlap::Outers(i, j));
+    }
+    if let Some((i, j)) = sharing(&holes) {
+        return Some(Overlap::Holes(i, j));
+    }
+    let mut left_m2: Vec<f64> = outers.iter().map(Wide::area_m2).collect();
+    for (index, hole) in holes.iter().enumerate() {
+        let around = |outer: &Wide| !hole.sides(outer).outside;
+        let Some(own) = outers.iter().position(around) else { return Some(Overlap::HoleOut(index)) };
+        left_m2[own] -= hole.area_m2();
+    }
+    let nothing = |(ring, left_m2): (&Wide, &f64)| *left_m2 < BORDER_M * ring.perimeter_m();
+    outers.iter().zip(&left_m2).position(nothing).map(Overlap::NothingLeft)
+}
+
+/// The first two rings that share ground.
+fn sharing(rings: &[Wide]) -> Option<(usize, usize)> {
+    let pairs = (0..rings.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
+    pairs.into_iter().find(|&(i, j)| {
+        let (a, b) = (&rings[i], &rings[j]);
+        if !a.meets(b) {
+            return false;
+        }
+        let (a_of_b, b_of_a) = (a.sides(b), b.sides(a));
+        let same = !a_of_b.outside && !b_of_a.outside;
+        a_of_b.inside || b_of_a.inside || same
+    })
+}
+
+/// A ring in f64, and its box.
+struct Wide {
+    ring: Vec<[f64; 2]>,
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+/// Where parts of a ring lie, as another one sees it.
+#[derive(Default)]
+struct Sides {
+    inside: bool,
+    outside: bool,
+}
+
+fn wide(rings: &[&[Flat]]) -> Vec<Wide> {
+    let wide = |ring: &&[Flat]| {
+        let ring: Vec<[f64; 2]> = ring.iter().map(|v| [f64::from(v.x), f64::from(v.y)]).collect();
+        let side = |from: f64, pick: fn(f64, f64) -> f64| {
+            [0, 1].map(|axis| ring.iter().map(|v| v[axis]).fold(from, pick))
+        };
+        Wide { low: side(f64::INFINITY, f64::min), high: side(f64::NEG_INFINITY, f64::max), ring }
+    };
+    rings.iter().map(wide).collect()
+}
+
+impl Wide {
+    fn edges(&self) -> impl Iterator<Item = ([f64; 2], [f64; 2])> + '_ {
+        self.ring.iter().copied().zip(self.ring.iter().copied().cycle().skip(1))
+    }
+
+    fn meets(&self, other: &Self) -> bool {
+        (0..2).all(|axis| self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis])
+    }
+
+    fn area_m2(&self) -> f64 {
+        let base = self.ring[0];
+        let at = |v: [f64; 2]| [v[0] - base[0], v[1] - base[1]];
+        let twice: f64 = self.edges().map(|(a, b)| cross(at(a), at(b))).sum();
+        (twice / 2.0).abs()
+    }
+
+    fn perimeter_m(&self) -> f64 {
+        self.edges().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum()
+    }
+
+    /// Where the pieces of this ring's edges lie.
+    fn sides(&self, other: &Self) -> Sides {
+        let mut sides = Sides::default();
+        for (a, b) in self.edges() {
+            let cuts = other.cuts(a, b);
+            for pair in cuts.windows(2) {
+                let share = f64::midpoint(pair[0], pair[1]);
+                let middle = [a[0] + (b[0] - a[0]) * share, a[1] + (b[1] - a[1]) * share];
+                if !other.has_on_border(middle) {
+                    let inside = other.holds(middle);
+                    sides.inside |= inside;
+                    sides.outside |= !inside;
+                }
+            }
+            if sides.inside && sides.outside {
+                break;
+            }
+        }
+        sides
+    }
+
+    /// Where this ring meets a segment, as shares of it, both ends among them.
+    fn cuts(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
+        let along = [b[0] - a[0], b[1] - a[1]];
+        let length2 = along[0] * along[0] + along[1] * along[1];
+        let mut shares = vec![0.0, 1.0];
+        for (c, d) in self.edges() {
+            let far = |axis: usize| {
+                c[axis].max(d[axis]) < a[axis].min(b[axis]) - BORDER_M
+                    || c[axis].min(d[axis]) > a[axis].max(b[axis]) + BORDER_M
+            };
+            if far(0) || far(1) {
+                continue;
+            }
+            let to = [c[0] - a[0], c[1] - a[1]];
+            let edge = [d[0] - c[0], d[1] - c[1]];
+            // The vertex, seen from the segment: where it lies on it, that is a cut.
+            shares.push((to[0] * along[0] + to[1] * along[1]) / length2);
+            shares.push(cross(to, edge) / cross(along, edge));
+        }
+        shares.retain(|share| (0.0..=1.0).contains(share));
+        shares.sort_by(f64::total_cmp);
+        shares
+    }
+
+    fn has_on_border(&self, place: [f64; 2]) -> bool {
+        self.edges().any(|(a, b)| {
+            let (along, to) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
+            let length2 = along[0] * along[0] + along[1] * along[1];
+            let share = ((to[0] * along[0] + to[1] * along[1]) / length2).clamp(0.0, 1.0);
+            (to[0] - along[0] * share).hypot(to[1] - along[1] * share) <= BORDER_M
+        })
+    }
+
+    fn holds(&self, place: [f64; 2]) -> bool {
+        let crossed = |(a, b): &([f64; 2], [f64; 2])| {
+            (a[1] <= place[1]) != (b[1] <= place[1])
+                && place[0] < a[0] + (place[1] - a[1]) * (b[0] - a[0]) / (b[1] - a[1])
+        };
+        self.edges().filter(crossed).count() % 2 == 1
+    }
+}
+
+fn cross(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[1] - a[1] * b[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use rand_core::{Rng, SeedableRng};
+
+    use super::*;
+
+    /// A rectangle by its corners in whole metres.
+    fn rectangle([x0, y0, x1, y1]: [u32; 4]) -> Vec<Flat> {
+        [[x0, y0], [x1, y0], [x1, y1], [x0, y1]].map(|[x, y]| Flat::new(x as f32, y as f32)).to_vec()
+    }
+
+    fn random(pcg: &mut rand_pcg::Pcg32, most: u32) -> [u32; 4] {
+        let mut span = || {
+            let from = pcg.next_u32() % most;
+            (from, from + 1 + pcg.next_u32() % (most - from))
+        };
+        let ((x0, x1), (y0, y1)) = (span(), span());
+        [x0, y0, x1, y1]
+    }
+
+    /// Of rectangles on a grid every square metre can be counted.
+    #[test]
+    fn rectangles_overlap_where_a_square_metre_says_so() {
+        let mut seen = [0; 5];
+        for seed in 0..20_000 {
+            let mut pcg = rand_pcg::Pcg32::seed_from_u64(seed);
+            let outers: Vec<[u32; 4]> = (0..1 + seed % 2).map(|_| random(&mut pcg, 6)).collect();
+            let holes: Vec<[u32; 4]> = (0..seed % 3).map(|_| random(&mut pcg, 6)).collect();
+            let holds = |r: &[u32; 4], x: u32, y: u32| r[0] <= x && x < r[2] && r[1] <= y && y < r[3];
+            let count = |all: &[[u32; 4]], x, y| all.iter().filter(|r| holds(r, x, y)).count();
+            let cells = || (0..6).flat_map(|x| (0..6).map(move |y| (x, y)));
+            let within = |hole: &[u32; 4], outer: &[u32; 4]| {
+                cells().all(|(x, y)| !holds(hole, x, y) || holds(outer, x, y))
+            };
+            let full =
+                |outer: &[u32; 4]| cells().all(|(x, y)| !holds(outer, x, y) || count(&holes, x, y) > 0);
+            let right = if cells().any(|(x, y)| count(&outers, x, y) > 1) {
+                1
+            } else if cells().any(|(x, y)| count(&holes, x, y) > 1) {
+                2
+            } else if holes.iter().any(|hole| !outers.iter().any(|outer| within(hole, outer))) {
+                3
+            } else {
+                4 * usize::from(outers.iter().any(full))
+            };
+            let [outer_rings, hole_rings] =
+                [&outers, &holes].map(|all| all.iter().copied().map(rectangle).collect::<Vec<_>>());
+            let [o, h] =
+                [&outer_rings, &hole_rings].map(|all| all.iter().map(Vec::as_slice).collect::<Vec<_>>());
+            let found = match find(&o, &h) {
+                None => 0,
+                Some(Overlap::Outers(..)) => 1,
+                Some(Overlap::Holes(..)) => 2,
+                Some(Overlap::HoleOut(_)) => 3,
+                Some(Overlap::NothingLeft(_)) => 4,
+            };
+            assert_eq!(found, right, "seed {seed}: {outers:?} without {holes:?}");
+            seen[found] += 1;
+        }
+        assert!(seen.iter().all(|count| *count > 20), "{seen:?}");
+    }
+}
