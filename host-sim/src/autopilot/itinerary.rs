@@ -45,6 +45,29 @@ pub(super) enum Leg {
     Return,
 }
 
+impl Leg {
+    /// Where the leg after this one begins: at its point, or where the vehicle is.
+    pub(super) fn end(leg: Option<Self>, here: &Point) -> Point {
+        match leg {
+            Some(Self::To { at, .. }) => at,
+            _ => *here,
+        }
+    }
+}
+
+/// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly along it: PX4's
+/// `PositionSmoothing` makes one velocity of all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
+pub(super) fn on_line(from: &Point, at: &Point, here: &Point, velocity: &Point) -> (f32, f32) {
+    let (way, up) = ((at - from).xy(), at.z - from.z);
+    let length = way.norm();
+    if length < REACHED_M {
+        return (at.z, 0.0);
+    }
+    let share = ((here - from).xy().dot(&way) / (length * length)).clamp(0.0, 1.0);
+    let rate = if share < 1.0 { up / length * velocity.xy().dot(&way) / length } else { 0.0 };
+    (from.z + up * share, rate)
+}
+
 fn real(item: &Item, at: usize) -> f32 {
     f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
 }

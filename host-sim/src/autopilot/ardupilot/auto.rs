@@ -10,7 +10,7 @@ use super::auto_state::Auto;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, TakeOff};
 use crate::autopilot::body::{Body, Sense};
-use crate::autopilot::itinerary::Leg;
+use crate::autopilot::itinerary::{Leg, on_line};
 
 /// A place is reached to land there within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
@@ -71,6 +71,7 @@ impl Copter {
             self.speed = (speed > 0.0).then_some(speed);
         }
         if leg != self.auto.leg {
+            self.auto.from = Leg::end(self.auto.leg, &sense.position);
             // At least a metre up from the ground.
             self.takeoff = match leg {
                 Some(Leg::TakeOff { up }) if self.landed => {
@@ -98,7 +99,11 @@ impl Copter {
                     self.auto.heading = Some(libm::atan2f(off.x, off.y));
                 }
                 self.auto.stay = Some(at);
-                Goal { heading: self.auto.heading.unwrap_or(f32::NAN), ..Goal::hold(at) }
+                let reference = &self.reference;
+                let (up, rate) = on_line(&self.auto.from, &at, &reference.position, &reference.velocity);
+                let heading = self.auto.heading.unwrap_or(f32::NAN);
+                let velocity = Point::new(0.0, 0.0, rate);
+                Goal { heading, velocity, ..Goal::hold(Point::new(at.x, at.y, up)) }
             }
             Some(Leg::TakeOff { up }) => {
                 let stay = self.auto.stay.unwrap_or(at);

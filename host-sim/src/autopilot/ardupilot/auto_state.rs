@@ -11,6 +11,8 @@ pub(super) struct Auto {
     pub may_lift: bool,
     /// What it flies now.
     pub leg: Option<Leg>,
+    /// Where that began.
+    pub from: Point,
     /// Where it stays when nothing is asked for.
     pub stay: Option<Point>,
     /// Where it looks.

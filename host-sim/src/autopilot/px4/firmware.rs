@@ -75,7 +75,12 @@ impl Px4 {
             }
             return;
         }
-        self.commander.mission.leg = body.fly_mission(sense, self.commander.landed());
+        let leg = body.fly_mission(sense, self.commander.landed());
+        let mission = &mut self.commander.mission;
+        if leg != mission.leg {
+            mission.from = Leg::end(mission.leg, &sense.position);
+        }
+        mission.leg = leg;
         if let Some(speed) = body.missions.speed.take() {
             self.commander.set_cruise(speed);
         }

@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::params::Tuning;
 use super::{Commander, Mode, ReturnLeg, Sense};
-use crate::autopilot::itinerary::Leg;
+use crate::autopilot::itinerary::{Leg, on_line};
 use crate::autopilot::shaping::Ramp;
 use crate::autopilot::vehicle::Demand;
 
@@ -113,7 +113,9 @@ impl Commander {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
                 self.hold = at;
-                Demand { position: at, heading: self.hold_heading, ..held }
+                let (up, rate) = on_line(&self.mission.from, &at, &sense.position, &sense.velocity);
+                let (position, velocity) = (Point::new(at.x, at.y, up), Point::new(0.0, 0.0, rate));
+                Demand { position, velocity, heading: self.hold_heading, ..held }
             }
             Some(Leg::Land { at }) => {
                 if let Some([east, north]) = at {

@@ -64,6 +64,8 @@ struct Mission {
     ready: bool,
     /// What it asks for, while it is flown.
     leg: Option<Leg>,
+    /// Where that began.
+    from: Point,
 }
 
 /// The state of the state machine.
