@@ -58,6 +58,8 @@ pub fn read(path: &Path) -> Result<Polygons, AreaFileError> {
 /// # Errors
 /// As [`read`].
 pub fn parse(text: &str, format: Format) -> Result<Polygons, AreaFileError> {
+    // Some programs begin every text with a byte order mark.
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut polygons = match format {
         Format::GeoJson => geojson::parse(text)?,
         Format::Wkt => wkt::parse(text)?,

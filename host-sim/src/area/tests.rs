@@ -31,6 +31,7 @@ fn all_formats_say_the_same() {
         let polygons = parse(&text, format).unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(polygons.outers, [SQUARE], "{text}");
         assert_eq!(polygons.holes, [HOLE], "{text}");
+        assert_eq!(parse(&format!("\u{feff}{text}"), format).ok(), Some(polygons), "{text}");
     }
 }
 
