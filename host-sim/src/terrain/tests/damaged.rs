@@ -123,6 +123,45 @@ fn damaged_files_end_in_an_error_or_in_heights() {
 }
 
 #[test]
+fn damaged_systems_are_refused_or_mean_something() {
+    let whole = r#"COMPD_CS["both",PROJCS["NAD83 / x",GEOGCS["NAD83",DATUM["North_American_Datum_1983",SPHEROID["GRS 1980",
+        6378137,298.257222101]],PRIMEM["Greenwich",0],UNIT["degree",0.0174532925199433]],
+        PROJECTION["Lambert_Conformal_Conic_2SP"],PARAMETER["standard_parallel_1",43],
+        PARAMETER["standard_parallel_2",45.5],PARAMETER["latitude_of_origin",41.75],PARAMETER["central_meridian",-120.5],
+        PARAMETER["false_easting",1312335.958],PARAMETER["false_northing",0],UNIT["foot",0.3048]],
+        VERT_CS["NAVD88 (ftUS)",VERT_DATUM["North American",2005],UNIT["US survey foot",0.3048006096012192]]]"#;
+    let feet = super::crs::wkt_height_unit_m(whole).unwrap();
+    assert!((feet - super::crs::US_FOOT_M).abs() < 1e-12);
+    assert_eq!(super::crs::System::wkt(whole).unwrap().unit_m, Some(0.3048));
+    let mut random = Pcg32::new(56, 78);
+    let mut refused = 0;
+    for _ in 0..3000 {
+        let mut bytes = whole.as_bytes().to_vec();
+        for _ in 0..1 + random.next_u32() % 4 {
+            let at = random.next_u32() as usize % bytes.len();
+            match random.next_u32() % 3 {
+                0 => bytes.truncate(at + 1),
+                1 => bytes[at] = b" \"[],.-09eE+PU"[random.next_u32() as usize % 14],
+                _ => drop(bytes.remove(at)),
+            }
+            if bytes.is_empty() {
+                bytes.push(b'[');
+            }
+        }
+        let text = String::from_utf8(bytes).unwrap();
+        let _ = super::crs::wkt_height_unit_m(&text);
+        match super::crs::System::wkt(&text) {
+            Ok(system) => drop(system.to_degrees([1_300_000.0, 500_000.0])),
+            Err(error) => {
+                refused += 1;
+                assert!(!error.to_string().contains('\n'), "{error}");
+            }
+        }
+    }
+    assert!(refused > 300, "{refused}");
+}
+
+#[test]
 fn files_that_say_that_they_are_vast_are_refused() {
     let vast = "ncols 100000\nnrows 100000\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n";
     assert!(matches!(decode_asc(vast.as_bytes()), Err(TerrainError::TooManyCells(10_000_000_000))));
