@@ -1,5 +1,7 @@
 //! Capacities of a board, and what each costs in RAM. The RP2350 has half a megabyte in all, so it takes half.
 
+use companion::Companion;
+
 /// Half on the smaller board.
 const fn share(of: usize) -> usize {
     if cfg!(feature = "pico2") { of / 2 } else { of }
@@ -25,3 +27,6 @@ pub const LANES: usize = share(512);
 pub const AREA_VERTICES: usize = 256;
 /// Outward corners of its no-fly zones: 4 bytes for each pair, and 8 each.
 pub const AREA_CORNERS: usize = 32;
+
+/// A companion with these.
+pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;

@@ -9,6 +9,7 @@ pub mod calls;
 pub mod capacity;
 pub mod cases;
 pub mod chips;
+pub mod flash;
 pub mod kept;
 pub mod lent;
 pub mod planner;

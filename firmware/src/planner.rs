@@ -13,10 +13,10 @@ use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
 
 use crate::boards;
+use crate::capacity::BoardCompanion;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::kept::Work;
 use crate::scratch::Scratch;
-use crate::shell::BoardCompanion;
 
 /// Most things that are flown around. A vehicle that fell silent may lie below a dozen places, any other is one or two; more
 /// than these and there is no way around, not one past what was left out.

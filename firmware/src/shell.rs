@@ -8,8 +8,8 @@ use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use companion::link::frame::{Framer, MAX_SENT};
-use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash};
-use companion::{Companion, Event, Link, PlanFailure, State, Wanted};
+use companion::storage::store::{FlashRequest, READ};
+use companion::{Event, Link, PlanFailure, State, Wanted};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
 use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
@@ -19,11 +19,9 @@ use embedded_io_async::{Read, Write};
 use heapless::Vec;
 
 use crate::boards::HoldsExecutors;
-use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::capacity::BoardCompanion;
+use crate::flash::Flash;
 use crate::planner::Planner;
-
-/// A companion with a board's capacities.
-pub type BoardCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
 
 /// Bytes taken from a UART at once.
 const CHUNK: usize = 256;
@@ -71,15 +69,6 @@ enum Request {
     Erase(u32),
     Program(u32, usize),
     Read(u32, usize),
-}
-
-/// A board's flash for files and parameters.
-pub trait Flash: ReadFlash {
-    /// Erases the sector that begins at an offset of the storage bank.
-    fn erase(&mut self, at: u32) -> impl Future<Output = Result<(), Fault>>;
-
-    /// Programs words that were erased.
-    fn program(&mut self, at: u32, bytes: &[u8]) -> impl Future<Output = Result<(), Fault>>;
 }
 
 /// The system id of the autopilot: of those whose heartbeat comes within a while after the first one, that of which most is

@@ -4,23 +4,17 @@
 
 use core::fmt::Write;
 use core::mem::MaybeUninit;
-use core::ops::Range;
 use core::panic::PanicInfo;
-use core::ptr::addr_of;
 
 use cortex_m::peripheral::SCB;
 use heapless::String;
 
-use super::chosen;
+use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
 use crate::kept::{Kept, TEXT, WORDS, Work};
 
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
-
-unsafe extern "C" {
-    static _stack_end: u32;
-}
 
 /// What is kept. Interrupts are off: tasks and the end of the program use it.
 fn read() -> Option<Kept> {
@@ -102,18 +96,12 @@ pub fn panicked(info: &PanicInfo<'_>) -> ! {
     end(&text)
 }
 
-/// The memory below the stack that nothing may touch.
-pub fn guard() -> Range<u32> {
-    let end = addr_of!(_stack_end) as u32;
-    end - super::GUARD_LEN..end
-}
-
 /// Keeps the program counter of a fault and restarts.
 pub fn faulted(pc: u32) -> ! {
     // SAFETY: registers that are read.
     let scb = unsafe { &*SCB::PTR };
     let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
-    if fault::is_overflow(cfsr, mmfar, &guard()) {
+    if fault::is_overflow(cfsr, mmfar, &stack::guard()) {
         // Where it was lies on the stack that was too small.
         end("Restarted: stack overflow")
     }

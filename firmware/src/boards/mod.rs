@@ -3,7 +3,13 @@
 use crate::kept::Work;
 
 #[cfg(all(target_os = "none", feature = "board"))]
+pub mod chosen;
+#[cfg(all(target_os = "none", feature = "board"))]
 pub mod crash;
+#[cfg(all(target_os = "none", feature = "board"))]
+mod executors;
+#[cfg(all(target_os = "none", feature = "board"))]
+mod limits;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod lock;
 #[cfg(all(target_os = "none", any(feature = "nucleo-h743", feature = "qemu")))]
@@ -21,13 +27,6 @@ pub mod sections;
 #[cfg(all(target_os = "none", feature = "board"))]
 pub mod stack;
 
-#[cfg(all(target_os = "none", feature = "nucleo-h743"))]
-pub use nucleo_h743 as chosen;
-#[cfg(all(target_os = "none", feature = "pico2"))]
-pub use pico2 as chosen;
-#[cfg(all(target_os = "none", feature = "qemu"))]
-pub use qemu as chosen;
-
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use lock::HoldsExecutors;
 
@@ -44,14 +43,6 @@ pub fn sleep() {
 /// On the desk there is no other executor to hold back.
 #[cfg(not(all(target_os = "none", feature = "board")))]
 pub type HoldsExecutors = embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
-
-/// The watchdog resets the board so long after it was last fed, microseconds.
-#[cfg(all(target_os = "none", feature = "board"))]
-pub(crate) const BITES_AFTER_US: u32 = 1_000_000;
-
-/// Bytes below the stack that nothing may touch; frames of the stack are larger than a few bytes.
-#[cfg(all(target_os = "none", feature = "board"))]
-pub(crate) const GUARD_LEN: u32 = 4096;
 
 /// Work with uploaded files begins; false if it brought three starts in a row down, and is not to
 /// be done. A desk has no starts.

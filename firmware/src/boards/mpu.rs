@@ -4,6 +4,8 @@
 use cortex_m::asm::{dsb, isb};
 use cortex_m::peripheral::MPU;
 
+use super::limits::GUARD_LEN;
+use super::stack;
 use crate::chips::mpu::{Access, Region};
 
 /// MPU_CTRL: what no region has is as without the unit (PRIVDEFENA); on; off in the handlers of
@@ -12,7 +14,7 @@ const ON: u32 = 1 << 2 | 1;
 
 /// The guard below the stack: a processor whose stack reaches it takes a fault.
 pub(super) fn guard() -> Region {
-    Region::new(super::crash::guard().start, super::GUARD_LEN, Access::None)
+    Region::new(stack::guard().start, GUARD_LEN, Access::None)
 }
 
 /// Sets regions, each of which counts more than those before it, and switches the unit on. To be

@@ -1,60 +1,25 @@
-//! What every board hands over at its start, and the two executors that run in its interrupts.
-#![expect(unsafe_code, reason = "executors in interrupts")]
+//! What every board hands over at its start.
 
-use cortex_m::interrupt::InterruptNumber;
-use embassy_executor::{InterruptExecutor, SendSpawner};
+use embassy_executor::SendSpawner;
 use heapless::Vec;
-
-use super::chosen::{Flash, Receiver, Transmitter, Watchdog};
 
 /// Most warnings.
 pub const WARNINGS: usize = 2;
 
-/// The board, ready.
-pub struct Parts {
+/// A board, ready: with its receivers, transmitters, flash and watchdog.
+pub struct Parts<R, T, F, W> {
     /// Runs links and setpoints, by interrupt.
     pub links: SendSpawner,
     /// Runs what takes long, by an interrupt below that.
     pub plans: SendSpawner,
     /// To the autopilot.
-    pub autopilot: (Receiver, Transmitter),
+    pub autopilot: (R, T),
     /// To the swarm's radio.
-    pub swarm: (Receiver, Transmitter),
+    pub swarm: (R, T),
     /// For files and parameters.
-    pub flash: Flash,
+    pub flash: F,
     /// Awake.
-    pub watchdog: Watchdog,
+    pub watchdog: W,
     /// What a person should know of the board.
     pub warnings: Vec<&'static str, WARNINGS>,
-}
-
-static LINKS: InterruptExecutor = InterruptExecutor::new();
-static PLANS: InterruptExecutor = InterruptExecutor::new();
-
-/// Starts the executor of links and setpoints in an interrupt that no device has, its priority set. To be called once.
-pub(super) fn start_links(irq: impl InterruptNumber) -> SendSpawner {
-    LINKS.start(irq)
-}
-
-/// The same for plans and flash.
-pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
-    PLANS.start(irq)
-}
-
-/// The handler of the interrupt given to [`start_links`].
-///
-/// # Safety
-/// Only that handler may call it: the executor is there once its interrupt is enabled.
-pub(super) unsafe fn on_links() {
-    // SAFETY: as the caller says.
-    unsafe { LINKS.on_interrupt() }
-}
-
-/// The handler of the interrupt given to [`start_plans`].
-///
-/// # Safety
-/// As [`on_links`].
-pub(super) unsafe fn on_plans() {
-    // SAFETY: as the caller says.
-    unsafe { PLANS.on_interrupt() }
 }

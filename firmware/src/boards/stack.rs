@@ -2,7 +2,10 @@
 //! never used.
 #![expect(unsafe_code, reason = "the stack is read as memory")]
 
+use core::ops::Range;
 use core::ptr::addr_of;
+
+use super::limits::GUARD_LEN;
 
 const PAINT: u32 = 0xcccc_cccc;
 
@@ -25,4 +28,10 @@ pub fn used() -> usize {
         unsafe { end.add(word).read_volatile() == PAINT }
     });
     size() - untouched.count() * size_of::<u32>()
+}
+
+/// The memory below the stack that nothing may touch.
+pub fn guard() -> Range<u32> {
+    let end = addr_of!(_stack_end) as u32;
+    end - GUARD_LEN..end
 }

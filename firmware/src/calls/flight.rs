@@ -14,9 +14,9 @@ use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
 use super::Meter;
+use crate::capacity::BoardCompanion;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{anywhere, below, uniform};
-use crate::shell::BoardCompanion;
 
 /// Mission and EKF origin of every flight.
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };

@@ -156,7 +156,7 @@ fn widen() {
     bank.cr().modify(|w| w.set_psize(X64));
 }
 
-impl crate::shell::Flash for Flash {
+impl crate::flash::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
         if !self.lender.allows(at, LAYOUT.sector_len) {
             return Err(Fault);

@@ -20,7 +20,8 @@ use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 use self::start::{clocks, guards};
-use super::parts::{self, Parts};
+use super::limits::BITES_AFTER_US;
+use super::{executors, parts};
 use crate::chips::h743::{self, Revision};
 
 bind_interrupts!(struct Irqs {
@@ -68,15 +69,18 @@ const LINKS_AT: Priority = Priority::P8;
 #[interrupt]
 unsafe fn UART7() {
     // SAFETY: this is the handler.
-    unsafe { parts::on_links() }
+    unsafe { executors::on_links() }
 }
 
 /// The same for plans and flash.
 #[interrupt]
 unsafe fn UART8() {
     // SAFETY: as above.
-    unsafe { parts::on_plans() }
+    unsafe { executors::on_plans() }
 }
+
+/// This board, ready.
+pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
@@ -115,8 +119,8 @@ pub fn start() -> Parts {
     let sends = Transmitter::new(sends, DMA_RADIO_OUT.take());
     let swarm = (receives.into_ring_buffered(DMA_RADIO_IN.take()), sends);
     Parts {
-        links: parts::start_links(interrupt::UART7),
-        plans: parts::start_plans(interrupt::UART8),
+        links: executors::start_links(interrupt::UART7),
+        plans: executors::start_plans(interrupt::UART8),
         autopilot,
         swarm,
         flash: Flash::new(Device::new(p.FLASH, Irqs)),
@@ -133,7 +137,7 @@ pub struct Watchdog {
 
 impl Watchdog {
     fn new(device: Peri<'static, peripherals::IWDG1>, light: Output<'static>) -> Self {
-        Self { device: IndependentWatchdog::new(device, super::BITES_AFTER_US), light }
+        Self { device: IndependentWatchdog::new(device, BITES_AFTER_US), light }
     }
 
     fn wake(&mut self) {

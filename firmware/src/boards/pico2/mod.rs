@@ -25,7 +25,8 @@ use embassy_rp::{Peri, bind_interrupts, install_core0_stack_guard, pac, peripher
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
-use super::parts::{self, Parts};
+use super::limits::BITES_AFTER_US;
+use super::{executors, parts};
 use crate::chips::{ResetCause, rp2350};
 use crate::lent::{Lender, Lent};
 
@@ -64,14 +65,14 @@ const LINKS_AT: Priority = Priority::P1;
 #[interrupt]
 unsafe fn SWI_IRQ_0() {
     // SAFETY: this is the handler.
-    unsafe { parts::on_links() }
+    unsafe { executors::on_links() }
 }
 
 /// Runs the executor of plans and flash.
 #[interrupt]
 unsafe fn SWI_IRQ_1() {
     // SAFETY: as above.
-    unsafe { parts::on_plans() }
+    unsafe { executors::on_plans() }
 }
 
 /// Why the chip started.
@@ -100,6 +101,9 @@ fn guard_stack() {
     // SAFETY: a bit of the processor's that means the handlers of hard faults alone.
     unsafe { (*cortex_m::peripheral::SCB::PTR).ccr.modify(|ccr| ccr | rp2350::STKOFHFNMIGN) };
 }
+
+/// This board, ready.
+pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
 pub fn start() -> Parts {
@@ -131,8 +135,8 @@ pub fn start() -> Parts {
     let autopilot = (receives, sends);
     let (sends, receives) = swarm.split();
     Parts {
-        links: parts::start_links(interrupt::SWI_IRQ_0),
-        plans: parts::start_plans(interrupt::SWI_IRQ_1),
+        links: executors::start_links(interrupt::SWI_IRQ_0),
+        plans: executors::start_plans(interrupt::SWI_IRQ_1),
         autopilot,
         swarm: (receives, sends),
         flash: Flash { device: Device::new_blocking(p.FLASH), lender: Lender::new() },
@@ -169,7 +173,7 @@ impl ReadFlash for Flash {
     }
 }
 
-impl crate::shell::Flash for Flash {
+impl crate::flash::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
         if !self.lender.allows(at, LAYOUT.sector_len) {
             return Err(Fault);
@@ -199,13 +203,13 @@ impl Watchdog {
     /// Wakes it; it stands still while a debugger has a processor halted.
     fn wake(&mut self) {
         self.device.pause_on_debug(true);
-        self.device.start(embassy_time::Duration::from_micros(super::BITES_AFTER_US.into()));
+        self.device.start(embassy_time::Duration::from_micros(BITES_AFTER_US.into()));
         set_watchdog_resets();
     }
 
     /// Puts the reset off.
     pub fn feed(&mut self) {
-        self.device.feed(embassy_time::Duration::from_micros(super::BITES_AFTER_US.into()));
+        self.device.feed(embassy_time::Duration::from_micros(BITES_AFTER_US.into()));
         self.light.toggle();
     }
 }

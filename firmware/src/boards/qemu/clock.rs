@@ -1,7 +1,7 @@
 //! Time: CMSDK timer 0 counts, timer 1 wakes.
 //!
 //! Both run at 25 MHz. With `-icount shift=0` one instruction is one nanosecond, so timer 0 counts instructions in forties.
-//! In lock step ([`grants`](super::grants)) it is two nanoseconds.
+//! In lock step it is two nanoseconds.
 
 use core::cell::{Cell, RefCell};
 use core::task::Waker;
@@ -12,7 +12,6 @@ use embassy_time_queue_utils::Queue;
 
 use super::interrupts::{self, Irq};
 use super::registers::Register;
-use super::{grants, watchdog};
 
 /// Counts in a microsecond.
 pub(super) const COUNTS_US: u64 = 25;
@@ -80,27 +79,15 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
     (u64::from(rounds.get()) << 32 | u64::from(u32::MAX - value)) + CLOCK.skipped.borrow(cs).get()
 };
 
-/// Interrupt control and state, and that an interrupt waits.
-const ICSR: usize = 0xE000_ED04;
-const ISRPENDING: u32 = 1 << 22;
+/// When a task is due, counts. Wakes those that are due by now.
+pub(super) fn alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
+    CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US).saturating_mul(COUNTS_US)
+}
 
-/// Sleeps in lock step: the time up to what is due next passes at once, unless an interrupt waits. QEMU would have it pass too, where a
-/// processor sleeps by WFI; but its main loop reads the clock before the last instructions are counted, if this machine is busy enough.
-pub fn skip() {
-    critical_section::with(|cs| {
-        let now = CLOCK_NOW(cs);
-        let alarm_us = CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US);
-        // Asked after that: it wakes the tasks that are due by now, and their executors' interrupts wait then.
-        if Register::new(ICSR, 0).read() & ISRPENDING != 0 {
-            return;
-        }
-        let due = alarm_us.saturating_mul(COUNTS_US).min(grants::due(cs));
-        let skipped = CLOCK.skipped.borrow(cs);
-        skipped.set(skipped.get() + watchdog::until_bite(cs, now, due).saturating_sub(now));
-        // Both are set again for what is left.
-        interrupts::pend(Irq::Timer1);
-        interrupts::pend(Irq::DualTimer);
-    });
+/// So many counts pass at once, in lock step.
+pub(super) fn pass(cs: CriticalSection<'_>, counts: u64) {
+    let skipped = CLOCK.skipped.borrow(cs);
+    skipped.set(skipped.get() + counts);
 }
 
 /// Instructions since the start, under `-icount shift=0`, to the next forty.

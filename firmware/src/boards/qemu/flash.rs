@@ -65,7 +65,7 @@ fn readable(at: u32, len: usize) -> Option<*const u8> {
     (!torn).then_some((BANK + at) as *const u8)
 }
 
-impl crate::shell::Flash for Flash {
+impl crate::flash::Flash for Flash {
     async fn erase(&mut self, at: u32) -> Result<(), Fault> {
         let (allowed, at, len) =
             (self.0.allows(at, LAYOUT.sector_len), at as usize, LAYOUT.sector_len as usize);

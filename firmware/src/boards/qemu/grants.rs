@@ -22,7 +22,6 @@ use semihosting::sys::arm_compat::sys_get_cmdline_uninit;
 use super::clock::{CLOCK_NOW, COUNTS_US};
 use super::interrupts::{self, Irq};
 use super::registers::Register;
-use super::uart;
 
 /// Where a message lies, and what is sent: beyond all that the program uses.
 const MESSAGE: usize = 0x6060_0000;
@@ -46,18 +45,20 @@ struct Desk {
     sent: usize,
     /// When the next of it is due, counts.
     due: u64,
+    /// Takes the bytes that come to a port.
+    take: fn(u8, &[u8]),
 }
 
 static DESK: Mutex<RefCell<Option<Desk>>> = Mutex::new(RefCell::new(None));
 
-/// Waits for the first message, if the board was switched on in lock step.
-pub fn start() {
+/// Waits for the first message, if the board was switched on in lock step. Bytes that come to a port are given to `take`.
+pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
         // What is logged goes to the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
-        let mut desk = Desk { input, output, length: 0, done: 0, sent: 0, due: 0 };
+        let mut desk = Desk { input, output, length: 0, done: 0, sent: 0, due: 0, take };
         desk.say(FromBoard::Started, &[]);
         desk.flush();
         desk.read();
@@ -139,8 +140,7 @@ impl Desk {
         self.done = from + record.follows();
         let bytes = &self.message()[from..self.done];
         match record {
-            ToBoard::Bytes { port: 0, .. } => uart::AUTOPILOT.take(bytes),
-            ToBoard::Bytes { .. } => uart::SWARM.take(bytes),
+            ToBoard::Bytes { port, .. } => (self.take)(port, bytes),
             ToBoard::Run { .. } => {}
             ToBoard::Peek { address, len } => {
                 // SAFETY: the desk asks for memory that there is.

@@ -1,12 +1,8 @@
-//! The vector table, priorities, and the executor that runs in an interrupt.
-#![expect(unsafe_code, reason = "the vector table is the linker's, the interrupt controller is shared")]
+//! The interrupts that are used, and their priorities.
+#![expect(unsafe_code, reason = "the interrupt controller is shared")]
 
 use cortex_m::interrupt::InterruptNumber;
 use cortex_m::peripheral::NVIC;
-use embassy_executor::SendSpawner;
-
-use super::{clock, grants, uart};
-use crate::boards::parts;
 
 /// Priority of the desk's grants, above all.
 pub const GRANTS: u8 = 0x20;
@@ -41,75 +37,15 @@ pub enum Irq {
     Links = 31,
 }
 
-// SAFETY: the numbers are places in the table below, and AN500 has 32.
+// SAFETY: the numbers are places in the vector table, and AN500 has 32.
 unsafe impl InterruptNumber for Irq {
     fn number(self) -> u16 {
         self as u16
     }
 }
 
-type Handler = Option<unsafe extern "C" fn()>;
-
-/// One place for each of AN500's interrupts; cortex-m-rt puts it after the exceptions.
-#[unsafe(link_section = ".vector_table.interrupts")]
-#[unsafe(no_mangle)]
-static __INTERRUPTS: [Handler; 32] = {
-    let mut table: [Handler; 32] = [None; 32];
-    table[Irq::Uart0Rx as usize] = Some(uart0);
-    table[Irq::Uart0Tx as usize] = Some(uart0);
-    table[Irq::Uart1Rx as usize] = Some(uart1);
-    table[Irq::Uart1Tx as usize] = Some(uart1);
-    table[Irq::Timer0 as usize] = Some(timer0);
-    table[Irq::Timer1 as usize] = Some(timer1);
-    table[Irq::DualTimer as usize] = Some(dual_timer);
-    table[Irq::Plans as usize] = Some(plans);
-    table[Irq::Links as usize] = Some(links);
-    table
-};
-
-unsafe extern "C" fn uart0() {
-    uart::AUTOPILOT.on_interrupt();
-}
-
-unsafe extern "C" fn uart1() {
-    uart::SWARM.on_interrupt();
-}
-
-unsafe extern "C" fn timer0() {
-    clock::on_timer0();
-}
-
-unsafe extern "C" fn timer1() {
-    clock::on_timer1();
-}
-
-unsafe extern "C" fn dual_timer() {
-    grants::on_alarm();
-}
-
-unsafe extern "C" fn links() {
-    // SAFETY: this is the handler.
-    unsafe { parts::on_links() }
-}
-
-unsafe extern "C" fn plans() {
-    // SAFETY: as above.
-    unsafe { parts::on_plans() }
-}
-
-/// Starts the executor of links and setpoints. To be called once.
-pub fn start_links() -> SendSpawner {
-    set_priority(Irq::Links, LINKS);
-    parts::start_links(Irq::Links)
-}
-
-/// Starts the executor of plans and flash. To be called once.
-pub fn start_plans() -> SendSpawner {
-    set_priority(Irq::Plans, PLANS);
-    parts::start_plans(Irq::Plans)
-}
-
-fn set_priority(irq: Irq, priority: u8) {
+/// Sets the priority of one that is not enabled yet.
+pub fn set_priority(irq: Irq, priority: u8) {
     // SAFETY: only priorities are set, before the interrupt is enabled, at the start when nothing else runs.
     unsafe { cortex_m::Peripherals::steal().NVIC.set_priority(irq, priority) }
 }

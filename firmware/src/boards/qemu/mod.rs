@@ -8,18 +8,20 @@ mod grants;
 pub mod interrupts;
 pub mod memory;
 mod registers;
+mod sleep;
 pub mod uart;
+mod vectors;
 mod watchdog;
 
 pub use flash::{Flash, LAYOUT};
 pub use interrupts::LINKS as LINKS_PRIORITY;
+pub use sleep::sleep;
 pub use uart::{Receiver, Transmitter};
 pub use watchdog::Watchdog;
 
 use heapless::Vec;
 
-use super::mpu;
-use super::parts::Parts;
+use super::{mpu, parts};
 use crate::chips::ResetCause;
 
 /// This board does not say.
@@ -32,14 +34,8 @@ pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// Sleeps until an interrupt comes.
-pub fn sleep() {
-    if grants::are_needed() {
-        clock::skip();
-    } else {
-        cortex_m::asm::wfi();
-    }
-}
+/// This board, ready.
+pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once.
 pub fn start() -> Parts {
@@ -48,14 +44,14 @@ pub fn start() -> Parts {
     let mut watchdog = Watchdog(());
     watchdog.wake();
     let parts = Parts {
-        links: interrupts::start_links(),
-        plans: interrupts::start_plans(),
+        links: vectors::start_links(),
+        plans: vectors::start_plans(),
         autopilot: uart::AUTOPILOT.start(interrupts::Irq::Uart0Rx),
         swarm: uart::SWARM.start(interrupts::Irq::Uart1Rx),
         flash: Flash::new(),
         watchdog,
         warnings: Vec::new(),
     };
-    grants::start();
+    grants::start(|port, bytes| uart::of_port(port).take(bytes));
     parts
 }

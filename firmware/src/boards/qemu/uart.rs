@@ -51,6 +51,11 @@ pub static AUTOPILOT: Uart = Uart::new(0x4000_4000, 0, Irq::Uart0Tx);
 /// UART 1, to the swarm's radio.
 pub static SWARM: Uart = Uart::new(0x4000_5000, 1, Irq::Uart1Tx);
 
+/// The UART that the desk counts as this.
+pub(super) fn of_port(port: u8) -> &'static Uart {
+    if port == AUTOPILOT.port { &AUTOPILOT } else { &SWARM }
+}
+
 impl Uart {
     const fn new(base: usize, port: u8, transmits: Irq) -> Self {
         let counters = Counters { overruns: AtomicU32::new(0), dropped: AtomicU32::new(0) };

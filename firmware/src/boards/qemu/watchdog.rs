@@ -3,11 +3,13 @@
 
 use core::cell::Cell;
 
+use cortex_m::peripheral::SCB;
 use cortex_m_rt::exception;
 use critical_section::{CriticalSection, Mutex};
 
 use super::clock::CLOCK_NOW;
 use super::registers::Register;
+use crate::boards::limits::BITES_AFTER_US;
 
 const WATCHDOG: usize = 0x4000_8000;
 const LOAD: usize = 0;
@@ -16,7 +18,7 @@ const INTCLR: usize = 12;
 const LOCK: usize = 0xC00;
 const UNLOCK: u32 = 0x1ACC_E551;
 /// Counts down twice at 25 MHz before the reset.
-const COUNTS: u32 = super::super::BITES_AFTER_US / 2 * 25;
+const COUNTS: u32 = BITES_AFTER_US / 2 * 25;
 /// Interrupt at the first end, reset at the second.
 const ENABLED: u32 = 0b11;
 
@@ -31,7 +33,7 @@ static FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let bites = FED.borrow(cs).get() + u64::from(2 * COUNTS);
     if now >= bites {
-        super::reset();
+        SCB::sys_reset();
     }
     due.min(bites)
 }

@@ -1,0 +1,8 @@
+//! The board that the firmware is built for.
+
+#[cfg(feature = "nucleo-h743")]
+pub use super::nucleo_h743::*;
+#[cfg(feature = "pico2")]
+pub use super::pico2::*;
+#[cfg(feature = "qemu")]
+pub use super::qemu::*;

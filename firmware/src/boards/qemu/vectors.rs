@@ -1,0 +1,69 @@
+//! The vector table: what each interrupt calls, the two executors among them.
+#![expect(unsafe_code, reason = "the vector table is the linker's")]
+
+use embassy_executor::SendSpawner;
+
+use super::interrupts::{self, Irq};
+use super::{clock, grants, uart};
+use crate::boards::executors;
+
+type Handler = Option<unsafe extern "C" fn()>;
+
+/// One place for each of AN500's interrupts; cortex-m-rt puts it after the exceptions.
+#[unsafe(link_section = ".vector_table.interrupts")]
+#[unsafe(no_mangle)]
+static __INTERRUPTS: [Handler; 32] = {
+    let mut table: [Handler; 32] = [None; 32];
+    table[Irq::Uart0Rx as usize] = Some(uart0);
+    table[Irq::Uart0Tx as usize] = Some(uart0);
+    table[Irq::Uart1Rx as usize] = Some(uart1);
+    table[Irq::Uart1Tx as usize] = Some(uart1);
+    table[Irq::Timer0 as usize] = Some(timer0);
+    table[Irq::Timer1 as usize] = Some(timer1);
+    table[Irq::DualTimer as usize] = Some(dual_timer);
+    table[Irq::Plans as usize] = Some(plans);
+    table[Irq::Links as usize] = Some(links);
+    table
+};
+
+unsafe extern "C" fn uart0() {
+    uart::AUTOPILOT.on_interrupt();
+}
+
+unsafe extern "C" fn uart1() {
+    uart::SWARM.on_interrupt();
+}
+
+unsafe extern "C" fn timer0() {
+    clock::on_timer0();
+}
+
+unsafe extern "C" fn timer1() {
+    clock::on_timer1();
+}
+
+unsafe extern "C" fn dual_timer() {
+    grants::on_alarm();
+}
+
+unsafe extern "C" fn links() {
+    // SAFETY: this is the handler.
+    unsafe { executors::on_links() }
+}
+
+unsafe extern "C" fn plans() {
+    // SAFETY: as above.
+    unsafe { executors::on_plans() }
+}
+
+/// Starts the executor of links and setpoints. To be called once.
+pub fn start_links() -> SendSpawner {
+    interrupts::set_priority(Irq::Links, interrupts::LINKS);
+    executors::start_links(Irq::Links)
+}
+
+/// Starts the executor of plans and flash. To be called once.
+pub fn start_plans() -> SendSpawner {
+    interrupts::set_priority(Irq::Plans, interrupts::PLANS);
+    executors::start_plans(Irq::Plans)
+}
