@@ -95,6 +95,7 @@ pub fn places(to: &mut Answers<'_, impl Listener>) {
     paths(to);
     neighbours(to);
     sets(to);
+    super::limits_field::fields(to);
 }
 
 fn frames(to: &mut Answers<'_, impl Listener>) {
@@ -357,6 +358,8 @@ fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
             to.call("photographs::Photographs::of_area", || photographs.of_area(u32::MAX, spacing_m > 0.0));
         assert_eq!(to.call("photographs::Photographs::area", || photographs.area()), u32::MAX);
         let all = to.call("photographs::Photographs::count", || photographs.count(path));
+        let end_m = to.call("photographs::Photographs::end_m", || photographs.end_m(path));
+        assert!(end_m.is_none_or(|end_m| end_m <= path.length_m()));
         let stretches =
             to.call("photographs::Photographs::stretches", || photographs.stretches(path).count());
         for along_m in [-1.0, 0.0, f32::NAN, f32::INFINITY] {

@@ -6,6 +6,7 @@
 pub mod coverage;
 pub mod flight;
 pub mod limits;
+mod limits_field;
 mod limits_graph;
 pub mod limits_routes;
 #[cfg(test)]

@@ -1,0 +1,76 @@
+//! The field, and paths above it, at their limits.
+
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::field::follow::Following;
+use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
+
+use super::limits::{Answers, HARD, Listener};
+
+const COLUMNS: u16 = 3;
+const ROWS: u16 = 2;
+const NODES: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
+const BYTES: usize = 64;
+
+const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
+/// A path to one of these has tens of thousands of samples: each is tried with one slope.
+const FAR: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
+
+pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
+    let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
+    let mut file = [0; BYTES];
+    for hard in HARD {
+        for shape in [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }] {
+            let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
+            to.is(written.is_ok());
+        }
+    }
+    for (columns, rows) in [(0, 0), (1, 2), (u16::MAX, u16::MAX), (2, 2), (3, 3)] {
+        let shape = FieldShape { columns, rows, ..good };
+        let nodes = to.call("field::FieldShape::node_count", || shape.node_count());
+        let length = to.call("field::FieldShape::encoded_len", || shape.encoded_len());
+        assert!(length > 2 * nodes);
+        let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
+        assert!(written.is_err(), "{columns} by {rows}, at most {MAX_NODES}");
+    }
+    let length = to.call("field::write", || field::write(&good, &NODES, &mut file)).expect("a field");
+    for cut in 0..length {
+        let parsed = to.call("field::FieldView::parse", || FieldView::parse(&file[..cut]));
+        assert!(parsed.is_err());
+    }
+    let field = to.call("field::FieldView::parse", || FieldView::parse(&file[..length])).expect("a field");
+    assert_eq!(to.call("field::FieldView::shape", || *field.shape()), good);
+    let crc = to.call("field::FieldView::crc", || field.crc());
+    to.count(crc as usize);
+    let highest_m = to.call("field::FieldView::highest_m", || field.highest_m());
+    to.add(highest_m);
+    for x in HARD {
+        for y in HARD {
+            let height_m = to.call("field::FieldView::height_at", || field.height_at(&Flat::new(x, y)));
+            to.add(height_m);
+        }
+    }
+    paths(to, field);
+}
+
+fn paths(to: &mut Answers<'_, impl Listener>, field: FieldView<'_>) {
+    for (i, hard) in HARD.into_iter().enumerate() {
+        for end in ENDS.into_iter().chain(FAR.get(i).copied()) {
+            let following = Following { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
+            let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
+            let lowest_m = to.call("follow::Following::lowest_m", || following.lowest_m(&there));
+            let top_m = to.call("follow::Following::top_m", || following.top_m());
+            let begin = to.call("follow::Following::begin", || following.begin(&here, &there));
+            let mut corners = 0;
+            let counted = |_: Point| -> Result<(), ()> {
+                corners += 1;
+                Ok(())
+            };
+            let ended = to.call("follow::Following::to", || following.to(&begin, &there, counted));
+            assert!(ended.is_ok());
+            [lowest_m, top_m].iter().for_each(|answer| to.add(*answer));
+            to.point(&begin);
+            to.count(corners);
+        }
+    }
+}
