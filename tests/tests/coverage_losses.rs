@@ -51,20 +51,30 @@ const EXPLAINED: [&str; 6] = [
 const KINDS: [&str; 6] =
     ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
 
-fn drawn(seed: u64) -> (String, &'static str, u8) {
+/// Draws an area for so many vehicles, with this share of messages lost; and until when one of them is struck, seconds.
+type Draw = (fn(&mut Pcg32, usize, f32) -> String, u32);
+
+/// One with so many lanes that it is flown in stretches.
+fn large(random: &mut Pcg32, vehicles: usize, loss: f32) -> String {
+    let text = areas::large(random, Shape::Convex, vehicles);
+    let kept = text.lines().filter(|line| !line.starts_with("radio_loss"));
+    kept.map(|line| format!("{line}\n")).collect::<String>() + &format!("radio_loss = {loss}\n")
+}
+
+fn drawn((draw, until_s): Draw, seed: u64) -> (String, &'static str, u8) {
     let mut random = Pcg32::seed_from_u64(seed);
     let count = [3, 5][(seed % 2) as usize];
-    let mut text = areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.5 } else { 0.1 });
+    let mut text = draw(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.5 } else { 0.1 });
     let kind = KINDS[(seed / 4 % 6) as usize];
     let vehicle = 1 + (random.next_u32() % count as u32) as u8;
     // Beside others, of which some are in the air and some on their pads yet.
-    let at_s = 20.0 + (random.next_u32() % 220) as f32;
+    let at_s = 20.0 + (random.next_u32() % until_s) as f32;
     text += &format!("[[faults]]\nat_s = {at_s}\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
     (text, kind, vehicle)
 }
 
-fn outcome(seed: u64) -> Option<Outcome> {
-    let (text, kind, vehicle) = drawn(seed);
+fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
+    let (text, kind, vehicle) = drawn(draw, seed);
     if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
         println!("{text}");
     }
@@ -96,8 +106,18 @@ fn outcome(seed: u64) -> Option<Outcome> {
 
 #[test]
 fn what_a_lost_vehicle_leaves_is_photographed_by_the_others() {
+    are_whole((areas::lost, 220));
+}
+
+#[test]
+fn what_a_lost_vehicle_leaves_of_a_large_area_is_photographed_too() {
+    are_whole((large, 900));
+}
+
+fn are_whole(draw: Draw) {
     let (from, count) = (number("FLOCKMATE_LOSSES_FROM", 0), number("FLOCKMATE_LOSSES", MISSIONS));
-    let all: Vec<Outcome> = (from..from + count).into_par_iter().filter_map(outcome).collect();
+    let all: Vec<Outcome> =
+        (from..from + count).into_par_iter().filter_map(|seed| outcome(draw, seed)).collect();
     let short = |o: &&Outcome| o.covered < 1.0 || o.landed_short > 0;
     let wrong = |o: &&Outcome| o.broken != [0; 3] || (short(o) && !o.explained);
     for o in all.iter().filter(|o| wrong(o) || short(o)) {
