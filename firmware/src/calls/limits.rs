@@ -95,7 +95,6 @@ pub fn places(to: &mut Answers<'_, impl Listener>) {
     paths(to);
     neighbours(to);
     sets(to);
-    super::limits_field::fields(to);
 }
 
 fn frames(to: &mut Answers<'_, impl Listener>) {

@@ -13,6 +13,7 @@ use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorksp
 use planner_core::search::SearchWorkspace;
 
 use super::limits::{Answers, HARD, Listener, points};
+use super::limits_field as field;
 use super::limits_graph::{self as graph, INDICES, NODES, PLACES, any};
 
 /// Capacities: vehicles, waypoints, timed segments, gates.
@@ -45,9 +46,10 @@ impl Default for Lent {
     }
 }
 
-/// Makes all of them; the sum of the answers after each part: files, roadmaps, searches, assignments, plans, schedules,
+/// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches, assignments, plans, schedules,
 /// detours.
 pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] {
+    field::fields(to);
     let len = graph::files(to, &mut lent.ws.search, &mut lent.file);
     let mut sums = [to.sum(); 7];
     let view = to
