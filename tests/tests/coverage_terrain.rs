@@ -7,12 +7,14 @@ use std::fmt::Write as _;
 use flockmate_tests::areas::{self, Shape};
 use flockmate_tests::shared_data;
 use host_sim::coverage::check::{Findings, check_plan};
+use host_sim::coverage::flight::{Act, Stop};
 use host_sim::coverage::{Planned, heights};
 use host_sim::margins;
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario::{self, Scenario};
 use host_sim::terrain::HeightGrid;
+use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::field::FieldView;
 use rand_core::{Rng as _, SeedableRng as _};
@@ -156,6 +158,32 @@ impl<'a> Ceiling<'a> {
     }
 }
 
+/// Random places around pictures that no picture shows where the ground is as high as there, not as below the camera: the
+/// plan need not see them, but overlaps should.
+fn hidden(planned: &Planned<'_>, stops: &[&Stop], places: usize) -> usize {
+    let (area, along) = (planned.wanted, planned.tracks.along());
+    let pictures: Vec<Point> =
+        stops.iter().filter(|stop| matches!(stop.act, Act::Photo(_))).map(|stop| stop.position).collect();
+    let mut random = Pcg32::seed_from_u64(pictures.len() as u64);
+    let mut beside = |side: f32| (areas::unit(&mut random) as f32 - 0.5) * side;
+    let hidden = (0..places).filter(|k| {
+        let near = pictures[k * pictures.len() / places].xy();
+        let (u, v) = (beside(area.spacing.waypoint_m), beside(area.spacing.lane_m));
+        let place = near + along * u + Flat::new(-along.y, along.x) * v;
+        let shown = |ground_m: &dyn Fn(&Point) -> f32| {
+            pictures.iter().any(|camera| {
+                let (off, half) = (place - camera.xy(), (camera.z - ground_m(camera)) / area.height_m / 2.0);
+                let footprint = area.spacing.footprint;
+                off.dot(&along).abs() <= footprint.along_m * half
+                    && off.perp(&along).abs() <= footprint.across_m * half
+            })
+        };
+        let ground_m = area.ground_m(&place);
+        shown(&|camera| area.ground_m(&camera.xy())) && !shown(&|_| ground_m)
+    });
+    hidden.count()
+}
+
 /// What is wrong with a plan.
 fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
     let method = scenario.area.as_ref().unwrap().method;
@@ -168,6 +196,10 @@ fn judge(scenario: &Scenario, looks: usize) -> Result<Findings, String> {
     let tolerance_m = area.terrain.as_ref().unwrap().tolerance_m;
     let flights = planned.flights();
     let low: Vec<_> = flights.iter().flat_map(|(_, stops, _)| stops).filter(|s| heights::is_low(s)).collect();
+    let hidden = hidden(&planned, &low, 500);
+    if hidden > 0 {
+        return Err(format!("{hidden} of 500 places are hidden by their own height"));
+    }
     for stop in low.iter().step_by(1 + low.len() / looks) {
         let most_m = ceiling.over(&stop.position.xy()) + area.height_m + tolerance_m + 0.2;
         if stop.position.z > most_m {
