@@ -75,6 +75,35 @@ fn are_photographed_whole(draw: fn(&mut Pcg32, Shape, usize) -> String, stretche
     assert!(wrong.is_empty() && flown >= count / 4, "{flown} flown, {} wrong", wrong.len());
 }
 
+/// On the pad, while it starts, or in the air: who is paused and resumed photographs its part.
+#[test]
+fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
+    let one = |seed: u64| {
+        let mut random = Pcg32::seed_from_u64(seed);
+        // Most on their pads: their times there are short.
+        let at_s = 0.5 + (random.next_u32() % [600, 6000][(seed % 3 / 2) as usize]) as f32 / 100.0;
+        let (duration_s, vehicle) = ((1 + random.next_u32() % 40) as f32 / 10.0, 1 + random.next_u32() % 2);
+        let autopilot = ["px4", "ardupilot"][(seed % 2) as usize];
+        let text = format!(
+            "seed = {seed}\n[area]\npolygon = [[0, 0], [80, 0], [80, 60]]\ncamera = {{ fov_deg = 73.7, aspect = 1.5 }}\n\
+             height_m = 25.0\n[mission]\ncruise_mps = 5.0\n[[vehicles]]\nid = 1\nstart = [0, -20, 0]\n\
+             personality = \"{autopilot}\"\nspeed_max_mps = 15.0\n[[vehicles]]\nid = 2\nstart = [12, -20, 0]\n\
+             personality = \"{autopilot}\"\nspeed_max_mps = 15.0\n[[faults]]\nkind = \"pause-order\"\nat_s = {at_s}\n\
+             duration_s = {duration_s}\nvehicle = {vehicle}\n"
+        );
+        let (result, log) = covered::fly_text(&text).expect("it is flown");
+        covered::faults(&result).map(|faults| format!("seed {seed}: {faults}\n{log}{text}"))
+    };
+    let count = number("FLOCKMATE_PAUSES", 40);
+    let wrong: Vec<String> = (0..count).into_par_iter().filter_map(one).collect();
+    assert!(
+        wrong.is_empty(),
+        "{} of {count}\n{}",
+        wrong.len(),
+        wrong[0].chars().take(4000).collect::<String>()
+    );
+}
+
 /// Two vehicles that each err by as much as stops none of them stay apart by the safety distance, whatever the separation.
 #[test]
 fn over_fields_estimates_have_the_room_that_the_separation_leaves() {

@@ -38,7 +38,16 @@ impl Order {
     /// Whether a vehicle in this state is still to be told.
     fn is_open(self, state: State) -> bool {
         match self {
-            Self::Resume => matches!(state, State::PilotReturned | State::Paused),
+            // On the pad a vehicle waits for it in its states before the start.
+            Self::Resume => matches!(
+                state,
+                State::PilotReturned
+                    | State::Paused
+                    | State::Ready
+                    | State::Scheduled
+                    | State::PadReplanning
+                    | State::CancelStart
+            ),
             Self::Pause => state != State::Paused,
             Self::Return | Self::Land => true,
         }
