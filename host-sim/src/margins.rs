@@ -81,7 +81,7 @@ fn touchdown_m(gust_mps: f32, autopilot: Personality) -> f32 {
 }
 
 /// How much lower than it believes a vehicle may be, metres.
-fn lower_m(estimator: Estimator, autopilot: Personality) -> f32 {
+pub fn lower_m(estimator: Estimator, autopilot: Personality) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
         (Estimator::Recorded, Personality::Px4) => 1.1,

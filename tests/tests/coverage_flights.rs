@@ -173,3 +173,25 @@ fn vehicles_land_on_pads_as_near_as_they_may_be() {
     println!("{count} flown, {} wrong", wrong.len());
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(3000).collect::<String>());
 }
+
+#[test]
+fn pictures_are_refused_so_low_that_an_error_reaches_the_ground() {
+    for (estimator, autopilot, lower_m) in
+        [("rtk", "px4", 0.15), ("recorded", "px4", 1.1), ("recorded", "ardupilot", 0.3)]
+    {
+        let prepared = |height_m: f32| {
+            let text = format!(
+                "[area]\npolygon = [[0, 0], [30, 0], [30, 20]]\nlane_m = 4\nheight_m = {height_m}\n[simulation]\n\
+                 estimator = \"{estimator}\"\n[[vehicles]]\nid = 1\nstart = [0, -8, 0]\npersonality = \"{autopilot}\"\n"
+            );
+            let scenario = scenario::parse(&text, "area").expect("a scenario");
+            Mission::prepare(scenario, &Progress::hidden())
+                .map(|mission| mission.scenario.vehicles[0].radius_m)
+        };
+        let radius_m = prepared(35.0).expect("a mission");
+        let least_m = lower_m + radius_m + TRACKING_M;
+        assert!(prepared(least_m + 0.01).is_ok(), "{estimator} {autopilot}");
+        let error = prepared(least_m - 0.01).expect_err("too low");
+        assert!(format!("{error:#}").contains("pictures too low"), "{error:#}");
+    }
+}

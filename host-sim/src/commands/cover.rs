@@ -81,6 +81,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     results.keep()?;
     remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);
+    print_batteries(&planned);
     Ok(if result.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
@@ -245,6 +246,18 @@ fn print(result: &CoverResult, findings: &Findings, dir: &std::path::Path) {
         result.method
     );
     say!("report     {}", dir.join("report.html").display());
+}
+
+/// Without `endurance_s` nothing says whether a battery lasts.
+fn print_batteries(planned: &Planned<'_>) {
+    let unknown = planned
+        .sorties
+        .iter()
+        .filter(|sortie| planned.scenario.vehicles[usize::from(sortie.route.vehicle)].endurance_s.is_none());
+    let longest_s = unknown.map(|sortie| sortie.flown_s).fold(0.0, f32::max);
+    if longest_s > 0.0 && !planned.wanted.batteries {
+        say!("batteries  not checked: vehicles without endurance_s fly up to {longest_s:.0} s");
+    }
 }
 
 fn print_terrain(coverage: &CoverageResult) {

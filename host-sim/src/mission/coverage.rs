@@ -4,6 +4,7 @@ use std::iter;
 
 use anyhow::{anyhow, bail};
 use companion::PlanFailure;
+use companion::margins::TRACKING_M;
 use companion::planner::coverage::{self, Error, Request, Workspace};
 use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, CoverageView, Parts, Share};
 use companion::storage::mission_file::{Block, Kind};
@@ -23,9 +24,9 @@ use crate::area::MOST_VERTICES;
 use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
-use crate::map;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::Method;
+use crate::{map, margins};
 
 /// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
 const OVER_PAD_M: f32 = 3.0;
@@ -60,6 +61,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
         .map(|(v, &weight)| Share { weight, climb_mps: v.climb_mps, descend_mps: v.descend_mps })
         .collect();
     check_batteries(&planned)?;
+    check_height(&planned)?;
     let top_m = OVER_PAD_M.min(planned.wanted.heights.mission_m);
     drop(planned);
     for vehicle in &mut scenario.vehicles {
@@ -113,6 +115,24 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
                 vehicle.id,
                 takes_s,
                 100.0 * (1.0 - USABLE_CHARGE)
+            );
+        }
+    }
+    Ok(())
+}
+
+/// Whoever believes to be at the height of the pictures is over the ground.
+fn check_height(planned: &Planned<'_>) -> anyhow::Result<()> {
+    let height_m = planned.wanted.heights.mission_m;
+    for vehicle in &planned.scenario.vehicles {
+        let lower_m = margins::lower_m(planned.scenario.simulation.estimator, vehicle.personality);
+        let least_m = lower_m + vehicle.radius_m + TRACKING_M;
+        if height_m < least_m {
+            bail!(
+                "pictures too low: {}: at {height_m:.2} m vehicle {} may touch the ground, {least_m:.2} m are needed\nhint: \
+                 its estimate may be {lower_m:.2} m too high, and it strays by {TRACKING_M} m",
+                planned.wanted.place,
+                vehicle.id
             );
         }
     }

@@ -32,6 +32,8 @@ use crate::map::{RESOLUTIONS_M, Source, Unknown};
 use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
+/// A flight is given up after this, seconds.
+const LIMIT_S: f32 = 600.0;
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 1000;
 /// Mission origin where none is given: a test field.
@@ -66,7 +68,8 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
 /// The scenario of a mission with goals.
 pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
-    let Common { seed, deconfliction, simulation, estimator_span } = common(text, root, margins::STRAY_M)?;
+    let Common { seed, deconfliction, simulation, estimator_span } =
+        common(text, root, (margins::STRAY_M, LIMIT_S))?;
     let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -130,14 +133,16 @@ struct Common {
     estimator_span: Option<Span>,
 }
 
-fn common(text: Text<'_>, root: &Table<'_>, stray_m: f32) -> Result<Common> {
+/// What they say where nothing is written follows from the kind: how far two vehicles stray, metres, and when a flight is given up,
+/// seconds.
+fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
     let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
     let deconfliction = deconfliction.unwrap_or_else(|| empty(text, "deconfliction"));
     let deconfliction = self::deconfliction(&deconfliction, stray_m)?;
     let simulation = root.get("simulation").map(|v| v.table()).transpose()?;
     let estimator_span = simulation.as_ref().and_then(|t| t.get("estimator")).map(|v| v.span);
-    let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")))?;
+    let simulation = self::simulation(&simulation.unwrap_or_else(|| empty(text, "simulation")), limit_s)?;
     Ok(Common { seed, deconfliction, simulation, estimator_span })
 }
 

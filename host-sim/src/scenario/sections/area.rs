@@ -21,6 +21,9 @@ use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
+/// A flight over an area is given up after this, seconds: batteries last for less.
+const LIMIT_S: f32 = 3600.0;
+
 /// Cell of the level ground where there is no map, metres.
 const GROUND_CELL_M: f32 = 1.0;
 /// Metres that are no more than this across are taken for degrees.
@@ -36,7 +39,7 @@ enum Coordinates {
 /// The scenario of a coverage mission.
 pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } =
-        common(text, root, margins::STRAY_OVER_FIELDS_M)?;
+        common(text, root, (margins::STRAY_OVER_FIELDS_M, LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let (mut area, terrain) = area(&root.need("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";

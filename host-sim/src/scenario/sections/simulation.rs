@@ -19,7 +19,8 @@ pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconflic
     Ok(deconfliction)
 }
 
-pub(super) fn simulation(table: &Table<'_>) -> Result<Simulation> {
+/// The table of a mission that is given up after `limit_s`, unless it says otherwise.
+pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> {
     let simulation = Simulation {
         wind_mps: table.f32("wind_mps", 0.0, 0.0..=50.0)?,
         gust_mps: table.f32("gust_mps", 0.0, 0.0..=50.0)?,
@@ -34,7 +35,7 @@ pub(super) fn simulation(table: &Table<'_>) -> Result<Simulation> {
         radio_loss: table.f32("radio_loss", 0.0, 0.0..=1.0)?,
         radio_delay_s: table.f32("radio_delay_s", 0.05, 0.0..=60.0)?,
         radio_range_m: table.f32("radio_range_m", 500.0, 0.0..=1e6)?,
-        time_limit_s: table.f32("time_limit_s", 600.0, 0.1..=1e6)?,
+        time_limit_s: table.f32("time_limit_s", limit_s, 0.1..=1e6)?,
     };
     table.finish()?;
     Ok(simulation)
