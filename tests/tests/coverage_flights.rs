@@ -14,8 +14,14 @@ use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
 /// Why a random area is not flown.
-const NO_FLIGHT: [&str; 5] =
-    ["too many corners", "bad area", "bad scenario", "no-fly zone", "cannot keep vehicles apart"];
+const NO_FLIGHT: [&str; 6] = [
+    "too many corners",
+    "area too large",
+    "bad area",
+    "bad scenario",
+    "no-fly zone",
+    "cannot keep vehicles apart",
+];
 
 /// `FLOCKMATE_FLOWN=N` flies more, `FLOCKMATE_FLOWN_FROM` others.
 #[test]

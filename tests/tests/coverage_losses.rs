@@ -81,7 +81,7 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let (result, log) = match covered::fly_text(&text) {
         Ok(flown) => flown,
         Err(error) => {
-            let known = ["too many corners", "cannot keep", "to land beside"];
+            let known = ["too many corners", "area too large", "cannot keep", "to land beside"];
             assert!(known.iter().any(|why| error.contains(why)), "seed {seed}: {error}");
             return None;
         }

@@ -65,7 +65,7 @@ use self::firmware::Firmware;
 use self::port::Port;
 pub use self::px4::Mode;
 use self::snapshot::Snapshot;
-pub use self::vehicle::{State, VehicleLimits};
+pub use self::vehicle::{State, VehicleLimits, cruise_load};
 pub use crate::kinds::{Estimator, Personality};
 
 /// One simulated vehicle with its autopilot.

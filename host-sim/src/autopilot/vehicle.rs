@@ -325,11 +325,8 @@ impl Vehicle {
 
     /// Power grows with the acceleration beyond hovering and, slightly, with speed; idle motors and the board take 4 %.
     fn drain(&mut self, lift: bool, dt: f32) {
-        let load = if lift {
-            1.0 + 0.1 * self.thrust.z.max(0.0) + 0.004 * self.state.velocity.norm_squared()
-        } else {
-            0.04
-        };
+        let load =
+            if lift { cruise_load(self.state.velocity.norm()) + 0.1 * self.thrust.z.max(0.0) } else { 0.04 };
         self.state.battery = (self.state.battery - load * dt / self.limits.endurance_s).max(0.0);
     }
 }
@@ -344,6 +341,11 @@ pub fn wrap_pi(angle: f32) -> f32 {
     } else {
         angle
     }
+}
+
+/// Power at this speed, as a multiple of that in a hover.
+pub fn cruise_load(speed_mps: f32) -> f32 {
+    1.0 + 0.004 * speed_mps * speed_mps
 }
 
 #[cfg(test)]

@@ -26,7 +26,7 @@ use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::scenario::Scenario;
 use crate::scenario::coverage::Method;
-use crate::{map, margins};
+use crate::{autopilot, map, margins};
 
 /// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
 const OVER_PAD_M: f32 = 3.0;
@@ -100,7 +100,8 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
-        let (lasts_s, takes_s) = (sorties::lasts_s(vehicle), sorties::flown_s(planned, route));
+        let takes_s = sorties::flown_s(planned, route);
+        let lasts_s = sorties::lasts_s(vehicle) / autopilot::cruise_load(planned.vehicles[index].cruise_mps);
         if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.wanted.batteries {
                 true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
@@ -109,7 +110,7 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
                 }
             };
             bail!(
-                "area too large: {}: vehicle {} would fly {:.0} s; its battery lasts {lasts_s:.0} s, and {:.0} % of that are \
+                "area too large: {}: vehicle {} would fly {:.0} s; its battery lasts {lasts_s:.0} s at that speed, and {:.0} % of that are \
                  for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
                 planned.scenario.vehicle_places[index],
                 vehicle.id,
