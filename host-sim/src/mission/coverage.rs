@@ -100,8 +100,10 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
-        let takes_s = sorties::flown_s(planned, route);
-        let lasts_s = sorties::lasts_s(vehicle) / autopilot::cruise_load(planned.vehicles[index].cruise_mps);
+        let cruise_mps = planned.vehicles[index].cruise_mps;
+        let beyond_hover = autopilot::cruise_load(cruise_mps) - 1.0;
+        let takes_s = sorties::flown_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
+        let lasts_s = sorties::lasts_s(vehicle);
         if takes_s > USABLE_CHARGE * lasts_s {
             let hint = match planned.wanted.batteries {
                 true => "`cover` writes a plan for each sortie, which autopilots fly without a companion",
@@ -110,8 +112,8 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
                 }
             };
             bail!(
-                "area too large: {}: vehicle {} would fly {:.0} s; its battery lasts {lasts_s:.0} s at that speed, and {:.0} % of that are \
-                 for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
+                "area too large: {}: vehicle {} would need the charge of {:.0} s in a hover; its battery lasts {lasts_s:.0} s, \
+                 and {:.0} % of that are for the landing\nhint: more vehicles, wider lanes or a higher cruise_mps take less time; {hint}",
                 planned.scenario.vehicle_places[index],
                 vehicle.id,
                 takes_s,
