@@ -25,6 +25,7 @@ use firmware::scratch::Scratch;
 use firmware::shell::{ALIVE_EVERY, NO_AUTOPILOT, Shell, hear_system_id};
 use heapless::{String, Vec};
 use planner_core::Point;
+use planner_core::field::FieldView;
 use planner_core::frames::Geodetic;
 use planner_core::plan::SwarmPlan;
 use planner_core::roadmap::RoadmapView;
@@ -105,8 +106,10 @@ async fn work(
     let mut store = Store::mount(LAYOUT, &mut flash);
     let (lent, roadmap_aside) = find_roadmap(&mut store, &mut flash);
     let roadmap = lent.as_deref().and_then(|bytes| RoadmapView::parse(bytes).ok());
+    let field = lent.as_deref().and_then(|bytes| FieldView::parse(bytes).ok());
+    let map_crc = roadmap.as_ref().map(RoadmapView::crc).or(field.as_ref().map(FieldView::crc)).unwrap_or(0);
     let FoundMission { mission, files, aside: mission_aside, refused } =
-        find_mission(&store, &mut flash, roadmap.as_ref());
+        find_mission(&store, &mut flash, roadmap.as_ref(), map_crc);
     let known = match store.parameters().system_id() {
         Some(id) => Some(id),
         None => hear_system_id(&mut autopilot.0).await,
@@ -145,11 +148,11 @@ async fn work(
     shell.start(companion);
     start_links(links, shell, known.is_none(), autopilot, swarm);
     let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM_PLAN.take(), own: OWN_PLAN.take() };
-    let mut planner = Planner { roadmap, mission, system_id, files, memory };
+    let mut planner = Planner { roadmap, field, mission, system_id, files, memory };
     shell.work(&mut planner, &mut flash).await
 }
 
-/// The newest roadmap that is one, as long as it may be used; and whether one was set aside.
+/// The newest roadmap or field that is one, as long as it may be used; and whether one was set aside.
 fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
     let mut aside = false;
     loop {
@@ -159,7 +162,7 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
             let sum = lent.last_chunk().copied().map_or(0, u32::from_le_bytes);
             let begun = crash::begin(Work::CheckRoadmap, sum);
             aside |= !begun;
-            let is_one = begun && RoadmapView::parse(&lent).is_ok();
+            let is_one = begun && (RoadmapView::parse(&lent).is_ok() || FieldView::parse(&lent).is_ok());
             crash::finish();
             if is_one {
                 return (Some(lent), aside);
@@ -185,8 +188,13 @@ struct FoundMission {
     refused: Option<MissionError>,
 }
 
-/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves.
-fn find_mission(store: &Store, flash: &mut Flash, roadmap: Option<&RoadmapView<'_>>) -> FoundMission {
+/// Looks for the mission on this roadmap. It is copied: the journal it lies in moves. `map_crc` is the roadmap's or the field's.
+fn find_mission(
+    store: &Store,
+    flash: &mut Flash,
+    roadmap: Option<&RoadmapView<'_>>,
+    map_crc: u32,
+) -> FoundMission {
     let bytes = MISSION_BYTES.take();
     let found = store.mission().and_then(|r| {
         let bytes = bytes.get_mut(..(r.end - r.start) as usize)?;
@@ -195,7 +203,7 @@ fn find_mission(store: &Store, flash: &mut Flash, roadmap: Option<&RoadmapView<'
     });
     let Some(bytes) = found else { return FoundMission::default() };
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
-    let files = roadmap.map_or(0, RoadmapView::crc) ^ sum.rotate_left(1);
+    let files = map_crc ^ sum.rotate_left(1);
     // What it crashed may be its reading, or a plan.
     if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
         return FoundMission { files, aside: true, ..FoundMission::default() };

@@ -8,6 +8,7 @@ use companion::swarm::fleet::{DIVISIONS, Lots};
 use companion::{DONE, PlanFailure, Wanted, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
+use planner_core::field::FieldView;
 use planner_core::flight::{Range, VehiclePlan};
 use planner_core::plan::{self, SwarmPlan};
 use planner_core::roadmap::RoadmapView;
@@ -63,15 +64,17 @@ impl Default for Own {
     }
 }
 
-/// A planner over a roadmap and a mission that belong together, or over none.
+/// A planner over a roadmap or field and a mission that belong together, or over none.
 pub struct Planner<'a> {
     /// What to plan on.
     pub roadmap: Option<RoadmapView<'a>>,
+    /// The heights to fly above.
+    pub field: Option<FieldView<'a>>,
     /// What to plan.
     pub mission: Option<MissionView<'a>>,
     /// Whose plan it is.
     pub system_id: u8,
-    /// A checksum of both.
+    /// A checksum of all.
     pub files: u32,
     /// Its memory.
     pub memory: Memory<'a>,
@@ -129,8 +132,8 @@ impl Planner<'_> {
         let schedule = &mission.header().schedule;
         if let Kind::Coverage(area) = mission.kind() {
             return match detour {
-                Some(request) => plan_around(area, request, &mut self.memory),
-                None => plan_area(mission, area, index, &mut self.memory),
+                Some(request) => plan_around(area, self.field, request, &mut self.memory),
+                None => plan_area(mission, self.field, index, &mut self.memory),
             };
         }
         let Some(roadmap) = &self.roadmap else { return Err(PlanFailure::NoRoadmap) };
@@ -162,6 +165,7 @@ impl Planner<'_> {
 #[inline(never)]
 fn plan_around<'m>(
     area: &CoverageView<'_>,
+    field: Option<FieldView<'_>>,
     request: &DetourRequest,
     memory: &'m mut Memory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
@@ -172,6 +176,7 @@ fn plan_around<'m>(
     let ws = &mut scratch.area().area;
     planner::coverage::around::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, WAYPOINTS, GATES>(
         area,
+        field,
         request,
         &mut own.obstacles,
         ws,
@@ -184,14 +189,15 @@ fn plan_around<'m>(
 #[inline(never)]
 fn plan_area<'m>(
     mission: &MissionView<'_>,
-    area: &CoverageView<'_>,
+    field: Option<FieldView<'_>>,
     index: usize,
     memory: &'m mut Memory<'_>,
 ) -> Result<&'m VehiclePlan<WAYPOINTS, GATES>, PlanFailure> {
+    let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
     let Memory { scratch, swarm, own } = memory;
     let ws = scratch.area();
     planner::coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
-        &Request { mission, view: area, gates_most: GATES, done: &own.done },
+        &Request { mission, view, field, gates_most: GATES, done: &own.done },
         own.losses.iter().map(|lots| &lots[..]),
         &mut ws.area,
         &mut ws.schedule,

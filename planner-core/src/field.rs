@@ -79,17 +79,7 @@ impl<'a> FieldView<'a> {
         let Some((header, rest)) = bytes.split_first_chunk::<HEADER_LEN>() else {
             return Err(FileError::Truncated);
         };
-        if header[..8] != MAGIC {
-            return Err(FileError::Magic);
-        }
-        let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
-        let number = |at: usize| f32::from_bits(u32::from(word(at)) | u32::from(word(at + 2)) << 16);
-        if word(8) != VERSION {
-            return Err(FileError::Version(word(8)));
-        }
-        let low = Flat::new(number(16), number(20));
-        let shape = FieldShape { low, cell_m: number(24), columns: word(10), rows: word(12) };
-        shape.check()?;
+        let shape = shape_of(header)?;
         if bytes.len() != shape.encoded_len() {
             return Err(if bytes.len() < shape.encoded_len() {
                 FileError::Truncated
@@ -139,6 +129,29 @@ impl<'a> FieldView<'a> {
         let across = |row: usize| node(column, row) * (1.0 - east) + node(column + 1, row) * east;
         (across(row) * (1.0 - north) + across(row + 1) * north) * STEP_M
     }
+}
+
+/// The length that a file's header tells, of a file that this version can read.
+///
+/// # Errors
+/// It is no field, of another version, or has nodes where none may be.
+pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, FileError> {
+    Ok(shape_of(head)?.encoded_len())
+}
+
+fn shape_of(header: &[u8; HEADER_LEN]) -> Result<FieldShape, FileError> {
+    if header[..8] != MAGIC {
+        return Err(FileError::Magic);
+    }
+    let word = |at: usize| u16::from_le_bytes([header[at], header[at + 1]]);
+    let number = |at: usize| f32::from_bits(u32::from(word(at)) | u32::from(word(at + 2)) << 16);
+    if word(8) != VERSION {
+        return Err(FileError::Version(word(8)));
+    }
+    let low = Flat::new(number(16), number(20));
+    let shape = FieldShape { low, cell_m: number(24), columns: word(10), rows: word(12) };
+    shape.check()?;
+    Ok(shape)
 }
 
 /// Writes a file: nodes in decimetres, rows from the south; returns its bytes.

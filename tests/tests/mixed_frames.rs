@@ -117,7 +117,7 @@ fn fly(seed: u64) -> Errors {
     for step in 0..LIMIT_S * 1_000_000 / STEP_US {
         let now_us = (step + 1) * STEP_US;
         for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, &mission.map, &mut radio, &places, &mut log).expect("it has no board");
+            member.step(step, i, &mission, &mut radio, &places, &mut log).expect("it has no board");
             if member.wants_plan.is_some() {
                 let own = mission.own_plan(&plan, i).expect("few gates");
                 member.answer_plan(now_us, Ok(&own));

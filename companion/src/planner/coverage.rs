@@ -11,6 +11,8 @@ use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, around};
 use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::field::FieldView;
+use planner_core::field::follow::Following;
 use planner_core::flight::{Look, Photographs, Range, VehiclePlan};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::ScheduleWorkspace;
@@ -77,6 +79,8 @@ pub enum Error {
     Coverage(CoverageError),
     /// The flights.
     Plan(PlanError),
+    /// The ground is not level, and the mission's field is not there.
+    NoField,
 }
 
 impl From<CoverageError> for Error {
@@ -105,6 +109,7 @@ impl fmt::Display for Error {
         match self {
             Self::Coverage(error) => write!(f, "{error:?}"),
             Self::Plan(error) => write!(f, "{error:?}"),
+            Self::NoField => f.write_str("NoField"),
         }
     }
 }
@@ -113,6 +118,7 @@ impl From<Error> for PlanFailure {
     fn from(error: Error) -> Self {
         match error {
             Error::Plan(error) => failure(&error),
+            Error::NoField => Self::NoRoadmap,
             Error::Coverage(
                 CoverageError::Area(AreaError::AreaFull)
                 | CoverageError::LanesFull
@@ -152,10 +158,25 @@ pub struct Request<'a, 'm> {
     pub mission: &'a MissionView<'m>,
     /// Its area.
     pub view: &'a CoverageView<'m>,
+    /// The heights to fly above, where there are any: used if they are the mission's.
+    pub field: Option<FieldView<'m>>,
     /// Most gates of one vehicle.
     pub gates_most: usize,
     /// Waypoints that were photographed before, by their numbers on the path along all lanes.
     pub done: &'a [Range],
+}
+
+impl<'m> Request<'_, 'm> {
+    /// What lanes keep above the ground; none where it is level.
+    fn following(&self, vehicles: &[Vehicle]) -> Result<Option<Following<'m>>, Error> {
+        let Some(ground) = &self.view.header().ground else { return Ok(None) };
+        let crc = self.mission.header().roadmap_crc;
+        let field = self.field.filter(|field| field.crc() == crc).ok_or(Error::NoField)?;
+        let steepest = vehicles.iter().map(|v| libm::fminf(v.climb_mps, v.descend_mps) / v.cruise_mps);
+        let slope = steepest.fold(f32::INFINITY, libm::fminf);
+        let (height_m, tolerance_m) = (ground.height_m, ground.tolerance_m);
+        Ok(Some(Following { field, height_m, tolerance_m, slope }))
+    }
 }
 
 /// The area of a mission.
@@ -175,8 +196,8 @@ fn area<'a, const X: usize>(
     Area::new(vertices, rings).map_err(CoverageError::Area)
 }
 
-/// Plans one vehicle's way home over the area, or aside, that keeps off all `obstacles` and out of no-fly zones, which may have `C`
-/// corners.
+/// Plans one vehicle's way home over the area, or aside, that keeps off all `obstacles`, above the field and out of no-fly zones, which may
+/// have `C` corners.
 ///
 /// # Errors
 /// Why there is none.
@@ -189,6 +210,7 @@ pub fn around<
     const G: usize,
 >(
     view: &CoverageView<'_>,
+    field: Option<FieldView<'_>>,
     request: &DetourRequest,
     obstacles: &mut [KeepOff],
     ws: &mut Workspace<X, L, K>,
@@ -197,7 +219,8 @@ pub fn around<
     let area = area(view, &mut ws.vertices, &mut ws.rings).map_err(Error::Coverage)?;
     let mut transit = Transit::<C>::empty();
     transit.learn(area).map_err(Error::Coverage)?;
-    around::plan_vehicle(&transit, request, obstacles, out).map_err(|_| PlanFailure::Unreachable)
+    let field = field.filter(|_| view.header().ground.is_some());
+    around::plan_vehicle(&transit, field, request, obstacles, out).map_err(|_| PlanFailure::Unreachable)
 }
 
 /// Plans the flights of all vehicles; no-fly zones may have `C` corners. `losses` are what has been lost, division by
@@ -220,7 +243,7 @@ pub fn plan<
     schedule: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
-    let Request { mission, view, gates_most, done } = *request;
+    let Request { mission, view, gates_most, done, .. } = *request;
     let header = view.header();
     let area = area(view, &mut ws.vertices, &mut ws.rings)?;
     let mut transit = Transit::<C>::empty();
@@ -269,6 +292,7 @@ pub fn plan<
         schedule: mission.header().schedule,
         gates_most,
         done: &[],
+        following: request.following(&vehicles)?,
     };
     flights::plan(&work, &ws.routes, &Swarm { done, ..swarm }, schedule, out)?;
     for lots in losses {

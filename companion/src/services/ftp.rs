@@ -1,4 +1,4 @@
-//! MAVLink FTP server: `roadmap.bin` and `mission.bin` are listed, read, written, removed and summed.
+//! MAVLink FTP server: `roadmap.bin` or `field.bin`, and `mission.bin` are listed, read, written, removed and summed.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol"; PX4, pymavlink's `mavftp` and MAVSDK for what clients rely on: an answer has
 //! the request's sequence number plus one, its session and its offset; the client names the session (`mavftp` writes to it before

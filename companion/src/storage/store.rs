@@ -1,4 +1,4 @@
-//! What a companion keeps in flash: two slots for roadmaps, and a journal with the mission file, the parameters
+//! What a companion keeps in flash: two slots for roadmaps or fields, and a journal with the mission file, the parameters
 //! and what of an area is photographed.
 //!
 //! Flash is I/O: the store asks ([`Store::poll`]) for one sector to be erased, one block to be programmed or some bytes to be
@@ -93,7 +93,7 @@ impl Store {
         store
     }
 
-    /// Where the roadmap that this start uses lies, in the storage bank. It is not written until the next start.
+    /// Where the roadmap or field that this start uses lies, in the storage bank. It is not written until the next start.
     pub fn roadmap(&self) -> Option<Range<u32>> {
         let slot = self.in_use?;
         let at = Area::Slot(slot).data_at(&self.layout);
@@ -159,8 +159,8 @@ impl Store {
     /// Removes a file: it is not there at the next start.
     pub fn remove(&mut self, file: File) {
         match file {
-            File::Roadmap => {
-                if let Some(Seal { sequence, .. }) = self.newest().and_then(|i| self.slots[i].seal()) {
+            File::Roadmap | File::Field => {
+                if let Some((_, Seal { sequence, .. })) = self.newest_of(file) {
                     self.forgotten = sequence;
                     self.unsaved = true;
                 }
@@ -203,12 +203,19 @@ impl Store {
         (0..2).filter(|i| number(i).is_some_and(|n| n > self.forgotten)).max_by_key(number)
     }
 
+    /// The same, if it is this file.
+    fn newest_of(&self, file: File) -> Option<(usize, Seal)> {
+        let slot = self.newest()?;
+        let seal = self.slots[slot].seal()?;
+        (seal.field == (file == File::Field)).then_some((slot, seal))
+    }
+
     fn extent(&self, file: File) -> Option<Range<u32>> {
         match file {
-            File::Roadmap => {
-                let slot = self.newest()?;
+            File::Roadmap | File::Field => {
+                let (slot, seal) = self.newest_of(file)?;
                 let at = Area::Slot(slot).data_at(&self.layout);
-                Some(at..at + self.slots[slot].seal()?.len)
+                Some(at..at + seal.len)
             }
             File::Mission => self.journal.mission.clone(),
         }

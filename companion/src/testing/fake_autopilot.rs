@@ -230,7 +230,7 @@ impl Bench {
                     answer.and_then(|()| {
                         let mut path = Path::new();
                         if matches!(request.goal, Goal::Home { .. }) {
-                            around::plan(&Transit::<1>::empty(), &request, &mut obstacles, &mut path)
+                            around::plan(&Transit::<1>::empty(), None, &request, &mut obstacles, &mut path)
                                 .map_err(|_| crate::PlanFailure::Unreachable)?;
                             return Ok(VehiclePlan { path, ..plan() });
                         }

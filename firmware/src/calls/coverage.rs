@@ -219,11 +219,11 @@ fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &
         };
         // That there is no way is an answer too.
         let found = meter.call("around::plan, 128 things", 0, || {
-            around::plan(transit, &request, &mut things, &mut own.path)
+            around::plan(transit, None, &request, &mut things, &mut own.path)
         });
         sum.add(u32::from(found.is_ok()) ^ own.path.length_m().to_bits());
         let again = meter.call("around::plan_vehicle, 128 things", 0, || {
-            around::plan_vehicle(transit, &request, &mut things, &mut own)
+            around::plan_vehicle(transit, None, &request, &mut things, &mut own)
         });
         sum.add(u32::from(again.is_ok()));
     }

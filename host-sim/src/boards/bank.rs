@@ -5,6 +5,8 @@ use companion::services::ftp::DATA;
 use companion::storage::store::window::Taken;
 use companion::storage::store::{Erasing, File, READ, Store, UploadState};
 
+use planner_core::field;
+
 use crate::flash::{DeskFlash, LAYOUT};
 
 /// Where bank 2 of the emulated flash lies.
@@ -33,8 +35,9 @@ pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
         }
     };
     settle(&mut store);
-    let files = [(File::Roadmap, roadmap), (File::Mission, mission)];
-    // A coverage mission has no roadmap.
+    let map = if roadmap.starts_with(&field::MAGIC) { File::Field } else { File::Roadmap };
+    let files = [(map, roadmap), (File::Mission, mission)];
+    // A coverage mission has no roadmap, over level ground no field.
     for (file, bytes) in files.into_iter().filter(|(_, bytes)| !bytes.is_empty()) {
         let opened = store.open(file, Erasing::Allowed);
         ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());

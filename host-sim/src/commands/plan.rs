@@ -20,8 +20,8 @@ use crate::shortage;
 pub struct Args {
     /// The scenario
     scenario: PathBuf,
-    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and for `roadmap.bin` and
-    /// `mission.bin`, the two files that a board is given
+    /// Directory for `result.json`, `timing.json`, `report.html`, `starts.txt` and `goals.txt`, and for the files that a board
+    /// is given: `roadmap.bin`, or `field.bin` over terrain, and `mission.bin`
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
     /// Make files that this board holds: nucleo-h743, qemu or pico2. Of the roadmap's edges some are left out, paths lengthen
@@ -37,7 +37,7 @@ pub struct Args {
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = load(&args.scenario, None)?;
-    let names = ["starts.txt", "goals.txt", "roadmap.bin", "mission.bin"];
+    let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
     let mut results = Results::open(&args.out, &[&output::NAMES[..], &names].concat())?;
     let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
@@ -47,8 +47,12 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     output::add(&mut results, &result, &mission.timing, page)?;
     let starts = output::points(mission.scenario.vehicles.iter().map(|v| v.start));
     let goals = output::points(mission.goals.iter().copied());
-    let contents = [starts.as_bytes(), goals.as_bytes(), &mission.roadmap_file, &mission.mission_file];
-    // A coverage mission has no roadmap.
+    // A coverage mission has no roadmap, over level ground no field.
+    let (roadmap, field) = match mission.scenario.area {
+        None => (&mission.roadmap_file[..], &[][..]),
+        Some(_) => (&[][..], &mission.roadmap_file[..]),
+    };
+    let contents = [starts.as_bytes(), goals.as_bytes(), roadmap, field, &mission.mission_file];
     for (name, bytes) in names.iter().zip(contents).filter(|(_, bytes)| !bytes.is_empty()) {
         results.add(name, bytes)?;
     }

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 use anyhow::{Context, anyhow, bail, ensure};
 use companion::storage::mission_file::{self, MissionView};
 use companion::storage::store::File;
+use planner_core::field::{self, FieldView};
 use planner_core::roadmap;
 
 use crate::capacity::{BOARDS, Board};
@@ -65,6 +66,10 @@ fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
     let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;
         (File::Roadmap, board.roadmap_excess(&view))
+    } else if bytes.starts_with(&field::MAGIC) {
+        FieldView::parse(bytes).map_err(|e| anyhow!("no sound field: {e}"))?;
+        // Every board holds the largest.
+        (File::Field, None)
     } else if bytes.starts_with(&mission_file::MAGIC) {
         let view = MissionView::parse(bytes).map_err(|e| anyhow!("no sound mission: {e}"))?;
         let more = bytes.len() - view.byte_len();
@@ -72,7 +77,8 @@ fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
         (File::Mission, board.mission_excess(&view))
     } else {
         bail!(
-            "it begins neither as a roadmap nor as a mission\nhint: `host-sim plan` writes roadmap.bin and mission.bin"
+            "it begins neither as a roadmap or field nor as a mission\nhint: `host-sim plan` writes roadmap.bin or field.bin, and \
+             mission.bin"
         )
     };
     match excess {

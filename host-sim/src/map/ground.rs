@@ -1,4 +1,4 @@
-//! Level ground, where a mission has no map: free space over a floor whose top is at height 0.
+//! Level ground, where a mission has no map: free space over a floor.
 
 use planner_core::Point;
 use planner_core::voxel::GridShape;
@@ -10,20 +10,23 @@ use super::octree::Occupancy;
 /// Most cells; larger grounds have larger cells.
 const MOST_CELLS: f32 = 4e6;
 
-/// The ground with the air over it, from `low` to `high`, in cells of `cell_m` or larger ones.
+/// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m` or larger ones.
 ///
 /// # Errors
 /// It is larger than a map can be.
 pub fn level(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, MapError> {
     let size = high - low;
     let mut cell_m = cell_m;
-    let dims = |cell_m: f32| [size.x, size.y, high.z].map(|side| (side / cell_m).ceil().max(1.0));
+    let dims = |cell_m: f32| [size.x, size.y, size.z].map(|side| (side / cell_m).ceil().max(1.0));
     while dims(cell_m).iter().product::<f32>() > MOST_CELLS {
         cell_m *= 1.5;
     }
     let [x, y, z] = dims(cell_m).map(|cells| cells as u32);
-    let shape =
-        GridShape { dims: [x, y, z + 1], min: Point::new(low.x, low.y, -cell_m), resolution_m: cell_m };
+    let shape = GridShape {
+        dims: [x, y, z + 1],
+        min: Point::new(low.x, low.y, low.z - cell_m),
+        resolution_m: cell_m,
+    };
     let mut map = OccupancyMap::unknown(shape, "the ground")?;
     map.fill([0, 0, 1], [x, y, z + 1], Occupancy::Free);
     map.fill([0, 0, 0], [x, y, 1], Occupancy::Occupied);

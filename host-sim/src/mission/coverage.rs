@@ -2,11 +2,13 @@
 
 use std::iter;
 
-use anyhow::{anyhow, bail};
+use anyhow::{Context, anyhow, bail};
 use companion::PlanFailure;
 use companion::margins::TRACKING_M;
 use companion::planner::coverage::{self, Error, Request, Workspace};
-use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, CoverageView, Parts, Share};
+use companion::storage::mission_file::coverage::{
+    CoverageHeader, CoverageParts, CoverageView, Ground, Parts, Share,
+};
 use companion::storage::mission_file::{Block, Kind};
 use companion::swarm::fleet::Lot;
 use planner_core::Point;
@@ -15,6 +17,7 @@ use planner_core::coverage::flights::FURTHEST_M;
 use planner_core::coverage::pack::Unit;
 use planner_core::coverage::transit::Transit;
 use planner_core::detour::{DetourRequest, KeepOff};
+use planner_core::field::FieldView;
 use planner_core::flight::{PathError, Range};
 use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
@@ -24,8 +27,8 @@ use crate::area::MOST_VERTICES;
 use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
-use crate::scenario::Scenario;
-use crate::scenario::coverage::Method;
+use crate::scenario::coverage::{Method, Terrain};
+use crate::scenario::{self, Scenario};
 use crate::{autopilot, map, margins};
 
 /// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
@@ -37,14 +40,6 @@ type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
 
 /// The mission up to its files.
 pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
-    let area = scenario.area.as_ref();
-    if let Some(area) = area.filter(|area| area.terrain.is_some()) {
-        bail!(
-            "cannot be flown: {}: companions know no terrain yet\nhint: `cover` writes plans that follow it, which autopilots \
-             fly without a companion",
-            area.place
-        );
-    }
     let planned = Planned::flown(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(
@@ -62,7 +57,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
         .collect();
     check_batteries(&planned)?;
     check_height(&planned)?;
-    let top_m = OVER_PAD_M.min(planned.wanted.heights.mission_m);
+    let top_m = OVER_PAD_M.min(above_ground_m(planned.wanted));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
@@ -82,6 +77,9 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     let mut schedule = schedule_config(&scenario);
     schedule.vertical_mps = climbs.iter().map(|s| s.climb_mps.min(s.descend_mps)).fold(f32::MAX, f32::min);
     let mut mission = Mission::new(scenario, map.voxel_map(map::Unknown::Free), tasks, schedule, board);
+    if let Some(terrain) = mission.scenario.area.as_ref().and_then(|area| area.terrain.as_ref()) {
+        mission.roadmap_file = terrain.field.to_vec();
+    }
     mission.encode_area(&climbs)?;
     let mut ws = on_heap(DeskWorkspace::new);
     let plan = mission.plan_area(&[], iter::empty(), &mut ws)?;
@@ -126,7 +124,7 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
 
 /// Whoever believes to be at the height of the pictures is over the ground.
 fn check_height(planned: &Planned<'_>) -> anyhow::Result<()> {
-    let height_m = planned.wanted.heights.mission_m;
+    let height_m = above_ground_m(planned.wanted);
     for vehicle in &planned.scenario.vehicles {
         let lower_m = margins::lower_m(planned.scenario.simulation.estimator, vehicle.personality);
         let least_m = lower_m + vehicle.radius_m + TRACKING_M;
@@ -147,7 +145,25 @@ pub fn method(scenario: &Scenario) -> Method {
     scenario.area.as_ref().map(|area| area.method).unwrap_or_default()
 }
 
-/// Level ground below area and pads.
+/// The ground as the mission file has it.
+fn ground_of(area: &scenario::coverage::Area, terrain: &Terrain) -> anyhow::Result<Ground> {
+    let [low_m, high_m] = uneven_m(terrain)?;
+    Ok(Ground { height_m: area.height_m, tolerance_m: terrain.tolerance_m, low_m, high_m })
+}
+
+/// The least height of pictures above the ground.
+fn above_ground_m(area: &scenario::coverage::Area) -> f32 {
+    if area.terrain.is_some() { area.height_m } else { area.heights.mission_m }
+}
+
+/// The lowest and the highest ground below an area, where it is not level, metres above the origin.
+fn uneven_m(terrain: &Terrain) -> anyhow::Result<[f32; 2]> {
+    let field = FieldView::parse(&terrain.field).map_err(|error| anyhow!("no field: {error}"))?;
+    let [low_m, high_m] = terrain.grid.range_m().context("no ground")?;
+    Ok([low_m, high_m.min(field.highest_m())])
+}
+
+/// Level ground below area and pads, as low as it is anywhere: the map of a flight over terrain has that beside.
 fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
     let places = planned.wanted.vertices.iter().chain(planned.vehicles.iter().map(|v| &v.place));
     let (mut low, mut high) = (Point::repeat(f32::INFINITY), Point::repeat(f32::NEG_INFINITY));
@@ -157,7 +173,11 @@ fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
     }
     let heights = planned.wanted.heights;
     high.z = heights.mission_m + heights.layer_m * (planned.vehicles.len() + 1) as f32;
-    let around = Point::repeat(AROUND_M);
+    let around = Point::new(AROUND_M, AROUND_M, 0.0);
+    high.z += AROUND_M;
+    if let Some(terrain) = &planned.wanted.terrain {
+        low.z = uneven_m(terrain)?[0];
+    }
     let cell_m = planned.scenario.map.resolution_m;
     Ok(map::level(&(low - around), &(high + around), cell_m)?)
 }
@@ -186,6 +206,7 @@ impl Mission {
             spacing: area.usable,
             angle_deg: area.angle_deg,
             margin_m: area.margin_m,
+            ground: area.terrain.as_ref().map(|terrain| ground_of(area, terrain)).transpose()?,
         };
         let (rings, vertices) = (&area.rings[..], &area.vertices[..]);
         let block = Block::Coverage(CoverageParts { header, shares, rings, vertices });
@@ -208,6 +229,7 @@ impl Mission {
             &Request {
                 mission: &mission,
                 view,
+                field: self.field(),
                 gates_most: self.board.map_or(GATES, |board| board.gates),
                 done,
             },
@@ -218,6 +240,11 @@ impl Mission {
         )
         .map_err(|error| self.explained(&error))?;
         Ok(plan)
+    }
+
+    /// The heights to fly above, as a board reads them; none over level ground.
+    fn field(&self) -> Option<FieldView<'_>> {
+        FieldView::parse(&self.roadmap_file).ok()
     }
 
     /// The plan of a coverage mission.
@@ -247,7 +274,12 @@ impl Mission {
         let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
         let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
         coverage::around::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, WAYPOINTS, GATES>(
-            view, request, obstacles, &mut ws, &mut own,
+            view,
+            self.field(),
+            request,
+            obstacles,
+            &mut ws,
+            &mut own,
         )?;
         Ok(own)
     }
@@ -274,7 +306,8 @@ impl Mission {
         match error {
             Error::Plan(PlanError::Path(id, PathError::PathFull)) => anyhow!(
                 "the route of vehicle {id} has too many corners: {path}: not one lane fits into a path of {WAYPOINTS} \
-                 waypoints\nhint: no-fly zones with fewer corners"
+                 waypoints\nhint: no-fly zones with fewer corners{}",
+                if self.roadmap_file.is_empty() { "" } else { ", or a larger area.terrain_tolerance_m" }
             ),
             Error::Plan(PlanError::Path(id, PathError::TooLong)) => anyhow!(
                 "the route of vehicle {id} is too long: {path}: a flight there, along one lane and home takes more than \

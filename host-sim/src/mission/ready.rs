@@ -40,7 +40,7 @@ pub struct Mission {
     pub goals: Vec<Point>,
     /// The roadmap.
     pub roadmap: Roadmap,
-    /// The roadmap as the file on the board.
+    /// The roadmap as the file on the board, or the field of an area over terrain.
     pub roadmap_file: Vec<u8>,
     /// The mission as the file on the board.
     pub mission_file: Vec<u8>,
@@ -112,6 +112,13 @@ impl Mission {
     /// The roadmap as a board reads it; the whole file is checked at each call.
     pub fn view(&self) -> RoadmapView<'_> {
         parsed(&self.roadmap_file)
+    }
+
+    /// Height of what a vehicle comes to stand on that sinks from a place, metres; none beside the map.
+    pub fn ground_below(&self, place: &Point) -> Option<f32> {
+        let below_m = self.map.ground_below(place)?;
+        let terrain = self.scenario.area.as_ref().and_then(|area| area.terrain.as_ref());
+        Some(terrain.and_then(|terrain| terrain.grid.height_at(&place.xy())).unwrap_or(below_m))
     }
 
     /// Its size.

@@ -15,8 +15,7 @@ use crate::boards::STACK_LEN;
 use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
 use crate::flash::{DeskFlash, LAYOUT};
-use crate::map::VoxelMap;
-use crate::mission::OwnPlan;
+use crate::mission::{Mission, OwnPlan};
 use crate::report::{self, Level};
 use crate::say;
 
@@ -207,14 +206,15 @@ impl Member {
         &mut self,
         step: u64,
         station: usize,
-        map: &VoxelMap,
+        mission: &Mission,
         radio: &mut Radio,
         places: &[Point],
         log: &mut Vec<report::Event>,
     ) -> anyhow::Result<()> {
         let now_us = (step + 1) * STEP_US;
         if step % GROUND_STEPS == station as u64 % GROUND_STEPS {
-            self.ground_m = map.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
+            self.ground_m =
+                mission.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
         }
         self.autopilot.step(STEP_S, self.ground_m);
         if self.killed {

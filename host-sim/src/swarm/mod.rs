@@ -210,6 +210,7 @@ impl<'a> Run<'a> {
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
         let mut monitor =
             Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &vehicles);
+        monitor.terrain = scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
         // Lanes of two vehicles may lie side by side: one waits for as long as the other is on them.
         monitor.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
@@ -243,7 +244,7 @@ impl<'a> Run<'a> {
         };
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
-            member.step(step, i, &mission.map, radio, places, log)?;
+            member.step(step, i, mission, radio, places, log)?;
             if let Some(wanted) = member.wants_plan.filter(|_| member.planner != Planner::Late) {
                 let own = match member.planner {
                     Planner::BadRoadmap => plan_on_damaged(&mission.roadmap_file),

@@ -9,6 +9,7 @@ use planner_core::segment::point_clearance;
 use planner_core::voxel::VoxelGrid;
 
 use crate::map::edt::ClearanceField;
+use crate::terrain::HeightGrid;
 
 /// Rounding of positions that is no contact, metres.
 const TOUCH_M: f32 = 1e-3;
@@ -81,6 +82,8 @@ struct Watched {
 pub struct Monitor<'a> {
     grid: VoxelGrid<'a>,
     field: &'a ClearanceField,
+    /// Uneven ground, of which the grid holds none.
+    pub terrain: Option<&'a HeightGrid>,
     safety_distance_m: f32,
     vehicles: Vec<Watched>,
     too_near: Vec<bool>,
@@ -132,6 +135,7 @@ impl<'a> Monitor<'a> {
         Self {
             grid,
             field,
+            terrain: None,
             safety_distance_m,
             vehicles: vehicles.iter().map(watched).collect(),
             too_near: vec![false; vehicles.len() * vehicles.len()],
@@ -181,6 +185,17 @@ impl<'a> Monitor<'a> {
         &self.vehicles[vehicle].track
     }
 
+    /// Whether a body in flight reaches into uneven ground: how high it is above it counts.
+    fn reaches_ground(&mut self, place: &Point, radius_m: f32) -> bool {
+        let Some(ground_m) = self.terrain.and_then(|terrain| terrain.height_at(&place.xy())) else {
+            return false;
+        };
+        let above_m = place.z - ground_m;
+        self.window.clearance_m = self.window.clearance_m.min(above_m);
+        self.min_clearance_m = self.min_clearance_m.min(above_m);
+        above_m < radius_m - TOUCH_M
+    }
+
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
         if matches!(now.phase, Phase::Grounded | Phase::Falling | Phase::Wreck) {
             return;
@@ -212,6 +227,7 @@ impl<'a> Monitor<'a> {
         } else {
             false
         };
+        let touches = touches || (flying && self.reaches_ground(&now.position, radius_m));
         let inside =
             |&(centre, extent_m): &(Point, f32)| (now.position - centre).norm() < radius_m + extent_m;
         let touches = touches || self.obstacles.iter().any(inside);

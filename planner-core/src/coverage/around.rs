@@ -2,18 +2,19 @@
 //!
 //! Home: straight up or down to the vehicle's own layer, there the shortest way to above its pad, and down. What is to be kept off is
 //! walked around: a visibility graph over the zones' corners ([`Transit::corners`]) and eight corners around either end of
-//! each [`KeepOff`] that reaches the layer, searched by A*. Where the layer leaves no way, the same at the height at which the
+//! each [`KeepOff`] that reaches the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer leaves no way, the same at the height at which the
 //! vehicle hovers. Aside: the nearest of places on rings around it, straight there.
 //!
 //! ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
 
 use heapless::Vec;
-use libm::{cosf, fabsf, fminf, sinf};
+use libm::{ceilf, cosf, fabsf, fminf, sinf};
 
 use super::Flat;
 use super::transit::Transit;
 use crate::Point;
 use crate::detour::{self, DetourError, DetourRequest, Goal, KeepOff};
+use crate::field::FieldView;
 use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::search::SearchError;
 
@@ -27,14 +28,19 @@ const OUTWARD: f32 = 1.09;
 const OUTWARD_M: f32 = 0.05;
 /// Nearer than this is the same place, metres.
 const SAME_M: f32 = 0.01;
+/// More samples of one leg are not taken: they are further apart then.
+const MOST_SAMPLES: f32 = 65_536.0;
+/// A leg is so high above the field at least, but for one straight up or down, metres.
+const OVER_FIELD_M: f32 = 1.5;
 /// A place aside is so many metres away at most, in steps of a metre.
 const RINGS: usize = 20;
 /// Directions that are looked in for it.
 const DIRECTIONS: usize = 16;
 
-/// Zones and things that no leg meets.
+/// Zones, ground and things that no leg meets.
 struct Clear<'a, 't, const N: usize> {
     transit: &'a Transit<'t, N>,
+    field: Option<FieldView<'a>>,
     obstacles: &'a [KeepOff],
     here: Point,
 }
@@ -42,17 +48,32 @@ struct Clear<'a, 't, const N: usize> {
 impl<const N: usize> Clear<'_, '_, N> {
     fn leg(&self, a: &Point, b: &Point) -> bool {
         let touches = |obstacle: &KeepOff| obstacle.solid(&self.here).touches(a, b);
-        self.transit.is_clear(&a.xy(), &b.xy()) && !self.obstacles.iter().any(touches)
+        self.transit.is_clear(&a.xy(), &b.xy()) && self.is_high(a, b) && !self.obstacles.iter().any(touches)
+    }
+
+    /// Whether a leg keeps above the field, looked at half a node apart.
+    fn is_high(&self, a: &Point, b: &Point) -> bool {
+        let (Some(field), step) = (&self.field, b - a) else { return true };
+        let length_m = step.xy().norm();
+        if length_m < SAME_M {
+            return true;
+        }
+        let count = fminf(ceilf(2.0 * length_m / field.shape().cell_m), MOST_SAMPLES) as u32;
+        (0..=count).all(|sample| {
+            let place = a + step * (sample as f32 / count as f32);
+            place.z >= field.height_at(&place.xy()) + OVER_FIELD_M
+        })
     }
 }
 
-/// The way to the goal ([`Goal::Home`]), or aside, that keeps off all `obstacles` and the zones that `transit` knows, written to `out`. Of an
+/// The way to the goal ([`Goal::Home`]), or aside, that keeps off all `obstacles`, above the field and out of the zones that `transit` knows, written to `out`. Of an
 /// obstacle that is nearer already the distance is shortened.
 ///
 /// # Errors
 /// Why there is none.
 pub fn plan<const N: usize, const W: usize>(
     transit: &Transit<'_, N>,
+    field: Option<FieldView<'_>>,
     request: &DetourRequest,
     obstacles: &mut [KeepOff],
     out: &mut Path<W>,
@@ -63,7 +84,7 @@ pub fn plan<const N: usize, const W: usize>(
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shorten(obstacles, &request.here);
-    let clear = Clear { transit, obstacles, here: request.here };
+    let clear = Clear { transit, field, obstacles, here: request.here };
     let from = |points: &[Point], out: &mut Path<W>| write(request, points, out).map_err(DetourError::Path);
     if request.aside {
         let place = aside(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;
@@ -94,11 +115,12 @@ pub fn plan<const N: usize, const W: usize>(
 /// Why there is none.
 pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
     transit: &Transit<'_, N>,
+    field: Option<FieldView<'_>>,
     request: &DetourRequest,
     obstacles: &mut [KeepOff],
     out: &mut VehiclePlan<W, G>,
 ) -> Result<(), DetourError> {
-    plan(transit, request, obstacles, &mut out.path)?;
+    plan(transit, field, request, obstacles, &mut out.path)?;
     out.task = Task::Goto(0);
     (out.climb_m, out.descent_m, out.depart_s) = (0.0, request.descent_m, 0.0);
     out.gates.clear();

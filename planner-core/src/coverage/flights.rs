@@ -12,6 +12,7 @@ use super::pack::{Heading, Plan, Route, Vehicle, Work};
 use super::transit::Transit;
 use super::{Flat, divide};
 use crate::Point;
+use crate::field::follow::Following;
 use crate::flight::{Flight, Look, Path, PathError, Photographs, Range, Task, Trigger};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
@@ -65,6 +66,8 @@ pub struct Swarm<'a> {
     pub gates_most: usize,
     /// Waypoints of the area that the lanes leave out, in rising order.
     pub done: &'a [Range],
+    /// What lanes, and ways between them, follow where the ground is not level: all below the lowest layer.
+    pub following: Option<Following<'a>>,
 }
 
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
@@ -172,25 +175,62 @@ struct Draft<'a, const N: usize, const W: usize> {
     path: Path<W>,
     transit: &'a Transit<'a, N>,
     clearance_m: f32,
+    following: Option<Following<'a>>,
+    /// Where it has come to.
+    here: Point,
 }
 
-impl<const N: usize, const W: usize> Draft<'_, N, W> {
+impl<'a, const N: usize, const W: usize> Draft<'a, N, W> {
+    /// Above a pad.
+    fn begin<const L: usize>(work: &Work<'a, L, N>, swarm: &Swarm<'a>, pad: &Pad) -> Result<Self, PathError> {
+        let Swarm { clearance_m, following, .. } = *swarm;
+        let mut draft =
+            Self { path: Path::new(), transit: work.transit, clearance_m, following, here: pad.start };
+        draft.to(pad.start)?;
+        Ok(draft)
+    }
+
     /// Flies straight to a place; the index of its waypoint.
     fn to(&mut self, place: Point) -> Result<usize, PathError> {
         self.path.push(place, self.clearance_m)?;
+        self.here = place;
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// Flies there around no-fly zones, all at one height.
-    fn around(&mut self, from: &Flat, to: &Flat, height_m: f32) -> Result<usize, PathError> {
+    /// The corners of the way around no-fly zones, and its end.
+    fn way(&self, to: &Flat) -> impl Iterator<Item = Flat> + use<N, W> {
         let mut corners: Vec<Flat, N> = Vec::new();
         // The plan has a finite length, so there is a way between all that it joins.
-        if self.transit.way(from, to, &mut corners).is_ok() {
-            for corner in &corners {
-                self.to(at(corner, height_m))?;
-            }
+        if self.transit.way(&self.here.xy(), to, &mut corners).is_err() {
+            corners.clear();
         }
-        self.to(at(to, height_m))
+        corners.into_iter().chain([*to])
+    }
+
+    /// Flies there around no-fly zones, all at one height.
+    fn around(&mut self, to: &Flat, height_m: f32) -> Result<(), PathError> {
+        self.way(to).try_for_each(|corner| self.to(at(&corner, height_m)).map(|_| ()))
+    }
+
+    /// Comes down to where the first lane begins, which leads to `end`; the index of that waypoint.
+    fn down(&mut self, end: &Flat, mission_m: f32) -> Result<usize, PathError> {
+        let here = self.here.xy();
+        let begin = self.following.map_or(at(&here, mission_m), |following| following.begin(&here, end));
+        self.to(begin)
+    }
+
+    /// Flies there straight as low as pictures are taken; the index of its waypoint.
+    fn low(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
+        let Some(following) = self.following else { return self.to(at(to, mission_m)) };
+        let here = self.here;
+        following.to(&here, to, |corner| self.to(corner).map(|_| ()))?;
+        self.path.last().ok_or(PathError::NotFinite)
+    }
+
+    /// The same around no-fly zones.
+    fn low_around(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
+        self.way(to).try_for_each(|corner| self.low(&corner, mission_m).map(|_| ()))?;
+        self.path.last().ok_or(PathError::NotFinite)
     }
 }
 
@@ -268,11 +308,9 @@ fn stretch<const L: usize, const N: usize, const W: usize>(
     let mission_m = work.heights.mission_m;
     let layer_m = mission_m + f32::from(route.layer) * work.heights.layer_m;
     let place = |number: u32| work.tracks.waypoint(number).ok_or(PathError::NotFinite);
-    let mut here = place(route.ends().0)?;
-    let mut draft = Draft { path: Path::new(), transit: work.transit, clearance_m: swarm.clearance_m };
-    draft.to(pad.start)?;
+    let mut draft = Draft::begin(work, swarm, pad)?;
     draft.to(at(&vehicle.place, layer_m))?;
-    draft.around(&vehicle.place, &here, layer_m)?;
+    draft.around(&place(route.ends().0)?, layer_m)?;
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let (low, high) = (*lanes.start(), *lanes.end());
     photographs.goes_on = most <= high - low;
@@ -283,15 +321,16 @@ fn stretch<const L: usize, const N: usize, const W: usize>(
         let first = divide::original(swarm.done, begin);
         let waypoints = Range { first, end: first + (end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
-        let from = draft.around(&here, &place(begin)?, mission_m)?;
-        here = place(end)?;
-        let to = draft.to(at(&here, mission_m))?;
+        let (begin, end) = (place(begin)?, place(end)?);
+        let from = match *laid {
+            0 => draft.down(&end, mission_m)?,
+            _ => draft.low_around(&begin, mission_m)?,
+        };
+        let to = draft.low(&end, mission_m)?;
         photographs.mark(from, to, waypoints)?;
         *laid += 1;
     }
-    draft.to(at(&here, layer_m))?;
-    let way_home = WayHome { from: here, layer_m, vehicle, photographs };
-    land(draft, &way_home, swarm, pad)
+    land(draft, &WayHome { layer_m, vehicle, photographs }, swarm, pad)
 }
 
 /// The flight home of a vehicle in the air that has no route: it photographs nothing.
@@ -304,32 +343,30 @@ fn homeward<const L: usize, const N: usize, const W: usize>(
 ) -> Result<Flight<W>, PathError> {
     let Manner { waypoint_m, look, trigger } = swarm.manner;
     let layer_m = work.heights.mission_m + f32::from(layer) * work.heights.layer_m;
-    let mut draft = Draft { path: Path::new(), transit: work.transit, clearance_m: swarm.clearance_m };
-    draft.to(pad.start)?;
-    draft.to(at(&vehicle.place, layer_m))?;
+    let draft = Draft::begin(work, swarm, pad)?;
     let photographs = Photographs::new(waypoint_m, look, trigger);
-    let way_home = WayHome { from: vehicle.place, layer_m, vehicle, photographs };
-    land(draft, &way_home, swarm, pad)
+    land(draft, &WayHome { layer_m, vehicle, photographs }, swarm, pad)
 }
 
-/// Where a vehicle begins its way home, in its layer.
+/// A vehicle's way home.
 struct WayHome<'a> {
-    from: Flat,
+    /// Its layer.
     layer_m: f32,
     vehicle: &'a Vehicle,
     /// What it has photographed by then.
     photographs: Photographs,
 }
 
-/// Ends a flight: home in the layer, down, and labelled.
+/// Ends a flight: up, home in the layer, down, and labelled.
 fn land<const N: usize, const W: usize>(
     mut draft: Draft<'_, N, W>,
     way_home: &WayHome<'_>,
     swarm: &Swarm<'_>,
     pad: &Pad,
 ) -> Result<Flight<W>, PathError> {
-    let WayHome { from, layer_m, vehicle, photographs } = *way_home;
-    draft.around(&from, &vehicle.home, layer_m)?;
+    let WayHome { layer_m, vehicle, photographs } = *way_home;
+    draft.to(at(&draft.here.xy(), layer_m))?;
+    draft.around(&vehicle.home, layer_m)?;
     draft.to(at(&vehicle.home, pad.end_z_m))?;
     let mut path = draft.path;
     let seconds = |from: &Point, to: &Point| {

@@ -1,8 +1,6 @@
 //! What a vehicle photographs along its path.
 
-use libm::fmaxf;
-
-use super::{Path, PathError, Range};
+use super::{Path, PathError, Range, Waypoint};
 
 /// Nearer than this along a path is the same place, metres.
 const SAME_PLACE_M: f32 = 1e-2;
@@ -27,36 +25,84 @@ pub enum Trigger {
     None,
 }
 
-/// A stretch of a path on which pictures are taken, metres along it: one picture at each end, others in between. Both
-/// ends are the same where one picture is enough.
+/// A stretch of a path on which pictures are taken, metres along it: one picture at each end, others in between, as far apart
+/// over ground. Both ends are the same where one picture is enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shots {
+pub struct Shots<'p> {
     /// Where the first is taken.
     pub from_m: f32,
     /// Where the last is.
     pub to_m: f32,
-    /// From one to the next; the whole stretch is a multiple of it. 0 for a single picture.
+    /// From one to the next over ground; the whole stretch is a multiple of it. 0 for a single picture.
     pub step_m: f32,
     /// How many there are, at least one.
     pub count: u32,
+    /// The corners of the path from the one end to the other.
+    corners: &'p [Waypoint],
 }
 
-impl Shots {
+/// A straight piece of a stretch: where it begins and how long it is, along the path and over ground, metres.
+#[derive(Clone, Copy)]
+struct Piece {
+    begin_m: f32,
+    length_m: f32,
+    ground_m: f32,
+}
+
+/// The pieces between these corners.
+fn pieces(corners: &[Waypoint]) -> impl Iterator<Item = Piece> {
+    corners.windows(2).map(|ends| {
+        let (begin_m, length_m) = (ends[0].along_m, ends[1].along_m - ends[0].along_m);
+        let step = ends[1].position - ends[0].position;
+        // Level ones are as long over ground, to the bit.
+        let ground_m = if step.z == 0.0 { length_m } else { step.xy().norm() };
+        Piece { begin_m, length_m, ground_m }
+    })
+}
+
+impl<'p> Shots<'p> {
+    fn new(corners: &'p [Waypoint], count: u32) -> Option<Self> {
+        let (from_m, to_m) = (corners.first()?.along_m, corners.last()?.along_m);
+        let ground_m: f32 = pieces(corners).map(|piece| piece.ground_m).sum();
+        let step_m = if count > 1 { ground_m / (count - 1) as f32 } else { 0.0 };
+        Some(Self { from_m, to_m, step_m, count, corners })
+    }
+
     /// Pictures of it that are taken once the vehicle is `along_m` metres along the path.
     fn taken_by(&self, along_m: f32) -> u32 {
         if along_m < self.from_m || along_m.is_nan() {
             0
-        } else if self.step_m > 0.0 {
+        } else if self.step_m > 0.0 && along_m < self.to_m {
             // What is too large for a count is the largest.
-            (((along_m - self.from_m) / self.step_m) as u32).saturating_add(1).min(self.count)
+            ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
         } else {
             self.count
         }
     }
 
-    /// Where picture `k` is taken, metres along the path.
+    /// From its begin over ground to where the path is so long, metres.
+    fn ground_m(&self, along_m: f32) -> f32 {
+        let mut ground_m = 0.0;
+        for piece in pieces(self.corners) {
+            let left_m = along_m - piece.begin_m;
+            if left_m < piece.length_m {
+                return ground_m + left_m * (piece.ground_m / piece.length_m);
+            }
+            ground_m += piece.ground_m;
+        }
+        ground_m
+    }
+
+    /// Where picture `k` is taken, metres along the path; the last of all where there are fewer.
     pub fn place_m(&self, k: u32) -> f32 {
-        self.from_m + self.step_m * k as f32
+        let mut left_m = self.step_m * k as f32;
+        for piece in pieces(self.corners) {
+            if left_m < piece.ground_m {
+                return piece.begin_m + left_m * (piece.length_m / piece.ground_m);
+            }
+            left_m -= piece.ground_m;
+        }
+        self.to_m
     }
 }
 
@@ -141,17 +187,15 @@ impl Photographs {
     }
 
     /// The stretches, in their order along the path they were marked on.
-    pub fn stretches<const W: usize>(&self, path: &Path<W>) -> impl Iterator<Item = Shots> {
+    pub fn stretches<'p, const W: usize>(&self, path: &'p Path<W>) -> impl Iterator<Item = Shots<'p>> {
         let (mut begins, mut ends) = (self.begins, self.ends);
         let waypoints = path.waypoints();
         self.counts.into_iter().map_while(move |count| {
             let (from, to) = (begins.trailing_zeros() as usize, ends.trailing_zeros() as usize);
-            let (from_m, to_m) = (waypoints.get(from)?.along_m, waypoints.get(to)?.along_m);
+            let corners = waypoints.get(from..=to)?;
             begins &= begins - 1;
             ends &= ends - 1;
-            let count = u32::from(count);
-            let step_m = if count > 1 { fmaxf(to_m - from_m, 0.0) / (count - 1) as f32 } else { 0.0 };
-            Some(Shots { from_m, to_m, step_m, count })
+            Shots::new(corners, u32::from(count))
         })
     }
 
@@ -174,7 +218,7 @@ impl Photographs {
 
     /// Where the last picture is taken no further than `along_m` metres along the path; none before the first.
     pub fn last_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
-        let last = |shots: Shots| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
+        let last = |shots: Shots<'_>| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
         self.stretches(path).filter_map(last).last()
     }
 
@@ -223,10 +267,12 @@ mod tests {
         mark_three(&mut photographs);
         let path = path();
         let mut stretches = photographs.stretches(&path);
-        assert_eq!(stretches.next(), Some(Shots { from_m: 0.0, to_m: 30.0, step_m: 7.5, count: 5 }));
+        let first = stretches.next().unwrap();
+        assert_eq!((first.from_m, first.to_m, first.step_m, first.count), (0.0, 30.0, 7.5, 5));
         let second = stretches.next().unwrap();
         assert_eq!((second.from_m, second.to_m, second.place_m(4)), (40.0, 70.0, 70.0));
-        assert_eq!(stretches.next(), Some(Shots { from_m: 80.0, to_m: 80.0, step_m: 0.0, count: 1 }));
+        let third = stretches.next().unwrap();
+        assert_eq!((third.from_m, third.to_m, third.step_m, third.count), (80.0, 80.0, 0.0, 1));
         assert_eq!(stretches.next(), None);
         assert_eq!(photographs.count(&path), 11);
         for (along_m, taken, last_m) in [
@@ -241,6 +287,26 @@ mod tests {
         }
         assert_eq!(photographs.end_m(&path), Some(80.0));
         assert_eq!(Photographs::new(9.0, Look::Ahead, Trigger::Distance).end_m(&path), None);
+    }
+
+    #[test]
+    fn pictures_are_evenly_apart_over_ground_where_the_path_rises_and_falls() {
+        let mut path = Path::<8>::new();
+        // 20 m level, 40 m up at 3 in 4, 20 m down as steep.
+        for (x, z) in [(0.0, 30.0), (20.0, 30.0), (60.0, 60.0), (80.0, 45.0), (80.0, 90.0)] {
+            path.push(Point::new(x, 0.0, z), 1.0).unwrap();
+        }
+        let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Waypoint);
+        photographs.mark(0, 3, Range { first: 0, end: 9 }).unwrap();
+        let shots = photographs.stretches(&path).next().unwrap();
+        assert_eq!((shots.step_m, shots.count), (10.0, 9));
+        for k in 0..9 {
+            let place = path.point_at(shots.place_m(k)).unwrap();
+            assert!((place.x - 10.0 * k as f32).abs() < 1e-3, "{place}");
+            let by = |beside_m: f32| photographs.taken_by(&path, shots.place_m(k) + beside_m);
+            assert_eq!((by(-0.05), by(0.0), by(0.05)), (k, k + 1, k + 1), "{k}");
+        }
+        assert_eq!(photographs.taken_by(&path, 1e9), 9);
     }
 
     #[test]

@@ -96,7 +96,7 @@ impl Camera {
         self.send(now, links);
     }
 
-    fn photograph(&mut self, trigger: Trigger, shots: &Shots, progress_m: f32) {
+    fn photograph(&mut self, trigger: Trigger, shots: &Shots<'_>, progress_m: f32) {
         if progress_m < shots.from_m {
             return;
         }

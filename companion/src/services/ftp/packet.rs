@@ -64,7 +64,7 @@ impl From<UploadError> for No {
 pub type Text = (bool, &'static str);
 
 /// All texts.
-pub const TEXTS: [Text; 8] = [
+pub const TEXTS: [Text; 9] = [
     (false, "Roadmap stored: used from the next start"),
     (false, "Mission stored: used from the next start"),
     (false, "File removed from the next start on"),
@@ -73,6 +73,7 @@ pub const TEXTS: [Text; 8] = [
     (true, "Upload incomplete: old file kept"),
     (true, "Upload is no such file or damaged: old file kept"),
     (true, "Flash failed: old file kept"),
+    (false, "Field stored: used from the next start"),
 ];
 
 /// What is said when a file was removed.
@@ -82,6 +83,7 @@ pub const REMOVED: Text = TEXTS[2];
 pub fn told(file: File, result: Result<(), UploadError>) -> Text {
     TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,
+        (File::Field, Ok(())) => 8,
         (File::Mission, Ok(())) => 1,
         (_, Err(UploadError::Armed)) => 3,
         (_, Err(UploadError::Waiting)) => 4,

@@ -14,7 +14,7 @@ use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, f32_at, positive, put, u16_at, u32_at};
 
 /// Bytes before the first vehicle's share.
-const HEAD_LEN: usize = 44;
+const HEAD_LEN: usize = 60;
 /// Bytes of a vehicle's share.
 const SHARE_LEN: usize = 12;
 /// Bytes of a ring.
@@ -63,6 +63,21 @@ pub struct CoverageHeader {
     pub angle_deg: Option<f32>,
     /// Lanes begin and end so far beyond the edge, metres.
     pub margin_m: f32,
+    /// The ground, where it is not level: the mission needs the field of its `roadmap_crc`.
+    pub ground: Option<Ground>,
+}
+
+/// Ground that is not level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Pictures are taken at least so high above the field, metres.
+    pub height_m: f32,
+    /// And at most so much higher, metres.
+    pub tolerance_m: f32,
+    /// The lowest ground, metres up in the mission frame.
+    pub low_m: f32,
+    /// The highest.
+    pub high_m: f32,
 }
 
 /// What one vehicle brings to the work.
@@ -120,9 +135,11 @@ impl CoverageParts<'_> {
             waypoint_m,
             angle_deg,
             h.margin_m,
-        ];
+        ]
+        .into_iter()
+        .chain(h.ground.map_or([0.0; 4], |g| [g.height_m, g.tolerance_m, g.low_m, g.high_m]));
         let (head, rest) = out.split_at_mut(HEAD_LEN);
-        put(head, 12, numbers.into_iter());
+        put(head, 12, numbers);
         let (shares, rest) = rest.split_at_mut(self.shares.len() * SHARE_LEN);
         put(shares, 0, self.shares.iter().flat_map(|s| [s.weight, s.climb_mps, s.descend_mps]));
         let (rings, vertices) = rest.split_at_mut(self.rings.len() * RING_LEN);
@@ -174,6 +191,7 @@ impl<'a> CoverageView<'a> {
             return Err(FileError::Length.into());
         }
         let angle_deg = f32_at(head, 36);
+        let [height_m, tolerance_m, low_m, high_m] = [44, 48, 52, 56].map(|at| f32_at(head, at));
         let header = CoverageHeader {
             unit: match head[4] {
                 0 => Unit::Lane,
@@ -205,6 +223,7 @@ impl<'a> CoverageView<'a> {
             },
             angle_deg: (!angle_deg.is_nan()).then_some(angle_deg),
             margin_m: f32_at(head, 40),
+            ground: (head[44..60] != [0; 16]).then_some(Ground { height_m, tolerance_m, low_m, high_m }),
         };
         header.check()?;
         let (shares, rest) = b[HEAD_LEN..].split_at(vehicles * SHARE_LEN);
@@ -291,6 +310,17 @@ impl CoverageHeader {
         }
         if !(0.0..=MAX_COORDINATE_M).contains(&self.margin_m) {
             return refuse("margin_m");
+        }
+        let sound = |ground: &Ground| {
+            let ends = [ground.low_m, ground.high_m];
+            positive(ground.height_m, MAX_COORDINATE_M)
+                && positive(ground.tolerance_m, MAX_COORDINATE_M)
+                && ends.iter().all(|m| libm::fabsf(*m) <= MAX_COORDINATE_M)
+                && ground.low_m <= ground.high_m
+                && ground.high_m + ground.height_m <= self.heights.mission_m
+        };
+        if !self.ground.as_ref().is_none_or(sound) {
+            return refuse("ground");
         }
         Ok(())
     }

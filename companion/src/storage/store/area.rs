@@ -85,6 +85,8 @@ pub struct Seal {
     pub len: u32,
     /// CRC-32 at the end of the roadmap file; 0 in the journal.
     pub crc: u32,
+    /// Whether that file is a field.
+    pub field: bool,
 }
 
 impl Seal {
@@ -94,6 +96,7 @@ impl Seal {
         word[4..8].copy_from_slice(&self.sequence.to_le_bytes());
         word[8..12].copy_from_slice(&self.len.to_le_bytes());
         word[12..16].copy_from_slice(&self.crc.to_le_bytes());
+        word[16] = u8::from(self.field);
         close(&mut word);
         word
     }
@@ -103,6 +106,7 @@ impl Seal {
             sequence: u32_at(word, 4),
             len: u32_at(word, 8),
             crc: u32_at(word, 12),
+            field: word[16] == 1,
         })
     }
 }

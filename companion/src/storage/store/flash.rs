@@ -109,18 +109,21 @@ pub enum Erasing {
 pub enum File {
     /// The roadmap.
     Roadmap,
+    /// The heights of uneven ground, in the roadmap's slot: of the two there is one.
+    Field,
     /// The mission.
     Mission,
 }
 
 impl File {
-    /// Both, in the order of a listing.
-    pub const ALL: [Self; 2] = [Self::Roadmap, Self::Mission];
+    /// All, in the order of a listing.
+    pub const ALL: [Self; 3] = [Self::Roadmap, Self::Field, Self::Mission];
 
     /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Roadmap => "roadmap.bin",
+            Self::Field => "field.bin",
             Self::Mission => "mission.bin",
         }
     }

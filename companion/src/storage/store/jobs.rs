@@ -106,7 +106,7 @@ impl Store {
     fn choose(&mut self, erasing: Erasing) -> Option<Job> {
         let may_erase = erasing == Erasing::Allowed;
         match self.upload {
-            Some((File::Roadmap, UploadState::Opening)) => {
+            Some((File::Roadmap | File::Field, UploadState::Opening)) => {
                 let slot = self.target()?;
                 return match self.slots[slot] {
                     Condition::Clean => Some(Job::MarkUsed(Area::Slot(slot))),
@@ -124,7 +124,7 @@ impl Store {
                     },
                 };
             }
-            Some((File::Roadmap, state)) => {
+            Some((File::Roadmap | File::Field, state)) => {
                 if let Some(slot) = self.open_slot() {
                     if self.window.block().is_some() {
                         return Some(Job::Flush(slot));
@@ -244,7 +244,8 @@ impl Store {
 
     fn check(&mut self, slot: Area, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
         let len = self.window.file_len();
-        if (done == 0 && !Self::is_roadmap(bytes, len)) || bytes.is_empty() {
+        let field = matches!(self.upload, Some((File::Field, _)));
+        if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {
             return self.end(Err(UploadError::Damaged));
         }
         // The file's own CRC is its last four bytes, and covers all others.
@@ -264,7 +265,7 @@ impl Store {
         }
         let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
         let newest = self.slots.iter().map(number).max().unwrap_or(0).max(self.forgotten);
-        self.job = Job::Seal(slot, Seal { sequence: newest + 1, len, crc });
+        self.job = Job::Seal(slot, Seal { sequence: newest + 1, len, crc, field });
     }
 
     fn sealed(&mut self, area: Area, seal: Seal) {

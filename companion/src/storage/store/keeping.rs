@@ -30,7 +30,7 @@ impl Store {
                     let number = |c: &Condition| c.seal().map_or(0, |seal| seal.sequence);
                     let newest = self.journal.halves.iter().map(number).max().unwrap_or(0);
                     self.journal.compacting = Some(Compaction { half, at, step: 3, mission });
-                    Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0 })
+                    Job::Seal(Area::Half(half), Seal { sequence: newest + 1, len: 0, crc: 0, field: false })
                 }
             });
         }

@@ -6,7 +6,7 @@ use super::flash::{Erasing, File};
 use super::upload_state::{UploadError, UploadState};
 use super::window::{Taken, WINDOW};
 use crate::storage::mission_file::MissionView;
-use planner_core::roadmap;
+use planner_core::{field, roadmap};
 
 impl Store {
     /// How far the upload has come, if there is one.
@@ -26,7 +26,7 @@ impl Store {
         if self.layout.stalls && erasing == Erasing::Forbidden {
             return Err(UploadError::Armed);
         }
-        if file == File::Roadmap {
+        if file != File::Mission {
             let slot = self.target().ok_or(UploadError::Waiting)?;
             if self.slots[slot] != Condition::Clean && erasing == Erasing::Forbidden {
                 return Err(UploadError::Armed);
@@ -34,7 +34,7 @@ impl Store {
             self.erasure_failed = false;
         }
         self.window.reset();
-        let state = if file == File::Roadmap { UploadState::Opening } else { UploadState::Taking };
+        let state = if file == File::Mission { UploadState::Taking } else { UploadState::Opening };
         self.upload = Some((file, state));
         Ok(())
     }
@@ -43,7 +43,7 @@ impl Store {
     pub fn take(&mut self, offset: u32, piece: &[u8]) -> Taken {
         match self.upload {
             Some((File::Mission, UploadState::Taking)) => self.window.take(offset, piece, WINDOW as u32),
-            Some((File::Roadmap, UploadState::Taking)) => {
+            Some((File::Roadmap | File::Field, UploadState::Taking)) => {
                 self.window.take(offset, piece, self.layout.slot_len - DATA_AT)
             }
             _ => Taken::Later,
@@ -62,7 +62,7 @@ impl Store {
                 UploadState::Closing
             }
             (File::Mission, Some(_)) => UploadState::Ended(Err(UploadError::Damaged)),
-            (File::Roadmap, Some(_)) => UploadState::Closing,
+            (File::Roadmap | File::Field, Some(_)) => UploadState::Closing,
         };
         self.upload = Some((file, state));
         if let UploadState::Ended(result) = state {
@@ -108,8 +108,12 @@ impl Store {
         self.slots.iter().position(|slot| *slot == Condition::Open).map(Area::Slot)
     }
 
-    /// Whether the first bytes are those of a roadmap file of this length that can be read.
-    pub(super) fn is_roadmap(bytes: &[u8], len: u32) -> bool {
-        bytes.first_chunk().is_some_and(|head| roadmap::declared_len(head) == Ok(len as usize))
+    /// Whether the first bytes are those of a roadmap file, or a field, of this length that can be read.
+    pub(super) fn declares(field: bool, bytes: &[u8], len: u32) -> bool {
+        let declared = match field {
+            true => bytes.first_chunk().and_then(|head| field::declared_len(head).ok()),
+            false => bytes.first_chunk().and_then(|head| roadmap::declared_len(head).ok()),
+        };
+        declared == Some(len as usize)
     }
 }

@@ -64,7 +64,7 @@ fn planned(
     }
     let mut known = obstacles.to_vec();
     let mut out = Path::<64>::new();
-    let found = plan(&transit, request, &mut known, &mut out);
+    let found = plan(&transit, None, request, &mut known, &mut out);
     let way = found.map(|()| out.waypoints().iter().map(|w| w.position).collect::<StdVec<_>>());
     if let Ok(points) = &way {
         assert_eq!(points[0], request.here);

@@ -53,6 +53,7 @@ fn header() -> CoverageHeader {
         },
         angle_deg: None,
         margin_m: 0.0,
+        ground: None,
     }
 }
 
@@ -102,7 +103,7 @@ fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Erro
     let view = MissionView::parse(file).ok()?;
     let Kind::Coverage(area) = view.kind() else { return None };
     let (ws, schedule, plan) = memory;
-    let request = coverage::Request { mission: &view, view: area, gates_most: 128, done: &[] };
+    let request = coverage::Request { mission: &view, view: area, gates_most: 128, field: None, done: &[] };
     Some(coverage::plan::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan))
 }
 
