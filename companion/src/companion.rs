@@ -86,7 +86,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mut neighbours =
             Neighbours::new(&config.roster, config.system_id, config.cruise_mps.max(config.climb_mps));
         if let Some(down_s) = config.division {
-            neighbours.form_fleet(down_s);
+            neighbours.form_fleet(down_s, config.ground);
         }
         Self {
             now: Instant::ZERO,

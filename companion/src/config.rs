@@ -67,6 +67,8 @@ pub struct Config<const V: usize> {
     /// Whether its mission is an area, which is divided again where a vehicle is lost: how long a lost vehicle may take until
     /// it is down, seconds.
     pub division: Option<f32>,
+    /// The ground of an area that is not level: between pads nobody knows more.
+    pub ground: Option<Ground>,
     /// Whether a new start leaves out what of an area is photographed already.
     pub resumes: bool,
     /// System ids whose commands, parameters and files count; 0 is no id.
@@ -133,6 +135,7 @@ impl<const V: usize> Config<V> {
             swarm_hz: 5,
             geofence: None,
             division: None,
+            ground: None,
             resumes: true,
             ground_stations: USUAL_GROUND_STATIONS,
         }
@@ -143,6 +146,19 @@ impl<const V: usize> Config<V> {
         let at = self.roster.iter().position(|e| e.system_id == self.system_id)?;
         Some((at as u16, &self.roster[at]))
     }
+}
+
+/// Ground that is not level.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ground {
+    /// Pictures are taken at least so high above the field, metres.
+    pub height_m: f32,
+    /// And at most so much higher, metres.
+    pub tolerance_m: f32,
+    /// The lowest ground, metres up in the mission frame.
+    pub low_m: f32,
+    /// The highest.
+    pub high_m: f32,
 }
 
 /// Why there is no plan.

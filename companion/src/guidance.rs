@@ -156,6 +156,8 @@ pub struct Guidance {
     pub aside: bool,
     /// Height over the ground at which the autopilot lands by itself, metres.
     low_m: f32,
+    /// The lowest ground between pads, as far as that is known, metres; infinite where those say how low.
+    lowest_ground_m: f32,
     /// Acceleration sent last, with what holds the vehicle on the reference.
     sent_acceleration: Point,
 }
@@ -230,6 +232,7 @@ impl Guidance {
             nowhere: false,
             trapped_since: None,
             aside: false,
+            lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
             low_m: libm::fminf(config.required_clearance_m - config.radius_m, LOW_MOST_M),
             sent_acceleration: Point::zeros(),
         }

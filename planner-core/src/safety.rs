@@ -304,6 +304,8 @@ impl Heard<'_> {
     pub fn set(&self, bounds: &Bounds, ahead_s: f32) -> Set {
         let mut set = Set::at(self.position);
         if self.grounded {
+            // How high it lies may be unknown.
+            set.add_column(self.column_to_m);
             return set;
         }
         if self.age_s > FRESH_S {

@@ -85,7 +85,10 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("transit::Transit::way", "the same"),
     ("transit::Transit::corners", "constant"),
     ("transit::Transit::forbids", "edges of no-fly zones"),
-    ("around::plan, 128 things", "320² looks at most, each at edges of zones and all things"),
+    (
+        "around::plan, 128 things",
+        "320² looks at most, each at edges of zones, all things, half nodes of a field",
+    ),
     ("around::plan_vehicle, 128 things", "the same"),
     ("tracks::build, 256 vertices", "lanes · vertices, and 2000 looks at the lanes' order, each one way"),
     ("tracks::build, 512 lanes", "the same"),

@@ -11,6 +11,17 @@ use host_sim::result::MissionResult;
 use host_sim::swarm::Flight;
 use host_sim::{scenario, swarm};
 
+/// Why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the lost one hovers
+/// where it was to fly.
+pub const EXPLAINED: [&str; 6] = [
+    "Neighbours still silent: landing",
+    "Vehicle on the path for 90 s: landing",
+    "Yielded for 60 s: landing",
+    "planning the way home",
+    "No way around: landing",
+    "No progress for 10 min: landing",
+];
+
 /// Flies a coverage mission: its result with what its pictures show, and what was said.
 ///
 /// # Errors

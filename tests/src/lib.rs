@@ -7,6 +7,7 @@ pub mod covered;
 pub mod downfall;
 pub mod edge;
 pub mod fidelity;
+pub mod hills;
 pub mod hostile;
 pub mod logs;
 pub mod meeting;

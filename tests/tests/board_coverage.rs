@@ -1,12 +1,15 @@
-//! Three boards plan an area from the mission file in their flash, divide it alike and photograph it. The pictures are judged
+//! Three boards plan an area above a hill from mission file and field in their flash, divide it alike and photograph it. The pictures are judged
 //! by where they were truly taken. Where one of them is switched off in flight, the other two divide what it left.
 
+use flockmate_tests::hills::Hills;
 use flockmate_tests::vehicle::mission;
 use flockmate_tests::{board, covered};
 use host_sim::mission::Mission;
 use host_sim::swarm::Flight;
+use rand_core::SeedableRng as _;
+use rand_pcg::Pcg32;
 
-/// A field with a zone that nobody enters, small: boards in QEMU are no faster than a few times the clock.
+/// An area with a zone that nobody enters, small: boards in QEMU are no faster than a few times the clock.
 const FIELD: &str = r#"
 [area]
 polygon = [[0, 0], [70, 0], [80, 45], [10, 50]]
@@ -37,7 +40,14 @@ radio_loss = 0.1
 fn three_boards_photograph_an_area_whole() {
     let Some(program) = board::program("flockmate") else { return };
     let folder = tempfile::tempdir().expect("a temporary directory");
-    let mut mission = mission(FIELD);
+    let hills = Hills::new(&mut Pcg32::seed_from_u64(4), 25.0);
+    let text = hills.under(FIELD, &folder.path().join("hills.asc"), 4.0);
+    let mut mission = mission(&text);
+    let up_m = |place: [f64; 2]| hills.at(place[0], place[1]);
+    let heights_m = [[0.0, 0.0], [70.0, 0.0], [80.0, 45.0], [10.0, 50.0], [40.0, 24.0]].map(up_m);
+    let [low_m, high_m] =
+        [f64::min, f64::max].map(|which| heights_m.into_iter().reduce(which).expect("some"));
+    assert!(high_m - low_m > 3.0, "it is level: {heights_m:?}");
     board::put_on_boards(&mut mission, &program, folder.path());
     let (result, log) = covered::fly(&mut mission).expect("the boards fly it");
     let said = || log.iter().map(|event| (event.t_s, event.vehicle, &event.text)).collect::<Vec<_>>();

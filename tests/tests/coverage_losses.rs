@@ -37,17 +37,6 @@ struct Outcome {
     text: String,
 }
 
-/// Why a vehicle that was not struck lands short of its part: the rule for those that no majority hears, or the lost one hovers
-/// where it was to fly.
-const EXPLAINED: [&str; 6] = [
-    "Neighbours still silent: landing",
-    "Vehicle on the path for 90 s: landing",
-    "Yielded for 60 s: landing",
-    "planning the way home",
-    "No way around: landing",
-    "No progress for 10 min: landing",
-];
-
 const KINDS: [&str; 6] =
     ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
 
@@ -88,7 +77,9 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     };
     let MissionResult { vehicles, safety, coverage, .. } = result;
     let coverage = coverage.expect("it has an area");
-    let short = |end: &str| end != "Done" && !end.starts_with("no goal");
+    // By a wrong estimate it lands beside its pad, all of its part flown.
+    let whole = ["Done", "no goal", "Aborted: Landed beside its goal"];
+    let short = |end: &str| !whole.iter().any(|whole| end.starts_with(whole));
     // None of them waits to take over: a vehicle without a part takes none.
     let had_none = |v: &VehicleResult| v.id == vehicle || v.end.starts_with("no goal");
     Some(Outcome {
@@ -99,7 +90,7 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         twice: coverage.twice,
         landed_short: vehicles.iter().filter(|v| v.id != vehicle && short(&v.end)).count(),
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
-        explained: EXPLAINED.iter().any(|row| log.contains(row)) || vehicles.iter().all(had_none),
+        explained: covered::EXPLAINED.iter().any(|row| log.contains(row)) || vehicles.iter().all(had_none),
         text: log,
     })
 }

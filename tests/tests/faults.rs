@@ -82,7 +82,7 @@ const CASES: &[Case] = &[
     Case { script: "kind = 'pause-order'\nduration_s = 8", then: GoesOn, says: &["Resumed"] },
     Case { script: "kind = 'return-order'", then: Out, says: &["Flying back to the start", "Landing on the pad", CANCELLED] },
     Case { script: "kind = 'land-order'", then: Out, says: &["Landing as commanded", CANCELLED] },
-    Case { script: "kind = 'bad-roadmap'", then: Out, says: &["Roadmap missing or wrong: mission aborted"] },
+    Case { script: "kind = 'bad-roadmap'", then: Out, says: &["Roadmap or field missing or wrong: mission aborted"] },
 ];
 
 const CANCELLED: &str = "Start cancelled as commanded";

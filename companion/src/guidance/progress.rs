@@ -105,7 +105,7 @@ impl Guidance {
         let end_m = plan.path.point_at(plan.path.length_m()).map_or(pad_m, |p| p.z - plan.descent_m);
         match self.on_path {
             true if self.reached_end(&plan.path) => end_m,
-            true => pad_m.min(end_m),
+            true => pad_m.min(end_m).min(self.lowest_ground_m),
             false => pad_m,
         }
     }

@@ -292,6 +292,7 @@ pub fn plan<
         schedule: mission.header().schedule,
         gates_most,
         done: &[],
+        layers_held: 0,
         following: request.following(&vehicles)?,
     };
     flights::plan(&work, &ws.routes, &Swarm { done, ..swarm }, schedule, out)?;

@@ -436,6 +436,7 @@ impl<'a> MissionView<'a> {
         {
             (config.climb_mps, config.descend_mps) = (share.climb_mps, share.descend_mps);
             config.division = Some(view.down_s());
+            config.ground = view.header().ground;
         }
         config.radius_m = own.radius_m;
         config.required_clearance_m = own.task.required_clearance_m;

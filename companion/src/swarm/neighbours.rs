@@ -24,7 +24,7 @@ use self::bounds::*;
 use self::contact::Contact;
 pub(crate) use self::met::{Met, Reach};
 use crate::autopilot::telemetry::SequenceFilter;
-use crate::config::{REACHES_ALL_M, RosterEntry};
+use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{Echo, Lateness};
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, WAITING};
 use crate::swarm::fleet::Fleet;
@@ -55,6 +55,8 @@ pub struct Neighbours<const V: usize> {
     own_rank: u16,
     /// What all agree on in a coverage mission.
     fleet: Option<Fleet<V>>,
+    /// The ground of an area that is not level.
+    ground: Option<Ground>,
     /// With the vehicle of this rank the next report of all begins.
     roster_next: usize,
 }
@@ -76,6 +78,7 @@ impl<const V: usize> Neighbours<V> {
             relay_next: 0,
             own_rank: 0,
             fleet: None,
+            ground: None,
             roster_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {

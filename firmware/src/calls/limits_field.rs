@@ -34,6 +34,11 @@ pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
         assert!(written.is_err(), "{columns} by {rows}, at most {MAX_NODES}");
     }
     let length = to.call("field::write", || field::write(&good, &NODES, &mut file)).expect("a field");
+    for bytes in [&file, &[0; BYTES]] {
+        let head = bytes.first_chunk().expect("it is longer");
+        let declared = to.call("field::declared_len", || field::declared_len(head));
+        assert_eq!(declared.is_ok_and(|declared| declared == length), bytes[0] != 0);
+    }
     for cut in 0..length {
         let parsed = to.call("field::FieldView::parse", || FieldView::parse(&file[..cut]));
         assert!(parsed.is_err());

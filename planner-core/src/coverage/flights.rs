@@ -66,6 +66,8 @@ pub struct Swarm<'a> {
     pub gates_most: usize,
     /// Waypoints of the area that the lanes leave out, in rising order.
     pub done: &'a [Range],
+    /// Layers that are not free, a bit each.
+    pub layers_held: u64,
     /// What lanes, and ways between them, follow where the ground is not level: all below the lowest layer.
     pub following: Option<Following<'a>>,
 }
@@ -89,14 +91,14 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
         return Err(PlanError::Terminals);
     }
     out.flights.clear();
-    // The layers above those of the routes are free.
-    let mut layer = routes.routes.len() as u8;
+    let used = |layer: u8| routes.routes.iter().any(|route| route.layer == layer);
+    let mut layers = free_layers(swarm.layers_held).filter(|layer| !used(*layer));
     for (index, pad) in swarm.pads.iter().enumerate() {
         let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
             Some(route) => flight(work, route, swarm, pad),
             None if pad.aloft => {
-                layer = layer.saturating_add(1);
-                homeward(work, layer, &work.vehicles[index], swarm, pad)
+                // There are more layers than vehicles.
+                homeward(work, layers.next().unwrap_or(u8::MAX), &work.vehicles[index], swarm, pad)
             }
             None => grounded(pad),
         };
@@ -110,6 +112,11 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
     }
     out.seal(&swarm.schedule);
     Ok(())
+}
+
+/// The layers that no vehicle holds, from the lowest on.
+pub(super) fn free_layers(held: u64) -> impl Iterator<Item = u8> {
+    (1..64).filter(move |layer| held >> layer & 1 == 0)
 }
 
 /// The vehicle that flies longest leaves first, each other one as early as those before it allow. One that they leave no

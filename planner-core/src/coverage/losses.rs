@@ -36,6 +36,8 @@ pub struct Workspace<const L: usize, const K: usize> {
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,
     rest: Plan<K>,
+    /// Layers of vehicles that left: they may be on their way home there.
+    held: u64,
 }
 
 impl<const L: usize, const K: usize> Workspace<L, K> {
@@ -47,6 +49,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
             vehicles: Vec::new(),
             pads: Vec::new(),
             rest: Plan::new(),
+            held: 0,
         }
     }
 
@@ -63,6 +66,7 @@ impl<const L: usize, const K: usize> Workspace<L, K> {
         done: &[Range],
     ) -> Result<(&'a Tracks<L>, &'a [Range]), CoverageError> {
         self.done.clear();
+        self.held = 0;
         let all = tracks.waypoint_count();
         for range in done {
             let range = Range { first: range.first, end: range.end.min(all) };
@@ -141,6 +145,9 @@ pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, con
     }
     note_done(fates, ws, out)?;
     place(loss, ws, out)?;
+    for route in routes.routes.iter().filter(|route| !fates[usize::from(route.vehicle)].lives) {
+        ws.held |= layer_bit(route.layer);
+    }
     routes.routes.clear();
     match divide::left(work.tracks, ws.done.ranges(), work.transit, &mut ws.left) {
         Ok(()) => share_out(work, fates, ws, pack, routes)?,
@@ -148,8 +155,13 @@ pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, con
         Err(error) => return Err(error.into()),
     }
     let work = Work { tracks: &ws.left, vehicles: &ws.vehicles, ..*work };
-    let swarm = Swarm { pads: &ws.pads, done: ws.done.ranges(), ..*swarm };
+    let swarm = Swarm { pads: &ws.pads, done: ws.done.ranges(), layers_held: ws.held, ..*swarm };
     Ok(flights::plan(&work, routes, &swarm, schedule, out)?)
+}
+
+/// The bit of a layer.
+const fn layer_bit(layer: u8) -> u64 {
+    1u64.wrapping_shl(layer as u32)
 }
 
 /// Adds what each vehicle has done, or keeps, to what was done before.
@@ -210,7 +222,9 @@ fn share_out<const L: usize, const N: usize, const K: usize>(
     pack::binpat(&Work { tracks: &ws.left, vehicles: &survivors, ..*work }, pack, &mut ws.rest)?;
     for route in &ws.rest.routes {
         let vehicle = living().nth(usize::from(route.vehicle)).ok_or(CoverageError::Vehicles)?;
-        let route = Route { vehicle: vehicle as u8, ..*route };
+        let layer = flights::free_layers(ws.held).nth(usize::from(route.layer).saturating_sub(1));
+        let layer = layer.ok_or(CoverageError::Vehicles)?;
+        let route = Route { vehicle: vehicle as u8, layer, ..*route };
         routes.routes.push(route).map_err(|_| CoverageError::Vehicles)?;
     }
     Ok(())

@@ -52,10 +52,15 @@ impl<const W: usize> Flight<W> {
         self.path.waypoints().last().filter(|_| self.task.flies()).map_or(0.0, landed_s)
     }
 
-    /// Timed segments that [`cut`] makes of it.
+    /// Timed segments that [`cut`] makes of it, by the same lengths: as those are rounded.
     pub(crate) fn pieces(&self) -> usize {
-        let legs = self.path.waypoints().windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
-        let lengths = [self.climb_m, self.descent_m].into_iter().chain(legs);
+        let waypoints = self.path.waypoints();
+        let legs = waypoints.windows(2).map(|leg| leg[1].along_m - leg[0].along_m);
+        let down_m = |waypoint: Option<&Waypoint>, m: f32| {
+            waypoint.map_or(0.0, |w| libm::fabsf(w.position.z - (w.position.z - m)))
+        };
+        let ends = [down_m(waypoints.first(), self.climb_m), down_m(waypoints.last(), self.descent_m)];
+        let lengths = ends.into_iter().chain(legs);
         let moving = lengths.map(|length_m| parts(length_m, self.piece_m)).fold(0, u32::saturating_add);
         let holds = self.path.waypoints().iter().filter(|w| w.leave_s > w.at_s).count();
         (moving as usize).saturating_add(2 + holds)

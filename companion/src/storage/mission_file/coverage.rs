@@ -12,6 +12,7 @@ use planner_core::flight::Trigger;
 
 use super::error::MissionError;
 use super::numbers::{MAX_SPEED_MPS, f32_at, positive, put, u16_at, u32_at};
+pub use crate::config::Ground;
 
 /// Bytes before the first vehicle's share.
 const HEAD_LEN: usize = 60;
@@ -65,19 +66,6 @@ pub struct CoverageHeader {
     pub margin_m: f32,
     /// The ground, where it is not level: the mission needs the field of its `roadmap_crc`.
     pub ground: Option<Ground>,
-}
-
-/// Ground that is not level.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ground {
-    /// Pictures are taken at least so high above the field, metres.
-    pub height_m: f32,
-    /// And at most so much higher, metres.
-    pub tolerance_m: f32,
-    /// The lowest ground, metres up in the mission frame.
-    pub low_m: f32,
-    /// The highest.
-    pub high_m: f32,
 }
 
 /// What one vehicle brings to the work.
@@ -178,8 +166,9 @@ impl<'a> CoverageView<'a> {
     /// A vehicle that nobody hears any more is down after so many seconds, from the highest layer.
     pub fn down_s(&self) -> f32 {
         let Heights { mission_m, layer_m } = self.header.heights;
+        let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
         let slowest_mps = self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
-        DOWN_S + (mission_m + layer_m * self.shares.len() as f32) / slowest_mps
+        DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
     }
 
     /// Checks the block of a mission of so many vehicles.

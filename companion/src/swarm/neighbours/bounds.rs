@@ -10,6 +10,8 @@ pub(crate) const STANDING_MPS: f32 = 0.3;
 pub(super) const RESTART_MS: u32 = 10_000;
 /// Heard within this time counts as heard: four positions and intents.
 pub(super) const LATELY: Duration = Duration::from_millis(800);
+/// Further from its pad, seen from above, a vehicle on its plan is not on the way up from it or down to it, metres.
+pub(super) const OVER_PAD_M: f32 = 10.0;
 /// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
 /// 20 s later; this leaves it 20 s to come down.
 pub(super) const DEAD: Duration = Duration::from_millis(DEAD_MS);

@@ -7,6 +7,7 @@ use planner_core::detour::{KeepOff, Nature};
 use planner_core::flight::PROGRESS_ERROR_M;
 
 use super::bounds::*;
+use super::places::Field;
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::link::echo::Lateness;
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, LANDED, OUT, POINTS, WAITING};
@@ -237,12 +238,25 @@ impl Contact {
         }
     }
 
-    /// Where it may be from now on, `apart_m` around it. Over a field, which is level, it lies on the ground that it reported.
+    /// How high it lies at most, once it came down from a place: on the ground that it reported, which away from pads is the
+    /// lowest there is. Then it is below what it flew along, which is over the ground by [`Ground::height_m`] but for what it
+    /// strayed; above its pad, and where it came down already, that is not known.
+    pub(super) fn lies_at_most_m(&self, field: Field, place: &Point) -> f32 {
+        let Some(ground) = field.ground.filter(|ground| self.floor_m <= ground.low_m) else {
+            return self.floor_m;
+        };
+        let away = self.pad.is_some_and(|pad| (pad - place).xy().norm() > OVER_PAD_M);
+        let below_m =
+            if away && !self.tells(DETOURS | OUT) && !self.column { ground.height_m / 2.0 } else { 0.0 };
+        libm::fmaxf(self.floor_m, libm::fminf(ground.high_m, place.z - below_m))
+    }
+
+    /// Where it may be from now on, `apart_m` around it. Over a field it lies on the ground that it reported.
     pub(super) fn obstacles(
         &self,
         now: Instant,
         apart_m: f32,
-        over_field: bool,
+        field: Option<Field>,
         mut tell: impl FnMut(KeepOff),
     ) {
         let here = self.state.position;
@@ -266,10 +280,12 @@ impl Contact {
                 tell(KeepOff { from: pad, to: pad, ..place(apart_m) });
             }
             let down = !self.heard_within(now, DOWN);
-            if down && over_field && !self.floor_m.is_nan() {
-                let low = |at: Point| Point::new(at.x, at.y, self.floor_m);
-                return self
-                    .stretch(|at| tell(KeepOff { from: low(at), to: low(at), ..place(apart_m + VAGUE_M) }));
+            if let Some(field) = field.filter(|_| down && !self.floor_m.is_nan()) {
+                let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
+                return self.stretch(|at| {
+                    let from = low(at, self.lies_at_most_m(field, &at));
+                    tell(KeepOff { from, to: low(at, self.floor_m), ..place(apart_m + VAGUE_M) });
+                });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
             self.stretch(|at| tell(column(at, nature)));

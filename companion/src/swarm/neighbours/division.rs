@@ -1,6 +1,7 @@
 //! What the fleet of a coverage mission agrees on follows from which vehicles hear each other.
 
 use super::*;
+use crate::config::Ground;
 use crate::link::roster::{ENTRIES, Roster};
 use crate::swarm::fleet::{HEARD, Hearing, Limits, Own};
 
@@ -8,8 +9,10 @@ use crate::swarm::fleet::{HEARD, Hearing, Limits, Own};
 const LATELY: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
-    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds.
-    pub(crate) fn form_fleet(&mut self, down_s: f32) {
+    /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds;
+    /// `ground` is what is not level.
+    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>) {
+        self.ground = ground;
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
     }

@@ -105,7 +105,8 @@ impl<const V: usize> Neighbours<V> {
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
         let top = contact.climbs_to().filter(|_| age_s > OLD_S && !lies);
-        here.z = if lies { libm::fminf(contact.floor_m, here.z) } else { top.unwrap_or(here.z) };
+        let highest_m = self.field().map_or(contact.floor_m, |field| contact.lies_at_most_m(field, &here));
+        here.z = if lies { libm::fminf(highest_m, here.z) } else { top.unwrap_or(here.z) };
         let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
         let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
         let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
@@ -125,7 +126,7 @@ impl<const V: usize> Neighbours<V> {
             extent_m: contact.extent_m,
             rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
-            column_to_m: (down && !grounded).then_some(floor_m),
+            column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
         };
         Some(Met {
             id: contact.id,

@@ -5,17 +5,30 @@ use planner_core::detour::{KeepOff, Nature};
 
 use super::contact::Contact;
 use super::{Neighbours, SKY_M, VAGUE_M};
+use crate::config::Ground;
 use crate::link::intent::{GROUNDED, LANDED};
 use crate::time::Instant;
 
+/// What is known of the ground of an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Field {
+    /// Where it is not level.
+    pub(super) ground: Option<Ground>,
+}
+
 impl<const V: usize> Neighbours<V> {
+    /// The ground, where the mission is an area.
+    pub(super) fn field(&self) -> Option<Field> {
+        self.fleet.is_some().then_some(Field { ground: self.ground })
+    }
+
     /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
     /// is far enough.
     pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, apart_m, self.fleet.is_some(), tell);
+            contact.obstacles(now, apart_m, self.field(), tell);
         }
     }
 
@@ -32,7 +45,7 @@ impl<const V: usize> Neighbours<V> {
     /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
     pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
-        placed.for_each(|c| c.obstacles(now, apart_m, self.fleet.is_some(), &mut tell));
+        placed.for_each(|c| c.obstacles(now, apart_m, self.field(), &mut tell));
     }
 
     /// Where vehicles that land without looking may come nearer than `apart_m`.

@@ -1,0 +1,90 @@
+//! Random hills as height maps, and areas above them.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use rand_core::Rng;
+
+use crate::areas;
+
+/// Half the side of a random map, metres.
+const HALF_M: f64 = 600.0;
+
+/// Hills, and noise from cell to cell.
+pub struct Hills {
+    cell_m: f64,
+    side: usize,
+    heights_m: Vec<f64>,
+}
+
+impl Hills {
+    /// Hills up to so high, and hollows not so deep, metres.
+    pub fn new(random: &mut impl Rng, most_m: f64) -> Self {
+        let cell_m = 2.0 + (18.0 * areas::unit(random)).round();
+        let side = (2.0 * HALF_M / cell_m).ceil() as usize;
+        let hills: Vec<[f64; 4]> = (0..random.next_u32() % 12)
+            .map(|_| {
+                let at = || 2.0 * HALF_M;
+                let place = [areas::unit(random) * at() - HALF_M, areas::unit(random) * at() - HALF_M];
+                let (wide, high) = (20.0 + 200.0 * areas::unit(random), most_m * (areas::unit(random) - 0.3));
+                [place[0], place[1], wide, high]
+            })
+            .collect();
+        let tilt = [0, 1].map(|_| 0.2 * (areas::unit(random) - 0.5));
+        // Level, trees here and there, or all rough.
+        let (share, rough) = [(0.0, 0.0), (0.02, 15.0), (1.0, 2.0)][random.next_u32() as usize % 3];
+        let mut heights_m = Vec::with_capacity(side * side);
+        for row in 0..side {
+            for column in 0..side {
+                let at = [column, row].map(|k| (k as f64 + 0.5) * cell_m - HALF_M);
+                let hill = |[x, y, wide, high]: &[f64; 4]| {
+                    high * (-((at[0] - x).powi(2) + (at[1] - y).powi(2)) / (wide * wide)).exp()
+                };
+                let noise = if areas::unit(random) < share { rough * areas::unit(random) } else { 0.0 };
+                let smooth: f64 = hills.iter().map(hill).sum();
+                let height = 300.0 + smooth + tilt[0] * at[0] + tilt[1] * at[1] + noise;
+                heights_m.push((height * 100.0).round() / 100.0);
+            }
+        }
+        Self { cell_m, side, heights_m }
+    }
+
+    /// The height at a place, metres.
+    pub fn at(&self, x: f64, y: f64) -> f64 {
+        let [column, row] = [x, y].map(|at| ((at + HALF_M) / self.cell_m) as usize);
+        self.heights_m[row * self.side + column]
+    }
+
+    /// As a file.
+    pub fn asc(&self) -> String {
+        let mut text = format!(
+            "ncols {0}\nnrows {0}\nxllcorner {1}\nyllcorner {1}\ncellsize {2}\n",
+            self.side, -HALF_M, self.cell_m
+        );
+        for row in self.heights_m.chunks_exact(self.side).rev() {
+            for height in row {
+                let _ = write!(text, "{height} ");
+            }
+            text.push('\n');
+        }
+        text
+    }
+
+    /// A scenario with these hills under its area, written to a file, and its vehicles on them.
+    pub fn under(&self, text: &str, path: &Path, tolerance_m: f64) -> String {
+        std::fs::write(path, self.asc()).expect("there is room");
+        let terrain =
+            format!("terrain = \"{}\"\nterrain_tolerance_m = {tolerance_m:.1}\ncamera = ", path.display());
+        let origin_m = self.at(0.0, 0.0);
+        let stand = |line: &str| match line.strip_prefix("start = [") {
+            Some(numbers) => {
+                let numbers = numbers.trim_end_matches(']').split(", ").map(str::parse);
+                let place: Vec<f64> = numbers.map(|number| number.expect("a number")).collect();
+                let up_m = self.at(place[0], place[1]) - origin_m;
+                format!("start = [{}, {}, {up_m:.2}]\n", place[0], place[1])
+            }
+            None => format!("{line}\n"),
+        };
+        text.replace("camera = ", &terrain).lines().map(stand).collect()
+    }
+}
