@@ -72,7 +72,7 @@ pub const REJOIN_WINDOW_M: f32 = 5.0;
 pub const LOST_WINDOW_M: f32 = 2.5;
 /// The same once the setpoint stands, metres: the raw point may be as far ahead as a second is flown.
 const SETTLE_WINDOW_M: f32 = 3.0;
-/// A nearest point this near the end of the window lies beyond it, metres.
+/// A nearest point so near the window's end lies beyond it, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Less than this is no progress, metres.
 const PROGRESS_M: f32 = 0.25;
@@ -156,7 +156,7 @@ pub struct Guidance {
     pub aside: bool,
     /// Height over the ground at which the autopilot lands by itself, metres.
     low_m: f32,
-    /// The lowest ground between pads, as far as that is known, metres; infinite where those say how low.
+    /// The lowest ground between pads, metres; infinite where those say how low.
     lowest_ground_m: f32,
     /// Acceleration sent last, with what holds the vehicle on the reference.
     sent_acceleration: Point,

@@ -7,11 +7,18 @@ use planner_core::detour::{KeepOff, Nature};
 use planner_core::flight::PROGRESS_ERROR_M;
 
 use super::bounds::*;
-use super::places::Field;
 use crate::autopilot::telemetry::SequenceFilter;
+use crate::config::Ground;
 use crate::link::echo::Lateness;
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, LANDED, OUT, POINTS, WAITING};
 use crate::time::{Duration, Instant};
+
+/// What is known of the ground of an area.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Field {
+    /// Where it is not level.
+    pub(super) ground: Option<Ground>,
+}
 
 #[derive(Clone, Debug)]
 pub(super) struct Contact {

@@ -3,18 +3,10 @@
 use planner_core::Point;
 use planner_core::detour::{KeepOff, Nature};
 
-use super::contact::Contact;
+use super::contact::{Contact, Field};
 use super::{Neighbours, SKY_M, VAGUE_M};
-use crate::config::Ground;
 use crate::link::intent::{GROUNDED, LANDED};
 use crate::time::Instant;
-
-/// What is known of the ground of an area.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Field {
-    /// Where it is not level.
-    pub(super) ground: Option<Ground>,
-}
 
 impl<const V: usize> Neighbours<V> {
     /// The ground, where the mission is an area.
