@@ -57,6 +57,8 @@ pub struct Neighbours<const V: usize> {
     fleet: Option<Fleet<V>>,
     /// The ground of an area that is not level.
     ground: Option<Ground>,
+    /// After this silence a vehicle is down.
+    down: Duration,
     /// With the vehicle of this rank the next report of all begins.
     roster_next: usize,
 }
@@ -79,6 +81,7 @@ impl<const V: usize> Neighbours<V> {
             own_rank: 0,
             fleet: None,
             ground: None,
+            down: DOWN,
             roster_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {
@@ -347,7 +350,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
     pub(crate) fn all_down(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, DOWN))
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster has landed, or is out of the plan.

@@ -3,6 +3,8 @@
 extern crate std;
 use std::vec::Vec;
 
+use planner_core::coverage::Flat;
+use planner_core::field::{self, FieldShape};
 use planner_core::roadmap::RoadmapView;
 use rand_core::Rng;
 
@@ -67,6 +69,30 @@ fn files_come_back_after_a_restart() {
     assert_eq!(upload(&mut store, &mut flash, File::Roadmap, &roadmap(20), 80).unwrap(), Ok(()));
     store = started(&mut flash);
     assert_eq!(held(&flash, store.roadmap()), Some(roadmap(20).as_slice()));
+}
+
+#[test]
+fn a_field_takes_the_place_of_the_roadmap_and_gives_it_back() {
+    let mut flash = Flash::new(3);
+    let mut store = started(&mut flash);
+    let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 30, rows: 20 };
+    let mut heights = std::vec![0; shape.encoded_len()];
+    field::write(&shape, &[70; 600], &mut heights).unwrap();
+    let road = roadmap(30);
+    for (own, other, bytes) in [
+        (File::Roadmap, File::Field, &road),
+        (File::Field, File::Roadmap, &heights),
+        (File::Roadmap, File::Field, &road),
+    ] {
+        assert_eq!(upload(&mut store, &mut flash, other, bytes, 239).unwrap(), Err(UploadError::Damaged));
+        store = started(&mut flash);
+        assert_eq!(upload(&mut store, &mut flash, own, bytes, 239).unwrap(), Ok(()));
+        store = started(&mut flash);
+        assert_eq!((store.size(own), store.size(other)), (Some(bytes.len() as u32), None));
+        assert_eq!(held(&flash, store.roadmap()), Some(bytes.as_slice()));
+    }
+    store.remove(File::Field);
+    assert!(store.size(File::Roadmap).is_some(), "the field was not there");
 }
 
 #[test]

@@ -18,6 +18,8 @@ use crate::time::{Duration, Instant};
 pub(super) struct Field {
     /// Where it is not level.
     pub(super) ground: Option<Ground>,
+    /// After this silence a vehicle is down.
+    pub(super) down: Duration,
 }
 
 #[derive(Clone, Debug)]
@@ -286,7 +288,7 @@ impl Contact {
             if let Some(pad) = self.pad {
                 tell(KeepOff { from: pad, to: pad, ..place(apart_m) });
             }
-            let down = !self.heard_within(now, DOWN);
+            let down = !self.heard_within(now, field.map_or(DOWN, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.floor_m.is_nan()) {
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
                 return self.stretch(|at| {

@@ -13,6 +13,7 @@ impl<const V: usize> Neighbours<V> {
     /// `ground` is what is not level.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>) {
         self.ground = ground;
+        self.down = DOWN.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
     }

@@ -99,7 +99,7 @@ impl<const V: usize> Neighbours<V> {
         let unplaced_for = now - contact.position_at?;
         let unplaced = unplaced_for >= DEAD && !contact.is_far(now);
         let dead = (contact.is_dead(now) || unplaced) && !contact.points.is_empty();
-        let down = unplaced_for >= DOWN || (contact.tells(GROUNDED) && contact.is_vague());
+        let down = unplaced_for >= self.down || (contact.tells(GROUNDED) && contact.is_vague());
         let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);

@@ -11,7 +11,7 @@ use crate::time::Instant;
 impl<const V: usize> Neighbours<V> {
     /// The ground, where the mission is an area.
     pub(super) fn field(&self) -> Option<Field> {
-        self.fleet.is_some().then_some(Field { ground: self.ground })
+        self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down })
     }
 
     /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it

@@ -7,6 +7,7 @@ use std::vec::Vec as List;
 
 use planner_core::Point;
 use planner_core::deconflict::Method;
+use planner_core::field::{self, FieldShape, FieldView};
 use planner_core::frames::Geodetic;
 use planner_core::plan::{Mode, SwarmPlan, VehicleTask};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
@@ -97,6 +98,12 @@ fn forged(at: usize, bytes: &[u8]) -> List<u8> {
     sealed(file)
 }
 
+/// Above ground of this height, tolerance, and lowest and highest.
+fn above(ground: [f32; 4]) -> List<u8> {
+    let bytes: List<u8> = ground.into_iter().flat_map(f32::to_le_bytes).collect();
+    forged(44, &bytes)
+}
+
 type Memory = (Workspace<64, 128, 8>, ScheduleWorkspace, SwarmPlan<4, 64>);
 
 fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Error>> {
@@ -132,6 +139,36 @@ fn comes_back_as_written_and_is_planned() {
 }
 
 #[test]
+fn above_uneven_ground_only_the_field_of_the_mission_is_planned_on() {
+    // A ramp of 4 m over the area.
+    let shape = FieldShape { low: Flat::new(-50.0, -50.0), cell_m: 50.0, columns: 5, rows: 4 };
+    let nodes: List<i16> = (0..20).map(|i| 10 * (i % 5)).collect();
+    let mut field = vec![0; shape.encoded_len()];
+    field::write(&shape, &nodes, &mut field).unwrap();
+    let field = FieldView::parse(&field).unwrap();
+    let mut file = above([18.0, 3.0, 0.0, 4.0]);
+    let mut with = |crc: u32, field: Option<FieldView<'_>>| {
+        file[16..20].copy_from_slice(&crc.to_le_bytes());
+        let file = sealed(file.clone());
+        let view = MissionView::parse(&file).unwrap();
+        let Kind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
+        assert_eq!(view.config::<2>(2).unwrap().ground, area.header().ground);
+        let mut memory = Box::<Memory>::default();
+        let (ws, schedule, plan) = &mut *memory;
+        let request = coverage::Request { mission: &view, view: area, field, gates_most: 128, done: &[] };
+        coverage::plan::<64, 128, 8, 16, 4, 64>(&request, core::iter::empty(), ws, schedule, plan)?;
+        let points = plan.flights.iter().flat_map(|flight| flight.path.waypoints()).map(|w| w.position);
+        // Over their pads they are lower.
+        Ok(points.filter(|p| p.z > 4.0).map(|p| p.z - field.map_or(0.0, |f| f.height_at(&p.xy()))).collect())
+    };
+    assert_eq!(with(field.crc(), None), Err(coverage::Error::NoField));
+    assert_eq!(with(field.crc() ^ 1, Some(field)), Err(coverage::Error::NoField));
+    let above_m: List<f32> = with(field.crc(), Some(field)).unwrap();
+    assert!(above_m.len() > 8 && above_m.iter().all(|m| *m >= 17.99), "{above_m:?}");
+    assert!(above_m.iter().any(|m| *m < 21.1), "{above_m:?}");
+}
+
+#[test]
 fn what_is_not_sound_is_refused_by_name() {
     let nan = f32::NAN.to_le_bytes();
     for (file, why) in [
@@ -146,10 +183,15 @@ fn what_is_not_sound_is_refused_by_name() {
         (forged(28, &31.0f32.to_le_bytes()), FileError::Header("spacing").into()),
         (forged(36, &f32::INFINITY.to_le_bytes()), FileError::Header("angle_deg").into()),
         (forged(40, &(-1.0f32).to_le_bytes()), FileError::Header("margin_m").into()),
-        (forged(44, &nan), MissionError::Vehicle(0)),
-        (forged(56 + 4, &0.0f32.to_le_bytes()), MissionError::Vehicle(1)),
-        (forged(68 + 2, &[3]), FileError::Header("rings").into()),
-        (forged(76, &1e9f32.to_le_bytes()), FileError::Header("vertices").into()),
+        (forged(44, &nan), FileError::Header("ground").into()),
+        (forged(48, &1.0f32.to_le_bytes()), FileError::Header("ground").into()),
+        (above([20.0, 3.0, 9.0, 4.0]), FileError::Header("ground").into()),
+        (above([20.0, 3.0, 1.0, 6.0]), FileError::Header("ground").into()),
+        (above([20.0, 0.0, 1.0, 4.0]), FileError::Header("ground").into()),
+        (forged(60, &nan), MissionError::Vehicle(0)),
+        (forged(72 + 4, &0.0f32.to_le_bytes()), MissionError::Vehicle(1)),
+        (forged(84 + 2, &[3]), FileError::Header("rings").into()),
+        (forged(92, &1e9f32.to_le_bytes()), FileError::Header("vertices").into()),
     ] {
         assert_eq!(MissionView::parse(&file).err(), Some(why));
     }
