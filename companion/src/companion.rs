@@ -22,6 +22,7 @@ use crate::events::{Event, Link, Wanted};
 use crate::guidance::{Guidance, Scene, Stats};
 use crate::link::frame::Counters;
 use crate::link::{Fresh, Links};
+use crate::margins;
 use crate::mission::State;
 use crate::mission::course::Mission;
 use crate::services::Services;
@@ -86,7 +87,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let mut neighbours =
             Neighbours::new(&config.roster, config.system_id, config.cruise_mps.max(config.climb_mps));
         if let Some(down_s) = config.division {
-            neighbours.form_fleet(down_s, config.ground);
+            let stray_m = margins::stray_m(config.required_clearance_m, config.radius_m);
+            neighbours.form_fleet(down_s, config.ground, stray_m);
         }
         Self {
             now: Instant::ZERO,

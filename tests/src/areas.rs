@@ -118,7 +118,10 @@ pub fn lost(random: &mut impl Rng, vehicles: usize, loss: f32) -> String {
     text = text.lines().filter(keep).map(|line| format!("{line}\n")).collect();
     text =
         text.replace("[mission]\n", &format!("[mission]\ncruise_mps = {:.1}\n", between(random, 3.0, 6.0)));
-    text = text.replace("time_limit_s = 7200.0", "time_limit_s = 2400.0");
+    text = text.replace("time_limit_s = 7200.0", "time_limit_s = 3600.0");
+    // A wider separation takes worse estimates.
+    let separation = format!("separation_m = {:.1}", between(random, 3.6, 8.0));
+    text = text.replace("separation_m = 3.6", &separation);
     text + &format!("radio_loss = {loss}\n")
 }
 

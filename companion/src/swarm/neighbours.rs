@@ -59,6 +59,8 @@ pub struct Neighbours<const V: usize> {
     ground: Option<Ground>,
     /// After this silence a vehicle is down.
     down: Duration,
+    /// By so much two vehicles in the air may be nearer than they believe, metres: over an area, where it is kept.
+    stray_m: f32,
     /// With the vehicle of this rank the next report of all begins.
     roster_next: usize,
 }
@@ -82,6 +84,7 @@ impl<const V: usize> Neighbours<V> {
             fleet: None,
             ground: None,
             down: DOWN,
+            stray_m: 0.0,
             roster_next: 0,
         };
         for (rank, entry) in roster.iter().enumerate() {

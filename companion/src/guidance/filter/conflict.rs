@@ -79,7 +79,8 @@ impl Guidance {
         let floor_m = scene.plan.map(|plan| self.lands_at_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
-        let most_apart_m = (safety_m + STRAY_M).max(2.0 * self.track.radius_m + HULLS_M);
+        let most_apart_m =
+            (safety_m + STRAY_M.max(neighbours.stray_m())).max(2.0 * self.track.radius_m + HULLS_M);
         let reach = Reach {
             place,
             within_m: own_reach_m + most_apart_m,
@@ -131,8 +132,10 @@ impl Guidance {
             } else if met.heard.grounded {
                 let vertical = lands || state == State::Climb || self.descends();
                 safety_m + if vertical { 0.0 } else { STRAYS_M }
-            } else {
+            } else if by_gates || met.lost {
                 safety_m + STRAY_M
+            } else {
+                safety_m + STRAY_M.max(neighbours.stray_m())
             };
             let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
             if lands && silent && !deaf && !met.stranger && floor_m.is_some_and(may_lie_below) {

@@ -20,6 +20,8 @@ pub(super) struct Field {
     pub(super) ground: Option<Ground>,
     /// After this silence a vehicle is down.
     pub(super) down: Duration,
+    /// By so much two vehicles in the air may be nearer than they believe, metres.
+    pub(super) stray_m: f32,
 }
 
 #[derive(Clone, Debug)]
@@ -269,6 +271,8 @@ impl Contact {
         mut tell: impl FnMut(KeepOff),
     ) {
         let here = self.state.position;
+        // In the air: those on the ground lie beside each other's pads.
+        let wide_m = apart_m + field.map_or(0.0, |field| field.stray_m);
         let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
         let column = |from: Point, nature: Nature| {
             let to = from - Point::new(0.0, 0.0, COLUMN_M);
@@ -279,9 +283,10 @@ impl Contact {
         } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
             tell(place(apart_m));
         } else if self.tells(OUT) {
-            tell(column(here, Nature::Solid));
+            let below = column(here, Nature::Solid);
+            tell(KeepOff { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // Where it is it may not be come near from above or the side, whatever its column leaves.
-            tell(place(apart_m + SWAY_M));
+            tell(place(wide_m + SWAY_M));
         } else if self.is_dead(now) && self.flies_on() {
             // Where the plan has it.
         } else if self.is_dead(now) {
@@ -302,7 +307,7 @@ impl Contact {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));
             }
-            tell(place(apart_m + SWAY_M));
+            tell(place(wide_m + SWAY_M));
         }
     }
 }

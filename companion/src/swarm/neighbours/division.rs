@@ -10,9 +10,9 @@ const LATELY: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
     /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds;
-    /// `ground` is what is not level.
-    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>) {
-        self.ground = ground;
+    /// `ground` is what is not level. By `stray_m` two may be nearer than they believe.
+    pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
+        (self.ground, self.stray_m) = (ground, stray_m);
         self.down = DOWN.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));

@@ -9,9 +9,14 @@ use crate::link::intent::{GROUNDED, LANDED};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
+    /// By so much vehicles in the air, off the plan, may be nearer than they believe, metres: 0 where walls leave no room for it.
+    pub(crate) fn stray_m(&self) -> f32 {
+        self.stray_m
+    }
+
     /// The ground, where the mission is an area.
     pub(super) fn field(&self) -> Option<Field> {
-        self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down })
+        self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down, stray_m: self.stray_m })
     }
 
     /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it

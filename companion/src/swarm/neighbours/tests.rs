@@ -397,3 +397,31 @@ fn nobody_falls_up() {
     }
     assert!(below > 100 && above > 20, "{below} {above}");
 }
+
+#[test]
+fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
+    let mut rng = Pcg32::seed_from_u64(11);
+    for _ in 0..500 {
+        let (apart_m, stray_m) = (uniform(&mut rng, 1.0, 3.0), uniform(&mut rng, 0.0, 6.0));
+        for (flags, in_air) in [(OUT, true), (0, true), (OUT | GROUNDED, false), (GROUNDED, false)] {
+            let mut table = joined(0);
+            table.form_fleet(64.0, None, stray_m);
+            table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+            let told = Intent { floor_m: 0.0, ..intent(flags, 1, 2) };
+            table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+            // Whatever shape is told, no place is free that may be too near by the truth.
+            let away =
+                Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0).normalize();
+            let truly_m = apart_m + if in_air { stray_m } else { 0.0 };
+            let here = table.contacts[1].state.position;
+            let near = here + away * (0.99 * truly_m);
+            let mut free = true;
+            table.places(Instant::from_millis(100), apart_m, |off| {
+                let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
+                let nearest = off.from - Point::new(0.0, 0.0, down_m);
+                free &= (near - nearest).norm() >= off.radius_m;
+            });
+            assert!(!free, "{flags:#x}: {apart_m} + {stray_m}");
+        }
+    }
+}
