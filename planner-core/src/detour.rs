@@ -9,6 +9,8 @@
 //!
 //! ENU metres. Cost: two A*, each edge looked at against every [`KeepOff`]; each of these against every node.
 
+use core::ops::Range;
+
 use heapless::Vec;
 use libm::{fmaxf, fminf, sqrtf};
 
@@ -139,11 +141,11 @@ impl Box {
     }
 }
 
-/// Whether the rest of a path from arc length `along_m`, from the climb to the descent, comes too near. Nearer than
-/// `here`, where the vehicle is, has to be: what it leaves is not in its way.
+/// Whether a path between two arc lengths, `ahead`, comes too near: with the climb if that begins before 0, and with the descent if
+/// it ends beyond the path. Nearer than `here`, where the vehicle is, has to be: what it leaves is not in its way.
 pub fn is_blocked<const W: usize>(
     path: &Path<W>,
-    along_m: f32,
+    ahead: Range<f32>,
     climb_m: f32,
     descent_m: f32,
     here: &Point,
@@ -152,23 +154,37 @@ pub fn is_blocked<const W: usize>(
     let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
     let obstacle = obstacle.seen_from(here, SWAY_M);
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
+    let (along_m, until_m) = (ahead.start, ahead.end);
     let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
     let ground = last.position - up(descent_m);
     let next = legs_begun(path, along_m);
-    if climbs || obstacle.touches(&last.position, &ground) {
+    let descends = until_m > path.length_m() && obstacle.touches(&last.position, &ground);
+    if climbs || descends {
         return true;
     }
-    let ahead = &path.waypoints()[next.saturating_sub(1)..];
-    let Some((begun, ahead)) = ahead.split_first() else { return false };
-    let begun = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
-    let mut from = begun.unwrap_or(first.position);
+    let waypoints = &path.waypoints()[next.saturating_sub(1)..];
+    let Some((begun, waypoints)) = waypoints.split_first() else { return false };
+    let place = if along_m > begun.along_m { path.point_at(along_m) } else { Some(begun.position) };
+    let mut from = place.unwrap_or(first.position);
     let room = Box::around(&obstacle);
     let mut beside = room.sides(&from);
-    ahead.iter().any(|w| {
-        let was_beside = core::mem::replace(&mut beside, room.sides(&w.position));
-        let leg = (core::mem::replace(&mut from, w.position), w.position);
+    let mut from_m = fmaxf(along_m, begun.along_m);
+    let mut touches = |to: Point| {
+        let was_beside = core::mem::replace(&mut beside, room.sides(&to));
+        let leg = (core::mem::replace(&mut from, to), to);
         was_beside & beside == 0 && obstacle.comes_near(&leg.0, &leg.1)
-    })
+    };
+    for waypoint in waypoints {
+        if from_m >= until_m {
+            return false;
+        }
+        from_m = waypoint.along_m;
+        let cut = if from_m > until_m { path.point_at(until_m) } else { None };
+        if touches(cut.unwrap_or(waypoint.position)) {
+            return true;
+        }
+    }
+    false
 }
 
 /// How many stretches [`is_blocked`] looks at: the legs ahead, the climb, the descent.

@@ -53,7 +53,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             None => f32::INFINITY,
         };
         let behind = fleet.division() > self.mission.division();
-        let wants = fleet.wants_hash() || (behind && self.may_take_division());
+        let wants =
+            fleet.wants_hash() || ((behind || self.detours.beside.flies()) && self.may_take_division());
         let fingerprint = fleet.fingerprint();
         self.guidance.halt_at(halt_m);
         if wants && self.mission.asks_division(fingerprint, now, ASK_AGAIN) {
@@ -71,10 +72,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             || self.detours.is_flying()
             || self.detours.home.is_on()
             || self.detours.has_left();
+        // Around something, and back: its part stays its own.
+        let beside = self.detours.beside.flies();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
             PilotControl | PilotReturned => self.mission.with_pilot(self.now) >= WITH_PILOT,
-            _ => off_plan,
+            _ => off_plan && !beside,
         };
         let along_m = self.guidance.progress_m(state, &self.scene());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
@@ -124,7 +127,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether it flies home, back, or aside, to land there.
     fn lands_elsewhere(&self) -> bool {
         let home = self.guidance.returning || self.detours.home.is_on();
-        home || self.guidance.aside || self.detours.lands()
+        home || (self.guidance.aside && !self.detours.beside.flies()) || self.detours.lands()
     }
 
     /// Whether others have divided its part, or count it as lost, while it would fly it.
@@ -152,7 +155,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
         // One whose path is blocked comes no further.
-        let promise_s = if self.mission.state() == Blocked { 0.0 } else { PROMISE_S };
+        let promise_s = if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { PROMISE_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let clear_m = self.guidance.clear_m(&self.scene());
         let most_m = ahead_m.min(clear_m).min(self.home_m()).max(along_m);
@@ -193,6 +196,20 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
+    /// Flies on along its own path, beyond what it flew around.
+    fn take_own_plan(&mut self, plan: &VehiclePlan<W, G>) {
+        let Some(back_m) = self.detours.beside.back_m() else { return };
+        let ends = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
+        let back = plan.path.point_at(back_m);
+        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).norm() < THERE_M);
+        if meets {
+            self.mission.take_up(plan);
+            self.neighbours.forget_avoided();
+            self.guidance.begin_path_at(back_m, self.now);
+        }
+        self.detours.come_back(meets);
+    }
+
     /// Takes the shell's answer.
     pub(super) fn take_division(&mut self, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
         let may_take = self.may_take_division();
@@ -209,6 +226,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 fleet.take_plan_crc(UNDIVIDED);
                 self.links.say(true, "What is left cannot be divided");
             }
+            Err(_) if may_take && self.detours.beside.flies() => self.detours.come_back(false),
+            Ok(plan) if may_take && self.detours.beside.flies() => self.take_own_plan(plan),
             Err(_) if may_take && division > self.mission.division() => self.mission.keep_plan(division),
             Err(_) => {}
             Ok(plan) if fleet.wants_hash() => fleet.take_plan_crc(plan.plan_crc),

@@ -54,6 +54,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let _ = self.events.push_back(Event::PlanRequested(Wanted::Detour));
     }
 
+    /// Asks the shell for a way around what blocks its path over a field, and back to that.
+    pub(super) fn request_beyond(&mut self) {
+        let back_m = self.detours.returns_m(&self.view());
+        if self.detours.beside.seek(back_m) {
+            self.request_detour(Aim::Beyond);
+        } else {
+            self.detours.beside.miss(self.now);
+            self.mission.fail(PlanFailure::Unreachable);
+        }
+    }
+
     /// What the shell is asked for by [`Wanted::Detour`]; `None` if nothing is, or no way around can be planned.
     /// `tell` is given all that is to be kept off.
     pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
@@ -65,12 +76,16 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        if !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
+        // What it promised meanwhile is along its own path.
+        let beside = self.detours.beside;
+        let bound = beside.back_m().is_some() && !beside.flies() && !self.is_undivided();
+        if bound || !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
             self.miss_detour(PlanFailure::Invalid);
             return;
         }
         let progress_m = self.guidance.progress_m(self.mission.state(), &self.scene());
-        self.mission.leave_plan(&detour.path, progress_m);
+        let ground_m = self.mission.plan().map(|plan| self.guidance.ground_m(plan));
+        self.mission.leave_plan(detour, progress_m, ground_m);
         self.detours.take(progress_m, self.now, self.guidance.progress_at());
         self.neighbours.avoid(self.now);
     }

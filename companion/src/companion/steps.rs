@@ -7,7 +7,7 @@ use crate::events::{Event, Link, Wanted};
 use crate::guidance::Scene;
 use crate::link::Fresh;
 use crate::margins;
-use crate::mission::task::Along;
+use crate::mission::task::{Along, Place};
 use crate::mission::{self, Action, Row, State};
 use crate::storage::store::Erasing;
 use crate::swarm::detour::Aim;
@@ -60,7 +60,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let along = Along {
             progress_m: self.guidance.progress_m(state, &self.scene()),
             // Where it brakes along its path it takes the pictures that it passes.
-            follows: state.holds_place() && !off_plan,
+            place: match state.holds_place() {
+                true if self.detours.beside.flies() && !self.guidance.returning => Place::Beside,
+                true if !off_plan => Place::OnPath,
+                _ => Place::Elsewhere,
+            },
         };
         self.mission.step_task(along, self.now, &mut self.links);
     }
@@ -166,8 +170,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::RunPath => self.guidance.run(now),
             Action::RequestDetour => self.request_detour(Aim::Goal),
             Action::RequestHome => self.request_detour(Aim::Home),
+            Action::RequestBeyond => self.request_beyond(),
             Action::TurnHome => {
                 self.guidance.brake();
+                self.detours.beside.end();
                 self.detours.home.turn(now);
             }
             Action::RequestAside => {
@@ -184,12 +190,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             }
             Action::FlyDivision => {
                 self.mission.fly_division();
+                self.detours.beside.end();
                 self.guidance.run(now);
             }
             Action::BrakeOnPath => self.guidance.brake(),
             Action::Rejoin => self.go_on(from, to),
             Action::TurnBack => {
                 self.detours.home.forget();
+                self.detours.beside.end();
                 let along_m = self.guidance.progress_m(from, &self.scene());
                 let guidance = &mut self.guidance;
                 self.mission.turn_back(along_m, |path| guidance.turn_back(path, now));

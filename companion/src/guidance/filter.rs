@@ -133,6 +133,11 @@ impl Filter {
         if self.is_stopped() { self.blocker } else { 0 }
     }
 
+    /// The vehicle that it stops for, or stopped for last.
+    pub(crate) fn last_blocker(&self) -> u8 {
+        self.blocker
+    }
+
     /// How often it stopped the vehicle.
     pub(crate) fn activations(&self) -> u32 {
         self.activations

@@ -34,6 +34,13 @@ impl Guidance {
         self.run(now);
     }
 
+    /// The same, from `along_m` metres along it on.
+    pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
+        self.begin_path(now);
+        self.tracker.along_m = along_m;
+        self.progress_m = along_m;
+    }
+
     /// It flies no further along its path than this for now, metres; ∞ for all of it.
     pub(crate) fn halt_at(&mut self, along_m: f32) {
         self.halt_m = along_m;

@@ -35,8 +35,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
     left_with_all: Option<bool>,
-    /// Where the plan ends, and the height in which it leads there, metres.
-    home: (Point, f32),
+    /// Where the plan ends, the height in which it leads there, and its descent, metres.
+    home: (Point, f32, f32),
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
     vague_since: Option<Instant>,
@@ -65,7 +65,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             start,
             plan: None,
             left_with_all: None,
-            home: (start, start.z),
+            home: (start, start.z, 0.0),
             failure: None,
             vague_since: None,
             waits: Waits::default(),
@@ -218,13 +218,14 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.plan = Some(plan.clone());
         self.left_with_all = None;
         if let [.., down, over] = plan.path.waypoints() {
-            self.home = (over.position, down.position.z);
+            self.home = (over.position, down.position.z, plan.descent_m);
         }
     }
 
-    /// Where its plan ends, as a goal that is reached without a roadmap.
-    pub(crate) fn home(&self) -> Goal {
-        Goal::Home { over: self.home.0, layer_m: self.home.1 }
+    /// Where its plan ends, as a goal that is reached without a roadmap, and how far it descends there, metres.
+    pub(crate) fn home(&self) -> (Goal, f32) {
+        let (over, layer_m, descent_m) = self.home;
+        (Goal::Home { over, layer_m }, descent_m)
     }
 
     /// Whether the part that the last division gives has come and is not flown yet.
@@ -343,14 +344,23 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along another path, beside the shared plan, `along_m` metres along that.
-    pub(crate) fn leave_plan(&mut self, path: &Path<W>, along_m: f32) {
+    /// Flies along another path, beside the shared plan, `along_m` metres along that, above the same ground.
+    pub(crate) fn leave_plan(&mut self, way: &VehiclePlan<W, G>, along_m: f32, ground_m: Option<f32>) {
         self.leave_path(along_m);
         if let Some(plan) = &mut self.plan {
-            plan.path = path.clone();
+            plan.path = way.path.clone();
+            plan.descent_m = way.descent_m;
+            if let (Some(first), Some(ground_m)) = (way.path.waypoints().first(), ground_m) {
+                plan.climb_m = libm::fmaxf(first.position.z - ground_m, 0.0);
+            }
             plan.gates.clear();
             plan.depart_s = 0.0;
         }
+    }
+
+    /// Flies along its own path again, as it was planned.
+    pub(crate) fn take_up(&mut self, plan: &VehiclePlan<W, G>) {
+        self.fly(plan);
     }
 
     /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan: neighbours keep clear of it as of a

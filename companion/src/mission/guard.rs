@@ -119,7 +119,15 @@ pub enum Guard {
     ReturnOverField,
     /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
     BlockedOverField,
-    /// The same where the safety filter has made it yield for the limit.
+    /// The same, and it may fly around what blocks it and back to its path.
+    AroundOverField,
+    /// It stands where it comes back to its path.
+    AroundFlown,
+    /// It does, and its own plan has come.
+    OwnPlanReady,
+    /// It does, and there is none.
+    OwnPlanLost,
+    /// The same as [`Guard::BlockedOverField`] where the safety filter has made it yield for the limit.
     YieldedOverField,
     /// The same where the safety filter has kept it from going on for the limit.
     HinderedOverField,
@@ -265,6 +273,14 @@ pub struct Inputs {
     pub area: bool,
     /// In a coverage mission: the way home can be planned from here.
     pub over_field: bool,
+    /// It may fly around what blocks its path, and back to that.
+    pub may_fly_beside: bool,
+    /// It stands where it comes back to its path.
+    pub around_flown: bool,
+    /// Its own plan has come there.
+    pub own_plan_ready: bool,
+    /// There is none.
+    pub own_plan_lost: bool,
     /// It is to fly home, or does.
     pub homeward: bool,
     /// For how long it has sought its way home, if it does.
@@ -389,6 +405,10 @@ impl Guard {
             Self::RoadmapBad => i.roadmap_bad,
             Self::StartCommanded => i.start && !i.imprecise && i.has_goal,
             Self::StartAgain => i.start,
+            Self::AroundOverField => i.blocked && i.may_fly_beside && i.blocked_for >= limit,
+            Self::AroundFlown => i.around_flown,
+            Self::OwnPlanReady => i.own_plan_ready,
+            Self::OwnPlanLost => i.own_plan_lost,
             Self::StartOverField => i.start && i.area,
             Self::StartWithoutGoal => i.start && !i.has_goal && i.plans_as_others,
             Self::StartElsewhere => i.start && !i.at_start,

@@ -43,6 +43,8 @@ pub enum Action {
     TurnHome,
     /// Ask the shell for the way home over a field, from here.
     RequestHome,
+    /// Ask the shell for a way around and back to its own path over a field, from here.
+    RequestBeyond,
     /// Ask the shell for a way aside, from here.
     RequestAside,
     /// Ask the shell for a way aside, from here, to land there.

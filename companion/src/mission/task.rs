@@ -8,7 +8,7 @@ mod camera;
 
 use planner_core::flight::{Path, Task};
 
-pub(crate) use self::along::Along;
+pub(crate) use self::along::{Along, Place};
 use self::camera::Camera;
 use crate::autopilot::telemetry::Ack;
 use crate::link::Links;

@@ -13,17 +13,20 @@
 //! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
 //! step, so a look among many takes several steps.
 //!
-//! Over a field there is no roadmap, and nobody flies around: who is stopped flies home ([`homeward`]).
+//! Over a field there is no roadmap, and nobody waits for a turn: who is stopped flies around what stops it and back to its path
+//! ([`beside`]), or home ([`homeward`]).
 //!
 //! ENU metres.
 
 mod asking;
+mod beside;
 mod homeward;
 
 use planner_core::Point;
 use planner_core::detour;
 use planner_core::frames::Geodetic;
 
+use self::beside::Beside;
 use self::homeward::Homeward;
 use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
@@ -90,6 +93,8 @@ pub(crate) enum Aim {
     Landing,
     /// To fly home over a field.
     Home,
+    /// To fly on along its path over a field, beyond what blocks that.
+    Beyond,
 }
 
 /// What is known of the way ahead, and of ways around.
@@ -108,6 +113,8 @@ pub(crate) struct Detours {
     lands: bool,
     /// Its way home over a field.
     pub(crate) home: Homeward,
+    /// Its way around something over a field, and back.
+    pub(crate) beside: Beside,
     /// Progress on the plan when it was left for a way around, metres.
     left_at_m: f32,
     /// The way around asked for has come.
@@ -194,9 +201,46 @@ impl Detours {
         self.flying
     }
 
-    /// Whether that path, or the one asked for, leads aside only.
+    /// Whether that path does not lead to where it lands: aside only, or back to its own.
     pub(crate) fn is_aside(&self) -> bool {
-        self.aside
+        self.aside || self.beside.flies()
+    }
+
+    /// Where it could come back to its path over a field, metres, beyond what blocks that.
+    pub(crate) fn returns_m<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> Option<f32> {
+        beside::returns_m(view, self.obstacles.known())
+    }
+
+    /// Whether it may fly around what is on its path over a field now: where it has not left that.
+    pub(crate) fn may_fly_beside<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+    ) -> bool {
+        let on_path = (!self.flying || self.beside.flies())
+            && !self.left
+            && !self.home.is_on()
+            && view.guidance.along_m() >= 0.0;
+        let over_field = view.config.division.is_some();
+        let flies = view.mission.plan().is_some_and(|plan| plan.task.flies());
+        (self.in_the_way || self.is_stopped(view, FREE))
+            && over_field
+            && on_path
+            && flies
+            && !view.guidance.returning
+            && self.beside.may_seek(view.now)
+    }
+
+    /// Its own plan has come, or there is none: it is on its path again, or has to do without.
+    pub(crate) fn come_back(&mut self, came: bool) {
+        self.beside.answered(came);
+        if came {
+            let beside = self.beside;
+            self.forget_plan();
+            self.beside = beside;
+        }
     }
 
     /// Whether it lands at the end of that.
@@ -336,7 +380,7 @@ impl Detours {
         let astray = self.left && (!self.flying || aside) && !self.lands;
         let dead_end = self.is_held(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END);
         let free = if view.mission.state() == State::Blocked { FREE } else { LATELY };
-        let stopped = view.guidance.filter.blocked_for(now, free) > STUCK;
+        let stopped = self.is_stopped(view, free);
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.in_the_way);
         let along_m = view.guidance.along_m();
@@ -351,6 +395,17 @@ impl Detours {
         }
         let claims = self.is_due(view) && !view.neighbours.claimed_before(view.config.system_id, now);
         self.claimed_since = self.claimed_since.or(Some(now)).filter(|_| claims);
+    }
+
+    /// Whether another vehicle has stopped it for long: one that lets it go first, or over a field one off the plan.
+    fn is_stopped<const V: usize, const W: usize, const G: usize>(
+        &self,
+        view: &View<'_, V, W, G>,
+        free: Duration,
+    ) -> bool {
+        let (now, filter) = (view.now, &view.guidance.filter);
+        let for_good = view.config.division.is_some() && !view.neighbours.follows_plan(filter.last_blocker());
+        filter.blocked_for(now, free) > STUCK || (for_good && filter.hindered_for(now) > STUCK)
     }
 
     /// Whether anything is; `None` while the look goes on.
@@ -374,10 +429,14 @@ impl Detours {
                 Some(obstacle) => tell(*obstacle),
                 None => neighbours.obstacle(source - new.len(), now, apart_m, tell),
             },
-            // Over a field no way around is planned: it photographs what comes before.
+            // Over a field it photographs what comes before, and flies around what blocks the way when it comes there.
             |obstacle| {
-                let far = (obstacle.from - here).xy().norm() > FIELD_M && view.config.division.is_some();
-                !far && detour::is_blocked(&plan.path, along_m, plan.climb_m, plan.descent_m, &here, obstacle)
+                let until_m = match view.config.division {
+                    Some(_) => along_m.max(0.0) + FIELD_M,
+                    None => f32::INFINITY,
+                };
+                let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);
+                detour::is_blocked(&plan.path, along_m..until_m, climb_m, descent_m, &here, obstacle)
             },
         )
     }

@@ -422,6 +422,16 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
+    /// Whether a vehicle of this id is heard to follow the shared plan, or is none that is known.
+    pub(crate) fn follows_plan(&self, id: u8) -> bool {
+        self.contacts.iter().find(|c| c.state.id == id).is_none_or(Contact::on_plan)
+    }
+
+    /// What was flown around counts again.
+    pub fn forget_avoided(&mut self) {
+        self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
+    }
+
     /// How many contacts there are.
     pub fn len(&self) -> usize {
         self.contacts.len()

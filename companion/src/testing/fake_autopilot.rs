@@ -97,6 +97,8 @@ pub struct Bench {
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
+    /// Its plan before it asked for a way around.
+    own_plan: Option<VehiclePlan<16, 8>>,
     /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
     /// flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
@@ -156,6 +158,7 @@ impl Bench {
             step_m: 0.1,
             undividable: false,
             answer_division: true,
+            own_plan: None,
             neighbour: None,
             neighbour_clock: None,
             neighbour_clear_m: -1e6,
@@ -226,13 +229,16 @@ impl Bench {
             if event == Event::PlanRequested(Wanted::Division) {
                 self.divide();
             } else if let Some((request, mut obstacles)) = self.requested() {
+                if !self.companion.detours.beside.flies() {
+                    self.own_plan = self.companion.mission.plan().cloned();
+                }
                 let answer = self.answer_detour.map(|answer| {
                     answer.and_then(|()| {
                         let mut path = Path::new();
                         if matches!(request.goal, Goal::Home { .. }) {
                             around::plan(&Transit::<1>::empty(), None, &request, &mut obstacles, &mut path)
                                 .map_err(|_| crate::PlanFailure::Unreachable)?;
-                            return Ok(VehiclePlan { path, ..plan() });
+                            return Ok(VehiclePlan { path, descent_m: request.descent_m, ..plan() });
                         }
                         path.push(request.here, 1.2).unwrap();
                         path.push(Point::new(13.0, 16.0, 2.0), 1.2).unwrap();
@@ -266,8 +272,14 @@ impl Bench {
         }
         let rank = usize::from(self.companion.config.own().expect("it is in the roster").0);
         let held_dm = self.companion.losses().last().map_or(0, |lots| lots[rank].along_dm);
-        let plan = self.companion.mission.plan().filter(|_| self.answer_division).cloned();
-        let Some(mut plan) = plan else { return };
+        // Beside its path its plan is the way around.
+        let own = self.own_plan.take_if(|_| self.companion.detours.beside.flies());
+        let plan = own.clone().or_else(|| self.companion.mission.plan().cloned());
+        let Some(mut plan) = plan.filter(|_| self.answer_division) else { return };
+        if own.is_some() {
+            self.companion.handle_plan(self.now, Wanted::Division, Ok(&plan));
+            return;
+        }
         let held_m = f32::from(held_dm) / 10.0;
         let mut path = Path::new();
         path.push(plan.path.point_at(held_m).expect("a path"), 1.2).unwrap();

@@ -289,8 +289,10 @@ fn detours(
         let holds = to.call("detour::KeepOff::holds", || thing.holds(&PLACES[5]));
         assert!(!holds || hard > 0.0 || hard.is_nan());
         for path in [&path, &empty] {
-            let blocked =
-                to.call("detour::is_blocked", || detour::is_blocked(path, hard, p.x, p.y, &p, &thing));
+            let blocked = to.call("detour::is_blocked", || {
+                detour::is_blocked(path, hard..f32::INFINITY, p.x, p.y, &p, &thing)
+            });
+            to.call("detour::is_blocked", || detour::is_blocked(path, -1.0..hard, p.x, p.y, &p, &thing));
             to.is(blocked);
             let count = to.call("detour::stretches_ahead", || detour::stretches_ahead(path, hard));
             assert!(count <= path.waypoints().len() + 2);

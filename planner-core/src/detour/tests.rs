@@ -111,12 +111,16 @@ fn a_path_is_blocked_by_what_is_ahead_of_it_only() {
         path.push(point, 1.5).unwrap();
     }
     let far = Point::new(0.0, 50.0, 0.0);
-    let blocked = |along_m: f32, place: Point| is_blocked(&path, along_m, 4.0, 4.0, &far, &at(place, 1.0));
+    let between = |ahead: Range<f32>, place: Point| is_blocked(&path, ahead, 4.0, 4.0, &far, &at(place, 1.0));
+    let blocked = |along_m: f32, place: Point| between(along_m..f32::INFINITY, place);
     assert!(blocked(1.0, Point::new(6.0, 0.5, 5.0)) && !blocked(7.5, Point::new(6.0, 0.5, 5.0)));
     assert!(!blocked(1.0, Point::new(6.0, 1.5, 5.0)), "beside it");
     assert!(blocked(1.0, Point::new(8.0, 0.0, 1.0)), "below the goal");
     let on_pad = Point::new(0.0, 0.0, 1.0);
     assert!(blocked(-4.0, on_pad) && !blocked(1.0, on_pad), "the climb, until it is over");
+    let on_path = Point::new(6.0, 0.5, 5.0);
+    assert!(between(1.0..6.0, on_path) && !between(1.0..5.0, on_path), "no further than is looked");
+    assert!(!between(1.0..7.0, Point::new(8.0, 0.0, 1.0)), "the descent, once it is looked at");
 }
 
 proptest::proptest! {

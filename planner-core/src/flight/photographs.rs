@@ -161,6 +161,11 @@ impl Photographs {
         Self { area, backward, ..self }
     }
 
+    /// From one picture to the next, metres: at most.
+    pub fn spacing_m(&self) -> f32 {
+        self.spacing_m
+    }
+
     /// Waypoints of the whole area; 0 where they have no numbers.
     pub fn area(&self) -> u32 {
         self.area

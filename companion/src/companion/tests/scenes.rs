@@ -75,6 +75,7 @@ fn every_row_has_its_scene() {
         losses::another_leaves,
         losses::the_others_give_it_up,
         homeward::is_ordered,
+        homeward::flies_around,
         homeward::is_blocked,
         homeward::is_in_the_way_of_another,
         homeward::finds_no_way,

@@ -9,7 +9,7 @@ use heapless::Deque;
 use libm::atan2f;
 use planner_core::flight::{Look, Path, Photographs, Shots, Trigger};
 
-use super::along::Along;
+use super::along::{Along, Place};
 use crate::autopilot::telemetry::Ack;
 use crate::events::Link;
 use crate::link::Links;
@@ -64,6 +64,8 @@ pub(super) struct Camera {
     /// The stretch at hand, and the next picture on it.
     stretch: usize,
     picture: u32,
+    /// Beside its path: where the next one is taken, metres along that way.
+    beside_m: f32,
     /// Whether the autopilot was commanded to trigger by distance.
     on: bool,
     orders: Deque<Order, ORDERS>,
@@ -85,19 +87,42 @@ impl Camera {
         links: &mut Links,
     ) {
         if photographs.trigger != Trigger::None {
-            if !along.follows {
-                if core::mem::take(&mut self.on) {
-                    self.order(Order::Off);
+            if along.place != Place::Beside {
+                self.beside_m = 0.0;
+            }
+            match photographs.stretches(path).nth(self.stretch) {
+                _ if along.place == Place::Beside => self.go_around(photographs, along.progress_m),
+                Some(shots) if along.place == Place::OnPath => {
+                    self.photograph(photographs.trigger, &shots, along.progress_m);
                 }
-            } else if let Some(shots) = photographs.stretches(path).nth(self.stretch) {
-                self.photograph(photographs.trigger, &shots, along.progress_m);
+                _ => self.switch_off(),
             }
         }
         self.send(now, links);
     }
 
+    fn switch_off(&mut self) {
+        if core::mem::take(&mut self.on) {
+            self.order(Order::Off);
+        }
+    }
+
+    /// Beside its path it takes pictures as far apart as on it, whether it would there or not.
+    fn go_around(&mut self, photographs: &Photographs, progress_m: f32) {
+        let spacing_m = photographs.spacing_m();
+        if photographs.trigger == Trigger::Distance {
+            if !core::mem::replace(&mut self.on, true) {
+                self.order(Order::Every(spacing_m));
+            }
+        } else if progress_m >= self.beside_m {
+            self.beside_m = progress_m + spacing_m;
+            self.order(Order::Picture);
+        }
+    }
+
     fn photograph(&mut self, trigger: Trigger, shots: &Shots<'_>, progress_m: f32) {
         if progress_m < shots.from_m {
+            self.switch_off();
             return;
         }
         let distance = trigger == Trigger::Distance;

@@ -4,7 +4,7 @@
 
 use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
-use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
+use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK, beside};
 use crate::guidance::retreat;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
@@ -12,13 +12,16 @@ use crate::time::{Duration, Instant};
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
 /// Beyond the safety distance, so that what strays a little does not block the way again, metres.
-const MARGIN_M: f32 = 0.5;
+pub(super) const MARGIN_M: f32 = 0.5;
 
 impl Detours {
     /// A way around, or just aside, is requested of the shell.
     pub(crate) fn request(&mut self, aim: Aim) {
         self.aside = matches!(aim, Aim::Aside | Aim::Landing);
         self.lands = aim == Aim::Landing;
+        if aim != Aim::Beyond {
+            self.beside.end();
+        }
         self.obstacles.request();
         self.ready = false;
     }
@@ -37,16 +40,27 @@ impl Detours {
         let behind = points.get(next.saturating_sub(1))?;
         let apart_m = view.config.safety_distance_m;
         self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
-        view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell);
+        match view.config.division {
+            Some(_) if !self.aside => beside::others(view, &mut tell),
+            _ => view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell),
+        }
         if self.aside {
             view.neighbours.landing_columns(view.now, apart_m + retreat::BESIDE_M, &mut tell);
         }
         if self.lands {
             view.neighbours.lands_on(apart_m + MARGIN_M, tell);
         }
-        let goal = match view.config.division {
-            Some(_) => view.mission.home(),
-            None => Goal::Node(plan.task.goal()?),
+        let (goal, descent_m) = match view.config.division {
+            Some(_) => match self.beside.back_m() {
+                Some(back_m) => {
+                    // The way that it is on ends there.
+                    let at_m = if self.beside.flies() { plan.path.length_m() } else { back_m };
+                    let over = plan.path.point_at(at_m)?;
+                    (Goal::Home { over, layer_m: over.z }, (over.z - view.guidance.ground_m(plan)).max(0.0))
+                }
+                None => view.mission.home(),
+            },
+            None => (Goal::Node(plan.task.goal()?), plan.descent_m),
         };
         Some(DetourRequest {
             aside: self.aside,
@@ -54,7 +68,7 @@ impl Detours {
             leg: [ahead.position, behind.position],
             leg_clearance_m: ahead.clearance_m,
             goal,
-            descent_m: plan.descent_m,
+            descent_m,
             required_clearance_m: view.config.required_clearance_m,
         })
     }
@@ -68,10 +82,12 @@ impl Detours {
         let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
         let Self { aside, lands, left_at_m, .. } = *self;
-        let home = self.home.taken(aside);
+        let (home, beside) = (self.home.taken(aside), self.beside.taken());
+        // It comes back to its plan.
+        let left = self.left || !beside.flies();
         let obstacles = core::mem::take(&mut self.obstacles);
-        let flying = Self { left: true, flying: true, ready: true, obstacles, ..Self::default() };
-        *self = Self { aside, lands, left_at_m, fruitless, home, ..flying };
+        let flying = Self { left, flying: true, ready: true, obstacles, ..Self::default() };
+        *self = Self { aside, lands, left_at_m, fruitless, home, beside, ..flying };
     }
 
     /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
@@ -79,6 +95,9 @@ impl Detours {
         // It is sought again.
         if self.home.seeks() {
             self.home.miss(now);
+            return;
+        }
+        if self.beside.miss(now) {
             return;
         }
         // Where no way aside is found there may yet be one around.

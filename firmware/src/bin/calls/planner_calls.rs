@@ -286,7 +286,7 @@ fn paths(meter: &mut impl Meter) {
         });
         let obstacle = KeepOff { from: near, to: near, radius_m: 1.0, nature: Nature::Solid };
         meter.call("detour::is_blocked", 0, || {
-            detour::is_blocked(&path, -1.0, 1.0, 1.0, &Point::new(500.0, 0.0, 0.0), &obstacle)
+            detour::is_blocked(&path, -1.0..f32::INFINITY, 1.0, 1.0, &Point::new(500.0, 0.0, 0.0), &obstacle)
         });
         let step = StepCase::new(&mut rng, VEHICLES, case % 2 == 0);
         meter.call("deconflict::advise, priority", 0, || step.advise(Method::Priority));

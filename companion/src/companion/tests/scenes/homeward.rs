@@ -29,23 +29,45 @@ pub(super) fn is_ordered(scenes: &mut Scenes) {
     }
 }
 
+/// What lies on its path it flies around, and back to that.
+pub(super) fn flies_around(scenes: &mut Scenes) {
+    let around = |b: &mut Bench| {
+        b.neighbour = below_the_path(OUT);
+        b.until(Blocked, 5.0);
+        b.until(Dividing, 30.0);
+    };
+    scenes.play(over_a_field(Follow), around, Done, 120.0);
+    let is_lost = |b: &mut Bench| {
+        b.neighbour = below_the_path(OUT);
+        b.undividable = true;
+        b.until(Dividing, 40.0);
+        is_home(b);
+    };
+    scenes.play(over_a_field(Follow), is_lost, Aborted, 1.0);
+}
+
 pub(super) fn is_blocked(scenes: &mut Scenes) {
     let blocked = |b: &mut Bench| {
         b.neighbour = below_the_path(OUT);
+        b.answer_detour = detours::NO_WAY;
         b.until(Blocked, 5.0);
+        b.run(119.0);
+        b.answer_detour = Some(Ok(()));
         is_home(b);
     };
     scenes.play(over_a_field(Follow), blocked, Aborted, 1.0);
     // It sways: the path is clear for a moment now and then.
     let sways = |b: &mut Bench| {
+        let told = |b: &Bench, text: &str| b.texts.iter().any(|told| told == text);
         for _ in 0..20 {
+            let turns = told(b, "Path blocked for 2 min: planning the way home");
+            b.answer_detour = if turns { Some(Ok(())) } else { detours::NO_WAY };
             b.neighbour = below_the_path(OUT);
             b.run(8.0);
             b.neighbour = on_pad(ON_PLAN);
             b.run(0.8);
         }
-        let told = |text: &str| b.texts.iter().any(|told| told == text);
-        assert!(told("Path clear again") && told("Flying home"), "{:?}", b.texts);
+        assert!(told(b, "Path clear again") && told(b, "Flying home"), "{:?}", b.texts);
         is_home(b);
     };
     scenes.play(over_a_field(Follow), sways, Aborted, 1.0);

@@ -91,7 +91,10 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
             at_m += MPS * STEP_S;
         }
         settle += i32::from(at_m > path.length_m());
-        let along = Along { progress_m: at_m.min(path.length_m()), follows: held == 0 };
+        let along = Along {
+            progress_m: at_m.min(path.length_m()),
+            place: if held == 0 { Place::OnPath } else { Place::Elsewhere },
+        };
         camera.step(photographs, &path, along, now, &mut links);
         fake.fly(at_m);
         let mut out = [0; 512];
