@@ -46,6 +46,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let height_tolerance_m = self.config.start_tolerance_m.min(START_HEIGHT_M);
         let beneath = self.mission.beneath();
         let follow = self.mission.state() == State::Follow;
+        let on_ground = t.on_ground == Some(true);
         let fence = self.config.geofence;
         let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
@@ -117,7 +118,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             offboard,
             mode_foreign,
             critical: t.is_critical(),
-            on_ground: t.on_ground == Some(true),
+            on_ground,
             flown: handshake.has_flown(),
             vertical: t.position_age(now) < FRESH && t.velocity.z.abs() > RESTING_MPS,
             airborne: t.armed && t.on_ground == Some(false),
@@ -132,7 +133,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && self.neighbours.is_clear_since(self.mission.entered_at())
                 && (self.is_linked() || self.neighbours.all_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
-            path_done: follow && self.guidance.path_done(scene),
+            // The ground may be higher than where its pad is said to be.
+            path_done: follow && (self.guidance.path_done(scene) || (self.guidance.descends() && on_ground)),
             at_goal: self.guidance.at_goal(scene) && !self.detours.home.is_on(),
             near_path: match (beneath, self.mission.state()) {
                 // Those refer to no place on the path.

@@ -26,7 +26,7 @@ use planner_core::Point;
 use planner_core::detour;
 use planner_core::frames::Geodetic;
 
-use self::beside::Beside;
+use self::beside::{Beside, FIELD_M};
 use self::homeward::Homeward;
 use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
@@ -39,9 +39,6 @@ use crate::time::{Duration, Instant};
 
 /// Time from one look along the path to the next.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Over a field what is further away than this does not block the path yet, metres: from 8 m/s a vehicle stops in less than
-/// half of it.
-const FIELD_M: f32 = 60.0;
 /// Stretches of the path that are looked at in one step, each against one thing; a step looks at the whole path at least once.
 const STRETCHES: usize = 160;
 /// A thing to look at costs as much as so many stretches beside those.

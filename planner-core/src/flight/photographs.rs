@@ -122,7 +122,7 @@ pub struct Photographs {
     /// Waypoints of the whole area.
     area: u32,
     /// From one picture to the next, metres: at most.
-    spacing_m: f32,
+    pub spacing_m: f32,
     /// Where the vehicle looks.
     pub look: Look,
     /// What takes the pictures.
@@ -159,11 +159,6 @@ impl Photographs {
     /// The same of an area with so many waypoints, along its path or back.
     pub const fn of_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
-    }
-
-    /// From one picture to the next, metres: at most.
-    pub fn spacing_m(&self) -> f32 {
-        self.spacing_m
     }
 
     /// Waypoints of the whole area; 0 where they have no numbers.

@@ -109,7 +109,7 @@ impl Camera {
 
     /// Beside its path it takes pictures as far apart as on it, whether it would there or not.
     fn go_around(&mut self, photographs: &Photographs, progress_m: f32) {
-        let spacing_m = photographs.spacing_m();
+        let spacing_m = photographs.spacing_m;
         if photographs.trigger == Trigger::Distance {
             if !core::mem::replace(&mut self.on, true) {
                 self.order(Order::Every(spacing_m));

@@ -4,15 +4,14 @@
 
 use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
-use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK, beside};
+use super::beside::{self, MARGIN_M};
+use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
 use crate::guidance::retreat;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
-/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
-pub(super) const MARGIN_M: f32 = 0.5;
 
 impl Detours {
     /// A way around, or just aside, is requested of the shell.

@@ -10,10 +10,14 @@ use heapless::Vec;
 use planner_core::Point;
 use planner_core::detour::{KeepOff, Nature};
 
-use super::{FIELD_M, asking::MARGIN_M};
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
+/// What is further ahead along the path than this does not block it yet, metres: from 8 m/s a vehicle stops in less than half of
+/// it.
+pub(super) const FIELD_M: f32 = 60.0;
+/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
+pub(super) const MARGIN_M: f32 = 0.5;
 /// After no way was found the next is sought so much later.
 const AGAIN: Duration = Duration::from_secs(30);
 /// So often it flies around things in one plan.
