@@ -34,7 +34,7 @@ pub const ACCURACY_AGE: Duration = Duration::from_secs(3);
 
 /// By how much two vehicles over an area may be nearer than they believe, metres: what the clearance leaves each for its
 /// estimate. Both are kept apart by that beside the safety distance, where no gates do it.
-pub fn stray_m(clearance_m: f32, radius_m: f32) -> f32 {
+pub(crate) fn stray_m(clearance_m: f32, radius_m: f32) -> f32 {
     2.0 * libm::fmaxf(room_m(clearance_m, radius_m, TRACKING_M), 0.0)
 }
 

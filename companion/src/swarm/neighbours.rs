@@ -428,7 +428,7 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// What was flown around counts again.
-    pub fn forget_avoided(&mut self) {
+    pub(crate) fn forget_avoided(&mut self) {
         self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
     }
 
