@@ -131,6 +131,8 @@ pub enum Guard {
     YieldedOverField,
     /// The same where the safety filter has kept it from going on for the limit.
     HinderedOverField,
+    /// The same as [`Guard::Stalled`] where the way home can be planned.
+    StalledOverField,
     /// It is to fly home, and stands.
     StandsToReturn,
     /// The way home has come.
@@ -151,8 +153,7 @@ pub enum Guard {
     Hindered,
     /// The same, and it does not: a place aside may yet be sought.
     NoRoomHere,
-    /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent
-    /// there by any: a place aside may be sought.
+    /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent there by any.
     PadTaken,
     /// There is no place aside to land at.
     NoPlaceAside,
@@ -335,8 +336,7 @@ pub struct Inputs {
     pub column_clear: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
-    /// Time for which something has stopped the descent to its pad, or a vehicle that rests the way
-    /// there.
+    /// Time for which something has stopped the descent to its pad, or a vehicle that rests the way there.
     pub pad_taken: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,
@@ -458,6 +458,7 @@ impl Guard {
             Self::BlockedOverField => i.blocked && i.blocked_for >= limit && i.turns_home(),
             Self::YieldedOverField => i.yielded >= limit && i.turns_home(),
             Self::HinderedOverField => i.hindered >= limit && i.turns_home(),
+            Self::StalledOverField => i.stalled >= limit && i.turns_home(),
             Self::StandsToReturn => i.stands_to_return,
             Self::WayHomeReady => i.detour_ready && i.homeward,
             Self::NoWayHome => i.sought_home.is_some_and(|sought| sought >= limit) && i.can_turn_back,

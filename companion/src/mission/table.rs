@@ -214,6 +214,7 @@ pub static TABLE: &[Row] = &[
     warn(&[Follow],           G::PadTaken,         s(20),  Replanning,      A::RequestLanding, "No room to land: seeking a place aside"),
     info(&[Follow],           G::AsideReached,     NOW,    Land,            A::AskLand,     "Landing aside"),
     warn(&[Follow],           G::PathBlocked,      NOW,    Blocked,         A::BrakeOnPath, "Path blocked: waiting until all others stand"),
+    warn(&[Follow],           G::StalledOverField, s(600), Blocked,         A::TurnHome,    "No progress for 10 min: planning the way home"),
     warn(&[Follow],           G::Stalled,          s(600), Land,            A::AskLand,     "No progress for 10 min: landing"),
     info(&[Blocked],          G::PathClear,        NOW,    Follow,          A::RunPath,     "Path clear again"),
     info(&[Blocked],          G::StandsToReturn,   NOW,    Replanning,      A::RequestHome, ""),

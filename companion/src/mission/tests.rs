@@ -216,6 +216,7 @@ fn inputs_for(guard: Guard) -> Inputs {
         G::HinderedOverField => (i.hindered, i.over_field) = (long, true),
         G::StartAgain => i.start = true,
         G::StartOverField => (i.start, i.area) = (true, true),
+        G::StalledOverField => (i.stalled, i.over_field) = (long, true),
         G::StandsToReturn => i.stands_to_return = true,
         G::WayHomeReady => (i.detour_ready, i.homeward) = (true, true),
         G::NoWayHome => (i.sought_home, i.can_turn_back) = (Some(long), true),

@@ -1,5 +1,7 @@
 //! Over a field: it is ordered back, or its path stays blocked, and it flies straight home.
 
+use planner_core::flight::Gate;
+
 use super::State::*;
 use super::losses::over_a_field;
 use super::*;
@@ -71,6 +73,19 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
         is_home(b);
     };
     scenes.play(over_a_field(Follow), sways, Aborted, 1.0);
+}
+
+/// Another vehicle flies elsewhere, and never passes the place that it waits for.
+pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
+    let mut plan = field_plan();
+    plan.gates.push(Gate { at_m: 4.0, id: 77, until_m: 60.0 }).unwrap();
+    let mut bench = losses::over_a_field_with(plan, Follow);
+    bench.neighbour = flies(Point::new(40.0, 40.0, 9.0), ON_PLAN);
+    let waits = |b: &mut Bench| {
+        b.run(600.0);
+        is_home(b);
+    };
+    scenes.play(bench, waits, Aborted, 1.0);
 }
 
 /// Another vehicle flies where it is to fly: on its way home it lets one on its plan go first.

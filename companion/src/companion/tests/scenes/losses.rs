@@ -10,10 +10,15 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 
 /// The two vehicles photograph an area, along the usual path.
 pub(super) fn over_a_field(state: State) -> Bench {
+    over_a_field_with(field_plan(), state)
+}
+
+/// The same by this plan.
+pub(super) fn over_a_field_with(plan: VehiclePlan<16, 8>, state: State) -> Bench {
     let mut config = two_vehicles();
     config.division = Some(60.0);
     let mut bench = Bench::new(config);
-    bench.answer_plan = Some(Ok(field_plan()));
+    bench.answer_plan = Some(Ok(plan));
     bench.neighbour = on_pad(ON_PLAN);
     bench.until(Ready, 6.0);
     if state != Ready {

@@ -1,0 +1,87 @@
+//! A vehicle that flies around what hovers on its lane is struck itself: nothing touches, and all come down.
+//!
+//! `FLOCKMATE_BESIDE=N` looks for such vehicles in N missions in place of [`MISSIONS`], `FLOCKMATE_BESIDE_FROM` in others.
+
+use flockmate_tests::{areas, covered, number};
+use rand_core::{Rng as _, SeedableRng as _};
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+const MISSIONS: u64 = 12;
+
+/// What leaves a vehicle that hovers.
+const HOVERS: [&str; 2] = ["pilot-takeover", "companion-reset"];
+
+/// What strikes the one that flies around it, with further keys.
+const STRIKES: [&str; 14] = [
+    "kill",
+    "radio-cut",
+    "radio-cut\"\ndirection = \"rx\"\nduration_s = \"12",
+    "battery-low",
+    "pilot-takeover",
+    "pilot-takeover\"\nduration_s = \"8",
+    "pilot-takeover\"\nduration_s = \"40",
+    "companion-reset",
+    "return-order",
+    "land-order",
+    "pause-order",
+    "pause-order\"\nduration_s = \"15",
+    "position-jump\"\nduration_s = \"4",
+    "serial-stall\"\nduration_s = \"2",
+];
+
+fn fault(kind: &str, at_s: f32, vehicle: u8) -> String {
+    let keys = format!("[[faults]]\nkind = \"{kind}\"\n").replace("duration_s = \"", "duration_s = ");
+    // A number has no quotes behind it.
+    let keys = match keys.contains("duration_s") {
+        true => keys.trim_end().trim_end_matches('"').to_owned() + "\n",
+        false => keys,
+    };
+    format!("{keys}at_s = {at_s:.2}\nvehicle = {vehicle}\n")
+}
+
+/// When somebody flies around something, and who.
+fn flies_around(log: &str) -> Option<(f32, u8)> {
+    let line = log.lines().find(|line| line.ends_with("Replanning → Follow: Flying around"))?;
+    let mut words = line.split_whitespace();
+    let at_s = words.next()?.parse().ok()?;
+    let vehicle = words.next()?.strip_prefix("Some(")?.strip_suffix(')')?.parse().ok()?;
+    Some((at_s, vehicle))
+}
+
+/// Whether somebody flew around, and what was wrong with the mission in which that one was struck.
+fn struck(seed: u64) -> (bool, Option<String>) {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let count = [3, 5][(seed % 2) as usize];
+    let mut text = areas::lost(&mut random, count, if (seed / 2).is_multiple_of(2) { 0.4 } else { 0.1 });
+    let hovers = 1 + (random.next_u32() % count as u32) as u8;
+    let at_s = 60.0 + (random.next_u32() % 150) as f32;
+    text += &fault(HOVERS[(seed / 4 % 2) as usize], at_s, hovers);
+    let Ok((_, log)) = covered::fly_text(&text) else { return (false, None) };
+    let Some((from_s, vehicle)) = flies_around(&log) else { return (false, None) };
+    let kind = STRIKES[random.next_u32() as usize % STRIKES.len()];
+    text += &fault(kind, from_s + 0.1 + 30.0 * areas::unit(&mut random) as f32, vehicle);
+    let (result, log) = covered::fly_text(&text).expect("it was flown before");
+    let safety = &result.safety;
+    let touches = (safety.wall_contacts, safety.violations, safety.deadlocks) != (0, 0, 0);
+    // Who was struck may hover with its pilot, or be gone.
+    let ends = |end: &str| ["Done", "Aborted", "no goal"].iter().any(|all| end.starts_with(all));
+    let others = result.vehicles.iter().filter(|v| v.id != hovers && v.id != vehicle);
+    let stays = others.filter(|v| !ends(&v.end)).count();
+    let disarmed = log.lines().any(|line| {
+        line.contains("Disarmed in flight") && !(kind == "kill" && line.contains(&format!("Some({vehicle})")))
+    });
+    let wrong = touches || stays > 0 || disarmed;
+    (true, wrong.then(|| format!("seed {seed} {kind}: {safety:?}, {stays} stay\n{log}\n{text}")))
+}
+
+#[test]
+fn who_flies_around_and_is_struck_touches_nothing() {
+    let (from, count) = (number("FLOCKMATE_BESIDE_FROM", 0), number("FLOCKMATE_BESIDE", MISSIONS));
+    let all: Vec<_> = (from..from + count).into_par_iter().map(struck).collect();
+    let around = all.iter().filter(|(around, _)| *around).count();
+    let wrong: Vec<_> = all.iter().filter_map(|(_, wrong)| wrong.as_ref()).collect();
+    wrong.iter().for_each(|wrong| println!("{wrong}"));
+    println!("{around} of {count} flew around something and were struck, {} wrong", wrong.len());
+    assert!(wrong.is_empty() && 4 * around as u64 >= count, "{around} of {count}");
+}
