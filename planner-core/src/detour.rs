@@ -228,6 +228,8 @@ pub struct DetourRequest {
     pub descent_m: f32,
     /// Radius + safety margin, metres.
     pub required_clearance_m: f32,
+    /// Lowest and highest corner of the volume that no leg over a field leaves, ENU metres.
+    pub fence: Option<(Point, Point)>,
 }
 
 impl DetourRequest {
@@ -240,6 +242,10 @@ impl DetourRequest {
         if let Goal::Home { over, layer_m } = &self.goal {
             finite("over", over)?;
             finite("layer_m", &Point::repeat(*layer_m))?;
+        }
+        if let Some((low, high)) = &self.fence {
+            finite("fence", low)?;
+            finite("fence", high)?;
         }
         not_negative("leg_clearance_m", self.leg_clearance_m)?;
         not_negative("descent_m", self.descent_m)?;

@@ -148,6 +148,7 @@ fn detours(name: &str, map: &VoxelMap, clearance_m: f32) {
             goal: Goal::Node(goal),
             descent_m,
             required_clearance_m: clearance_m,
+            fence: None,
         };
         let deep = Point::new(silent.x, silent.y, silent.z - 60.0);
         let column = KeepOff { from: silent, to: deep, radius_m: KEPT_M, nature: Nature::Lying };

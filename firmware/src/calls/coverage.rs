@@ -216,6 +216,7 @@ fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &
             goal: Goal::Home { over: Point::new(-150.0, -80.0, 3.0), layer_m: 40.0 },
             descent_m: 3.0,
             required_clearance_m: 1.2,
+            fence: None,
         };
         // That there is no way is an answer too.
         let found = meter.call("around::plan, 128 things", 0, || {

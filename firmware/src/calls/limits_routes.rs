@@ -240,6 +240,7 @@ fn detours(
         goal: Goal::Node(0),
         descent_m: 1.5,
         required_clearance_m: 0.8,
+        fence: None,
     };
     let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
     let path = own.path.clone();
@@ -255,6 +256,7 @@ fn detours(
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
             DetourRequest { goal: Goal::Home { over: p, layer_m: hard }, ..good },
+            DetourRequest { fence: Some((p, PLACES[5])), ..good },
         ] {
             let bad = [
                 to.call("detour::DetourRequest::check", || request.check()).is_err(),

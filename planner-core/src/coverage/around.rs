@@ -5,7 +5,7 @@
 //! each [`KeepOff`] that reaches the layer, searched by A*. Legs keep above the ground, where that is not level. Where the layer leaves no way, the same at the height at which the
 //! vehicle hovers. Aside: the nearest of places on rings around it, straight there.
 //!
-//! ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
+//! No leg leaves the request's fence. ENU metres. Cost: n² / 2 looks at most for n places, each at all edges of zones and all [`KeepOff`]s.
 
 use heapless::Vec;
 use libm::{ceilf, cosf, fabsf, fminf, sinf};
@@ -43,12 +43,21 @@ struct Clear<'a, 't, const N: usize> {
     field: Option<FieldView<'a>>,
     obstacles: &'a [KeepOff],
     here: Point,
+    fence: Option<(Point, Point)>,
 }
 
 impl<const N: usize> Clear<'_, '_, N> {
     fn leg(&self, a: &Point, b: &Point) -> bool {
         let touches = |obstacle: &KeepOff| obstacle.solid(&self.here).touches(a, b);
-        self.transit.is_clear(&a.xy(), &b.xy()) && self.is_high(a, b) && !self.obstacles.iter().any(touches)
+        // A box holds what is between two places in it; where the vehicle is it may have strayed beyond.
+        self.is_inside(b)
+            && self.transit.is_clear(&a.xy(), &b.xy())
+            && self.is_high(a, b)
+            && !self.obstacles.iter().any(touches)
+    }
+
+    fn is_inside(&self, place: &Point) -> bool {
+        self.fence.is_none_or(|(low, high)| (0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]))
     }
 
     /// Whether a leg keeps above the field, looked at half a node apart.
@@ -84,7 +93,7 @@ pub fn plan<const N: usize, const W: usize>(
         return Err(DetourError::Search(SearchError::NoPath));
     };
     detour::shorten(obstacles, &request.here);
-    let clear = Clear { transit, field, obstacles, here: request.here };
+    let clear = Clear { transit, field, obstacles, here: request.here, fence: request.fence };
     let from = |points: &[Point], out: &mut Path<W>| write(request, points, out).map_err(DetourError::Path);
     if request.aside {
         let place = aside(&clear).ok_or(DetourError::Search(SearchError::NoPath))?;

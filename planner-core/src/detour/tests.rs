@@ -26,6 +26,7 @@ fn request() -> DetourRequest {
         goal: Goal::Node(0),
         descent_m: 4.0,
         required_clearance_m: 0.8,
+        fence: None,
     }
 }
 

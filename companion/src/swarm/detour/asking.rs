@@ -69,6 +69,7 @@ impl Detours {
             goal,
             descent_m,
             required_clearance_m: view.config.required_clearance_m,
+            fence: view.config.geofence,
         })
     }
 

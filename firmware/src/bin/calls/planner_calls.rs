@@ -253,6 +253,7 @@ fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) 
             goal: Goal::Node(0),
             descent_m: 0.5,
             required_clearance_m: cases::CLEARANCE_M,
+            fence: None,
         };
         // That there is no way is an answer too.
         let _ = meter.call("detour::plan, 128 things", bytes, || {

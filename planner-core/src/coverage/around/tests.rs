@@ -20,6 +20,7 @@ fn request(here: Point, aside: bool) -> DetourRequest {
         goal: Goal::Home { over: OVER, layer_m: LAYER_M },
         descent_m: 12.0,
         required_clearance_m: 1.2,
+        fence: None,
     }
 }
 
@@ -77,6 +78,10 @@ fn planned(
                     "{leg:?} meets {obstacle:?}"
                 );
             }
+        }
+        if let Some((low, high)) = request.fence {
+            let inside = |p: &Point| (0..3).all(|a| p[a] >= low[a] && p[a] <= high[a]);
+            assert!(points[1..].iter().all(inside), "{points:?} leave {low:?} to {high:?}");
         }
         let end = points.last().unwrap();
         if request.aside {
@@ -148,6 +153,7 @@ proptest! {
         things in prop::collection::vec((0f32..400.0, 0f32..400.0, 0f32..30.0, 0f32..60.0, 0.5f32..8.0, any::<bool>()), 0..12),
         here in (0f32..400.0, 0f32..400.0, 5f32..60.0),
         aside in any::<bool>(),
+        room_m in 0f32..40.0,
     ) {
         let here = Point::new(here.0, here.1, here.2);
         let request = request(here, aside);
@@ -157,6 +163,13 @@ proptest! {
         };
         let things: StdVec<_> = things.iter().map(thing).collect();
         let Some((way, shortest_m)) = planned(&zones, &request, &things) else { return Ok(()) };
+        // A fence that holds both ends takes ways away, and adds none.
+        let room = Point::repeat(room_m);
+        let fence = Some((here.inf(&OVER) - room, Point::new(here.x, here.y, LAYER_M).sup(&OVER).sup(&here) + room));
+        if let Some((Ok(fenced), _)) = planned(&zones, &DetourRequest { fence, ..request }, &things) {
+            let free = way.as_ref().expect("the same way without a fence");
+            prop_assert!(aside || length_m(free) < length_m(&fenced) + 0.1 || free[1].z != fenced[1].z);
+        }
         let Some((alone, _)) = planned(&zones, &request, &[]) else { return Ok(()) };
         if !aside && shortest_m.is_finite() {
             let alone = alone.expect("a way around the zones");
