@@ -137,10 +137,10 @@ impl Beside {
 /// What other vehicles leave no room for over a field: where they are, and where those in the air off the plan may come down.
 pub(super) fn others<const V: usize, const W: usize, const G: usize>(
     view: &View<'_, V, W, G>,
-    mut tell: impl FnMut(KeepOff),
+    tell: &mut dyn FnMut(KeepOff),
 ) {
     let apart_m = view.config.safety_distance_m + MARGIN_M;
-    view.neighbours.places(view.now, apart_m, &mut tell);
+    view.neighbours.places(view.now, apart_m, &mut *tell);
     let beside_m = apart_m + view.neighbours.stray_m();
     view.neighbours
         .landing_columns(view.now, beside_m, |column| tell(KeepOff { nature: Nature::Solid, ..column }));

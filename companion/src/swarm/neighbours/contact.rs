@@ -195,14 +195,14 @@ impl Contact {
     }
 
     /// The columns it may come down in.
-    pub(super) fn columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    pub(super) fn columns(&self, now: Instant, apart_m: f32, tell: &mut dyn FnMut(KeepOff)) {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
         let mut column = |from: Point, below_m: f32, nature: Nature| {
             tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
         };
         if !self.heard_within(now, SILENT) {
-            return self.stretch(|place| column(place, COLUMN_M, Nature::Landing));
+            return self.stretch(&mut |place| column(place, COLUMN_M, Nature::Landing));
         }
         let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
         let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
@@ -230,7 +230,7 @@ impl Contact {
     }
 
     /// Places along its path as far as it may come unheard.
-    pub(super) fn stretch(&self, mut tell: impl FnMut(Point)) {
+    pub(super) fn stretch(&self, tell: &mut dyn FnMut(Point)) {
         let (mut at, mut left_m) = (self.state.position, self.stretch_m());
         tell(at);
         for next in &self.points {
@@ -268,7 +268,7 @@ impl Contact {
         now: Instant,
         apart_m: f32,
         field: Option<Field>,
-        mut tell: impl FnMut(KeepOff),
+        tell: &mut dyn FnMut(KeepOff),
     ) {
         let here = self.state.position;
         // In the air: those on the ground lie beside each other's pads.
@@ -296,13 +296,13 @@ impl Contact {
             let down = !self.heard_within(now, field.map_or(DOWN, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.floor_m.is_nan()) {
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
-                return self.stretch(|at| {
+                return self.stretch(&mut |at| {
                     let from = low(at, self.lies_at_most_m(field, &at));
                     tell(KeepOff { from, to: low(at, self.floor_m), ..place(apart_m + VAGUE_M) });
                 });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
-            self.stretch(|at| tell(column(at, nature)));
+            self.stretch(&mut |at| tell(column(at, nature)));
         } else {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));

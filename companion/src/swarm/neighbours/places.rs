@@ -21,11 +21,11 @@ impl<const V: usize> Neighbours<V> {
 
     /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
     /// is far enough.
-    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
+    pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, apart_m, self.field(), tell);
+            contact.obstacles(now, apart_m, self.field(), &mut tell);
         }
     }
 
@@ -51,10 +51,10 @@ impl<const V: usize> Neighbours<V> {
     }
 
     /// The same of contact `i`.
-    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, tell: impl FnMut(KeepOff)) {
+    pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.columns(now, apart_m, tell);
+            contact.columns(now, apart_m, &mut tell);
         }
     }
 
@@ -91,7 +91,7 @@ impl<const V: usize> Neighbours<V> {
             let high_m = libm::fmaxf(a.z, b.z);
             below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
         };
-        contact.stretch(|at| near(core::mem::replace(&mut from, at), at));
+        contact.stretch(&mut |at| near(core::mem::replace(&mut from, at), at));
         below
     }
 
