@@ -134,10 +134,11 @@ impl<'a> Area<'a> {
         self.rings.iter().any(|ring| ring.kind == RingKind::NoFly)
     }
 
-    /// Vertices of one ring.
+    /// Vertices of one ring; none of one that there is not.
     pub fn ring(&self, index: usize) -> &'a [Flat] {
-        let start = if index == 0 { 0 } else { usize::from(self.rings[index - 1].end) };
-        &self.vertices[start..usize::from(self.rings[index].end)]
+        let Some(ring) = self.rings.get(index) else { return &[] };
+        let start = index.checked_sub(1).map_or(0, |before| usize::from(self.rings[before].end));
+        &self.vertices[start..usize::from(ring.end)]
     }
 
     /// Each ring's kind and vertices.

@@ -20,10 +20,7 @@ pub fn left<const L: usize, const N: usize>(
     transit: &Transit<'_, N>,
     left: &mut Tracks<L>,
 ) -> Result<(), CoverageError> {
-    let in_order = done.iter().all(|range| range.first <= range.end)
-        && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
-        && done.last().is_none_or(|range| range.end <= tracks.waypoint_count());
-    if !in_order {
+    if !in_order(done) || done.last().is_some_and(|range| range.end > tracks.waypoint_count()) {
         return Err(CoverageError::Setting("done"));
     }
     left.lanes.clear();
@@ -43,6 +40,12 @@ pub fn left<const L: usize, const N: usize>(
     left.measure(transit)
 }
 
+/// Whether ranges are in rising order and do not overlap.
+pub(super) fn in_order(done: &[Range]) -> bool {
+    done.iter().all(|range| range.first <= range.end)
+        && done.windows(2).all(|pair| pair[0].end <= pair[1].first)
+}
+
 fn keep<const L: usize>(lane: &Lane, from: u32, end: u32, left: &mut Tracks<L>) -> Result<(), CoverageError> {
     if from >= end {
         return Ok(());
@@ -58,14 +61,14 @@ fn keep<const L: usize>(lane: &Lane, from: u32, end: u32, left: &mut Tracks<L>) 
     left.lanes.push(part).map_err(|_| CoverageError::LanesFull)
 }
 
-/// The number that waypoint `number` of what is left had on the whole path.
+/// The number that waypoint `number` of what is left had on the whole path: the greatest there is where it had none.
 pub fn original(done: &[Range], number: u32) -> u32 {
     let mut whole = number;
     for range in done.iter().filter(|range| range.first < range.end) {
         if whole < range.first {
             break;
         }
-        whole += range.end - range.first;
+        whole = whole.saturating_add(range.end - range.first);
     }
     whole
 }

@@ -27,10 +27,11 @@ pub struct Workspace<'a> {
 }
 
 impl Workspace<'_> {
-    /// Lengths of the three for so many vehicles and waypoints.
+    /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where no memory has so much.
     pub fn lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
         let vehicles = vehicles.min(MOST_VEHICLES);
-        [2 * vehicles * waypoints, vehicles * vehicles * (waypoints + 1), 1 << (2 * vehicles)]
+        let reaches = (vehicles * vehicles).saturating_mul(waypoints.saturating_add(1));
+        [(2 * vehicles).saturating_mul(waypoints), reaches, 1 << (2 * vehicles)]
     }
 }
 

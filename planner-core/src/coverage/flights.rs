@@ -78,7 +78,8 @@ pub struct Swarm<'a> {
 ///
 /// # Errors
 /// [`PlanError::Path`] for a route of which not one lane fits, [`PlanError::Schedule`] for a vehicle that cannot be kept
-/// apart from the others, [`PlanError::Terminals`] where pads and vehicles do not belong together.
+/// apart from the others, [`PlanError::Terminals`] where pads, vehicles, routes and lanes do not belong together,
+/// [`PlanError::Config`] for a setting, [`PlanError::BadTask`] for a vehicle's, [`PlanError::SameId`].
 pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     work: &Work<'_, L, N>,
     routes: &Plan<K>,
@@ -86,10 +87,7 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
     ws: &mut ScheduleWorkspace,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
-    swarm.schedule.check().map_err(PlanError::Config)?;
-    if swarm.pads.len() != work.vehicles.len() {
-        return Err(PlanError::Terminals);
-    }
+    check(work, &routes.routes, swarm)?;
     out.flights.clear();
     let used = |layer: u8| routes.routes.iter().any(|route| route.layer == layer);
     let mut layers = free_layers(swarm.layers_held).filter(|layer| !used(*layer));
@@ -111,6 +109,49 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
             .map_err(|e| PlanError::Schedule(flight.id, e))?;
     }
     out.seal(&swarm.schedule);
+    Ok(())
+}
+
+/// Whether every number is one that can be planned with, and all belong together.
+fn check<const L: usize, const N: usize>(
+    work: &Work<'_, L, N>,
+    routes: &[Route],
+    swarm: &Swarm<'_>,
+) -> Result<(), PlanError> {
+    swarm.schedule.check().map_err(PlanError::Config)?;
+    let settings = [
+        ("mission_m", work.heights.mission_m),
+        ("layer_m", work.heights.layer_m),
+        ("waypoint_m", swarm.manner.waypoint_m),
+    ];
+    crate::all_positive(&settings).map_err(PlanError::Config)?;
+    let all = work.tracks.waypoint_count();
+    let within = |route: &Route| {
+        route.first < route.end && route.end <= all && usize::from(route.vehicle) < work.vehicles.len()
+    };
+    if swarm.pads.len() != work.vehicles.len() || !routes.iter().all(within) || !divide::in_order(swarm.done)
+    {
+        return Err(PlanError::Terminals);
+    }
+    for (index, (pad, vehicle)) in swarm.pads.iter().zip(work.vehicles).enumerate() {
+        let speeds = [
+            ("cruise_mps", vehicle.cruise_mps),
+            ("climb_mps", vehicle.climb_mps),
+            ("descend_mps", vehicle.descend_mps),
+        ];
+        let heights = [pad.climb_m, pad.descent_m];
+        let places =
+            pad.start.iter().chain(vehicle.place.iter()).chain(vehicle.home.iter()).chain([&pad.end_z_m]);
+        if crate::all_positive(&speeds).is_err()
+            || !heights.iter().all(|height_m| *height_m >= 0.0 && height_m.is_finite())
+            || !places.into_iter().all(|place| place.is_finite())
+        {
+            return Err(PlanError::BadTask(pad.id));
+        }
+        if swarm.pads[..index].iter().any(|other| other.id == pad.id) {
+            return Err(PlanError::SameId(pad.id));
+        }
+    }
     Ok(())
 }
 
@@ -308,8 +349,8 @@ fn stretch<const L: usize, const N: usize, const W: usize>(
     let vehicle = &work.vehicles[usize::from(route.vehicle)];
     let Manner { waypoint_m, trigger, .. } = swarm.manner;
     let look = look(work, route, swarm);
-    let done: u32 = swarm.done.iter().map(|range| range.end - range.first).sum();
-    let area = work.tracks.waypoint_count() + done;
+    let done = swarm.done.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add);
+    let area = work.tracks.waypoint_count().saturating_add(done);
     let backward = route.heading == Heading::Backward;
     let mut photographs = Photographs::new(waypoint_m, look, trigger).of_area(area, backward);
     let mission_m = work.heights.mission_m;
@@ -326,7 +367,7 @@ fn stretch<const L: usize, const N: usize, const W: usize>(
         let Some(lane) = work.tracks.lanes().get(lane) else { continue };
         let (begin, end) = part_of(lane, route);
         let first = divide::original(swarm.done, begin);
-        let waypoints = Range { first, end: first + (end + 1 - begin) };
+        let waypoints = Range { first, end: first.saturating_add(end + 1 - begin) };
         let (begin, end) = if backward { (end, begin) } else { (begin, end) };
         let (begin, end) = (place(begin)?, place(end)?);
         let from = match *laid {

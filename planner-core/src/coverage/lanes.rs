@@ -46,13 +46,13 @@ impl Lane {
         (self.to - self.from).norm()
     }
 
-    /// Waypoint `k` of it, from 0.
+    /// Waypoint `k` of it, from 0: the last one for numbers beyond.
     pub fn waypoint(&self, k: u32) -> Flat {
         if self.count < 2 { self.from } else { self.from + (self.to - self.from) * self.share(k) }
     }
 
     fn share(&self, k: u32) -> f32 {
-        if self.count < 2 { 0.0 } else { k as f32 / (self.count - 1) as f32 }
+        if self.count < 2 { 0.0 } else { k.min(self.count - 1) as f32 / (self.count - 1) as f32 }
     }
 
     /// The same lane flown the other way.
@@ -69,12 +69,12 @@ pub struct Tracks<const L: usize> {
 }
 
 impl<const L: usize> Tracks<L> {
-    /// No lanes.
+    /// No lanes: all zeros.
     pub const fn new() -> Self {
-        Self { lanes: Vec::new(), along: Flat::new(1.0, 0.0) }
+        Self { lanes: Vec::new(), along: Flat::new(0.0, 0.0) }
     }
 
-    /// The direction along the lanes, of length 1.
+    /// The direction along the lanes, of length 1; 0 where there are none.
     pub fn along(&self) -> Flat {
         self.along
     }
@@ -106,7 +106,7 @@ impl<const L: usize> Tracks<L> {
         Some(lane.waypoint(k))
     }
 
-    /// Length of the path up to a waypoint, metres.
+    /// Length of the path up to a waypoint, metres: up to the last one for numbers beyond.
     pub fn along_m(&self, number: u32) -> f32 {
         let Some(lane) = self.lanes.get(self.lane_of(number)) else { return 0.0 };
         lane.start_m + lane.length_m() * lane.share(number - lane.first)

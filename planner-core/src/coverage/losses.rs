@@ -129,8 +129,8 @@ impl From<PlanError> for Error {
 /// Divides what is left. `routes` are those of the plan before, `out` has its flights; afterwards both are those of the division.
 ///
 /// # Errors
-/// Those of [`divide::left`], [`pack::binpat`] and [`flights::plan`]; [`CoverageError::Vehicles`] where fates and vehicles do
-/// not belong together.
+/// Those of [`divide::left`], [`pack::binpat`] and [`flights::plan`]; [`CoverageError::Vehicles`] where fates, routes and
+/// vehicles do not belong together; [`CoverageError::Setting`] for an `along_m` that is NaN or negative.
 pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,
@@ -140,8 +140,16 @@ pub fn again<const L: usize, const N: usize, const K: usize, const V: usize, con
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), Error> {
     let Loss { work, swarm, fates } = *loss;
-    if fates.len() != work.vehicles.len() || out.flights.len() != fates.len() {
+    let known = |route: &Route| usize::from(route.vehicle) < fates.len();
+    if fates.len() != work.vehicles.len()
+        || swarm.pads.len() != fates.len()
+        || out.flights.len() != fates.len()
+        || !routes.routes.iter().all(known)
+    {
         return Err(CoverageError::Vehicles.into());
+    }
+    if !fates.iter().all(|fate| fate.along_m >= 0.0) {
+        return Err(CoverageError::Setting("along_m").into());
     }
     note_done(fates, ws, out)?;
     place(loss, ws, out)?;

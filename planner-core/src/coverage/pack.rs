@@ -84,11 +84,12 @@ pub struct Route {
 }
 
 impl Route {
-    /// The waypoint that is flown to first, and the last one.
+    /// The waypoint that is flown to first, and the last one. A route has one at least.
     pub fn ends(&self) -> (u32, u32) {
+        let last = self.end.saturating_sub(1);
         match self.heading {
-            Heading::Forward => (self.first, self.end - 1),
-            Heading::Backward => (self.end - 1, self.first),
+            Heading::Forward => (self.first, last),
+            Heading::Backward => (last, self.first),
         }
     }
 
