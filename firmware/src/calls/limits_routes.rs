@@ -13,6 +13,7 @@ use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorksp
 use planner_core::search::SearchWorkspace;
 
 use super::limits::{Answers, HARD, Listener, points};
+use super::limits_area_flights as area_flights;
 use super::limits_field as field;
 use super::limits_graph::{self as graph, INDICES, NODES, PLACES, any};
 
@@ -31,12 +32,19 @@ pub struct Lent {
     plan: Plan,
     own: VehiclePlan<WAYPOINTS, GATES>,
     file: [u8; 512],
+    coverage: area_flights::Lent,
 }
 
 impl Lent {
     /// Empty.
     pub const fn new() -> Self {
-        Self { ws: Workspace::new(), plan: Plan::new(), own: VehiclePlan::new(), file: [0; 512] }
+        Self {
+            ws: Workspace::new(),
+            plan: Plan::new(),
+            own: VehiclePlan::new(),
+            file: [0; 512],
+            coverage: area_flights::Lent::new(),
+        }
     }
 }
 
@@ -47,11 +55,11 @@ impl Default for Lent {
 }
 
 /// Makes all of them; the sum of the answers after each part: fields and files, roadmaps, searches, assignments, plans, schedules,
-/// detours.
-pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] {
+/// detours, coverage.
+pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 8] {
     field::fields(to);
     let len = graph::files(to, &mut lent.ws.search, &mut lent.file);
-    let mut sums = [to.sum(); 7];
+    let mut sums = [to.sum(); 8];
     let view = to
         .call("roadmap::RoadmapView::parse", || RoadmapView::parse(&lent.file[..len]))
         .expect("just written");
@@ -67,6 +75,8 @@ pub fn routes(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) -> [u32; 7] 
     sums[5] = to.sum();
     detours(to, &view, &mut lent.ws.search, &mut lent.own);
     sums[6] = to.sum();
+    area_flights::coverage(to, &mut lent.ws.schedule, &mut lent.coverage);
+    sums[7] = to.sum();
     sums
 }
 

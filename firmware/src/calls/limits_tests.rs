@@ -39,11 +39,10 @@ fn public(folder: &Path, names: &mut BTreeSet<String>) {
     for entry in fs::read_dir(folder).expect("a folder of sources") {
         let path = entry.expect("readable").path();
         let file = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_string();
-        // No board plans coverage yet.
-        if path.is_dir() && file != "coverage" {
+        if path.is_dir() {
             public(&path, names);
         }
-        if path.is_dir() || file.ends_with("tests") || file == "coverage" {
+        if path.is_dir() || file.ends_with("tests") {
             continue;
         }
         let source = fs::read_to_string(&path).expect("readable");
@@ -79,7 +78,7 @@ fn every_public_call_of_planner_core_holds_at_its_limits() {
     routes(&mut answers, &mut Box::new(Lent::new()));
     let mut all = BTreeSet::new();
     public(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../planner-core/src"), &mut all);
-    assert!(all.len() > 90, "{}", all.len());
+    assert!(all.len() > 150, "{}", all.len());
     let called: BTreeSet<String> = called.0.iter().copied().map(String::from).collect();
     let missing: std::vec::Vec<_> = all.difference(&called).collect();
     assert!(missing.is_empty(), "not called at their limits: {missing:?}");

@@ -6,6 +6,8 @@
 pub mod coverage;
 pub mod flight;
 pub mod limits;
+mod limits_area_flights;
+mod limits_coverage;
 mod limits_field;
 mod limits_graph;
 pub mod limits_routes;

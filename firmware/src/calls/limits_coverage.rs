@@ -1,0 +1,402 @@
+//! The calls on areas, lanes and their division at their limits and beyond.
+
+use heapless::Vec;
+use planner_core::coverage::area::{Area, Ring, RingKind};
+use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
+use planner_core::coverage::pack::{self, Heading, Heights, PackWorkspace, Plan, Route, Unit, Vehicle, Work};
+use planner_core::coverage::powell::{self, powell};
+use planner_core::coverage::tracks::{self, Lane, Pattern, Tracks};
+use planner_core::coverage::transit::Transit;
+use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
+use planner_core::flight::Range;
+
+use super::limits::{Answers, HARD, Listener};
+
+/// Capacities: lanes, vertices, corners of no-fly zones, vehicles.
+pub(super) const LANES: usize = 8;
+pub(super) const VERTICES: usize = 12;
+pub(super) const CORNERS: usize = 4;
+pub(super) const VEHICLES: usize = 3;
+/// Places of waypoints and ends of ranges.
+const NUMBERS: [u32; 6] = [0, 1, 7, 1 << 24, u32::MAX - 1, u32::MAX];
+
+const CORNERS_OF_ALL: [Flat; 8] = [
+    Flat::new(0.0, 0.0),
+    Flat::new(40.0, 0.0),
+    Flat::new(40.0, 30.0),
+    Flat::new(0.0, 30.0),
+    Flat::new(12.0, 12.0),
+    Flat::new(18.0, 12.0),
+    Flat::new(18.0, 17.0),
+    Flat::new(12.0, 17.0),
+];
+const RINGS: [Ring; 2] = [Ring { end: 4, kind: RingKind::Outer }, Ring { end: 8, kind: RingKind::NoFly }];
+const SPACING: Spacing =
+    Spacing { footprint: Footprint { along_m: 10.0, across_m: 10.0 }, lane_m: 10.0, waypoint_m: 10.0 };
+const PATTERN: Pattern = Pattern { spacing: SPACING, angle_deg: None, margin_m: 0.0, looks: 100 };
+pub(super) const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+const VEHICLE: Vehicle = Vehicle {
+    place: Flat::new(-5.0, -5.0),
+    home: Flat::new(-5.0, -5.0),
+    cruise_mps: 5.0,
+    climb_mps: 3.0,
+    descend_mps: 1.0,
+    weight: 1.0,
+};
+pub(super) const FLEET: [Vehicle; VEHICLES] = [
+    VEHICLE,
+    Vehicle { place: Flat::new(5.0, -5.0), home: Flat::new(5.0, -5.0), ..VEHICLE },
+    Vehicle { place: Flat::new(15.0, -5.0), home: Flat::new(15.0, -5.0), ..VEHICLE },
+];
+const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
+
+pub(super) type Lanes = Tracks<LANES>;
+pub(super) type Ways<'a> = Transit<'a, CORNERS>;
+
+/// What the calls are lent.
+pub(super) struct Lent {
+    pub(super) tracks: Lanes,
+    left: Lanes,
+    build: tracks::Workspace<VERTICES>,
+    pub(super) powell: powell::Workspace<VEHICLES>,
+    pub(super) plan: Plan<VEHICLES>,
+}
+
+impl Lent {
+    /// All zeros.
+    pub(super) const fn new() -> Self {
+        Self {
+            tracks: Tracks::new(),
+            left: Tracks::new(),
+            build: tracks::Workspace::new(),
+            powell: powell::Workspace::new(),
+            plan: Plan::new(),
+        }
+    }
+}
+
+fn is_good(number: f32) -> bool {
+    number > 0.0 && number.is_finite()
+}
+
+/// Makes all of them. Lent are afterwards the lanes and the routes of [`area`].
+pub(super) fn coverage(to: &mut Answers<'_, impl Listener>, lent: &mut Lent) {
+    cameras(to);
+    areas(to);
+    let area = area();
+    let mut transit = to.call("transit::Transit::empty", Ways::empty);
+    ways(to, &mut transit);
+    lanes(to, &area, &transit, lent);
+    divisions(to, &transit, lent);
+    packs(to, &transit, lent);
+    searches(to, &transit, lent);
+}
+
+/// 40 by 30 m, around a no-fly zone.
+pub(super) fn area() -> Area<'static> {
+    Area::new(&CORNERS_OF_ALL, &RINGS).expect("an area")
+}
+
+fn cameras(to: &mut Answers<'_, impl Listener>) {
+    let pixels = [6000, 4000];
+    for hard in HARD {
+        for camera in [
+            Camera::Diagonal { fov_deg: 73.7, aspect: 1.5 },
+            Camera::Diagonal { fov_deg: hard, aspect: 1.5 },
+            Camera::Diagonal { fov_deg: 73.7, aspect: hard },
+            Camera::Sensor { sides_mm: [hard, 15.6], focal_mm: 16.0, pixels },
+            Camera::Sensor { sides_mm: [23.5, hard], focal_mm: 16.0, pixels },
+            Camera::Sensor { sides_mm: [23.5, 15.6], focal_mm: hard, pixels },
+            Camera::Sensor { sides_mm: [23.5, 15.6], focal_mm: 16.0, pixels: [0, u32::MAX] },
+        ] {
+            let checked = to.call("footprint::Camera::check", || camera.check());
+            let seen = to.call("footprint::Camera::footprint", || camera.footprint(hard));
+            let height_m = to.call("footprint::Camera::height_for_gsd", || camera.height_for_gsd(hard));
+            assert!(checked.is_ok() || seen.is_err() && height_m.is_err());
+            assert!(is_good(hard) || seen.is_err() && height_m.is_err());
+            let Ok(footprint) = seen else { continue };
+            to.add(footprint.along_m);
+            to.add(footprint.across_m);
+            to.add(height_m.unwrap_or(0.0));
+            let spacing = Spacing { footprint, lane_m: hard, waypoint_m: 1.0 };
+            let checked = to_check(to, &spacing).is_ok();
+            to.is(checked);
+        }
+        for spacing in [
+            Spacing { lane_m: hard, ..SPACING },
+            Spacing { waypoint_m: hard, ..SPACING },
+            Spacing { footprint: Footprint { along_m: hard, across_m: hard }, ..SPACING },
+        ] {
+            assert!(is_good(hard) || to_check(to, &spacing).is_err());
+        }
+    }
+}
+
+fn to_check(to: &mut Answers<'_, impl Listener>, spacing: &Spacing) -> Result<(), CoverageError> {
+    to.call("footprint::Spacing::check", || spacing.check())
+}
+
+fn areas(to: &mut Answers<'_, impl Listener>) {
+    for x in HARD {
+        for y in HARD {
+            let mut vertices = CORNERS_OF_ALL;
+            vertices[2] = Flat::new(x, y);
+            let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
+            to.is(found.is_ok());
+            let place = Flat::new(x, y);
+            let holds = to.call("area::Area::holds", || area().holds(&place));
+            let forbids = to.call("area::Area::forbids", || area().forbids(&place));
+            assert!(holds || !forbids, "the zone lies in the area");
+            let Ok(area) = found else { continue };
+            let mut hull: Vec<Flat, VERTICES> = Vec::new();
+            let direction = to.call("sweep::least_width", || sweep::least_width(&area, &mut hull));
+            assert!(direction.is_ok_and(|found| (found.along.norm() - 1.0).abs() < 1e-3));
+            to.add(direction.map_or(0.0, |found| found.across.x));
+        }
+        let direction = to.call("sweep::Direction::at_deg", || sweep::Direction::at_deg(x));
+        to.add(direction.along.x);
+    }
+    let rings = |ends: [u16; 2], kind: RingKind| ends.map(|end| Ring { end, kind });
+    for (end, kind) in
+        [(0, RingKind::Outer), (9, RingKind::Outer), (u16::MAX, RingKind::NoFly), (4, RingKind::Hole)]
+    {
+        for rings in [rings([end, 8], kind), rings([4, end], kind), rings([end, end], kind)] {
+            let found = to.call("area::Area::new", || Area::new(&CORNERS_OF_ALL, &rings));
+            assert!(found.is_err());
+        }
+    }
+    assert!(Area::new(&[], &[]).is_err());
+    let area = area();
+    for index in [0, 1, 2, usize::MAX] {
+        let ring = to.call("area::Area::ring", || area.ring(index));
+        assert_eq!(ring.len(), if index < 2 { 4 } else { 0 });
+    }
+    assert_eq!(to.call("area::Area::vertices", || area.vertices()).len(), 8);
+    assert_eq!(to.call("area::Area::rings", || area.rings()).len(), 2);
+    assert!(to.call("area::Area::has_no_fly", || area.has_no_fly()));
+    let mut none: Vec<Flat, 2> = Vec::new();
+    assert!(sweep::least_width(&area, &mut none).is_err(), "no room for the hull");
+}
+
+fn ways(to: &mut Answers<'_, impl Listener>, transit: &mut Ways<'static>) {
+    let mut small = Transit::<3>::empty();
+    let full = to.call("transit::Transit::learn", || small.learn(area()));
+    assert_eq!(full, Err(CoverageError::NoFlyFull));
+    for known in [false, true] {
+        if known {
+            assert_eq!(to.call("transit::Transit::learn", || transit.learn(area())), Ok(()));
+        }
+        let corners = to.call("transit::Transit::corners", || transit.corners().len());
+        assert_eq!(corners, if known { CORNERS } else { 0 });
+        for x in HARD {
+            for y in HARD {
+                let (from, there) = (Flat::new(x, y), Flat::new(15.0, 40.0));
+                let forbids = to.call("transit::Transit::forbids", || transit.forbids(&from));
+                assert!(known || !forbids);
+                let clear = to.call("transit::Transit::is_clear", || transit.is_clear(&from, &there));
+                to.is(clear);
+                let far_m = to.call("transit::Transit::distance_m", || transit.distance_m(&from, &there));
+                to.add(far_m);
+                let mut corners: Vec<Flat, CORNERS> = Vec::new();
+                let way = to.call("transit::Transit::way", || transit.way(&from, &there, &mut corners));
+                to.is(way.is_ok());
+                to.count(corners.len());
+                let back = transit.way(&there, &from, &mut corners);
+                to.is(back.is_ok());
+            }
+        }
+    }
+}
+
+fn lanes(to: &mut Answers<'_, impl Listener>, area: &Area<'_>, transit: &Ways<'_>, lent: &mut Lent) {
+    let Lent { tracks, build, .. } = lent;
+    *build = to.call("strips::Workspace::new", tracks::Workspace::new);
+    *tracks = to.call("lanes::Tracks::new", Tracks::new);
+    numbers(to, tracks);
+    for hard in HARD {
+        for pattern in [
+            Pattern { angle_deg: Some(hard), ..PATTERN },
+            Pattern { margin_m: hard, ..PATTERN },
+            Pattern { spacing: Spacing { lane_m: hard, ..SPACING }, ..PATTERN },
+            Pattern { spacing: Spacing { waypoint_m: hard, ..SPACING }, looks: u32::MAX, ..PATTERN },
+            Pattern { looks: 0, ..PATTERN },
+        ] {
+            let built = to.call("tracks::build", || tracks::build(area, &pattern, transit, build, tracks));
+            to.is(built.is_ok());
+            if built.is_ok() {
+                numbers(to, tracks);
+            }
+        }
+        for end in HARD {
+            let (from, end) = (Flat::new(hard, 0.0), Flat::new(0.0, end));
+            for count in NUMBERS {
+                let lane = Lane { from, to: end, first: count, count, start_m: 0.0, strip: 0 };
+                let length_m = to.call("lanes::Lane::length_m", || lane.length_m());
+                to.add(length_m);
+                let place = to.call("lanes::Lane::waypoint", || lane.waypoint(u32::MAX));
+                to.add(place.x);
+            }
+        }
+    }
+    let many = Pattern { spacing: Spacing { lane_m: 1.0, ..SPACING }, ..PATTERN };
+    assert_eq!(tracks::build(area, &many, transit, build, tracks), Err(CoverageError::LanesFull));
+    assert_eq!(tracks::build(area, &PATTERN, transit, build, tracks), Ok(()));
+    numbers(to, tracks);
+}
+
+/// Waypoints that there are and that there are not.
+fn numbers(to: &mut Answers<'_, impl Listener>, tracks: &Lanes) {
+    let count = to.call("lanes::Tracks::waypoint_count", || tracks.waypoint_count());
+    let lanes = to.call("lanes::Tracks::lanes", || tracks.lanes().len());
+    let along = to.call("lanes::Tracks::along", || tracks.along());
+    let length_m = to.call("lanes::Tracks::length_m", || tracks.length_m());
+    for number in NUMBERS.into_iter().chain([count, count.saturating_sub(1)]) {
+        let lane = to.call("lanes::Tracks::lane_of", || tracks.lane_of(number));
+        assert!(lane < lanes.max(1));
+        let place = to.call("lanes::Tracks::waypoint", || tracks.waypoint(number));
+        assert_eq!(place.is_some(), number < count);
+        let along_m = to.call("lanes::Tracks::along_m", || tracks.along_m(number));
+        assert!(along_m <= length_m * 1.001);
+        to.add(along_m + along.x);
+    }
+}
+
+fn divisions(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
+    let Lent { tracks, left, .. } = lent;
+    for first in NUMBERS {
+        for end in NUMBERS {
+            let done = [Range { first: 0, end: 2 }, Range { first, end }];
+            for done in [&done[..], &done[1..]] {
+                let found = to.call("divide::left", || divide::left(tracks, done, transit, left));
+                assert!(found.is_err() || first <= end && end <= tracks.waypoint_count());
+                to.is(found.is_ok());
+                for number in NUMBERS {
+                    let whole = to.call("divide::original", || divide::original(done, number));
+                    assert!(whole >= number);
+                    to.count(whole as usize);
+                }
+            }
+        }
+    }
+    let all = [Range { first: 0, end: tracks.waypoint_count() }];
+    assert_eq!(divide::left(tracks, &all, transit, left), Err(CoverageError::NothingToCover));
+    let mut none = Tracks::<1>::new();
+    assert!(divide::left(&none.clone(), &[], transit, &mut none).is_err());
+}
+
+/// [`FLEET`], one of which has a hard number.
+fn fleets(hard: f32) -> [[Vehicle; VEHICLES]; 6] {
+    let with = |vehicle: Vehicle| [FLEET[0], vehicle, FLEET[2]];
+    [
+        with(Vehicle { place: Flat::new(hard, 0.0), ..VEHICLE }),
+        with(Vehicle { home: Flat::new(0.0, hard), ..VEHICLE }),
+        with(Vehicle { cruise_mps: hard, ..VEHICLE }),
+        with(Vehicle { climb_mps: hard, ..VEHICLE }),
+        with(Vehicle { descend_mps: hard, ..VEHICLE }),
+        with(Vehicle { weight: hard, ..VEHICLE }),
+    ]
+}
+
+fn packs(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
+    let Lent { tracks, powell, plan, .. } = lent;
+    *plan = to.call("pack::Plan::new", Plan::new);
+    let ws = &mut powell.pack;
+    *ws = to.call("pack::PackWorkspace::new", PackWorkspace::new);
+    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: Unit::Waypoint };
+    let pack = |to: &mut Answers<'_, _>, work: &Work<'_, LANES, CORNERS>, ws: &mut _, plan: &mut Plan<_>| {
+        let checked = to.call("pack::Work::check", || work.check::<VEHICLES>());
+        let packed = to.call("pack::binpat", || pack::binpat(work, ws, plan));
+        assert!(checked.is_ok() || packed == checked);
+        to.is(packed.is_ok());
+        let shares = to.call("pack::PackWorkspace::shares", || *ws.shares());
+        shares.iter().for_each(|share| to.add(*share));
+        for vehicle in work.vehicles {
+            let delay_s = to.call("pack::Work::altitude_delay_s", || work.altitude_delay_s(vehicle, u8::MAX));
+            to.add(delay_s);
+        }
+        let max_s = to.call("pack::Plan::max_cost_s", || plan.max_cost_s());
+        to.add(max_s);
+        for route in &plan.routes {
+            let mut waypoints = to.call("pack::Route::waypoints", || route.waypoints());
+            let ends = to.call("pack::Route::ends", || route.ends());
+            assert_eq!(waypoints.next(), Some(ends.0));
+            to.count((ends.0 ^ ends.1) as usize);
+        }
+    };
+    for hard in HARD {
+        for unit in [Unit::Lane, Unit::Waypoint] {
+            for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
+                pack(to, &Work { unit, heights, ..good }, ws, plan);
+            }
+            for vehicles in &fleets(hard) {
+                pack(to, &Work { unit, vehicles, ..good }, ws, plan);
+            }
+            for shares in [&[hard; VEHICLES][..], &[1.0, hard, 0.0], &[hard], &[]] {
+                let work = Work { unit, ..good };
+                let packed = to.call("pack::by_shares", || pack::by_shares(&work, shares, ws, plan));
+                assert!(shares.len() == VEHICLES || packed.is_err());
+                to.is(packed.is_ok());
+                let mut ends = [0; VEHICLES];
+                to.call("pack::cbinpack", || pack::cbinpack(tracks, unit, shares, &mut ends));
+                assert!(ends.iter().all(|end| *end <= tracks.waypoint_count()), "{shares:?}");
+                pack::cbinpack(tracks, unit, &SHARES, &mut ends[..1]);
+                pack::cbinpack(&Tracks::<LANES>::new(), unit, shares, &mut ends);
+            }
+        }
+    }
+    let crowd = [VEHICLE; VEHICLES + 1];
+    for vehicles in [&crowd[..], &[]] {
+        pack(to, &Work { vehicles, ..good }, ws, plan);
+    }
+    for (first, end) in NUMBERS.into_iter().zip(NUMBERS.into_iter().rev()) {
+        for heading in [Heading::Forward, Heading::Backward] {
+            let whole = Route { vehicle: u8::MAX, first, end, heading, layer: 0, ..plan.routes[0] };
+            for route in [whole, Route { first: end, ..whole }] {
+                let ends = to.call("pack::Route::ends", || route.ends());
+                let waypoints = to.call("pack::Route::waypoints", || route.waypoints().take(3).count());
+                to.count((ends.0 ^ ends.1) as usize + waypoints);
+            }
+        }
+    }
+}
+
+fn searches(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Lent) {
+    let Lent { tracks, powell: ws, plan, .. } = lent;
+    *ws = to.call("powell::Workspace::new", powell::Workspace::new);
+    let good = Work { tracks, transit, vehicles: &FLEET, heights: HEIGHTS, unit: Unit::Waypoint };
+    let mut ways_m = [0.0; 512];
+    let mut reaches = [0; 1024];
+    let mut states = [(0, 0); 1 << (2 * VEHICLES)];
+    for hard in HARD {
+        for vehicles in &fleets(hard) {
+            let work = Work { vehicles, ..good };
+            let checked = work.check::<VEHICLES>();
+            let bound = to.call("bound::lower_bound_s", || bound::lower_bound_s(&work));
+            assert_eq!(bound.is_ok(), checked.is_ok());
+            to.add(bound.unwrap_or(0.0));
+            for evaluations in [0, 20] {
+                let config = powell::Config { evaluations };
+                let found = to.call("powell::powell", || powell(&work, &config, ws, plan));
+                assert!(checked.is_ok() || found == checked);
+                to.is(found.is_ok());
+                to.add(plan.max_cost_s());
+            }
+            let mut memory =
+                exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
+            let found = to.call("exact::exact", || exact::exact(&work, &mut memory, &mut ws.pack, plan));
+            assert!(checked.is_ok() || found == checked);
+            to.is(found.is_ok());
+            to.add(plan.max_cost_s());
+        }
+    }
+    for vehicles in [0, VEHICLES, exact::MOST_VEHICLES, usize::MAX] {
+        for waypoints in [0, 1, usize::MAX] {
+            let lengths =
+                to.call("exact::Workspace::lengths", || exact::Workspace::lengths(vehicles, waypoints));
+            assert!(lengths[2] <= 1 << (2 * exact::MOST_VEHICLES));
+        }
+    }
+    let mut small = exact::Workspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };
+    assert_eq!(exact::exact(&good, &mut small, &mut ws.pack, plan), Err(CoverageError::WorkspaceTooSmall));
+    assert_eq!(powell(&good, &powell::Config { evaluations: 50 }, ws, plan), Ok(()));
+}
