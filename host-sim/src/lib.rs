@@ -2,14 +2,12 @@
 #![forbid(unsafe_code)]
 
 pub mod area;
-pub mod autopilot;
 pub mod boards;
 pub mod capacity;
 pub mod commands;
 pub mod coverage;
 pub mod files;
 pub mod flash;
-pub mod kinds;
 pub mod link;
 pub mod map;
 pub mod margins;

@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use anyhow::bail;
 use clap::error::ErrorKind;
 use clap::{CommandFactory, Parser, Subcommand};
-use host_sim::{autopilot, commands, map, progress, quote, say};
+use host_sim::{commands, map, progress, quote, say};
 
 /// Plans and flies drone swarms on the desk, with the code that flies on the board.
 #[derive(Parser)]
@@ -33,7 +33,7 @@ enum Command {
     /// Print a paper's tables, ours beside theirs
     Paper(commands::paper::Args),
     /// Simulate one autopilot for any MAVLink client
-    Autopilot(autopilot::server::AutopilotArgs),
+    Autopilot(commands::autopilot::AutopilotArgs),
     /// Run one vehicle's companion beside any autopilot, simulated, SITL or real
     Companion(commands::companion::Args),
     /// Upload a roadmap or mission file to a companion
@@ -67,7 +67,7 @@ fn run(command: Command) -> anyhow::Result<ExitCode> {
         Command::Fly(args) => commands::fly::run(&args),
         Command::Cover(args) => commands::cover::run(&args),
         Command::Paper(args) => commands::paper::run(&args),
-        Command::Autopilot(args) => autopilot::server::run(&args),
+        Command::Autopilot(args) => commands::autopilot::run(&args),
         Command::Companion(args) => commands::companion::run(&args),
         Command::Upload(args) => commands::upload::run(&args),
         Command::Radio(args) => commands::radio::run(&args),

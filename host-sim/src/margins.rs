@@ -16,8 +16,9 @@
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
+use sim_autopilot::{Estimator, Personality};
 
-use crate::scenario::{Estimator, Personality, Simulation, Vehicle};
+use crate::scenario::{Simulation, Vehicle};
 
 /// What two vehicles together may stray from their paths, beyond the safety distance, metres.
 pub const STRAY_M: f32 = 0.5;

@@ -6,7 +6,6 @@ use std::time::Duration;
 use companion::Link as Port;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{COMPONENT, Instant, State};
-use host_sim::autopilot::{Autopilot, Config};
 use host_sim::boards::{self, Emulated, Piece};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -19,6 +18,7 @@ use mavlink::dialects::ardupilotmega::{
 use planner_core::Point;
 use planner_core::flight::Path;
 use planner_core::frames::geodetic_to_enu;
+use sim_autopilot::{Autopilot, Config};
 
 use crate::downfall::{self, Downfall};
 

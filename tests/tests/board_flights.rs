@@ -16,7 +16,6 @@ use companion::{Link as Port, State};
 use flockmate_tests::board;
 use flockmate_tests::downfall::{self, Downfall};
 use flockmate_tests::vehicle::{Heard, Vehicle, ahead, mission};
-use host_sim::autopilot::ardupilot;
 use host_sim::link::Link;
 use host_sim::mission::Mission;
 use host_sim::upload::Client;
@@ -25,6 +24,7 @@ use planner_core::Point;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use sim_autopilot::ardupilot;
 
 /// One vehicle across the lobby of the built-in building.
 const LOBBY: &str = r#"

@@ -3,13 +3,13 @@
 
 use companion::link::frame::{self, Framer, Header};
 use companion::time::Instant;
-use host_sim::autopilot::{Autopilot, Config, Personality, Photo};
 use host_sim::coverage::Planned;
 use host_sim::coverage::export::{self, Item};
 use host_sim::coverage::flight::{Act, Stop};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::Point;
+use sim_autopilot::{Autopilot, Config, Personality, Photo};
 
 /// A waypoint is passed within 2 m across, and by what is flown in a step.
 const PASSED_M: f32 = 2.2;

@@ -1,7 +1,7 @@
 //! Simulated autopilots fly what the recorded ones flew: `cargo xtask bench --only fidelity` prints the whole table.
 
 use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
-use host_sim::autopilot::Personality;
+use sim_autopilot::Personality;
 
 /// The recorded flights that nobody interrupted.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {

@@ -3,9 +3,9 @@
 
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Event, Instant, Link, State};
-use host_sim::autopilot::{self, Autopilot, Mode, Personality, ardupilot};
 use planner_core::Point;
 use planner_core::flight::{Path, Task, VehiclePlan};
+use sim_autopilot::{Autopilot, Mode, Personality, ardupilot};
 
 const STEP_US: u64 = 4_000;
 const START: Point = Point::new(0.0, 0.0, 2.0);
@@ -32,8 +32,11 @@ struct Pair {
 
 impl Pair {
     fn new(personality: Personality) -> Self {
-        let config =
-            autopilot::Config { personality, estimator_ready_s: READY_S, ..autopilot::Config::default() };
+        let config = sim_autopilot::Config {
+            personality,
+            estimator_ready_s: READY_S,
+            ..sim_autopilot::Config::default()
+        };
         let mut autopilot = Autopilot::new(&config).unwrap();
         autopilot.land_on_stream_loss();
         Self {

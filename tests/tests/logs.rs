@@ -10,7 +10,6 @@ use std::process::Command;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config, Duration, Event, Instant, Link};
 use flockmate_tests::{logs, python, workspace};
-use host_sim::autopilot::{self, Autopilot, Personality};
 use mavlink::Message;
 use mavlink::dialects::ardupilotmega::MavMessage;
 use planner_core::Point;
@@ -19,6 +18,7 @@ use planner_core::frames::Geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
+use sim_autopilot::{Autopilot, Personality};
 
 /// Where PX4's recording was flown.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 47.397_741_4, lon_deg: 8.545_596_2, alt_m: 489.8 };
@@ -120,7 +120,7 @@ struct Victims {
 impl Victims {
     fn new() -> Self {
         let autopilot = |personality| {
-            let config = autopilot::Config { personality, ..autopilot::Config::default() };
+            let config = sim_autopilot::Config { personality, ..sim_autopilot::Config::default() };
             Autopilot::new(&config).unwrap()
         };
         Self {

@@ -8,10 +8,10 @@ use std::path::Path;
 use companion::link::frame::{self, Frame, Framer, Header};
 use companion::{Companion, Config as CompanionConfig, Instant, Link};
 use flockmate_tests::{logs, shared_data};
-use host_sim::autopilot::{Autopilot, Config, Personality};
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
+use sim_autopilot::{Autopilot, Config, Personality};
 
 const COMMAND_ACK: u32 = 77;
 const HEARTBEAT: u32 = 0;

@@ -14,7 +14,8 @@ use anyhow::{Result, ensure};
 use self::sources::Tree;
 
 /// The crates that are looked at, by folder.
-const CRATES: [&str; 6] = ["planner-core", "companion", "host-sim", "firmware", "tests", "xtask"];
+const CRATES: [&str; 7] =
+    ["planner-core", "companion", "sim-autopilot", "host-sim", "firmware", "tests", "xtask"];
 
 /// Prints every cycle of imports and every struct or function beyond the limits; fails if there is one without a reason.
 pub fn run() -> Result<()> {

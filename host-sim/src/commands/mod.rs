@@ -1,5 +1,6 @@
 //! The commands of `host-sim` that work on a scenario.
 
+pub mod autopilot;
 pub mod companion;
 pub mod cover;
 pub mod fly;

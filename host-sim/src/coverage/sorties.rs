@@ -13,11 +13,11 @@
 
 use planner_core::coverage::flights::ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
+use sim_autopilot::VehicleLimits;
 
 use super::Planned;
 use super::flight::Act;
 pub use super::planned::Sortie;
-use crate::autopilot::VehicleLimits;
 use crate::scenario;
 
 /// Share of its charge that a vehicle flies with: then it lands (`FLK_BATT_LOW`).

@@ -29,7 +29,7 @@ use crate::coverage::sorties::{self, USABLE_CHARGE};
 use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
 use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
-use crate::{autopilot, map, margins};
+use crate::{map, margins};
 
 /// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
 const OVER_PAD_M: f32 = 3.0;
@@ -99,7 +99,7 @@ fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
         let index = usize::from(route.vehicle);
         let vehicle = &planned.scenario.vehicles[index];
         let cruise_mps = planned.vehicles[index].cruise_mps;
-        let beyond_hover = autopilot::cruise_load(cruise_mps) - 1.0;
+        let beyond_hover = sim_autopilot::cruise_load(cruise_mps) - 1.0;
         let takes_s = sorties::flown_s(planned, route) + beyond_hover * route.ground_m / cruise_mps;
         let lasts_s = sorties::lasts_s(vehicle);
         if takes_s > USABLE_CHARGE * lasts_s {

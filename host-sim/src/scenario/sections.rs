@@ -13,6 +13,7 @@ use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 use planner_core::prm::Sampling;
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
+use sim_autopilot::Personality;
 use toml::de::DeTable;
 
 use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
@@ -26,7 +27,6 @@ use super::types::{
 };
 use crate::capacity::VEHICLES;
 use crate::files;
-use crate::kinds::Personality;
 use crate::link::LinkUrl;
 use crate::map::{RESOLUTIONS_M, Source, Unknown};
 use crate::margins;

@@ -7,10 +7,10 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
+use sim_autopilot::{Estimator, Personality};
 
 use super::coverage::Area;
 use super::error::ScenarioError;
-use crate::kinds::{Estimator, Personality};
 use crate::link::LinkUrl;
 use crate::map::Unknown;
 

@@ -4,13 +4,13 @@ use anyhow::Context;
 use companion::storage::store::{READ, Store};
 use companion::{Config, Event, Instant, Link, State, Wanted};
 use planner_core::Point;
+use sim_autopilot::{Autopilot, Photo};
 
 use super::board::{Board, Lines};
 use super::monitor::{Observation, Phase};
 use super::radio::Radio;
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
-use crate::autopilot::{self, Autopilot, Photo};
 use crate::boards::STACK_LEN;
 use crate::capacity::{DeskCompanion, VEHICLES, new_companion};
 use crate::coverage::check::Picture;
@@ -70,7 +70,7 @@ pub struct Member {
 impl Member {
     /// A vehicle on its pad, powered up.
     pub fn new(
-        autopilot: &autopilot::Config,
+        autopilot: &sim_autopilot::Config,
         config: Config<VEHICLES>,
         serial: SerialConfig,
         seed: u64,

@@ -24,6 +24,7 @@ use planner_core::Point;
 use planner_core::flight::{Range, Task};
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
+use sim_autopilot as autopilot;
 
 use self::board::Board;
 use self::divisions::{Division, Divisions};
@@ -35,7 +36,6 @@ use self::monitor::{Monitor, Sample};
 use self::radio::{Radio, RadioConfig};
 use self::serial::SerialConfig;
 use self::step::STEP_US;
-use crate::autopilot;
 use crate::capacity::VEHICLES;
 use crate::coverage::check::Picture;
 use crate::flash::DeskFlash;

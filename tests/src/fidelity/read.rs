@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use host_sim::autopilot::Personality;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
+use sim_autopilot::Personality;
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 

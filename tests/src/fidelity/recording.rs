@@ -1,8 +1,8 @@
 //! A recorded flight.
 
-use host_sim::autopilot::Personality;
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
+use sim_autopilot::Personality;
 
 /// One recorded row that says where something was or shall be.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,12 +1,12 @@
 //! Flies a recording's setpoints and commands again.
 
 use companion::link::frame::{self, Header};
-use host_sim::autopilot::{Autopilot, Config, Personality};
 use mavlink::dialects::ardupilotmega::{
     MavFrame, MavParamType, PARAM_SET_DATA, PositionTargetTypemask, SET_POSITION_TARGET_LOCAL_NED_DATA,
 };
 use nalgebra::Vector3;
 use planner_core::Point;
+use sim_autopilot::{Autopilot, Config, Personality};
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 use super::{Correction, Estimator};

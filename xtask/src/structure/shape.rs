@@ -92,10 +92,10 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("firmware/src/calls/limits_routes.rs", "plans", AT_LIMITS),
     ("firmware/src/calls/limits_routes.rs", "schedules", AT_LIMITS),
     ("firmware/src/calls/limits_routes.rs", "detours", AT_LIMITS),
-    ("host-sim/src/autopilot/ardupilot/params.rs", "Tuning", SETTINGS),
-    ("host-sim/src/autopilot/px4/params.rs", "Tuning", SETTINGS),
+    ("sim-autopilot/src/ardupilot/params.rs", "Tuning", SETTINGS),
+    ("sim-autopilot/src/px4/params.rs", "Tuning", SETTINGS),
     ("host-sim/src/commands/companion.rs", "run", "the loop of a shell, in the order of the drain contract"),
-    ("host-sim/src/autopilot/ardupilot/mod.rs", "Copter", FIRMWARE),
+    ("sim-autopilot/src/ardupilot/mod.rs", "Copter", FIRMWARE),
     (
         "host-sim/src/coverage/check.rs",
         "judge",

@@ -1,10 +1,11 @@
 //! What must hold between the tables of a scenario.
 
 use planner_core::Point;
+use sim_autopilot::Estimator;
 
 use crate::margins;
 use crate::scenario::reader::{Result, Span, Table, Text};
-use crate::scenario::{Deconfliction, Estimator, Mission, Mode, Roadmap, Simulation, Vehicle};
+use crate::scenario::{Deconfliction, Mission, Mode, Roadmap, Simulation, Vehicle};
 
 /// What errors about a vehicle point at.
 pub(super) struct VehicleSpans {

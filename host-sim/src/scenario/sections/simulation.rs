@@ -1,9 +1,9 @@
 //! The tables of how a mission is flown: deconfliction, simulation, faults.
 
 use planner_core::deconflict::Method;
+use sim_autopilot::Estimator;
 
 use super::values::{MAX_ID, point};
-use crate::kinds::Estimator;
 use crate::scenario::reader::{Result, Table};
 use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Simulation};
 

@@ -1,0 +1,186 @@
+//! `host-sim autopilot`: one simulated autopilot in real time, on flat ground at the altitude of its home.
+//!
+//! Steps of 4 ms are made when the clock has passed them; between them the process sleeps. A machine too slow for that
+//! (more than a second behind) lets simulated time lag rather than run ever later.
+
+use std::process::ExitCode;
+use std::str::FromStr;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+use anyhow::Context;
+use clap::Args;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use sim_autopilot::{Autopilot, Config, Personality};
+
+use crate::link::{Link, LinkUrl};
+use crate::progress::printed;
+use crate::say;
+
+const STEP: Duration = Duration::from_millis(4);
+const LATEST: Duration = Duration::from_secs(1);
+/// Small enough for any path's datagrams.
+const DATAGRAM: usize = 1400;
+
+/// Arguments of `host-sim autopilot`.
+#[derive(Args, Clone, Debug)]
+pub struct AutopilotArgs {
+    /// Link to serve: tcp:HOST:PORT, tcp-listen:HOST:PORT, udp:HOST:PORT, udp-listen:HOST:PORT or serial:PATH:BAUD; may
+    /// be repeated
+    #[arg(long, value_name = "URL", required = true)]
+    pub listen: Vec<LinkUrl>,
+    /// Which autopilot to be
+    #[arg(long, value_name = "NAME", default_value = "px4", value_parser = personality())]
+    pub personality: Personality,
+    /// MAVLink system id
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    pub sysid: u8,
+    /// Seconds from its start until ArduCopter's estimator has a position; PX4 has one at once
+    #[arg(long, value_name = "S", default_value_t = 40.0, value_parser = seconds)]
+    pub ready_after: f32,
+    /// Where it stands: degrees, degrees, metres above the sea
+    #[arg(
+        long,
+        value_name = "LAT,LON,ALT",
+        allow_hyphen_values = true,
+        default_value = "47.397742,8.545594,488"
+    )]
+    pub home: Place,
+    /// Origin of its own local frame (EKF origin); home if not given
+    #[arg(long, value_name = "LAT,LON,ALT", allow_hyphen_values = true)]
+    pub origin: Option<Place>,
+}
+
+fn personality() -> impl TypedValueParser<Value = Personality> {
+    let names = PossibleValuesParser::new(["px4", "ardupilot"]);
+    names.map(|name| if name == "px4" { Personality::Px4 } else { Personality::Ardupilot })
+}
+
+fn seconds(text: &str) -> Result<f32, String> {
+    let sound = text.parse().ok().filter(|s| (0.0..=3600.0).contains(s));
+    sound.ok_or_else(|| "expected a number of seconds from 0 to 3600".to_owned())
+}
+
+/// A place as it is written on the command line.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place(pub Geodetic);
+
+impl FromStr for Place {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let parts: Vec<f64> = text.split(',').filter_map(|part| part.trim().parse().ok()).collect();
+        let &[lat_deg, lon_deg, alt_m] = parts.as_slice() else {
+            return Err("expected three numbers LAT,LON,ALT".to_owned());
+        };
+        let place = Geodetic { lat_deg, lon_deg, alt_m };
+        if text.split(',').count() != 3 || !place.is_valid() {
+            return Err("expected latitude within ±90, longitude within ±180, finite altitude".to_owned());
+        }
+        Ok(Self(place))
+    }
+}
+
+/// Serves one simulated autopilot until the process is ended. Prints `listening URL` for each link, with the port it
+/// got where 0 was asked for.
+///
+/// # Errors
+/// A link that cannot be opened or is lost for good, a personality not simulated.
+pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
+    let home = args.home.0;
+    let config = Config {
+        system_id: args.sysid,
+        personality: args.personality,
+        world_origin: home,
+        ekf_origin: args.origin.map_or(home, |place| place.0),
+        start: Point::zeros(),
+        estimator_ready_s: args.ready_after,
+        boot_unix_us: SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |t| t.as_micros() as u64),
+        ports: args.listen.len(),
+        routes: true,
+        ..Config::default()
+    };
+    let mut autopilot = Autopilot::new(&config).context("cannot simulate the autopilot: --personality")?;
+    let mut links = Vec::new();
+    for url in &args.listen {
+        let link = url.open()?;
+        say!("listening {}", url.opened(&*link));
+        links.push((url, link));
+    }
+    // Whoever waits for these lines would wait for ever.
+    printed()?;
+    let ground_up_m = -config.vehicle.radius_m;
+    let mut next = Instant::now();
+    loop {
+        for (port, (url, link)) in links.iter_mut().enumerate() {
+            exchange(&mut autopilot, port, &mut **link).with_context(|| format!("link lost: {url}"))?;
+        }
+        autopilot.step(STEP.as_secs_f32(), ground_up_m);
+        next += STEP;
+        let now = Instant::now();
+        if now > next + LATEST {
+            next = now;
+        }
+        std::thread::sleep(next.saturating_duration_since(now));
+    }
+}
+
+/// Everything that came in, then everything that is to go out.
+fn exchange(autopilot: &mut Autopilot, port: usize, link: &mut dyn Link) -> std::io::Result<()> {
+    let mut buffer = [0; 2048];
+    loop {
+        let len = link.receive(&mut buffer)?;
+        if len == 0 {
+            break;
+        }
+        autopilot.handle_bytes_on(port, &buffer[..len]);
+    }
+    loop {
+        let len = autopilot.poll_transmit_from(port, &mut buffer[..DATAGRAM]);
+        if len == 0 {
+            return Ok(());
+        }
+        link.send(&buffer[..len])?;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        args: AutopilotArgs,
+    }
+
+    fn parse(line: &str) -> Result<AutopilotArgs, String> {
+        Cli::try_parse_from(line.split(' ')).map(|cli| cli.args).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn places_and_links_are_read() {
+        let args =
+            parse("x --listen udp-listen:127.0.0.1:0 --home -33.9,18.4,12.5 --origin 40,-3.7,700 --sysid 7")
+                .unwrap();
+        assert_eq!(args.home.0, Geodetic { lat_deg: -33.9, lon_deg: 18.4, alt_m: 12.5 });
+        assert_eq!(args.origin.unwrap().0.lon_deg, -3.7);
+        assert_eq!(args.sysid, 7);
+    }
+
+    #[test]
+    fn what_is_no_place_or_no_link_is_refused() {
+        for line in [
+            "x --listen udp-listen:127.0.0.1:0 --home 91,0,0",
+            "x --listen udp-listen:127.0.0.1:0 --home 1,2",
+            "x --listen udp-listen:127.0.0.1:0 --home 1,2,3,x",
+            "x --listen udp:nowhere",
+            "x --listen udp:127.0.0.1:1 --sysid 0",
+            "x",
+        ] {
+            assert!(parse(line).is_err(), "{line}");
+        }
+    }
+}

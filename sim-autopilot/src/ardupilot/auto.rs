@@ -1,0 +1,124 @@
+//! ArduCopter's AUTO: an uploaded mission.
+//!
+//! It is entered only with a mission, on the ground armed only with one that begins with a take-off; it is not armed in.
+//! On the ground it waits for MISSION_START, as nobody raises a throttle; in the air it goes on at once. It looks where it
+//! flies (`WP_YAW_BEHAVIOR` 2), whatever heading an item has. A return and a landing are flown within AUTO.
+
+use planner_core::Point;
+
+use super::auto_state::Auto;
+use super::setpoint::Goal;
+use super::{Copter, Mode, ReturnLeg, TakeOff};
+use crate::body::{Body, Sense};
+use crate::itinerary::{Leg, on_line};
+
+/// A place is reached to land there within this distance, metres.
+const ARRIVED_M: f32 = 0.5;
+/// Nearer than this it does not turn to where it flies, metres.
+const LOOKS_M: f32 = 2.0;
+
+impl Copter {
+    /// Whether AUTO can be entered; says why not.
+    pub(super) fn auto_runs(&self, body: &mut Body) -> bool {
+        if body.has_mission() && self.armed && self.landed && !body.mission_takes_off() {
+            body.say(2, "Auto: Missing Takeoff Cmd");
+            return false;
+        }
+        body.has_mission()
+    }
+
+    /// MISSION_START.
+    pub(super) fn start_mission(&mut self, body: &mut Body) -> bool {
+        let starts = self.auto_runs(body) && self.set_mode(Mode::Auto, &body.sense());
+        self.auto.may_lift |= starts && self.armed;
+        starts
+    }
+
+    /// It comes down by itself, in AUTO.
+    pub(super) fn lands_in_auto(&self) -> bool {
+        self.mode == Mode::Auto
+            && match self.auto.leg {
+                Some(Leg::Land { .. }) => true,
+                Some(Leg::Return) => self.leg == ReturnLeg::Land,
+                _ => false,
+            }
+    }
+
+    /// Disarmed: what came down is done, and the mission is flown from its first item again.
+    pub(super) fn end_auto(&mut self, body: &mut Body) {
+        if self.lands_in_auto() {
+            body.pass_item();
+        }
+        if self.auto.leg.is_some() {
+            body.rewind_mission();
+        }
+        self.auto = Auto::default();
+    }
+
+    /// One step of the mission.
+    pub(super) fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
+        if self.mode != Mode::Auto {
+            if self.auto.leg.take().is_some() {
+                body.missions.progress.interrupt();
+            }
+            return;
+        }
+        if self.landed && !self.auto.may_lift {
+            return;
+        }
+        let leg = body.fly_mission(sense, self.landed);
+        if let Some(speed) = body.missions.speed.take() {
+            self.speed = (speed > 0.0).then_some(speed);
+        }
+        if leg != self.auto.leg {
+            self.auto.from = Leg::end(self.auto.leg, &sense.position);
+            // At least a metre up from the ground.
+            self.takeoff = match leg {
+                Some(Leg::TakeOff { up }) if self.landed => {
+                    Some(TakeOff { since_us: sense.now_us, up: up.max(sense.position.z + 1.0) })
+                }
+                _ => None,
+            };
+            if leg == Some(Leg::Return) {
+                self.leg = ReturnLeg::Climb { up: f32::NAN };
+            }
+        }
+        self.auto.leg = leg;
+    }
+
+    /// What the mission asks for now.
+    pub(super) fn auto_goal(&mut self, sense: &Sense) -> Goal {
+        if self.takeoff.is_some() {
+            return self.take_off_goal();
+        }
+        let at = self.reference.position;
+        match self.auto.leg {
+            Some(Leg::To { at, .. }) => {
+                let off = at - sense.position;
+                if libm::hypotf(off.x, off.y) > LOOKS_M {
+                    self.auto.heading = Some(libm::atan2f(off.x, off.y));
+                }
+                self.auto.stay = Some(at);
+                let reference = &self.reference;
+                let (up, rate) = on_line(&self.auto.from, &at, &reference.position, &reference.velocity);
+                let heading = self.auto.heading.unwrap_or(f32::NAN);
+                let velocity = Point::new(0.0, 0.0, rate);
+                Goal { heading, velocity, ..Goal::hold(Point::new(at.x, at.y, up)) }
+            }
+            Some(Leg::TakeOff { up }) => {
+                let stay = self.auto.stay.unwrap_or(at);
+                Goal::hold(Point::new(stay.x, stay.y, up))
+            }
+            Some(Leg::Land { at: Some([east, north]) })
+                if libm::hypotf(east - sense.position.x, north - sense.position.y) > ARRIVED_M
+                    && !sense.touching =>
+            {
+                let up = self.auto.stay.map_or(at.z, |stay| stay.z);
+                Goal::hold(Point::new(east, north, up))
+            }
+            Some(Leg::Land { .. }) => self.landing_goal(sense),
+            Some(Leg::Return) => self.return_goal(sense),
+            Some(Leg::Wait(_)) | None => self.auto.stay.map_or(Goal::STOP, Goal::hold),
+        }
+    }
+}

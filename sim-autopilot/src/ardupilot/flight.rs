@@ -1,0 +1,140 @@
+//! What each flight mode asks of the position controller.
+
+use planner_core::Point;
+
+use super::reference::Reference;
+use super::setpoint::Goal;
+use super::{Copter, Mode, ReturnLeg, micros};
+use crate::body::Sense;
+use crate::shaping::approach;
+use crate::vehicle::Demand;
+
+/// The take-off is done this near its height, metres: landed_state 2 came 9.3 s after the command to 10 m.
+const TAKEN_OFF_M: f32 = 0.12;
+/// How it leaves the ground, as seen: seconds since it lifted, and the acceleration up until then, m/s². First the throttle
+/// creeps past hover; the controllers wind up meanwhile and then kick.
+const LIFT_OFF: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
+/// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts: the speed decays with
+/// 7.5 / 5 s.
+const BRAKE_MPS2: f32 = 7.5;
+/// A leg of the return is at its end within this distance, metres.
+const ARRIVED_M: f32 = 0.5;
+
+impl Copter {
+    /// What the mode asks for now.
+    pub(super) fn demand(&mut self, sense: &Sense, dt: f32) -> Demand {
+        let mut tuning = self.tuning;
+        tuning.speed = self.speed.unwrap_or(tuning.speed);
+        let goal = match self.mode {
+            Mode::Auto => self.auto_goal(sense),
+            Mode::Guided if self.takeoff.is_some() => self.take_off_goal(),
+            Mode::Guided => self.guided_goal(sense.now_us, dt),
+            Mode::Brake => {
+                tuning.acceleration = BRAKE_MPS2;
+                Goal::STOP
+            }
+            Mode::Stabilize | Mode::AltHold | Mode::Loiter => {
+                tuning.speed_down = tuning.stick_sink;
+                Goal { velocity: Point::new(0.0, 0.0, -tuning.stick_sink), ..Goal::STOP }
+            }
+            Mode::Rtl => self.return_goal(sense),
+            Mode::Land => self.landing_goal(sense),
+        };
+        self.reference.advance(&goal, &tuning, dt);
+        // Without a position there is nothing to hold across.
+        let across = self.position_known(sense.now_us);
+        let (p, v, a) = (self.reference.position, self.reference.velocity, self.reference.acceleration);
+        let position =
+            Point::new(if across { p.x } else { f32::NAN }, if across { p.y } else { f32::NAN }, p.z);
+        // ArduPilot's derivative acts on the error, not on what is measured: what the reference shall do is added back.
+        let d = 1.0 + tuning.gains.velocity_d[0];
+        if sense.touching && v.z < 0.0 {
+            // The reference does not run on below the ground.
+            self.reference.position.z = sense.position.z;
+        }
+        Demand {
+            position,
+            velocity: v,
+            acceleration: Point::new(a.x * d, a.y * d, a.z),
+            heading: goal.heading,
+            heading_rate: goal.heading_rate,
+            lift_off: self.lift_off(sense.now_us),
+            ..tuning.nothing()
+        }
+    }
+
+    /// Acceleration up while it leaves the ground; NaN once it has.
+    fn lift_off(&self, now_us: u64) -> f32 {
+        let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
+        LIFT_OFF.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
+    }
+
+    pub(super) fn take_off_goal(&mut self) -> Goal {
+        let Some(takeoff) = self.takeoff else { return Goal::STOP };
+        let at = self.reference.position;
+        let goal = Goal::hold(Point::new(at.x, at.y, takeoff.up));
+        if takeoff.up - at.z < TAKEN_OFF_M {
+            self.takeoff = None;
+            self.goal = goal;
+        }
+        goal
+    }
+
+    /// Velocities end with `GUID_TIMEOUT`; until then they carry a position with them.
+    fn guided_goal(&mut self, now_us: u64, dt: f32) -> Goal {
+        let age_us = now_us.saturating_sub(self.goal_us);
+        if self.goal.expires && age_us > micros(self.tuning.guided_timeout_s) {
+            self.goal = Goal { velocity: Point::zeros(), acceleration: Point::zeros(), ..self.goal };
+            self.goal.heading_rate = f32::NAN;
+        }
+        if let Some(position) = &mut self.goal.position {
+            *position += self.goal.velocity * dt;
+        }
+        self.goal
+    }
+
+    /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and `WPNAV_SPEED_DN` at most
+    /// (`Mode::land_run_vertical_control`): without a rangefinder it knows no other ground.
+    pub(super) fn landing_goal(&self, sense: &Sense) -> Goal {
+        let tuning = &self.tuning;
+        let above_low = sense.position.z - sense.home.z - tuning.land_slow_below.max(1.0);
+        let rate = approach(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
+        let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
+        Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
+    }
+
+    pub(super) fn return_goal(&mut self, sense: &Sense) -> Goal {
+        let home = sense.home;
+        let at = self.reference.position;
+        let away = libm::hypotf(home.x - sense.position.x, home.y - sense.position.y);
+        if let ReturnLeg::Climb { up } = &mut self.leg
+            && up.is_nan()
+        {
+            // Near home the climb is cut by the cone `RTL_CONE_SLOPE`.
+            let height = self.tuning.return_height.min(away * self.tuning.return_cone);
+            *up = (home.z + height).max(sense.position.z);
+        }
+        match self.leg {
+            ReturnLeg::Climb { up } => {
+                if up - sense.position.z < ARRIVED_M {
+                    self.leg = ReturnLeg::Cross { up };
+                }
+                Goal::hold(Point::new(at.x, at.y, up))
+            }
+            ReturnLeg::Cross { up } => {
+                if away < ARRIVED_M {
+                    self.leg = ReturnLeg::Wait { since_us: sense.now_us, up };
+                }
+                Goal::hold(Point::new(home.x, home.y, up))
+            }
+            ReturnLeg::Wait { since_us, up } => {
+                if sense.now_us - since_us >= micros(self.tuning.return_loiter_s) {
+                    self.leg = ReturnLeg::Land;
+                    self.reference = Reference::new(at, self.reference.velocity);
+                }
+                Goal::hold(Point::new(home.x, home.y, up))
+            }
+            ReturnLeg::Land => self.landing_goal(sense),
+        }
+    }
+}

@@ -1,0 +1,474 @@
+//! ArduCopter 4.6's state machine: arming, modes, take-off, Guided, failsafes and landing, as it was seen to behave.
+//!
+//! | state | leaves it |
+//! |---|---|
+//! | disarmed | arm command in a mode that allows it, with the estimator ready |
+//! | armed, on the ground | NAV_TAKEOFF in Guided; `DISARM_DELAY` disarms. Setpoints do not lift it |
+//! | take-off | lifts 2.3 s after the command and climbs; a setpoint ends it, before the lift-off for good |
+//! | flying | the ground, touched for 1.6 s without a demand to climb |
+//! | landed | in LAND and RTL disarms 0.4 s later, else after `DISARM_DELAY` |
+//!
+//! In Guided a velocity is held for `GUID_TIMEOUT` after the last setpoint, a position for ever. Times are microseconds since
+//! boot and arguments; nothing here reads a clock.
+
+mod auto;
+mod auto_state;
+mod commands;
+mod flight;
+mod modes;
+pub mod params;
+pub mod reference;
+pub mod setpoint;
+mod unasked;
+
+pub(super) use self::commands::handle_stream_request;
+pub use self::modes::Mode;
+
+use planner_core::Point;
+
+use self::auto_state::Auto;
+use self::params::Tuning;
+use self::reference::Reference;
+use self::setpoint::Goal;
+use super::body::{Body, Integral, Order, Sense};
+use super::params::Params;
+use super::port::Sender;
+use super::status::Status;
+use super::vehicle::VehicleLimits;
+use super::wire::Fields;
+use crate::Personality;
+
+/// From arming until it lifts, where NAV_TAKEOFF comes at once: `MOT` arming delay 2 s, spool-up 0.5 s, and the throttle's
+/// slew to hover.
+const ARM_TO_LIFT_S: f32 = 3.05;
+/// The same from a later NAV_TAKEOFF.
+const SPOOL_UP_S: f32 = 2.07;
+/// `LAND_DETECTOR_TRIGGER_SEC` and its filters: 1.68 s seen.
+const LAND_DETECTOR_S: f32 = 1.6;
+/// Landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
+const LAND_DISARM_S: f32 = 0.4;
+/// How much sooner than `DISARM_DELAY` it disarms: 9.94 s of 10 seen.
+const DISARM_EARLY_S: f32 = 0.06;
+/// How much later than `FS_GCS_TIMEOUT` the failsafe acts: 5.1 s of 5 seen.
+const GCS_REACTION_S: f32 = 0.1;
+/// Position lost to the EKF failsafe (`EKF_CHECK_ITERATIONS_MAX` and the estimator's own wait).
+const ESTIMATOR_REACTION_S: f32 = 1.5;
+/// Boot until the estimator has an attitude: 5.8 s seen.
+const ATTITUDE_S: f32 = 5.8;
+/// Of the time until the estimator has a position, the share after which it has an origin: 20 of 41.6 s seen.
+const ORIGIN_SHARE: f32 = 0.48;
+/// Boot until the first STANDBY.
+const BOOT_S: f32 = 3.0;
+
+/// Streams: message id and interval in µs, 0 off until asked for.
+pub const STREAMS: [(u32, u32); 25] = [
+    (0, 1_000_000),    // HEARTBEAT
+    (111, 10_000_000), // TIMESYNC
+    (1, 0),            // SYS_STATUS
+    (2, 0),            // SYSTEM_TIME
+    (24, 0),           // GPS_RAW_INT
+    (29, 0),           // SCALED_PRESSURE
+    (30, 0),           // ATTITUDE
+    (31, 0),           // ATTITUDE_QUATERNION
+    (32, 0),           // LOCAL_POSITION_NED
+    (33, 0),           // GLOBAL_POSITION_INT
+    (36, 0),           // SERVO_OUTPUT_RAW
+    (42, 0),           // MISSION_CURRENT
+    (49, 0),           // GPS_GLOBAL_ORIGIN
+    (62, 0),           // NAV_CONTROLLER_OUTPUT
+    (74, 0),           // VFR_HUD
+    (83, 0),           // ATTITUDE_TARGET
+    (85, 0),           // POSITION_TARGET_LOCAL_NED
+    (105, 0),          // HIGHRES_IMU
+    (132, 0),          // DISTANCE_SENSOR
+    (147, 0),          // BATTERY_STATUS
+    (148, 0),          // AUTOPILOT_VERSION
+    (193, 0),          // EKF_STATUS_REPORT
+    (241, 0),          // VIBRATION
+    (242, 0),          // HOME_POSITION
+    (245, 0),          // EXTENDED_SYS_STATE
+];
+
+/// What a failsafe acts on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Failsafe {
+    GroundStation,
+    Estimator,
+    Battery,
+}
+
+/// A take-off under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TakeOff {
+    since_us: u64,
+    up: f32,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ReturnLeg {
+    Climb { up: f32 },
+    Cross { up: f32 },
+    Wait { since_us: u64, up: f32 },
+    Land,
+}
+
+/// When each of these began last, microseconds since boot.
+#[derive(Clone, Copy, Debug, Default)]
+struct Since {
+    armed_us: u64,
+    lifted_us: u64,
+    idle_us: u64,
+    landed_us: u64,
+    touching_us: Option<u64>,
+}
+
+/// The firmware: state machine and parameters.
+#[derive(Clone, Debug)]
+pub struct Copter {
+    /// The parameter table.
+    pub params: Params,
+    /// Those of them that act.
+    pub tuning: Tuning,
+    ready_us: u64,
+    said: [bool; 2],
+    runtime_us: u64,
+    armed: bool,
+    since: Since,
+    /// The position controller starts in this step.
+    starts: bool,
+    landed: bool,
+    mode: Mode,
+    failsafe: Option<Failsafe>,
+    position_ok: bool,
+    lost_us: Option<u64>,
+    gcs_us: Option<u64>,
+    takeoff: Option<TakeOff>,
+    goal: Goal,
+    goal_us: u64,
+    reference: Reference,
+    speed: Option<f32>,
+    leg: ReturnLeg,
+    auto: Auto,
+}
+
+impl Copter {
+    /// As ArduCopter boots: disarmed in STABILIZE, without a position until `ready_s`.
+    pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
+        let params = params::params(system_id, limits);
+        Self {
+            tuning: Tuning::new(&params),
+            params,
+            ready_us: micros(ready_s),
+            said: [false; 2],
+            runtime_us: 0,
+            armed: false,
+            since: Since::default(),
+            starts: false,
+            landed: true,
+            mode: Mode::Stabilize,
+            failsafe: None,
+            position_ok: true,
+            lost_us: None,
+            gcs_us: None,
+            takeoff: None,
+            goal: Goal::STOP,
+            goal_us: 0,
+            reference: Reference::new(Point::zeros(), Point::zeros()),
+            speed: None,
+            leg: ReturnLeg::Land,
+            auto: Auto::default(),
+        }
+    }
+
+    /// Motors on.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// The land detector's verdict.
+    pub fn landed(&self) -> bool {
+        self.landed
+    }
+
+    /// A failsafe acts.
+    pub fn in_failsafe(&self) -> bool {
+        self.failsafe.is_some()
+    }
+
+    /// The estimator lost or found its position.
+    pub fn set_position_ok(&mut self, ok: bool) {
+        self.position_ok = ok;
+    }
+
+    fn position_known(&self, now_us: u64) -> bool {
+        self.position_ok && now_us >= self.ready_us
+    }
+
+    /// What telemetry reports.
+    pub fn status(&self, sense: &Sense) -> Status {
+        let now_us = sense.now_us;
+        let known = self.position_known(now_us);
+        let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
+        Status {
+            personality: Personality::Ardupilot,
+            custom_mode: self.mode.number(),
+            intended_mode: self.mode.number(),
+            // Custom, stabilised, manual input; with the guided flag in every mode that has a position.
+            flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
+            system_status: match self.failsafe {
+                Some(_) => 5,
+                None if now_us < micros(BOOT_S) => 1,
+                None if self.landed => 3,
+                None => 4,
+            },
+            armable: self.armable(sense).is_ok(),
+            landed_state: match self.mode {
+                _ if self.landed => 1,
+                _ if self.takeoff.is_some() => 3,
+                Mode::Land => 4,
+                Mode::Auto if self.lands_in_auto() => 4,
+                Mode::Rtl if self.leg == ReturnLeg::Land => 4,
+                _ => 2,
+            },
+            guided: self.mode == Mode::Guided,
+            ekf_flags: if now_us < micros(ATTITUDE_S).min(self.ready_us) {
+                0x400
+            } else if known {
+                0x33F
+            } else {
+                0xA7
+            },
+            origin_known: self.origin_known(now_us),
+            position_known: known,
+        }
+    }
+
+    fn origin_known(&self, now_us: u64) -> bool {
+        now_us as f32 >= ORIGIN_SHARE * self.ready_us as f32
+    }
+
+    /// Takes a setpoint; outside Guided it is ignored.
+    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+        if self.mode != Mode::Guided {
+            return;
+        }
+        let goal =
+            if id == 84 { setpoint::local_ned(fields, body) } else { setpoint::global_int(fields, body) };
+        self.fly_to(goal, &body.sense());
+    }
+
+    /// A new goal in Guided: it ends a take-off.
+    fn fly_to(&mut self, goal: Goal, sense: &Sense) {
+        if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some() {
+            self.reference = Reference::new(sense.position, sense.velocity);
+        }
+        (self.goal, self.goal_us) = (goal, sense.now_us);
+    }
+
+    /// HEARTBEAT of another system: only the ground station's counts.
+    pub(super) fn handle_heartbeat(&mut self, body: &mut Body, from: Sender) {
+        if from.system != self.tuning.gcs_system {
+            return;
+        }
+        self.gcs_us = Some(body.time_us);
+        if self.failsafe == Some(Failsafe::GroundStation) {
+            // It stays in the mode the failsafe chose.
+            self.failsafe = None;
+            body.say(4, "GCS Failsafe Cleared");
+        }
+    }
+
+    /// Whether the arming checks pass, or why not.
+    fn armable(&self, sense: &Sense) -> Result<(), &'static str> {
+        if !self.mode.allows_arming() {
+            Err("Arm: Mode not armable")
+        } else if self.tuning.checks && !self.position_known(sense.now_us) {
+            Err("Arm: Need Position Estimate")
+        } else if sense.battery < self.tuning.battery_to_arm {
+            Err("Arm: Battery 1 below minimum arming capacity")
+        } else {
+            Ok(())
+        }
+    }
+
+    fn arm(&mut self, body: &mut Body, sense: &Sense, force: bool) -> bool {
+        if self.armed {
+            return true;
+        }
+        if !force && let Err(why) = self.armable(sense) {
+            body.say(2, why);
+            return false;
+        }
+        self.armed = true;
+        self.since.armed_us = sense.now_us;
+        self.since.idle_us = sense.now_us;
+        self.goal = Goal::STOP;
+        body.announce_origin();
+        body.set_home_here();
+        body.say(6, "Arming motors");
+        true
+    }
+
+    /// Disarms; in the air only by force.
+    fn disarm(&mut self, body: &mut Body, force: bool) -> bool {
+        if self.armed && !self.landed && !force {
+            return false;
+        }
+        if self.armed {
+            body.say(6, "Disarming motors");
+        }
+        self.end_auto(body);
+        self.armed = false;
+        self.takeoff = None;
+        self.failsafe = None;
+        self.speed = None;
+        true
+    }
+
+    /// Changes the mode if it can run. Disarmed, Guided is accepted without a position.
+    fn set_mode(&mut self, mode: Mode, sense: &Sense) -> bool {
+        if self.armed && mode.needs_position() && !self.position_known(sense.now_us) {
+            return false;
+        }
+        self.force_mode(mode, sense);
+        true
+    }
+
+    /// Changes the mode as a pilot's switch does. The mode it is in is not entered again.
+    pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
+        if mode == self.mode {
+            return;
+        }
+        // Land goes on with the reference of a controller that was running, the others start theirs.
+        let runs = self.mode.needs_position() && !self.landed;
+        if mode != Mode::Land || !runs {
+            self.reference = Reference::new(sense.position, sense.velocity);
+            self.reference.acceleration = if self.landed { Point::zeros() } else { sense.acceleration };
+            self.starts = !self.landed;
+        }
+        self.mode = mode;
+        self.takeoff = None;
+        self.goal = Goal::STOP;
+        self.leg = ReturnLeg::Climb { up: f32::NAN };
+    }
+
+    /// NAV_TAKEOFF to a height in the mission frame.
+    fn take_off(&mut self, up: f32, sense: &Sense) -> bool {
+        let possible = self.armed && self.landed && self.mode == Mode::Guided && up > sense.position.z;
+        if possible {
+            let since_us = self.takeoff.map_or(sense.now_us, |takeoff| takeoff.since_us);
+            self.takeoff = Some(TakeOff { since_us, up });
+            self.auto.may_lift = true;
+        }
+        possible
+    }
+
+    /// One step: timers, failsafes, phases, and what the mode asks for.
+    pub fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
+        let now_us = sense.now_us;
+        self.tell_progress(body, now_us);
+        if self.armed {
+            self.update_failsafe(body, sense);
+            self.update_timers(body, sense);
+            self.fly_mission(body, sense);
+        }
+        if !self.armed {
+            // A vehicle disarmed in the air falls, and has landed when it lies still.
+            self.landed |= sense.touching;
+            return self.rest();
+        }
+        if self.landed
+            && let Some(takeoff) = self.takeoff
+            && now_us
+                >= (takeoff.since_us + micros(SPOOL_UP_S)).max(self.since.armed_us + micros(ARM_TO_LIFT_S))
+        {
+            self.landed = false;
+            self.since.touching_us = None;
+            self.since.lifted_us = now_us;
+            self.reference = Reference::new(sense.position, Point::zeros());
+        }
+        if self.landed {
+            return self.rest();
+        }
+        let demand = self.demand(sense, dt_s);
+        let climbing = demand.velocity.z > 0.05;
+        self.detect_landing(sense, climbing);
+        let integral = if core::mem::take(&mut self.starts) { Integral::Match } else { Integral::Keep };
+        Order { lift: true, integral, demand }
+    }
+
+    /// Motors off or idle.
+    fn rest(&self) -> Order {
+        Order { lift: false, integral: Integral::Clear, demand: self.tuning.nothing() }
+    }
+
+    /// Origin and position, each once.
+    fn update_failsafe(&mut self, body: &mut Body, sense: &Sense) {
+        let now_us = sense.now_us;
+        let since = |start: u64| now_us.saturating_sub(start);
+        if self.position_known(now_us) {
+            self.lost_us = None;
+            if self.failsafe == Some(Failsafe::Estimator) {
+                self.failsafe = None;
+            }
+        } else if self.tuning.estimator_failsafe
+            && self.mode.needs_position()
+            && since(*self.lost_us.get_or_insert(now_us)) >= micros(ESTIMATOR_REACTION_S)
+        {
+            self.failsafe = Some(Failsafe::Estimator);
+            body.say(2, "EKF Failsafe: changed to LAND Mode");
+            self.force_mode(Mode::Land, sense);
+        }
+        if self.failsafe.is_some() || self.landed {
+            return;
+        }
+        let silent = |at: u64| since(at) >= micros(self.tuning.gcs_timeout_s + GCS_REACTION_S);
+        if self.tuning.gcs_failsafe && self.gcs_us.is_some_and(silent) {
+            self.failsafe = Some(Failsafe::GroundStation);
+            body.say(4, "GCS Failsafe");
+            self.force_mode(Mode::Rtl, sense);
+        } else if sense.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
+            self.failsafe = Some(Failsafe::Battery);
+            body.say(4, "Battery 1 is low");
+            self.force_mode(if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl }, sense);
+        }
+    }
+
+    fn update_timers(&mut self, body: &mut Body, sense: &Sense) {
+        let since = |start: u64| sense.now_us.saturating_sub(start);
+        if !self.landed || self.takeoff.is_some() {
+            self.since.idle_us = sense.now_us;
+        } else {
+            let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
+            let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.lands_in_auto();
+            if landing && since(self.since.landed_us) >= micros(LAND_DISARM_S)
+                || delay > 0.0 && since(self.since.idle_us) >= micros(delay)
+            {
+                self.disarm(body, false);
+            }
+        }
+        if sense.battery <= 0.0 {
+            self.disarm(body, true);
+        }
+    }
+
+    fn detect_landing(&mut self, sense: &Sense, climbing: bool) {
+        if !sense.touching || climbing {
+            self.since.touching_us = None;
+            return;
+        }
+        let since = *self.since.touching_us.get_or_insert(sense.now_us);
+        if sense.now_us - since >= micros(LAND_DETECTOR_S) {
+            self.since.touching_us = None;
+            self.landed = true;
+            self.since.landed_us = sense.now_us;
+            self.takeoff = None;
+            self.goal = Goal::STOP;
+        }
+    }
+}
+
+/// Microseconds of a time in seconds; what is negative or not a number is none.
+fn micros(s: f32) -> u64 {
+    (f64::from(s) * 1e6) as u64
+}

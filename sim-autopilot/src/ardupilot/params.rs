@@ -1,0 +1,197 @@
+//! The parameters of the simulated ArduCopter: names, types and defaults of 4.6, and the few that act.
+
+use planner_core::Point;
+
+use crate::params::Value::{self, Int, Int8, Int16, Real};
+use crate::params::{Encoding, Params};
+use crate::vehicle::{Demand, Gains, VehicleLimits};
+
+/// Sorted by name.
+const DEFAULTS: &[(&str, Value)] = &[
+    ("ACRO_TRAINER", Int8(2)),
+    ("ANGLE_MAX", Int16(3000)),
+    ("ARMING_CHECK", Int(1)),
+    ("ATC_SLEW_YAW", Real(6000.0)),
+    ("BATT_ARM_MAH", Int(0)),
+    ("BATT_CAPACITY", Int(3300)),
+    ("BATT_CRT_MAH", Real(0.0)),
+    ("BATT_FS_CRT_ACT", Int8(0)),
+    ("BATT_FS_LOW_ACT", Int8(0)),
+    ("BATT_LOW_MAH", Real(0.0)),
+    ("BATT_MONITOR", Int8(4)),
+    // An installer's, with a camera: 1 is a servo.
+    ("CAM1_TYPE", Int8(1)),
+    ("DISARM_DELAY", Int8(10)),
+    ("EK3_ENABLE", Int8(1)),
+    ("EK3_SRC1_POSXY", Int8(3)),
+    ("FENCE_ACTION", Int8(1)),
+    ("FENCE_ENABLE", Int8(0)),
+    ("FLTMODE1", Int8(7)),
+    ("FLTMODE6", Int8(0)),
+    ("FRAME_CLASS", Int8(1)),
+    ("FRAME_TYPE", Int8(0)),
+    ("FS_EKF_ACTION", Int8(1)),
+    ("FS_GCS_ENABLE", Int8(0)),
+    ("FS_GCS_TIMEOUT", Real(5.0)),
+    ("FS_OPTIONS", Int(16)),
+    ("FS_THR_ENABLE", Int8(1)),
+    ("GUID_OPTIONS", Int(0)),
+    ("GUID_TIMEOUT", Real(3.0)),
+    ("LAND_ALT_LOW", Int16(1000)),
+    ("LAND_SPEED", Int16(50)),
+    ("LAND_SPEED_HIGH", Int16(0)),
+    ("LOIT_SPEED", Real(1250.0)),
+    ("MOT_THST_HOVER", Real(0.39)),
+    ("PILOT_SPEED_DN", Int16(0)),
+    ("PILOT_SPEED_UP", Int16(250)),
+    ("PSC_JERK_XY", Real(5.0)),
+    ("PSC_JERK_Z", Real(5.0)),
+    ("PSC_POSXY_P", Real(1.0)),
+    ("PSC_POSZ_P", Real(1.0)),
+    ("PSC_VELXY_D", Real(0.25)),
+    ("PSC_VELXY_I", Real(1.0)),
+    ("PSC_VELXY_P", Real(2.0)),
+    ("PSC_VELZ_I", Real(1.0)),
+    ("PSC_VELZ_P", Real(5.0)),
+    ("RTL_ALT", Int(1500)),
+    ("RTL_ALT_FINAL", Int16(0)),
+    ("RTL_CONE_SLOPE", Real(3.0)),
+    ("RTL_LOIT_TIME", Int(5000)),
+    ("RTL_SPEED", Int16(0)),
+    ("SR0_POSITION", Int16(0)),
+    ("STAT_RUNTIME", Int(0)),
+    ("SYSID_MYGCS", Int16(255)),
+    ("SYSID_THISMAV", Int16(1)),
+    ("WPNAV_ACCEL", Real(250.0)),
+    ("WPNAV_ACCEL_Z", Real(100.0)),
+    ("WPNAV_SPEED", Real(1000.0)),
+    ("WPNAV_SPEED_DN", Real(150.0)),
+    ("WPNAV_SPEED_UP", Real(250.0)),
+    ("WP_YAW_BEHAVIOR", Int8(2)),
+];
+
+/// The defaults, with the airframe's limits in the parameters that carry them.
+pub fn params(system_id: u8, limits: &VehicleLimits) -> Params {
+    let own = [
+        ("SYSID_THISMAV", Int16(i16::from(system_id))),
+        ("WPNAV_SPEED", Real(100.0 * limits.speed_max_mps.min(10.0))),
+    ];
+    Params::new(DEFAULTS, Encoding::Cast, &own)
+}
+
+const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+
+/// The parameters that act, by what they do. Metres, seconds, m/s.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
+pub struct Tuning {
+    pub gains: Gains,
+    pub speed: f32,
+    pub speed_up: f32,
+    pub speed_down: f32,
+    pub acceleration: f32,
+    pub acceleration_z: f32,
+    pub jerk: f32,
+    pub jerk_z: f32,
+    pub land_speed: f32,
+    pub land_slow_below: f32,
+    pub stick_sink: f32,
+    pub guided_timeout_s: f32,
+    pub disarm_delay_s: f32,
+    pub return_height: f32,
+    pub return_cone: f32,
+    pub return_loiter_s: f32,
+    pub gcs_failsafe: bool,
+    pub gcs_timeout_s: f32,
+    pub gcs_system: u8,
+    pub estimator_failsafe: bool,
+    pub battery_action: i32,
+    pub battery_low: f32,
+    pub battery_to_arm: f32,
+    pub checks: bool,
+}
+
+impl Tuning {
+    /// A demand for nothing.
+    pub(super) fn nothing(&self) -> Demand {
+        Demand {
+            position: NONE,
+            velocity: NONE,
+            acceleration: NONE,
+            heading: f32::NAN,
+            heading_rate: f32::NAN,
+            // The reference keeps the limits; the controller may correct beyond them.
+            speed_max: 1.5 * self.speed,
+            climb_max: 1.5 * self.speed_up,
+            descend_max: 1.5 * self.speed_down.max(self.stick_sink),
+            lift_off: f32::NAN,
+            thrust_min: 0.15,
+            height_rate_share: 0.0,
+        }
+    }
+
+    /// What acts, looked up once after each change.
+    pub fn new(params: &Params) -> Self {
+        let cm = |name| 0.01 * params.real(name);
+        let whole_cm = |name| 0.01 * params.int(name) as f32;
+        let capacity = params.int("BATT_CAPACITY").max(1) as f32;
+        let or = |first: f32, second: f32| if first > 0.0 { first } else { second };
+        Self {
+            gains: Gains {
+                position: [params.real("PSC_POSXY_P"), params.real("PSC_POSZ_P")],
+                velocity_p: [params.real("PSC_VELXY_P"), params.real("PSC_VELZ_P")],
+                velocity_i: [params.real("PSC_VELXY_I"), params.real("PSC_VELZ_I")],
+                velocity_d: [params.real("PSC_VELXY_D"), 0.0],
+                tilt_tan: libm::tanf((whole_cm("ANGLE_MAX")).clamp(10.0, 80.0).to_radians()),
+                heading_rate_max: cm("ATC_SLEW_YAW").to_radians(),
+            },
+            speed: cm("WPNAV_SPEED"),
+            speed_up: cm("WPNAV_SPEED_UP"),
+            speed_down: cm("WPNAV_SPEED_DN"),
+            acceleration: cm("WPNAV_ACCEL").max(0.5),
+            acceleration_z: cm("WPNAV_ACCEL_Z").max(0.5),
+            jerk: params.real("PSC_JERK_XY").max(1.0),
+            jerk_z: params.real("PSC_JERK_Z").max(1.0),
+            land_speed: whole_cm("LAND_SPEED"),
+            land_slow_below: whole_cm("LAND_ALT_LOW"),
+            stick_sink: or(whole_cm("PILOT_SPEED_DN"), whole_cm("PILOT_SPEED_UP")),
+            guided_timeout_s: params.real("GUID_TIMEOUT").max(0.1),
+            disarm_delay_s: params.int("DISARM_DELAY") as f32,
+            return_height: whole_cm("RTL_ALT"),
+            return_cone: params.real("RTL_CONE_SLOPE"),
+            return_loiter_s: 0.001 * params.int("RTL_LOIT_TIME") as f32,
+            gcs_failsafe: params.int("FS_GCS_ENABLE") != 0,
+            gcs_timeout_s: params.real("FS_GCS_TIMEOUT"),
+            gcs_system: params.int("SYSID_MYGCS") as u8,
+            estimator_failsafe: params.int("FS_EKF_ACTION") != 0,
+            battery_action: params.int("BATT_FS_LOW_ACT"),
+            battery_low: params.real("BATT_LOW_MAH") / capacity,
+            battery_to_arm: params.int("BATT_ARM_MAH") as f32 / capacity,
+            checks: params.int("ARMING_CHECK") != 0,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_sorted_and_fit_the_wire() {
+        assert!(DEFAULTS.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        assert!(DEFAULTS.iter().all(|(name, _)| name.len() <= 16));
+    }
+
+    #[test]
+    fn every_parameter_that_acts_is_in_the_table() {
+        // A misspelt name would read as 0; of these only the battery's and the GCS failsafe are 0 by default.
+        let t = Tuning::new(&params(3, &VehicleLimits::default()));
+        let positive = [t.speed, t.speed_up, t.speed_down, t.land_speed, t.land_slow_below, t.stick_sink];
+        assert!(positive.iter().all(|v| *v > 0.1));
+        let positive = [t.disarm_delay_s, t.return_height, t.return_cone, t.return_loiter_s, t.gcs_timeout_s];
+        assert!(positive.iter().all(|v| *v > 1.0) && t.guided_timeout_s == 3.0);
+        assert!((t.acceleration, t.acceleration_z, t.jerk, t.jerk_z) == (2.5, 1.0, 5.0, 5.0));
+        assert!(t.gcs_system == 255 && t.estimator_failsafe && t.checks && !t.gcs_failsafe);
+        assert!(t.gains.position == [1.0, 1.0] && t.gains.heading_rate_max > 1.0);
+    }
+}

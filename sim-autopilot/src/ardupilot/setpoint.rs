@@ -1,0 +1,131 @@
+//! What Guided flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as ArduCopter reads them
+//! (`GCS_MAVLINK_Copter::handle_message_set_position_target_*`).
+//!
+//! An axis left out leaves out its whole vector. What asks for nothing, for a frame it does not know, for force, or for
+//! acceleration alone (which ArduCopter would fly and this does not) is not refused: it stops.
+
+use nalgebra::Vector3;
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+
+use crate::body::Body;
+use crate::wire::Fields;
+
+const FRAME_LOCAL_NED: u8 = 1;
+const FRAME_LOCAL_OFFSET_NED: u8 = 7;
+const FRAME_BODY_NED: u8 = 8;
+const FRAME_BODY_OFFSET_NED: u8 = 9;
+const MASK_POSITION: u16 = 0x007;
+const MASK_VELOCITY: u16 = 0x038;
+const MASK_ACCELERATION: u16 = 0x1C0;
+const MASK_FORCE: u16 = 0x200;
+const MASK_YAW: u16 = 0x400;
+const MASK_YAW_RATE: u16 = 0x800;
+
+/// What Guided flies, in the mission frame.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// ENU metres; `None` flies the velocity alone.
+    pub position: Option<Point>,
+    /// ENU m/s; with a position its feed-forward.
+    pub velocity: Point,
+    /// ENU m/s², as feed-forward.
+    pub acceleration: Point,
+    /// Radians clockwise from north; NaN keeps the heading.
+    pub heading: f32,
+    /// rad/s clockwise; NaN none.
+    pub heading_rate: f32,
+    /// Velocity and acceleration end with `GUID_TIMEOUT`.
+    pub expires: bool,
+}
+
+impl Goal {
+    /// Stand still.
+    pub const STOP: Self = Self {
+        position: None,
+        velocity: Point::new(0.0, 0.0, 0.0),
+        acceleration: Point::new(0.0, 0.0, 0.0),
+        heading: f32::NAN,
+        heading_rate: f32::NAN,
+        expires: false,
+    };
+
+    /// Fly to a point and hold it for ever.
+    pub fn hold(position: Point) -> Self {
+        Self { position: Some(position), ..Self::STOP }
+    }
+}
+
+/// Reads message 84.
+pub fn local_ned(fields: &Fields<'_>, body: &Body) -> Goal {
+    let frame = fields.u8(52);
+    let in_body = matches!(frame, FRAME_BODY_NED | FRAME_BODY_OFFSET_NED);
+    if frame != FRAME_LOCAL_NED && frame != FRAME_LOCAL_OFFSET_NED && !in_body {
+        return Goal::STOP;
+    }
+    let (sin, cos) = libm::sincos(f64::from(body.vehicle.state().heading_rad));
+    let turned = |v: Vector3<f64>| match in_body {
+        true => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
+        false => v,
+    };
+    let mut ned = turned(vector(fields, 4));
+    if frame != FRAME_LOCAL_NED {
+        ned += body.frame.ned(&body.sense().position.cast::<f64>());
+    }
+    let position = body.frame.enu(&ned).cast::<f32>();
+    let rate = |at| body.frame.enu_rate(&turned(vector(fields, at))).cast::<f32>();
+    finish(fields, position, rate(16), rate(28))
+}
+
+/// Reads message 86.
+pub fn global_int(fields: &Fields<'_>, body: &Body) -> Goal {
+    let base = match fields.u8(52) {
+        0 | 5 => 0.0,
+        3 | 6 => body.home.alt_m,
+        _ => return Goal::STOP,
+    };
+    let asked = Geodetic {
+        lat_deg: f64::from(fields.i32(4)) * 1e-7,
+        lon_deg: f64::from(fields.i32(8)) * 1e-7,
+        alt_m: f64::from(fields.f32(12)) + base,
+    };
+    if !asked.is_valid() {
+        return Goal::STOP;
+    }
+    let rate = |at| body.frame.enu_rate(&vector(fields, at)).cast::<f32>();
+    finish(fields, body.frame.enu_of_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
+}
+
+fn vector(fields: &Fields<'_>, at: usize) -> Vector3<f64> {
+    Vector3::new(fields.f32(at), fields.f32(at + 4), fields.f32(at + 8)).cast::<f64>()
+}
+
+fn finish(fields: &Fields<'_>, position: Point, velocity: Point, acceleration: Point) -> Goal {
+    let mask = fields.u16(48);
+    let given = |bits: u16| mask & bits == 0;
+    let has = (given(MASK_POSITION), given(MASK_VELOCITY), given(MASK_ACCELERATION));
+    let sound = |v: &Point| v.iter().all(|x| x.is_finite());
+    let usable =
+        (!has.0 || sound(&position)) && (!has.1 || sound(&velocity)) && (!has.2 || sound(&acceleration));
+    if !usable || (mask & MASK_FORCE != 0 && has.2) {
+        return Goal::STOP;
+    }
+    let optional = |bit: u16, at: usize| {
+        let value = fields.f32(at);
+        if given(bit) && value.is_finite() { value } else { f32::NAN }
+    };
+    let turn = core::f32::consts::TAU;
+    let heading = optional(MASK_YAW, 40);
+    let goal = Goal {
+        heading: heading - turn * libm::roundf(heading / turn),
+        heading_rate: optional(MASK_YAW_RATE, 44),
+        ..Goal::STOP
+    };
+    let acceleration = if has.2 { acceleration } else { Point::zeros() };
+    match has {
+        (true, true, _) => Goal { position: Some(position), velocity, acceleration, expires: true, ..goal },
+        (false, true, _) => Goal { velocity, acceleration, expires: true, ..goal },
+        (true, false, false) => Goal { position: Some(position), ..goal },
+        _ => Goal::STOP,
+    }
+}

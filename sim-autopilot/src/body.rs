@@ -1,0 +1,322 @@
+//! What every simulated autopilot has, whatever its firmware: airframe, estimator, ports, home, stored missions.
+
+use planner_core::Point;
+use planner_core::frames::{self, Geodetic};
+
+use super::camera::{Camera, Photo};
+use super::command::{ACCEPTED, Command, DO_DIGICAM_CONTROL, message_id};
+use super::config::Config;
+use super::estimator::Errors;
+use super::geodesy::LocalFrame;
+use super::mission::Missions;
+use super::noise::{self, Disturbance};
+use super::port::{Ack, Port, Sender};
+use super::vehicle::{Demand, Vehicle};
+use super::wire::Fields;
+use crate::Personality;
+
+const MESSAGE_INTERVAL: u32 = 244;
+const HOME_POSITION: u32 = 242;
+const GPS_GLOBAL_ORIGIN: u32 = 49;
+/// An answer leaves one step after the question: 4 ms, where PX4 was seen to take 1.3 to 16 and ArduCopter 2.5 to 7.
+const ANSWER_US: u64 = 4_000;
+/// From the command to reboot until it does.
+const REBOOT_US: u64 = 200_000;
+
+/// What a state machine perceives in one step.
+#[derive(Clone, Copy, Debug)]
+pub struct Sense {
+    /// Microseconds since boot.
+    pub now_us: u64,
+    /// Estimated position, ENU metres.
+    pub position: Point,
+    /// Estimated velocity, ENU m/s.
+    pub velocity: Point,
+    /// Change of the estimated height, m/s.
+    pub height_rate: f32,
+    /// Measured acceleration, ENU m/s².
+    pub acceleration: Point,
+    /// Heading, radians clockwise from north.
+    pub heading: f32,
+    /// The body touches the ground.
+    pub touching: bool,
+    /// Height of the body over its resting place as the distance sensor shows it, metres; infinite without one.
+    pub distance: f32,
+    /// Home, ENU metres.
+    pub home: Point,
+    /// Charge left, 0 to 1.
+    pub battery: f32,
+}
+
+/// What moves the vehicle in this step.
+#[derive(Clone, Copy, Debug)]
+pub struct Order {
+    /// Motors carry weight.
+    pub lift: bool,
+    /// What becomes of the controller's integral.
+    pub integral: Integral,
+    /// What the mode asks for.
+    pub demand: Demand,
+}
+
+/// What becomes of the velocity controller's integral in a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Integral {
+    /// It goes on.
+    Keep,
+    /// It is zero, as on the ground.
+    Clear,
+    /// It is what was asked of the airframe beyond what that does, as where ArduCopter initialises its controller in flight.
+    Match,
+}
+
+/// Airframe, estimator, ports, home and stored missions.
+#[derive(Clone, Debug)]
+pub struct Body {
+    pub(super) config: Config,
+    pub(super) time_us: u64,
+    slot_us: u64,
+    pub(super) vehicle: Vehicle,
+    pub(super) disturbance: Disturbance,
+    pub(super) errors: Errors,
+    pub(super) jump: Point,
+    /// Estimated minus true velocity that a replay imposes, ENU m/s.
+    pub(super) velocity_bias: Point,
+    /// Change of the estimate's error in height, m/s.
+    pub(super) height_error_rate: f32,
+    pub(super) gps_ok: bool,
+    pub(super) frame: LocalFrame,
+    pub(super) home: Geodetic,
+    pub(super) home_enu: Point,
+    home_fixed: bool,
+    pub(super) height: f32,
+    pub(super) demand: Option<Demand>,
+    pub(super) ports: Vec<Port>,
+    pub(super) missions: Missions,
+    pub(super) camera: Camera,
+    /// When to reboot, once that was commanded.
+    pub(super) reboot_us: Option<u64>,
+}
+
+impl Body {
+    pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
+        let mut limits = config.vehicle;
+        limits.drag_per_s *= config.personality.drag_share();
+        limits.wind_per_s *= config.personality.wind_share();
+        let mut vehicle = Vehicle::new(limits, config.start);
+        vehicle.set_heading(config.heading_rad);
+        let start = config.start.cast::<f64>();
+        let projection = config.personality.projection();
+        let frame = LocalFrame::new(projection, config.world_origin, config.ekf_origin, start);
+        let ports = (0..config.ports.max(1)).map(|_| Port::new(config.system_id, streams));
+        let ground = config.ground_port.then(|| Port::for_ground(config.system_id, streams));
+        let home = config.home.unwrap_or_else(|| frame.geodetic(&start));
+        let seed = config.vehicle_seed();
+        Self {
+            time_us: 0,
+            slot_us: 0,
+            disturbance: Disturbance::new(config.wind, config.gust_mps, config.position_noise_m, seed),
+            errors: Errors::new(config.estimator, config.personality, seed),
+            jump: Point::zeros(),
+            velocity_bias: Point::zeros(),
+            height_error_rate: 0.0,
+            gps_ok: true,
+            home,
+            home_enu: frames::geodetic_to_enu(&config.world_origin, &home),
+            home_fixed: config.home.is_some(),
+            height: 0.0,
+            demand: None,
+            ports: ports.chain(ground).collect(),
+            missions: Missions::default(),
+            camera: Camera::default(),
+            reboot_us: None,
+            vehicle,
+            frame,
+            config: config.clone(),
+        }
+    }
+
+    /// Lets time pass, wind change, and the ground be where it is.
+    pub(super) fn advance_time(&mut self, dt_s: f32, ground_up_m: f32) {
+        self.time_us += libm::roundf(dt_s * 1e6) as u64;
+        if self.time_us >= self.slot_us {
+            self.slot_us += (noise::SLOT_S * 1e6) as u64;
+            self.disturbance.advance();
+            self.errors.advance();
+        }
+        self.height = self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
+    }
+
+    pub(super) fn sense(&self) -> Sense {
+        let state = self.vehicle.state();
+        Sense {
+            now_us: self.time_us,
+            position: state.position + self.position_error(),
+            velocity: state.velocity
+                + self.disturbance.velocity_error
+                + self.velocity_bias
+                + self.errors.velocity,
+            height_rate: state.velocity.z + self.height_error_rate + self.errors.rate.z,
+            acceleration: state.acceleration,
+            heading: state.heading_rad,
+            touching: state.touching,
+            distance: if self.config.distance_sensor { self.height } else { f32::INFINITY },
+            home: self.home_enu,
+            battery: state.battery,
+        }
+    }
+
+    /// Estimated minus true position, ENU metres.
+    pub(super) fn position_error(&self) -> Point {
+        self.disturbance.position_error + self.errors.position + self.jump
+    }
+
+    pub(super) fn set_fixed_home(&mut self, home: Geodetic) {
+        self.home = home;
+        self.home_enu = frames::geodetic_to_enu(&self.config.world_origin, &home);
+        self.home_fixed = true;
+        self.announce(HOME_POSITION);
+    }
+
+    /// Home where it stands, as both firmwares set it on arming.
+    pub(super) fn set_home_here(&mut self) {
+        if self.home_fixed {
+            return;
+        }
+        let position = self.sense().position;
+        self.home_enu = position;
+        self.home = self.frame.geodetic(&position.cast::<f64>());
+        self.announce(HOME_POSITION);
+    }
+
+    /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
+    pub(super) fn control_camera(&mut self, from: Sender, command: &Command) {
+        self.do_camera(command);
+        let soon_us = self.time_us + ANSWER_US;
+        let answer_us = match self.config.personality {
+            Personality::Px4 => self.camera.looks_us().max(soon_us),
+            Personality::Ardupilot => soon_us,
+        };
+        let ack = Ack { command: command.id, result: ACCEPTED, to: from.id() };
+        self.ports[from.port].later.push((answer_us, ack));
+    }
+
+    /// The same without an answer.
+    pub(super) fn do_camera(&mut self, command: &Command) {
+        if command.id == DO_DIGICAM_CONTROL {
+            self.camera.control(command);
+        } else {
+            self.camera.set_distance(command);
+        }
+    }
+
+    /// Takes the picture that is due, if one is, and says so.
+    pub(super) fn update_camera(&mut self) {
+        let state = self.vehicle.state();
+        let truth = Photo { time_us: self.time_us, position: state.position, heading_rad: state.heading_rad };
+        let estimate = self.gps_ok.then(|| state.position + self.position_error());
+        if let Some(message) = self.camera.update(self.config.personality, truth, estimate) {
+            self.announce(message);
+        }
+    }
+
+    /// Reboots when the answer is out.
+    pub(super) fn reboot_soon(&mut self) {
+        self.reboot_us = Some(self.time_us + REBOOT_US);
+    }
+
+    pub(super) fn announce_origin(&mut self) {
+        self.announce(GPS_GLOBAL_ORIGIN);
+    }
+
+    /// Sends one message through every port in the next step.
+    pub(super) fn announce(&mut self, id: u32) {
+        for port in &mut self.ports {
+            if !port.once.contains(&id) {
+                port.once.push(id);
+            }
+        }
+    }
+
+    /// Sends STATUSTEXT through every port.
+    pub(super) fn say(&mut self, severity: u8, text: &str) {
+        self.ports.iter_mut().for_each(|port| port.send_text(severity, text));
+    }
+
+    /// Takes a message of the mission protocol.
+    pub(super) fn handle_mission(&mut self, from: Sender, id: u32, fields: &Fields<'_>) {
+        self.missions.handle(self.time_us, &mut self.ports[from.port], from, id, fields);
+    }
+
+    pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
+        let ack = Ack { command, result, to: from.id() };
+        self.ports[from.port].later.push((self.time_us + ANSWER_US, ack));
+    }
+
+    /// Where DO_REPOSITION asks to go, ENU with NaN for what it leaves; `None` for no place on earth.
+    pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
+        let here = self.frame.geodetic(self.vehicle.position());
+        let [lat_deg, lon_deg] = command.place;
+        let base = if command.relative { self.home.alt_m } else { 0.0 };
+        let across = lat_deg.is_finite() && lon_deg.is_finite();
+        let asked = Geodetic {
+            lat_deg: if across { lat_deg } else { here.lat_deg },
+            lon_deg: if across { lon_deg } else { here.lon_deg },
+            alt_m: if command.z.is_finite() { f64::from(command.z) + base } else { here.alt_m },
+        };
+        if !asked.is_valid() {
+            return None;
+        }
+        let enu = self.frame.enu_of_geodetic(&asked).cast::<f32>();
+        let (east, north) = if across { (enu.x, enu.y) } else { (f32::NAN, f32::NAN) };
+        Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
+    }
+
+    /// DO_SET_HOME; whether the place is one.
+    pub(super) fn set_home(&mut self, command: &Command) -> bool {
+        let [lat_deg, lon_deg] = command.place;
+        let home = if command.param[0] == 1.0 {
+            self.frame.geodetic(self.vehicle.position())
+        } else {
+            Geodetic { lat_deg, lon_deg, alt_m: f64::from(command.z) }
+        };
+        let valid = home.is_valid();
+        if valid {
+            self.set_fixed_home(home);
+        }
+        valid
+    }
+
+    /// SET_MESSAGE_INTERVAL; 0 restores what `streams` says. `refused` is the firmware's answer to an id it has not.
+    pub(super) fn set_interval(
+        &mut self,
+        from: Sender,
+        command: &Command,
+        streams: &[(u32, u32)],
+        refused: u8,
+    ) -> u8 {
+        let Some(id) = message_id(command.param[0]) else { return refused };
+        let interval = match command.param[1] {
+            0.0 => streams.iter().find(|stream| stream.0 == id).map_or(0, |stream| stream.1),
+            us if us < 0.0 => 0,
+            us => us as u32,
+        };
+        let now = self.time_us;
+        if self.ports[from.port].set_interval(id, interval, now) { ACCEPTED } else { refused }
+    }
+
+    /// GET_MESSAGE_INTERVAL.
+    pub(super) fn report_interval(&mut self, from: Sender, id: f32, refused: u8) -> u8 {
+        let port = &mut self.ports[from.port];
+        let Some(stream) = message_id(id).and_then(|id| port.streams.iter().find(|stream| stream.id == id))
+        else {
+            return refused;
+        };
+        let interval_us = if stream.interval_us == 0 { -1 } else { stream.interval_us as i32 };
+        let mut payload = [0; 6];
+        payload[..4].copy_from_slice(&interval_us.to_le_bytes());
+        payload[4..].copy_from_slice(&(stream.id as u16).to_le_bytes());
+        port.send_raw(MESSAGE_INTERVAL, &payload);
+        ACCEPTED
+    }
+}

@@ -1,0 +1,167 @@
+//! The camera that the autopilot triggers: by distance flown (DO_SET_CAM_TRIGG_DIST, 206) or at once (DO_DIGICAM_CONTROL, 203).
+//!
+//! Each firmware looks as it does. PX4's `camera_trigger` (TRIG_MODE 4) runs every 50 ms: then it takes up a command,
+//! photographs where it is switched on, and where it is the distance or more from there. ArduPilot's `AP_Camera` runs every
+//! 20 ms, counts from where it is switched on or from the picture before, and photographs at once what is asked for at once.
+//! Both measure across, on the estimate, from the last picture: pictures are a little more than the distance apart, by what
+//! is flown between two looks. Then CAMERA_IMAGE_CAPTURED (263, PX4, counted from 0) or CAMERA_FEEDBACK (180, ArduPilot, from
+//! 1) goes out through every port, with the estimated place. Source: `camera_trigger.cpp`, `AP_Camera_Backend.cpp`.
+//!
+//! Where the vehicle truly was is kept for a referee ([`super::Autopilot::take_photos`]).
+
+use planner_core::Point;
+
+use super::command::Command;
+use super::messages::scaled;
+use super::port::Port;
+use super::snapshot::Snapshot;
+use crate::Personality;
+
+const CAMERA_FEEDBACK: u32 = 180;
+const CAMERA_IMAGE_CAPTURED: u32 = 263;
+/// Time between two looks: PX4's, ArduPilot's.
+const LOOK_EVERY_US: [u64; 2] = [50_000, 20_000];
+/// Photos kept for a referee that does not ask.
+const KEPT: usize = 100_000;
+
+/// A picture as it truly was taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Photo {
+    /// Microseconds since boot.
+    pub time_us: u64,
+    /// True centre of the body, ENU metres.
+    pub position: Point,
+    /// True heading, radians clockwise from north.
+    pub heading_rad: f32,
+}
+
+/// The camera's trigger.
+#[derive(Clone, Debug, Default)]
+pub struct Camera {
+    /// Metres between pictures while it triggers by distance.
+    distance_m: Option<f32>,
+    /// The estimated place, east and north, that the distance counts from.
+    last: Option<[f32; 2]>,
+    /// A picture was asked for at once.
+    once: bool,
+    look_us: u64,
+    /// Pictures since boot.
+    taken: u32,
+    photos: Vec<Photo>,
+}
+
+impl Camera {
+    /// DO_SET_CAM_TRIGG_DIST: metres in parameter 1, 0 and less stop it; parameter 3 asks for one picture at once.
+    pub(super) fn set_distance(&mut self, command: &Command) {
+        let distance_m = command.param[0];
+        self.distance_m = (distance_m > 0.0).then_some(distance_m);
+        self.last = None;
+        self.once |= command.param[2] > 0.0;
+    }
+
+    /// DO_DIGICAM_CONTROL: 1 in parameter 5 asks for a picture.
+    pub(super) fn control(&mut self, command: &Command) {
+        self.once |= libm::roundf(command.number5) == 1.0;
+    }
+
+    /// What a reboot leaves: what was photographed.
+    pub(super) fn rebooted(&mut self) -> Self {
+        Self { photos: core::mem::take(&mut self.photos), ..Self::default() }
+    }
+
+    /// Hands over what was photographed since the last call.
+    pub(super) fn take_photos(&mut self) -> Vec<Photo> {
+        core::mem::take(&mut self.photos)
+    }
+
+    /// Pictures since boot.
+    pub(super) fn taken(&self) -> u32 {
+        self.taken
+    }
+
+    /// When it looks next, microseconds since boot.
+    pub(super) fn looks_us(&self) -> u64 {
+        self.look_us
+    }
+
+    /// One step: the message to announce, if a picture was taken. `estimate` is none without a position.
+    pub(super) fn update(
+        &mut self,
+        personality: Personality,
+        truth: Photo,
+        estimate: Option<Point>,
+    ) -> Option<u32> {
+        let px4 = personality == Personality::Px4;
+        let looks = truth.time_us >= self.look_us;
+        if looks {
+            self.look_us += LOOK_EVERY_US[usize::from(!px4)];
+        }
+        let mut shoot = (looks || !px4) && core::mem::take(&mut self.once);
+        if shoot {
+            self.last = estimate.map(|at| [at.x, at.y]);
+        }
+        if let (Some(distance_m), Some(at)) = (self.distance_m, estimate)
+            && looks
+        {
+            let far = self.last.map(|last| libm::hypotf(at.x - last[0], at.y - last[1]) >= distance_m);
+            // PX4 photographs where it begins, ArduPilot only counts from there.
+            let due = far.unwrap_or(px4);
+            if due || far.is_none() {
+                self.last = Some([at.x, at.y]);
+            }
+            shoot |= due;
+        }
+        if !shoot {
+            return None;
+        }
+        self.taken += 1;
+        if self.photos.len() < KEPT {
+            self.photos.push(truth);
+        }
+        Some(if px4 { CAMERA_IMAGE_CAPTURED } else { CAMERA_FEEDBACK })
+    }
+}
+
+impl Snapshot {
+    /// What is said about the picture taken in this step.
+    pub(super) fn send_camera(&self, id: u32, port: &mut Port) -> bool {
+        let (latitude, longitude, altitude_mm) = scaled(&self.geodetic);
+        let relative_m = (self.geodetic.alt_m - self.home.0.alt_m) as f32;
+        match id {
+            CAMERA_IMAGE_CAPTURED => {
+                let mut payload = [0; 50];
+                payload[..8].copy_from_slice(&self.unix_us.to_le_bytes());
+                payload[8..12].copy_from_slice(&self.boot_ms().to_le_bytes());
+                let relative_mm = libm::roundf(1e3 * relative_m) as i32;
+                let index = self.pictures.saturating_sub(1) as i32;
+                for (at, value) in
+                    [(12, latitude), (16, longitude), (20, altitude_mm), (24, relative_mm), (44, index)]
+                {
+                    payload[at..at + 4].copy_from_slice(&value.to_le_bytes());
+                }
+                for (k, q) in self.attitude().quaternion.iter().enumerate() {
+                    payload[28 + 4 * k..32 + 4 * k].copy_from_slice(&q.to_le_bytes());
+                }
+                // Camera 1; success; no address of a file.
+                payload[48..].copy_from_slice(&[1, 1]);
+                port.send_raw(id, &payload);
+            }
+            CAMERA_FEEDBACK => {
+                let mut payload = [0; 47];
+                payload[..8].copy_from_slice(&self.unix_us.to_le_bytes());
+                for (at, value) in [(8, latitude), (12, longitude)] {
+                    payload[at..at + 4].copy_from_slice(&value.to_le_bytes());
+                }
+                let [roll, pitch, yaw] = self.attitude().euler.map(f32::to_degrees);
+                let reals = [self.geodetic.alt_m as f32, relative_m, roll, pitch, yaw, 0.0];
+                for (k, real) in reals.iter().enumerate() {
+                    payload[16 + 4 * k..20 + 4 * k].copy_from_slice(&real.to_le_bytes());
+                }
+                payload[40..42].copy_from_slice(&(self.pictures as u16).to_le_bytes());
+                port.send_raw(id, &payload);
+            }
+            _ => return false,
+        }
+        true
+    }
+}

@@ -1,0 +1,177 @@
+//! What a simulated autopilot is made from, and what of it is refused.
+
+use planner_core::Point;
+use planner_core::frames::{Geodetic, Projection};
+
+use super::estimator::Errors;
+use super::vehicle::VehicleLimits;
+use crate::{Estimator, Personality};
+
+impl Personality {
+    /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its recorded flights.
+    pub(super) fn drag_share(self) -> f32 {
+        match self {
+            Self::Px4 => 1.0,
+            Self::Ardupilot => 0.4,
+        }
+    }
+
+    /// Share of the push of wind.
+    pub(super) fn wind_share(self) -> f32 {
+        match self {
+            Self::Px4 => 1.0,
+            Self::Ardupilot => 0.2,
+        }
+    }
+
+    /// How it flattens the earth about its EKF origin.
+    pub fn projection(self) -> Projection {
+        match self {
+            Self::Px4 => Projection::Px4,
+            Self::Ardupilot => Projection::ArduPilot,
+        }
+    }
+}
+
+/// What a simulated autopilot is made from.
+#[derive(Clone, Debug)]
+pub struct Config {
+    /// MAVLink system id, 1 to 255.
+    pub system_id: u8,
+    /// Which autopilot it is.
+    pub personality: Personality,
+    /// Origin of the mission frame.
+    pub world_origin: Geodetic,
+    /// Origin of the autopilot's own local frame.
+    pub ekf_origin: Geodetic,
+    /// Home; `None` is where it stands when it arms.
+    pub home: Option<Geodetic>,
+    /// Where the centre of its body starts, ENU metres.
+    pub start: Point,
+    /// Heading at the start, radians clockwise from north.
+    pub heading_rad: f32,
+    /// What the airframe can do.
+    pub vehicle: VehicleLimits,
+    /// Mean wind, ENU m/s.
+    pub wind: Point,
+    /// Peak of gusts over the mean wind, m/s.
+    pub gust_mps: f32,
+    /// Standard deviation of the position estimate, metres.
+    pub position_noise_m: f32,
+    /// How good its estimate is.
+    pub estimator: Estimator,
+    /// Whether PX4 lands by a distance sensor, as the recorded ones did: it crawls over its last metre.
+    pub distance_sensor: bool,
+    /// Seed of gusts and noise.
+    pub seed: u64,
+    /// UTC at boot, microseconds since 1970.
+    pub boot_unix_us: u64,
+    /// Time from boot until ArduCopter's estimator has a position, seconds; PX4 is found running.
+    pub estimator_ready_s: f32,
+    /// MAVLink ports, at least one, each with its own stream settings.
+    pub ports: usize,
+    /// Whether it has one more port, with a ground station's rates.
+    pub ground_port: bool,
+    /// Whether it passes on what is for others, from port to port.
+    pub routes: bool,
+}
+
+impl Default for Config {
+    /// PX4 as system 1 at rest on flat ground at the mission origin, in still air.
+    fn default() -> Self {
+        let origin = Geodetic { lat_deg: 47.397_742, lon_deg: 8.545_594, alt_m: 488.0 };
+        let vehicle = VehicleLimits::default();
+        Self {
+            system_id: 1,
+            personality: Personality::Px4,
+            world_origin: origin,
+            ekf_origin: origin,
+            home: None,
+            start: Point::new(0.0, 0.0, vehicle.radius_m),
+            heading_rad: 0.0,
+            vehicle,
+            wind: Point::zeros(),
+            gust_mps: 0.0,
+            position_noise_m: 0.0,
+            estimator: Estimator::Perfect,
+            distance_sensor: false,
+            seed: 1,
+            boot_unix_us: 1_767_225_600_000_000,
+            estimator_ready_s: 40.0,
+            ports: 1,
+            ground_port: false,
+            routes: false,
+        }
+    }
+}
+
+impl Config {
+    /// What everything random about this vehicle is drawn from.
+    pub(super) fn vehicle_seed(&self) -> u64 {
+        self.seed ^ (u64::from(self.system_id) << 32)
+    }
+
+    /// What its estimate of the height is wrong by for the whole flight, metres: so much its EKF origin is off as well, if the receiver
+    /// set it.
+    pub fn height_error_m(&self) -> f32 {
+        Errors::new(self.estimator, self.personality, self.vehicle_seed()).height_m()
+    }
+}
+
+/// Why no autopilot can be made from a [`Config`].
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ConfigError {
+    /// A latitude, longitude or altitude out of range.
+    #[error("{0} is no place on earth: latitude within ±90°, longitude within ±180°, finite altitude")]
+    Place(&'static str),
+    /// A number that is not finite, or not positive where it must be.
+    #[error("{0} must be finite and not negative")]
+    Number(&'static str),
+    /// A parameter that the autopilot does not have.
+    #[error("no integer parameter `{0}`")]
+    Parameter(&'static str),
+    /// System id 0 is broadcast.
+    #[error("system id 0 means everybody: choose 1 to 255")]
+    SystemId,
+}
+
+/// Refuses what cannot be simulated.
+pub(super) fn check(config: &Config) -> Result<(), ConfigError> {
+    if config.system_id == 0 {
+        return Err(ConfigError::SystemId);
+    }
+    let home = config.home.unwrap_or(config.world_origin);
+    for (name, place) in
+        [("world origin", config.world_origin), ("EKF origin", config.ekf_origin), ("home", home)]
+    {
+        if !place.is_valid() {
+            return Err(ConfigError::Place(name));
+        }
+    }
+    if !config.start.iter().chain(config.wind.iter()).all(|x| x.is_finite())
+        || !config.heading_rad.is_finite()
+    {
+        return Err(ConfigError::Number("start position, heading and wind"));
+    }
+    let v = &config.vehicle;
+    let positive = [
+        v.radius_m,
+        v.speed_max_mps,
+        v.climb_max_mps,
+        v.descend_max_mps,
+        v.acceleration_max_mps2,
+        v.jerk_max_mps3,
+        v.tilt_max_deg,
+        v.lag_s,
+        v.drag_per_s,
+        v.wind_per_s,
+        v.endurance_s,
+        config.gust_mps,
+        config.position_noise_m,
+        config.estimator_ready_s,
+    ];
+    if positive.iter().any(|x| !x.is_finite() || *x < 0.0) {
+        return Err(ConfigError::Number("every vehicle limit, gust and noise"));
+    }
+    Ok(())
+}

@@ -1,0 +1,193 @@
+//! Which firmware runs: every call that depends on it goes through here.
+
+use super::ardupilot::{self, Copter};
+use super::body::{Body, Order, Sense};
+use super::command::Command;
+use super::config::Config;
+use super::params::Params;
+use super::port::Sender;
+use super::px4::{self, Px4};
+use super::status::Status;
+use super::telemetry;
+use super::vehicle::Gains;
+use super::wire::Fields;
+use crate::Personality;
+
+/// The firmware of one vehicle.
+#[derive(Clone, Debug)]
+pub enum Firmware {
+    /// PX4 1.17.
+    Px4(Box<Px4>),
+    /// ArduCopter 4.6.
+    Copter(Box<Copter>),
+}
+
+impl Firmware {
+    pub(super) fn new(config: &Config) -> Self {
+        match config.personality {
+            Personality::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
+            Personality::Ardupilot => Self::Copter(Box::new(Copter::new(
+                config.system_id,
+                &config.vehicle,
+                config.estimator_ready_s,
+            ))),
+        }
+    }
+
+    /// Streams it starts with: message id and interval in µs, 0 off until asked for.
+    pub(super) fn streams(personality: Personality) -> &'static [(u32, u32)] {
+        match personality {
+            Personality::Px4 => &telemetry::STREAMS,
+            Personality::Ardupilot => &ardupilot::STREAMS,
+        }
+    }
+
+    /// Sends what it says unasked when it has booted.
+    pub(super) fn boot(&mut self, body: &mut Body) {
+        match self {
+            Self::Px4(_) => body.announce_origin(),
+            Self::Copter(copter) => copter.boot(body),
+        }
+    }
+
+    pub(super) fn armed(&self) -> bool {
+        match self {
+            Self::Px4(px4) => px4.commander.armed(),
+            Self::Copter(copter) => copter.armed(),
+        }
+    }
+
+    pub(super) fn landed(&self) -> bool {
+        match self {
+            Self::Px4(px4) => px4.commander.landed(),
+            Self::Copter(copter) => copter.landed(),
+        }
+    }
+
+    pub(super) fn in_failsafe(&self) -> bool {
+        match self {
+            Self::Px4(px4) => px4.commander.in_failsafe(),
+            Self::Copter(copter) => copter.in_failsafe(),
+        }
+    }
+
+    pub(super) fn gains(&self) -> &Gains {
+        match self {
+            Self::Px4(px4) => &px4.tuning.gains,
+            Self::Copter(copter) => &copter.tuning.gains,
+        }
+    }
+
+    pub(super) fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
+        match self {
+            Self::Px4(px4) => px4.update(body, sense),
+            Self::Copter(copter) => copter.update(body, sense, dt_s),
+        }
+    }
+
+    pub(super) fn status(&self, body: &Body, sense: &Sense) -> Status {
+        match self {
+            Self::Px4(px4) => px4.status(body, sense),
+            Self::Copter(copter) => copter.status(sense),
+        }
+    }
+
+    pub(super) fn handle_command(&mut self, body: &mut Body, from: Sender, command: &Command) {
+        match self {
+            Self::Px4(px4) => px4.handle_command(body, from, command),
+            Self::Copter(copter) => copter.handle_command(body, from, command),
+        }
+    }
+
+    pub(super) fn handle_set_mode(&mut self, body: &mut Body, from: Sender, fields: &Fields<'_>) {
+        match self {
+            Self::Px4(px4) => px4.handle_set_mode(body, fields),
+            Self::Copter(copter) => copter.handle_set_mode(body, from, fields),
+        }
+    }
+
+    /// SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
+    pub(super) fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+        match self {
+            Self::Px4(px4) => px4.handle_setpoint(body, id, fields),
+            Self::Copter(copter) => copter.handle_setpoint(body, id, fields),
+        }
+    }
+
+    /// REQUEST_DATA_STREAM, which PX4 ignores.
+    pub(super) fn handle_stream_request(&mut self, body: &mut Body, from: Sender, fields: &Fields<'_>) {
+        if let Self::Copter(_) = self {
+            ardupilot::handle_stream_request(body, from, fields);
+        }
+    }
+
+    /// HEARTBEAT of another system.
+    pub(super) fn handle_heartbeat(&mut self, body: &mut Body, from: Sender) {
+        if let Self::Copter(copter) = self {
+            copter.handle_heartbeat(body, from);
+        }
+    }
+
+    pub(super) fn params(&self) -> &Params {
+        match self {
+            Self::Px4(px4) => &px4.params,
+            Self::Copter(copter) => &copter.params,
+        }
+    }
+
+    /// Takes PARAM_SET.
+    pub(super) fn set_param(&mut self, name: &str, wire: f32, wire_type: u8) {
+        match self {
+            Self::Px4(px4) => {
+                px4.params.set(name, wire, wire_type);
+                px4.tuning = px4::params::Tuning::new(&px4.params);
+            }
+            Self::Copter(copter) => {
+                copter.params.set(name, wire, wire_type);
+                copter.tuning = ardupilot::params::Tuning::new(&copter.params);
+            }
+        }
+    }
+
+    /// Sets an integer parameter; false where there is none of that name.
+    pub(super) fn set_integer(&mut self, name: &str, value: i32) -> bool {
+        let params = self.params();
+        let Some((_, old)) = params.index(name).and_then(|index| params.get(index)) else { return false };
+        let Some(new) = old.with_integer(value) else { return false };
+        let wire = params.wire(new);
+        self.set_param(name, wire, new.wire_type());
+        true
+    }
+
+    /// Takes over the parameters of the same firmware before a reboot.
+    pub(super) fn keep_params(&mut self, before: &Self) {
+        match (self, before) {
+            (Self::Px4(now), Self::Px4(before)) => {
+                (now.params, now.tuning) = (before.params.clone(), before.tuning);
+            }
+            (Self::Copter(now), Self::Copter(before)) => {
+                (now.params, now.tuning) = (before.params.clone(), before.tuning);
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn set_position_ok(&mut self, ok: bool) {
+        match self {
+            Self::Px4(px4) => px4.commander.set_position_ok(ok),
+            Self::Copter(copter) => copter.set_position_ok(ok),
+        }
+    }
+
+    /// The pilot's switch, by `custom_mode`; false where there is no such mode.
+    pub(super) fn force_mode(&mut self, custom_mode: u32, sense: &Sense) -> bool {
+        match self {
+            Self::Px4(px4) => px4::Mode::from_custom_mode(custom_mode)
+                .map(|mode| px4.commander.force_mode(mode, sense))
+                .is_some(),
+            Self::Copter(copter) => {
+                ardupilot::Mode::from_number(custom_mode).map(|mode| copter.force_mode(mode, sense)).is_some()
+            }
+        }
+    }
+}

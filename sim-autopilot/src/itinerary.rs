@@ -1,0 +1,221 @@
+//! An uploaded mission as it is flown: AUTO.MISSION of PX4, AUTO of ArduCopter.
+//!
+//! The items NAV_DELAY (93), NAV_TAKEOFF (22), NAV_WAYPOINT (16), NAV_LAND (21) and NAV_RETURN_TO_LAUNCH (20) are flown,
+//! one after the other; DO_CHANGE_SPEED (178), DO_DIGICAM_CONTROL (203) and DO_SET_CAM_TRIGG_DIST (206) are done at once
+//! when the item before them is done. Every other item is passed over. ArduPilot's item 0 is home and not flown.
+//!
+//! Item numbers as they were uploaded; ENU metres in the mission frame; microseconds since boot.
+
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+
+use super::body::{Body, Sense};
+use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
+use super::mission::{Item, Progress};
+use super::vehicle::wrap_pi;
+use crate::Personality;
+
+const NAV_WAYPOINT: u16 = 16;
+const NAV_RETURN_TO_LAUNCH: u16 = 20;
+const NAV_LAND: u16 = 21;
+const NAV_TAKEOFF: u16 = 22;
+const NAV_DELAY: u16 = 93;
+const DO_CHANGE_SPEED: u16 = 178;
+const MISSION_CURRENT: u32 = 42;
+const MISSION_ITEM_REACHED: u32 = 46;
+/// `NAV_ACC_RAD` of PX4's multicopters and `WPNAV_RADIUS`, metres.
+const REACHED_M: f32 = 2.0;
+/// `NAV_MC_ALT_RAD`, metres.
+const REACHED_UP_M: f32 = 0.8;
+/// `MIS_YAW_ERR` of PX4: 12°. ArduCopter does not wait for its heading.
+const YAW_ERROR: f32 = 0.21;
+
+/// What is flown for an item.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Leg {
+    /// Wait so long, seconds.
+    Wait(f32),
+    /// Climb to a height.
+    TakeOff { up: f32 },
+    /// Fly to a point: with a heading, NaN none; stay, seconds; how near is there, metres.
+    To { at: Point, heading: f32, stay_s: f32, reached_m: f32 },
+    /// Land, at a place if one is given.
+    Land { at: Option<[f32; 2]> },
+    /// Return and land.
+    Return,
+}
+
+impl Leg {
+    /// Where the leg after this one begins: at its point, or where the vehicle is.
+    pub(super) fn end(leg: Option<Self>, here: &Point) -> Point {
+        match leg {
+            Some(Self::To { at, .. }) => at,
+            _ => *here,
+        }
+    }
+}
+
+/// Height, and change of it, on the straight line between two items abreast of a vehicle. Both fly along it: PX4's
+/// `PositionSmoothing` makes one velocity of all three axes towards its end, ArduCopter's `AC_WPNav` one S-curve.
+pub(super) fn on_line(from: &Point, at: &Point, here: &Point, velocity: &Point) -> (f32, f32) {
+    let (way, up) = ((at - from).xy(), at.z - from.z);
+    let length = way.norm();
+    if length < REACHED_M {
+        return (at.z, 0.0);
+    }
+    let share = ((here - from).xy().dot(&way) / (length * length)).clamp(0.0, 1.0);
+    let rate = if share < 1.0 { up / length * velocity.xy().dot(&way) / length } else { 0.0 };
+    (from.z + up * share, rate)
+}
+
+fn real(item: &Item, at: usize) -> f32 {
+    f32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
+}
+
+fn whole(item: &Item, at: usize) -> i32 {
+    i32::from_le_bytes([item[at], item[at + 1], item[at + 2], item[at + 3]])
+}
+
+fn command_of(item: &Item) -> u16 {
+    u16::from_le_bytes([item[30], item[31]])
+}
+
+impl Body {
+    /// The first item that is flown.
+    fn first_item(&self) -> u16 {
+        u16::from(self.config.personality == Personality::Ardupilot)
+    }
+
+    /// Whether a mission is stored that can be flown.
+    pub(super) fn has_mission(&self) -> bool {
+        self.missions.items().len() > usize::from(self.first_item())
+    }
+
+    /// Whether the first thing that the mission flies is a take-off; it may wait before.
+    pub(super) fn mission_takes_off(&self) -> bool {
+        let flown = self.missions.items().iter().skip(usize::from(self.first_item()));
+        let mut legs = flown.map(command_of).filter(|&id| is_flown(id) && id != NAV_DELAY);
+        legs.next() == Some(NAV_TAKEOFF)
+    }
+
+    /// Does what is to be done at once and says what is to be flown; `None` once all is done. The next
+    /// call begins with the first item again.
+    pub(super) fn fly_mission(&mut self, sense: &Sense, landed: bool) -> Option<Leg> {
+        let first = self.first_item();
+        let progress = &mut self.missions.progress;
+        progress.current = progress.current.max(first);
+        while let Some(item) = self.missions.items().get(usize::from(self.missions.progress.current)).copied()
+        {
+            match self.leg(&item) {
+                Some(leg) => {
+                    let begun = self.missions.progress.since_us.is_some();
+                    self.missions.progress.since_us.get_or_insert(sense.now_us);
+                    if !(begun && self.is_done(&leg, sense, landed)) {
+                        return Some(leg);
+                    }
+                }
+                None => self.do_at_once(&item),
+            }
+            self.pass_item();
+        }
+        None
+    }
+
+    /// The item under way is done.
+    pub(super) fn pass_item(&mut self) {
+        let passed = self.missions.progress.current;
+        self.missions.progress = Progress::at(passed + 1);
+        let reached = passed.to_le_bytes();
+        self.ports.iter_mut().for_each(|port| port.send_raw(MISSION_ITEM_REACHED, &reached));
+        self.announce(MISSION_CURRENT);
+    }
+
+    /// The next flight begins with the first item.
+    pub(super) fn rewind_mission(&mut self) {
+        self.missions.progress = Progress::default();
+    }
+
+    fn leg(&self, item: &Item) -> Option<Leg> {
+        let heading = real(item, 12);
+        let turn = core::f32::consts::TAU;
+        let leg = match command_of(item) {
+            NAV_DELAY => Leg::Wait(real(item, 0)),
+            NAV_TAKEOFF => Leg::TakeOff { up: self.place(item).z },
+            NAV_WAYPOINT => {
+                let radians = heading.to_radians();
+                let asked_m = real(item, 4);
+                Leg::To {
+                    at: self.place(item),
+                    heading: radians - turn * libm::roundf(radians / turn),
+                    stay_s: real(item, 0),
+                    reached_m: if asked_m > 0.0 { asked_m } else { REACHED_M },
+                }
+            }
+            NAV_LAND => {
+                let at = self.place(item);
+                let given = whole(item, 16) != 0 || whole(item, 20) != 0;
+                Leg::Land { at: given.then_some([at.x, at.y]) }
+            }
+            NAV_RETURN_TO_LAUNCH => Leg::Return,
+            _ => return None,
+        };
+        Some(leg)
+    }
+
+    /// Where an item is; what it leaves is where the vehicle is. A place that is none on earth is home.
+    fn place(&self, item: &Item) -> Point {
+        let base = if matches!(item[34], 3 | 6 | 10 | 11) { self.home.alt_m } else { 0.0 };
+        let here = self.frame.geodetic(self.vehicle.position());
+        let degrees = |at: usize| f64::from(whole(item, at)) * 1e-7;
+        let given = whole(item, 16) != 0 || whole(item, 20) != 0;
+        let asked = Geodetic {
+            lat_deg: if given { degrees(16) } else { here.lat_deg },
+            lon_deg: if given { degrees(20) } else { here.lon_deg },
+            alt_m: f64::from(real(item, 24)) + base,
+        };
+        let place = if asked.is_valid() { asked } else { self.home };
+        self.frame.enu_of_geodetic(&place).cast::<f32>()
+    }
+
+    fn do_at_once(&mut self, item: &Item) {
+        match command_of(item) {
+            DO_CHANGE_SPEED => self.missions.speed = Some(real(item, 4)),
+            id @ (DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST) => {
+                self.do_camera(&Command {
+                    id,
+                    param: [0, 4, 8, 12].map(|at| real(item, at)),
+                    number5: whole(item, 16) as f32,
+                    place: [f64::NAN; 2],
+                    z: real(item, 24),
+                    relative: false,
+                });
+            }
+            _ => {}
+        }
+    }
+
+    fn is_done(&mut self, leg: &Leg, sense: &Sense, landed: bool) -> bool {
+        let progress = &mut self.missions.progress;
+        let since = |us: Option<u64>| sense.now_us.saturating_sub(us.unwrap_or(sense.now_us)) as f32 * 1e-6;
+        match *leg {
+            Leg::Wait(s) => since(progress.since_us) >= s,
+            Leg::TakeOff { up } => !landed && sense.position.z > up - REACHED_UP_M,
+            Leg::To { at, heading, stay_s, reached_m } => {
+                let off = at - sense.position;
+                // NaN is no heading to wait for.
+                let turned = wrap_pi(heading - sense.heading).abs() < YAW_ERROR;
+                let turned = turned || heading.is_nan() || self.config.personality == Personality::Ardupilot;
+                if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_UP_M && turned {
+                    progress.inside_us.get_or_insert(sense.now_us);
+                }
+                let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;
+                !landed && (stayed || progress.inside_us.is_some() && stay_s.is_nan())
+            }
+            Leg::Land { .. } | Leg::Return => false,
+        }
+    }
+}
+
+fn is_flown(id: u16) -> bool {
+    matches!(id, NAV_WAYPOINT | NAV_RETURN_TO_LAUNCH | NAV_LAND | NAV_TAKEOFF | NAV_DELAY)
+}

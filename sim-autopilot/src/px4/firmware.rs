@@ -1,0 +1,142 @@
+//! PX4 as a whole: the commander, the parameters, a mode change that is under way, and what it says when a failsafe begins.
+
+use super::params::{self, Tuning};
+use super::setpoint;
+use super::{Commander, Mode};
+use crate::Personality;
+use crate::body::{Body, Order, Sense};
+use crate::command::{DO_SET_MODE, accept};
+use crate::itinerary::Leg;
+use crate::params::Params;
+use crate::port::Sender;
+use crate::status::Status;
+use crate::vehicle::VehicleLimits;
+use crate::wire::Fields;
+
+const COMMAND_LONG: u32 = 76;
+/// DO_GIMBAL_MANAGER_CONFIGURE and DO_GIMBAL_MANAGER_PITCHYAW as they were recorded when a failsafe began: takes control of the
+/// gimbal, points it ahead, gives it up. To component 0, so to everybody; nobody answers.
+const GIMBAL: [(u16, [f32; 5]); 3] = [
+    (1001, [1.0, 1.0, -1.0, -1.0, 0.0]),
+    (1000, [f32::NAN, f32::NAN, f32::NAN, f32::NAN, 2.0]),
+    (1001, [-3.0, -3.0, -1.0, -1.0, 0.0]),
+];
+
+/// The firmware: state machine and parameters.
+#[derive(Clone, Debug)]
+pub struct Px4 {
+    /// Arming, modes, failsafe.
+    pub commander: Commander,
+    /// The parameter table.
+    pub params: Params,
+    /// Those of them that act.
+    pub tuning: Tuning,
+    /// DO_SET_MODE understood and not yet decided: who asked, for which mode if it is one.
+    pub(super) asked: Option<(Sender, Option<Mode>)>,
+}
+
+impl Px4 {
+    /// As PX4 boots, with the airframe's limits in its parameters.
+    pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
+        let params = params::params(system_id, limits);
+        Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
+    }
+
+    /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
+    pub(crate) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
+        self.commander.set_mission_ready(body.has_mission());
+        if let Some((from, mode)) = self.asked.take() {
+            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
+            body.acknowledge(from, DO_SET_MODE, accept(changed));
+        }
+        self.fly_mission(body, sense);
+        let failed = self.commander.in_failsafe();
+        let order = self.commander.update(sense, &self.tuning);
+        if self.commander.in_failsafe() && !failed {
+            turn_gimbal(body);
+        }
+        order
+    }
+
+    /// What the mission asks for, while AUTO.MISSION flies it. Its return is AUTO.RTL.
+    fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
+        if !self.commander.armed() {
+            if let Some(leg) = self.commander.mission.leg.take() {
+                if matches!(leg, Leg::Land { .. }) {
+                    body.pass_item();
+                }
+                body.rewind_mission();
+            }
+            return;
+        }
+        if self.commander.mode() != Mode::Mission {
+            if self.commander.mission.leg.take().is_some() {
+                body.missions.progress.interrupt();
+            }
+            return;
+        }
+        let leg = body.fly_mission(sense, self.commander.landed());
+        let mission = &mut self.commander.mission;
+        if leg != mission.leg {
+            mission.from = Leg::end(mission.leg, &sense.position);
+        }
+        mission.leg = leg;
+        if let Some(speed) = body.missions.speed.take() {
+            self.commander.set_cruise(speed);
+        }
+        if self.commander.mission.leg == Some(Leg::Return) {
+            self.commander.mission.leg = None;
+            body.pass_item();
+            body.rewind_mission();
+            self.commander.force_mode(Mode::Return, sense);
+        }
+    }
+
+    /// What telemetry reports.
+    pub fn status(&self, body: &Body, sense: &Sense) -> Status {
+        let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
+        Status {
+            personality: Personality::Px4,
+            custom_mode: self.commander.mode().custom_mode(),
+            intended_mode: self.commander.intention().custom_mode(),
+            flags,
+            system_status,
+            armable: self.commander.armable(sense, &self.tuning),
+            landed_state: self.commander.landed_state(),
+            guided: true,
+            ekf_flags: 0,
+            origin_known: true,
+            // LOCAL_POSITION_NED comes only while the estimate is valid.
+            position_known: body.gps_ok,
+        }
+    }
+
+    /// Takes a setpoint, if it counts.
+    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+        let context = setpoint::Context {
+            frame: &body.frame,
+            heading: body.vehicle.state().heading_rad,
+            home_alt_m: body.home.alt_m,
+        };
+        let setpoint = if id == 84 {
+            setpoint::local_ned(fields, &context)
+        } else {
+            setpoint::global_int(fields, &context)
+        };
+        if let Some(setpoint) = setpoint {
+            self.commander.handle_setpoint(setpoint, body.time_us);
+        }
+    }
+}
+
+fn turn_gimbal(body: &mut Body) {
+    for (command, params) in GIMBAL {
+        let mut payload = [0; 33];
+        for (k, param) in params.iter().enumerate() {
+            payload[4 * k..4 * k + 4].copy_from_slice(&param.to_le_bytes());
+        }
+        payload[28..30].copy_from_slice(&command.to_le_bytes());
+        payload[30] = body.config.system_id;
+        body.ports.iter_mut().for_each(|port| port.send_raw(COMMAND_LONG, &payload));
+    }
+}

@@ -1,0 +1,202 @@
+//! What each flight mode asks of the position controller.
+
+use planner_core::Point;
+
+use super::params::Tuning;
+use super::{Commander, Mode, ReturnLeg, Sense};
+use crate::itinerary::{Leg, on_line};
+use crate::shaping::Ramp;
+use crate::vehicle::Demand;
+
+/// A demand to climb is one that asks for more than this above the present height, metres, or for more than
+/// [`CLIMB_MPS`].
+const CLIMB_M: f32 = 0.15;
+const CLIMB_MPS: f32 = 0.05;
+/// An automatic mode is at its target within this distance, metres.
+const ARRIVED_M: f32 = 0.5;
+/// Nearer than this it does not turn to where it flies, metres.
+const LOOKS_M: f32 = 2.0;
+/// Faster than this it was not seen to sink in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its height, which
+/// is also what it controls there; the velocity it reported meanwhile went up to 1.6.
+const LAND_MPS: f32 = 1.3;
+/// Share of `MPC_LAND_CRWL` that it was seen to crawl at: 0.22 of 0.3 m/s.
+const CRAWL_SHARE: f32 = 0.75;
+/// Seconds that the measured distance to the ground is late: it crawls from 0.85 m on, not from `MPC_LAND_ALT3`.
+const DISTANCE_LAG_S: f32 = 0.2;
+/// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
+const BRAKE_MPS2: f32 = 3.0;
+
+impl Commander {
+    /// Fixes what the mode leans on: where it stops, which leg of the return is next.
+    pub(super) fn enter(&mut self, mode: Mode, sense: &Sense) {
+        let speed = libm::hypotf(sense.velocity.x, sense.velocity.y);
+        self.hold = sense.position;
+        self.hold.x += sense.velocity.x * speed / (2.0 * BRAKE_MPS2);
+        self.hold.y += sense.velocity.y * speed / (2.0 * BRAKE_MPS2);
+        self.hold_heading = sense.heading;
+        self.leg = ReturnLeg::Climb { up: f32::NAN };
+        self.descent = None;
+        if mode == Mode::Takeoff {
+            (self.hold.x, self.hold.y) = (sense.position.x, sense.position.y);
+        }
+    }
+
+    /// Whether the demand lifts a vehicle off the ground. Hold, Return and Land never do.
+    pub(super) fn wants_up(&self, sense: &Sense, demand: &Demand) -> bool {
+        match self.mode() {
+            Mode::Takeoff => true,
+            Mode::Mission => demand.position.z - sense.position.z > CLIMB_M,
+            Mode::Offboard => {
+                demand.position.z - sense.position.z > CLIMB_M
+                    || demand.velocity.z > CLIMB_MPS
+                    || demand.acceleration.z > CLIMB_MPS
+            }
+            _ => false,
+        }
+    }
+
+    /// What the mode asks for now.
+    pub(super) fn demand(&mut self, sense: &Sense, tuning: &Tuning) -> Demand {
+        let held = Demand {
+            position: self.hold,
+            heading: self.hold_heading,
+            speed_max: self.cruise.unwrap_or(tuning.cruise).min(tuning.speed_max),
+            climb_max: tuning.auto_up.min(tuning.climb_max),
+            descend_max: tuning.auto_down.min(tuning.descend_max),
+            ..tuning.nothing()
+        };
+        match self.mode() {
+            Mode::Offboard => match self.setpoint {
+                Some(s) => Demand {
+                    position: s.position,
+                    velocity: s.velocity,
+                    acceleration: s.acceleration,
+                    heading: s.heading,
+                    heading_rate: s.heading_rate,
+                    ..tuning.nothing()
+                },
+                None => held,
+            },
+            Mode::Takeoff => {
+                let up = self.takeoff_up;
+                let up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
+                if !self.landed && sense.position.z > up - ARRIVED_M {
+                    // Reached: PX4 goes on in Hold at the height asked for.
+                    self.intention = Mode::Hold;
+                    self.after_disarm = Mode::Hold;
+                    self.takeoff_up = f32::NAN;
+                    self.hold.z = up;
+                }
+                let position = Point::new(self.hold.x, self.hold.y, up);
+                Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
+            }
+            Mode::Mission => self.mission_demand(sense, tuning, held),
+            Mode::Land => self.landing(sense, tuning, held),
+            Mode::Return => self.returning(sense, tuning, held),
+            _ => held,
+        }
+    }
+
+    /// What an item of the mission asks for. Without a heading it looks where it flies (`MPC_YAW_MODE` 0).
+    fn mission_demand(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        match self.mission.leg {
+            Some(Leg::TakeOff { up }) => {
+                self.hold.z = up;
+                let climb_max = tuning.takeoff_speed.min(held.climb_max);
+                Demand { position: self.hold, climb_max, ..held }
+            }
+            Some(Leg::To { at, heading, .. }) => {
+                let off = at - sense.position;
+                if heading.is_finite() {
+                    self.hold_heading = heading;
+                } else if libm::hypotf(off.x, off.y) > LOOKS_M {
+                    self.hold_heading = libm::atan2f(off.x, off.y);
+                }
+                self.hold = at;
+                let (up, rate) = on_line(&self.mission.from, &at, &sense.position, &sense.velocity);
+                let (position, velocity) = (Point::new(at.x, at.y, up), Point::new(0.0, 0.0, rate));
+                Demand { position, velocity, heading: self.hold_heading, ..held }
+            }
+            Some(Leg::Land { at }) => {
+                if let Some([east, north]) = at {
+                    (self.hold.x, self.hold.y) = (east, north);
+                    if libm::hypotf(east - sense.position.x, north - sense.position.y) > ARRIVED_M {
+                        return Demand { position: self.hold, ..held };
+                    }
+                }
+                self.landing(sense, tuning, held)
+            }
+            Some(Leg::Wait(_) | Leg::Return) | None => held,
+        }
+    }
+
+    /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`, these heights
+    /// above home; and crawls (`MPC_LAND_CRWL`) once a distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the
+    /// rate is smooth (`MPC_JERK_AUTO`).
+    fn landing(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        let [high, low] = tuning.land_slow_below;
+        let height = sense.position.z - sense.home.z;
+        let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
+        let mut sink = LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
+        if sense.distance - sense.velocity.z * DISTANCE_LAG_S < tuning.land_crawl_below {
+            sink = CRAWL_SHARE * tuning.land_crawl_speed;
+        }
+        let descent = match &mut self.descent {
+            Some((at_us, ramp)) => {
+                let dt = sense.now_us.saturating_sub(core::mem::replace(at_us, sense.now_us)) as f32 * 1e-6;
+                ramp.advance(sink, tuning.auto_acceleration_down, tuning.auto_jerk, dt);
+                *ramp
+            }
+            begin => {
+                let ramp = Ramp { rate: -sense.velocity.z, change: 0.0 };
+                *begin = Some((sense.now_us, ramp));
+                ramp
+            }
+        };
+        Demand {
+            position: Point::new(self.hold.x, self.hold.y, f32::NAN),
+            velocity: Point::new(f32::NAN, f32::NAN, -descent.rate),
+            acceleration: Point::new(f32::NAN, f32::NAN, -descent.change),
+            // A change of the height has less bias than the velocity (`z_deriv`).
+            height_rate_share: (descent.rate.abs() / tuning.land_speed.max(0.01)).min(1.0),
+            ..held
+        }
+    }
+
+    fn returning(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+        let away = libm::hypotf(sense.home.x - sense.position.x, sense.home.y - sense.position.y);
+        if let ReturnLeg::Climb { up } = &mut self.leg
+            && up.is_nan()
+        {
+            let mut height = tuning.return_height;
+            if away <= tuning.return_min_distance {
+                // Near home the climb is cut by the cone `RTL_CONE_ANG`.
+                height = height.min(away / tuning.return_cone_tan.max(0.01));
+            }
+            *up = (sense.home.z + height).max(sense.position.z);
+        }
+        match self.leg {
+            ReturnLeg::Climb { up } => {
+                if sense.position.z > up - ARRIVED_M {
+                    self.leg = ReturnLeg::Cross { up };
+                }
+                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+            }
+            ReturnLeg::Cross { up } => {
+                if away < ARRIVED_M {
+                    self.leg = ReturnLeg::Descend;
+                    (self.hold.x, self.hold.y) = (sense.home.x, sense.home.y);
+                }
+                Demand { position: Point::new(sense.home.x, sense.home.y, up), ..held }
+            }
+            ReturnLeg::Descend => {
+                let up = sense.home.z + tuning.return_descend_height;
+                if sense.position.z < up + ARRIVED_M {
+                    self.leg = ReturnLeg::Land;
+                }
+                Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
+            }
+            ReturnLeg::Land => self.landing(sense, tuning, held),
+        }
+    }
+}

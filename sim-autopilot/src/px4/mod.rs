@@ -1,0 +1,435 @@
+//! PX4's commander: arming, modes, failsafe, take-off and landing, as PX4 1.17 was seen to behave.
+//!
+//! | state | leaves it |
+//! |---|---|
+//! | disarmed | arm command, unless the mode cannot run (Offboard without a stream, Land, Return) |
+//! | armed, on the ground | a demand to climb, `COM_SPOOLUP_TIME` after arming; `COM_DISARM_PRFLT` disarms |
+//! | ramp | thrust rises over `MPC_TKO_RAMP_T`, whatever is asked for meanwhile; it counts as in the air before it lifts |
+//! | flying | `LNDMC_TRIG_TIME` on the ground with a demand to sink lands it |
+//! | landed | a demand to climb; `COM_DISARM_LAND` disarms |
+//!
+//! In Offboard, setpoints missing for `COM_OF_LOSS_T` start the failsafe `COM_OBL_RC_ACT`; the first setpoint after that
+//! ends it. Times are microseconds since boot and arguments; nothing here reads a clock.
+
+mod flight;
+mod modes;
+pub mod params;
+pub mod setpoint;
+
+mod commands;
+mod firmware;
+
+use planner_core::Point;
+
+pub use self::firmware::Px4;
+pub use self::modes::Mode;
+use self::params::Tuning;
+use self::setpoint::Setpoint;
+use super::body::{Integral, Order, Sense};
+use super::itinerary::Leg;
+use super::shaping::Ramp;
+use super::vehicle::Demand;
+
+/// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
+const LOSS_REACTION_S: f32 = 0.15;
+/// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3 s seen, before it lifts.
+const IN_AIR_SHARE: f32 = 0.31;
+/// It lands only while it is to sink at this rate or faster, m/s, whatever flies it: at a demand to stay it reports itself in
+/// the air, on the ground too.
+const LAND_RATE_MPS: f32 = 0.2;
+/// The land detector's own filters beyond `LNDMC_TRIG_TIME`.
+const LAND_FILTER_S: f32 = 0.5;
+/// Disarmed 2.2 to 2.4 s after ON_GROUND with `COM_DISARM_LAND` 2.0.
+const DISARM_REACTION_S: f32 = 0.25;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Phase {
+    Ground,
+    Ramp { since_us: u64 },
+    Flying,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum ReturnLeg {
+    Climb { up: f32 },
+    Cross { up: f32 },
+    Descend,
+    Land,
+}
+
+/// Of AUTO.MISSION.
+#[derive(Clone, Copy, Debug, Default)]
+struct Mission {
+    /// One is stored.
+    ready: bool,
+    /// What it asks for, while it is flown.
+    leg: Option<Leg>,
+    /// Where that began.
+    from: Point,
+}
+
+/// The state of the state machine.
+#[derive(Clone, Debug)]
+pub struct Commander {
+    armed: bool,
+    landed: bool,
+    flown: bool,
+    intention: Mode,
+    after_disarm: Mode,
+    failsafe: Option<Mode>,
+    phase: Phase,
+    armed_us: u64,
+    landed_us: u64,
+    touching_us: Option<u64>,
+    setpoint: Option<Setpoint>,
+    setpoint_us: u64,
+    hold: Point,
+    hold_heading: f32,
+    takeoff_up: f32,
+    cruise: Option<f32>,
+    leg: ReturnLeg,
+    /// Rate of sinking in Land, as of when.
+    descent: Option<(u64, Ramp)>,
+    position_ok: bool,
+    mission: Mission,
+}
+
+impl Default for Commander {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl Commander {
+    /// Disarmed on the ground in Hold, as PX4 boots without a remote.
+    pub fn new() -> Self {
+        Self {
+            armed: false,
+            landed: true,
+            flown: false,
+            intention: Mode::Hold,
+            after_disarm: Mode::Hold,
+            failsafe: None,
+            phase: Phase::Ground,
+            armed_us: 0,
+            landed_us: 0,
+            touching_us: None,
+            setpoint: None,
+            setpoint_us: 0,
+            hold: Point::zeros(),
+            hold_heading: 0.0,
+            takeoff_up: f32::NAN,
+            cruise: None,
+            leg: ReturnLeg::Descend,
+            descent: None,
+            position_ok: true,
+            mission: Mission::default(),
+        }
+    }
+
+    /// Motors on.
+    pub fn armed(&self) -> bool {
+        self.armed
+    }
+
+    /// The land detector's verdict.
+    pub fn landed(&self) -> bool {
+        self.landed
+    }
+
+    /// The mode that flies, the failsafe's while there is one.
+    pub fn mode(&self) -> Mode {
+        self.failsafe.unwrap_or(self.intention)
+    }
+
+    /// The mode that was asked for, whatever a failsafe flies.
+    pub fn intention(&self) -> Mode {
+        self.intention
+    }
+
+    /// A failsafe flies.
+    pub fn in_failsafe(&self) -> bool {
+        self.failsafe.is_some()
+    }
+
+    /// MAV_LANDED_STATE.
+    pub fn landed_state(&self) -> u8 {
+        match self.mode() {
+            _ if self.landed => 1,
+            Mode::Takeoff => 3,
+            Mode::Mission if matches!(self.mission.leg, Some(Leg::TakeOff { .. })) => 3,
+            Mode::Mission if matches!(self.mission.leg, Some(Leg::Land { .. })) => 4,
+            Mode::Land => 4,
+            Mode::Return if self.leg == ReturnLeg::Land => 4,
+            _ => 2,
+        }
+    }
+
+    /// MAV_STATE and MAV_MODE_FLAG of HEARTBEAT.
+    pub fn heartbeat(&self, now_us: u64, tuning: &Tuning) -> (u8, u8) {
+        let mode = self.mode();
+        let status = match (self.armed, self.failsafe) {
+            (true, Some(_)) => 5,
+            (true, None) => 4,
+            // A disarmed vehicle whose mode could not run says 0, not STANDBY.
+            (false, _) if mode == Mode::Offboard && !self.stream_fresh(now_us, tuning) => 0,
+            (false, _) => 3,
+        };
+        let flags = if mode.is_auto() {
+            16 | 8 | 4
+        } else if mode.needs_sticks() {
+            64 | 16
+        } else if self.setpoint.is_some() {
+            16
+        } else {
+            0
+        };
+        (status, 1 | flags | if self.armed { 128 } else { 0 })
+    }
+
+    /// The estimator lost or found its position.
+    pub fn set_position_ok(&mut self, ok: bool) {
+        self.position_ok = ok;
+    }
+
+    /// Whether a mission is stored that AUTO.MISSION can fly.
+    pub fn set_mission_ready(&mut self, ready: bool) {
+        self.mission.ready = ready;
+    }
+
+    /// Takes a setpoint that counts.
+    pub fn handle_setpoint(&mut self, setpoint: Setpoint, now_us: u64) {
+        self.setpoint = Some(setpoint);
+        self.setpoint_us = now_us;
+    }
+
+    /// Whether setpoints keep coming.
+    pub fn stream_fresh(&self, now_us: u64, tuning: &Tuning) -> bool {
+        let limit = seconds(tuning.offboard_loss_s + LOSS_REACTION_S);
+        self.setpoint.is_some() && now_us.saturating_sub(self.setpoint_us) <= limit
+    }
+
+    /// Arms, if the mode can run; false is TEMPORARILY_REJECTED.
+    pub fn arm(&mut self, sense: &Sense, tuning: &Tuning, force: bool) -> bool {
+        if self.armed {
+            return true;
+        }
+        if !force && !self.armable(sense, tuning) {
+            return false;
+        }
+        self.armed = true;
+        self.armed_us = sense.now_us;
+        self.flown = !self.landed;
+        self.enter(self.intention, sense);
+        true
+    }
+
+    /// Whether the arming checks pass.
+    pub fn armable(&self, sense: &Sense, tuning: &Tuning) -> bool {
+        let runs = match self.intention {
+            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Hold | Mode::Takeoff => true,
+            Mode::Mission => self.mission.ready,
+            Mode::Land | Mode::Return => false,
+            Mode::Manual | Mode::Altitude | Mode::Position => false,
+        };
+        runs && self.position_ok && sense.battery >= tuning.battery_low
+    }
+
+    /// Disarms; in the air only by force.
+    pub fn disarm(&mut self, force: bool) -> bool {
+        if self.armed && !self.landed && !force {
+            return false;
+        }
+        self.armed = false;
+        self.failsafe = None;
+        self.phase = Phase::Ground;
+        self.cruise = None;
+        if self.intention.ends_with_flight() {
+            self.intention = self.after_disarm;
+        }
+        true
+    }
+
+    /// Changes the mode if it can run; the second ack of DO_SET_MODE says so.
+    pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
+        let runs = match mode {
+            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Mission => self.mission.ready,
+            mode => !mode.needs_sticks(),
+        };
+        if self.armed && !runs {
+            return false;
+        }
+        self.force_mode(mode, sense);
+        true
+    }
+
+    /// Changes the mode as a pilot's switch does, whom nobody asks whether it can run.
+    pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
+        self.intention = mode;
+        if !mode.ends_with_flight() {
+            self.after_disarm = mode;
+        }
+        if mode != Mode::Takeoff {
+            self.takeoff_up = f32::NAN;
+        }
+        self.failsafe = None;
+        self.enter(mode, sense);
+    }
+
+    /// Take-off to a height in the mission frame; NaN is `MIS_TAKEOFF_ALT` above home.
+    pub fn takeoff(&mut self, up: f32, sense: &Sense, tuning: &Tuning) -> bool {
+        let accepted = self.set_mode(Mode::Takeoff, sense, tuning);
+        if accepted {
+            self.takeoff_up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
+        }
+        accepted
+    }
+
+    /// Holds at a point instead of where it is (DO_REPOSITION); NaN keeps an axis.
+    pub fn reposition(&mut self, to: &Point, heading: f32, sense: &Sense, tuning: &Tuning) -> bool {
+        if !self.armed || !self.set_mode(Mode::Hold, sense, tuning) {
+            return false;
+        }
+        for axis in 0..3 {
+            if to[axis].is_finite() {
+                self.hold[axis] = to[axis];
+            }
+        }
+        if heading.is_finite() {
+            self.hold_heading = heading;
+        }
+        true
+    }
+
+    /// Cruise speed of the automatic modes (DO_CHANGE_SPEED), m/s.
+    pub fn set_cruise(&mut self, speed: f32) {
+        self.cruise = (speed > 0.0).then_some(speed);
+    }
+
+    /// One step: timers, failsafe, phases, and what the mode asks for.
+    pub fn update(&mut self, sense: &Sense, tuning: &Tuning) -> Order {
+        let now = sense.now_us;
+        if self.armed {
+            self.update_failsafe(sense, tuning);
+            self.update_timers(sense, tuning);
+        }
+        if !self.armed {
+            // A vehicle disarmed in the air falls, and has landed when it lies still.
+            if !self.landed && sense.touching {
+                self.landed = true;
+                self.landed_us = now;
+            }
+            let demand = tuning.nothing();
+            return Order { lift: false, integral: Integral::Clear, demand };
+        }
+        let mut demand = self.demand(sense, tuning);
+        let wants_up = self.wants_up(sense, &demand);
+        let mut integral = Integral::Keep;
+        match self.phase {
+            Phase::Ground => {
+                integral = Integral::Clear;
+                if wants_up && now.saturating_sub(self.armed_us) >= seconds(tuning.spool_up_s) {
+                    self.phase = Phase::Ramp { since_us: now };
+                }
+            }
+            Phase::Ramp { since_us } => {
+                let progress = now.saturating_sub(since_us) as f32 * 1e-6 / tuning.takeoff_ramp_s.max(0.01);
+                // The climb limit starts where it cancels hover thrust (`TakeoffHandling::updateRamp`).
+                let floor = -crate::vehicle::GRAVITY / tuning.gains.velocity_p[1].max(0.1);
+                let limit = floor + progress * (demand.climb_max - floor);
+                if self.landed && progress >= IN_AIR_SHARE {
+                    self.landed = false;
+                    self.flown = true;
+                }
+                if progress >= 1.0 {
+                    self.phase = Phase::Flying;
+                } else {
+                    demand.climb_max = limit;
+                    demand.thrust_min = 0.0;
+                    demand.acceleration.z = f32::NAN;
+                }
+            }
+            Phase::Flying => {
+                let rate = descent(&demand, sense, tuning);
+                self.detect_landing(sense, rate > LAND_RATE_MPS, tuning);
+            }
+        }
+        Order { lift: self.phase != Phase::Ground, integral, demand }
+    }
+
+    fn update_failsafe(&mut self, sense: &Sense, tuning: &Tuning) {
+        let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sense.now_us, tuning);
+        let battery_out = sense.battery < tuning.battery_critical && !self.intention.ends_with_flight();
+        let action = if !self.position_ok {
+            (self.intention != Mode::Land).then_some(Mode::Land)
+        } else if stream_lost {
+            match tuning.offboard_loss_action {
+                4 => Some(Mode::Land),
+                5 => Some(Mode::Hold),
+                6 | 7 => {
+                    self.disarm(true);
+                    return;
+                }
+                // Position, Altitude and Manual (0 to 2) need sticks nobody holds: Return, as for 3.
+                _ => Some(Mode::Return),
+            }
+        } else if battery_out && tuning.low_battery_action == 2 {
+            Some(Mode::Land)
+        } else if battery_out && tuning.low_battery_action == 3 {
+            Some(Mode::Return)
+        } else {
+            None
+        };
+        if action != self.failsafe {
+            self.failsafe = action;
+            self.enter(self.mode(), sense);
+        }
+    }
+
+    fn update_timers(&mut self, sense: &Sense, tuning: &Tuning) {
+        let since = |start: u64| sense.now_us.saturating_sub(start);
+        let idle = self.landed && self.phase == Phase::Ground;
+        if idle && !self.flown && tuning.disarm_preflight_s > 0.0 {
+            if since(self.armed_us) >= seconds(tuning.disarm_preflight_s) {
+                self.disarm(false);
+            }
+        } else if idle
+            && self.flown
+            && tuning.disarm_land_s > 0.0
+            && since(self.landed_us) >= seconds(tuning.disarm_land_s + DISARM_REACTION_S)
+        {
+            self.disarm(false);
+        }
+        if sense.battery <= 0.0 {
+            self.disarm(true);
+        }
+    }
+
+    fn detect_landing(&mut self, sense: &Sense, wants_down: bool, tuning: &Tuning) {
+        if !sense.touching || !wants_down {
+            self.touching_us = None;
+            return;
+        }
+        let since = *self.touching_us.get_or_insert(sense.now_us);
+        if sense.now_us - since >= seconds(tuning.land_trigger_s + LAND_FILTER_S) {
+            self.touching_us = None;
+            self.landed = true;
+            self.landed_us = sense.now_us;
+            self.phase = Phase::Ground;
+        }
+    }
+}
+
+/// Rate of sinking that a demand comes to, m/s.
+fn descent(demand: &Demand, sense: &Sense, tuning: &Tuning) -> f32 {
+    let error = (demand.position.z - sense.position.z) * tuning.gains.position[1];
+    let feed = demand.velocity.z;
+    -(if error.is_nan() { 0.0 } else { error } + if feed.is_nan() { 0.0 } else { feed })
+}
+
+/// Microseconds of a time in seconds; what is negative or not a number is none.
+fn seconds(s: f32) -> u64 {
+    (f64::from(s) * 1e6) as u64
+}

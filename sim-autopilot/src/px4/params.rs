@@ -1,0 +1,251 @@
+//! The parameters of the simulated PX4: names, types and defaults of 1.17's quadrotor, and the few that act.
+
+use planner_core::Point;
+
+use crate::params::Encoding;
+use crate::params::Params;
+use crate::params::Value::{self, Int, Real};
+use crate::vehicle::{Demand, Gains, VehicleLimits};
+
+/// Sorted by name, as PX4 lists them.
+const DEFAULTS: &[(&str, Value)] = &[
+    ("BAT1_CAPACITY", Real(-1.0)),
+    ("BAT1_N_CELLS", Int(4)),
+    ("BAT1_V_CHARGED", Real(4.05)),
+    ("BAT1_V_EMPTY", Real(3.6)),
+    ("BAT_CRIT_THR", Real(0.07)),
+    ("BAT_EMERGEN_THR", Real(0.05)),
+    ("BAT_LOW_THR", Real(0.15)),
+    ("CAL_ACC0_ID", Int(1_310_988)),
+    ("CAL_ACC0_PRIO", Int(50)),
+    ("CAL_GYRO0_ID", Int(1_310_988)),
+    ("CAL_GYRO0_PRIO", Int(50)),
+    ("CAL_MAG0_ID", Int(197_388)),
+    ("CAL_MAG0_PRIO", Int(50)),
+    ("CBRK_SUPPLY_CHK", Int(0)),
+    ("CBRK_USB_CHK", Int(197_848)),
+    ("COM_ARM_WO_GPS", Int(1)),
+    ("COM_DISARM_LAND", Real(2.0)),
+    ("COM_DISARM_PRFLT", Real(10.0)),
+    ("COM_DL_LOSS_T", Int(10)),
+    ("COM_FAIL_ACT_T", Real(5.0)),
+    ("COM_HOME_EN", Int(1)),
+    ("COM_LOW_BAT_ACT", Int(0)),
+    ("COM_OBC_LOSS_T", Real(5.0)),
+    ("COM_OBL_RC_ACT", Int(0)),
+    ("COM_OF_LOSS_T", Real(1.0)),
+    ("COM_RCL_EXCEPT", Int(0)),
+    ("COM_RC_IN_MODE", Int(1)),
+    ("COM_RC_LOSS_T", Real(0.5)),
+    ("COM_SPOOLUP_TIME", Real(1.0)),
+    ("EKF2_AID_MASK", Int(1)),
+    ("EKF2_EN", Int(1)),
+    ("EKF2_GPS_CTRL", Int(7)),
+    ("EKF2_HGT_REF", Int(1)),
+    ("GF_ACTION", Int(2)),
+    ("GF_MAX_HOR_DIST", Real(0.0)),
+    ("GF_MAX_VER_DIST", Real(0.0)),
+    ("LNDMC_TRIG_TIME", Real(1.0)),
+    ("MAV_0_MODE", Int(0)),
+    ("MAV_COMP_ID", Int(1)),
+    ("MAV_SYS_ID", Int(1)),
+    ("MAV_TYPE", Int(2)),
+    ("MIS_DIST_1WP", Real(10_000.0)),
+    ("MIS_TAKEOFF_ALT", Real(2.5)),
+    ("MIS_TKO_LAND_REQ", Int(0)),
+    ("MPC_ACC_DOWN_MAX", Real(3.0)),
+    ("MPC_ACC_HOR", Real(3.0)),
+    ("MPC_ACC_HOR_MAX", Real(5.0)),
+    ("MPC_ACC_UP_MAX", Real(4.0)),
+    ("MPC_JERK_AUTO", Real(4.0)),
+    ("MPC_JERK_MAX", Real(8.0)),
+    ("MPC_LAND_ALT1", Real(10.0)),
+    ("MPC_LAND_ALT2", Real(5.0)),
+    ("MPC_LAND_ALT3", Real(1.0)),
+    ("MPC_LAND_CRWL", Real(0.3)),
+    ("MPC_LAND_SPEED", Real(0.7)),
+    ("MPC_THR_HOVER", Real(0.5)),
+    ("MPC_THR_MAX", Real(1.0)),
+    ("MPC_THR_MIN", Real(0.12)),
+    ("MPC_TILTMAX_AIR", Real(45.0)),
+    ("MPC_TILTMAX_LND", Real(12.0)),
+    ("MPC_TKO_RAMP_T", Real(3.0)),
+    ("MPC_TKO_SPEED", Real(1.5)),
+    ("MPC_XY_CRUISE", Real(5.0)),
+    ("MPC_XY_P", Real(0.95)),
+    ("MPC_XY_VEL_ALL", Real(-10.0)),
+    ("MPC_XY_VEL_D_ACC", Real(0.2)),
+    ("MPC_XY_VEL_I_ACC", Real(0.4)),
+    ("MPC_XY_VEL_MAX", Real(12.0)),
+    ("MPC_XY_VEL_P_ACC", Real(1.8)),
+    ("MPC_YAWRAUTO_MAX", Real(60.0)),
+    ("MPC_Z_P", Real(1.0)),
+    ("MPC_Z_VEL_D_ACC", Real(0.0)),
+    ("MPC_Z_VEL_I_ACC", Real(2.0)),
+    ("MPC_Z_VEL_MAX_DN", Real(1.5)),
+    ("MPC_Z_VEL_MAX_UP", Real(3.0)),
+    ("MPC_Z_VEL_P_ACC", Real(4.0)),
+    ("MPC_Z_V_AUTO_DN", Real(1.5)),
+    ("MPC_Z_V_AUTO_UP", Real(3.0)),
+    ("NAV_ACC_RAD", Real(2.0)),
+    ("NAV_DLL_ACT", Int(0)),
+    ("NAV_RCL_ACT", Int(2)),
+    ("RTL_CONE_ANG", Int(45)),
+    ("RTL_DESCEND_ALT", Real(30.0)),
+    ("RTL_LAND_DELAY", Real(0.0)),
+    ("RTL_MIN_DIST", Real(10.0)),
+    ("RTL_RETURN_ALT", Real(60.0)),
+    ("RTL_TYPE", Int(0)),
+    ("SDLOG_MODE", Int(0)),
+    ("SYS_AUTOSTART", Int(10_040)),
+    ("SYS_HAS_BARO", Int(1)),
+    ("SYS_HAS_GPS", Int(1)),
+    ("SYS_HAS_MAG", Int(1)),
+    // An installer's, with a camera: 4 is distance, on command.
+    ("TRIG_MODE", Int(4)),
+];
+
+/// The defaults, with the airframe's limits in the parameters that carry them.
+pub fn params(system_id: u8, limits: &VehicleLimits) -> Params {
+    let own = [
+        ("MAV_SYS_ID", Int(i32::from(system_id))),
+        ("MPC_XY_VEL_MAX", Real(limits.speed_max_mps)),
+        ("MPC_Z_VEL_MAX_UP", Real(limits.climb_max_mps)),
+        ("MPC_Z_VEL_MAX_DN", Real(limits.descend_max_mps)),
+        ("MPC_TILTMAX_AIR", Real(limits.tilt_max_deg)),
+    ];
+    Params::new(DEFAULTS, Encoding::Bytewise, &own)
+}
+
+const NONE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
+
+/// The parameters that act, by what they do. Metres, seconds, m/s.
+#[derive(Clone, Copy, Debug)]
+#[expect(missing_docs, reason = "each is the parameter it is read from, in `Tuning::new`")]
+pub struct Tuning {
+    pub gains: Gains,
+    pub speed_max: f32,
+    pub climb_max: f32,
+    pub descend_max: f32,
+    pub cruise: f32,
+    pub auto_up: f32,
+    pub auto_down: f32,
+    pub land_speed: f32,
+    pub land_slow_below: [f32; 2],
+    pub land_crawl_speed: f32,
+    pub land_crawl_below: f32,
+    pub auto_jerk: f32,
+    pub auto_acceleration_down: f32,
+    pub takeoff_speed: f32,
+    pub takeoff_ramp_s: f32,
+    pub takeoff_height: f32,
+    pub spool_up_s: f32,
+    pub land_trigger_s: f32,
+    pub offboard_loss_s: f32,
+    pub offboard_loss_action: i32,
+    pub disarm_land_s: f32,
+    pub disarm_preflight_s: f32,
+    pub return_height: f32,
+    pub return_descend_height: f32,
+    pub return_min_distance: f32,
+    pub return_cone_tan: f32,
+    pub low_battery_action: i32,
+    pub battery_critical: f32,
+    pub battery_low: f32,
+}
+
+impl Tuning {
+    /// A demand for nothing, within the bounds of manual and Offboard flight.
+    pub(super) fn nothing(&self) -> Demand {
+        Demand {
+            position: NONE,
+            velocity: NONE,
+            acceleration: NONE,
+            heading: f32::NAN,
+            heading_rate: f32::NAN,
+            speed_max: self.speed_max,
+            climb_max: self.climb_max,
+            descend_max: self.descend_max,
+            lift_off: f32::NAN,
+            // MPC_THR_MIN 0.12 of a hover thrust of 0.49.
+            thrust_min: 0.245,
+            height_rate_share: 0.0,
+        }
+    }
+
+    /// What acts, looked up once after each change.
+    pub fn new(params: &Params) -> Self {
+        Self {
+            gains: Gains {
+                position: [params.real("MPC_XY_P"), params.real("MPC_Z_P")],
+                velocity_p: [params.real("MPC_XY_VEL_P_ACC"), params.real("MPC_Z_VEL_P_ACC")],
+                velocity_i: [params.real("MPC_XY_VEL_I_ACC"), params.real("MPC_Z_VEL_I_ACC")],
+                velocity_d: [params.real("MPC_XY_VEL_D_ACC"), params.real("MPC_Z_VEL_D_ACC")],
+                tilt_tan: libm::tanf(params.real("MPC_TILTMAX_AIR").clamp(1.0, 80.0).to_radians()),
+                heading_rate_max: params.real("MPC_YAWRAUTO_MAX").to_radians(),
+            },
+            speed_max: params.real("MPC_XY_VEL_MAX"),
+            climb_max: params.real("MPC_Z_VEL_MAX_UP"),
+            descend_max: params.real("MPC_Z_VEL_MAX_DN"),
+            cruise: params.real("MPC_XY_CRUISE"),
+            auto_up: params.real("MPC_Z_V_AUTO_UP"),
+            auto_down: params.real("MPC_Z_V_AUTO_DN"),
+            land_speed: params.real("MPC_LAND_SPEED"),
+            land_slow_below: [params.real("MPC_LAND_ALT1"), params.real("MPC_LAND_ALT2")],
+            land_crawl_speed: params.real("MPC_LAND_CRWL"),
+            land_crawl_below: params.real("MPC_LAND_ALT3"),
+            auto_jerk: params.real("MPC_JERK_AUTO").max(0.5),
+            auto_acceleration_down: params.real("MPC_ACC_DOWN_MAX").max(0.5),
+            takeoff_speed: params.real("MPC_TKO_SPEED"),
+            takeoff_ramp_s: params.real("MPC_TKO_RAMP_T"),
+            takeoff_height: params.real("MIS_TAKEOFF_ALT"),
+            spool_up_s: params.real("COM_SPOOLUP_TIME"),
+            land_trigger_s: params.real("LNDMC_TRIG_TIME"),
+            offboard_loss_s: params.real("COM_OF_LOSS_T"),
+            offboard_loss_action: params.int("COM_OBL_RC_ACT"),
+            disarm_land_s: params.real("COM_DISARM_LAND"),
+            disarm_preflight_s: params.real("COM_DISARM_PRFLT"),
+            return_height: params.real("RTL_RETURN_ALT"),
+            return_descend_height: params.real("RTL_DESCEND_ALT"),
+            return_min_distance: params.real("RTL_MIN_DIST"),
+            return_cone_tan: libm::tanf((params.int("RTL_CONE_ANG").clamp(0, 90) as f32).to_radians()),
+            low_battery_action: params.int("COM_LOW_BAT_ACT"),
+            battery_critical: params.real("BAT_CRIT_THR"),
+            battery_low: params.real("BAT_LOW_THR"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_sorted_and_fit_the_wire() {
+        assert!(DEFAULTS.windows(2).all(|pair| pair[0].0 < pair[1].0));
+        assert!(DEFAULTS.iter().all(|(name, _)| name.len() <= 16));
+    }
+
+    #[test]
+    fn every_parameter_that_acts_is_in_the_table() {
+        // A misspelt name would read as 0; none of these defaults is 0 but the two actions.
+        let t = Tuning::new(&params(3, &VehicleLimits::default()));
+        for value in [t.speed_max, t.cruise, t.land_speed, t.spool_up_s, t.offboard_loss_s, t.return_height] {
+            assert!(value > 0.0);
+        }
+        for value in
+            [t.auto_up, t.auto_down, t.takeoff_speed, t.takeoff_ramp_s, t.takeoff_height, t.land_trigger_s]
+        {
+            assert!(value > 0.0);
+        }
+        for value in [t.land_crawl_speed, t.land_crawl_below, t.auto_jerk, t.auto_acceleration_down] {
+            assert!(value > 0.0);
+        }
+        for value in
+            [t.disarm_land_s, t.disarm_preflight_s, t.return_descend_height, t.battery_low, t.return_cone_tan]
+        {
+            assert!(value > 0.0);
+        }
+        assert_eq!((t.offboard_loss_action, t.low_battery_action), (0, 0));
+    }
+}

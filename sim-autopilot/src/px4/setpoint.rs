@@ -1,0 +1,163 @@
+//! What Offboard flies: SET_POSITION_TARGET_LOCAL_NED (84) and _GLOBAL_INT (86), as PX4 reads them
+//! (`MavlinkReceiver::handle_message_set_position_target_*`).
+//!
+//! Each axis left out by the mask is NaN. A message that asks for nothing, or in a frame PX4 does not know, is not an
+//! error: it just does not count, and the stream of those that count runs dry.
+
+use nalgebra::Vector3;
+use planner_core::frames::Geodetic;
+
+use crate::geodesy::LocalFrame;
+use crate::wire::Fields;
+use planner_core::Point;
+
+const FRAME_LOCAL_NED: u8 = 1;
+const FRAME_BODY_NED: u8 = 8;
+const FRAME_GLOBAL: u8 = 0;
+const FRAME_GLOBAL_RELATIVE_ALT: u8 = 3;
+const FRAME_GLOBAL_INT: u8 = 5;
+const FRAME_GLOBAL_RELATIVE_ALT_INT: u8 = 6;
+const MASK_FORCE: u16 = 0x200;
+const MASK_YAW: u16 = 0x400;
+const MASK_YAW_RATE: u16 = 0x800;
+const MASK_NOTHING: u16 = 0x1ff;
+
+/// The last setpoint, in the mission frame; NaN asks nothing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setpoint {
+    /// ENU metres.
+    pub position: Point,
+    /// ENU m/s.
+    pub velocity: Point,
+    /// ENU m/s².
+    pub acceleration: Point,
+    /// Radians clockwise from north.
+    pub heading: f32,
+    /// rad/s clockwise.
+    pub heading_rate: f32,
+}
+
+/// What the frame of a setpoint leans on.
+pub struct Context<'a> {
+    /// The autopilot's local frame.
+    pub frame: &'a LocalFrame,
+    /// Heading of the vehicle, radians.
+    pub heading: f32,
+    /// Altitude of home, metres AMSL.
+    pub home_alt_m: f64,
+}
+
+/// Reads message 84; `None` where it does not count.
+pub fn local_ned(fields: &Fields<'_>, context: &Context<'_>) -> Option<Setpoint> {
+    let frame = fields.u8(52);
+    if frame != FRAME_LOCAL_NED && frame != FRAME_BODY_NED {
+        return None;
+    }
+    let mask = fields.u16(48);
+    let mut position = masked(fields, 4, mask);
+    let mut velocity = masked(fields, 16, mask >> 3);
+    let mut acceleration = masked(fields, 28, mask >> 6);
+    if frame == FRAME_BODY_NED {
+        // PX4 turns velocity and acceleration by the heading and takes no position in the body's frame.
+        position = Vector3::repeat(f64::NAN);
+        velocity = turned(velocity, context.heading);
+        acceleration = turned(acceleration, context.heading);
+    }
+    let position = keep_nan(position, |ned| context.frame.enu(ned));
+    finish(fields, mask, position, velocity, acceleration, context)
+}
+
+/// Reads message 86; `None` where it does not count.
+pub fn global_int(fields: &Fields<'_>, context: &Context<'_>) -> Option<Setpoint> {
+    let base = match fields.u8(52) {
+        FRAME_GLOBAL | FRAME_GLOBAL_INT => 0.0,
+        FRAME_GLOBAL_RELATIVE_ALT | FRAME_GLOBAL_RELATIVE_ALT_INT => context.home_alt_m,
+        _ => return None,
+    };
+    let mask = fields.u16(48);
+    let given = |bit: u16| mask & bit == 0;
+    let mut position = Vector3::repeat(f64::NAN);
+    let asked = Geodetic {
+        lat_deg: f64::from(fields.i32(4)) * 1e-7,
+        lon_deg: f64::from(fields.i32(8)) * 1e-7,
+        alt_m: f64::from(fields.f32(12)) + base,
+    };
+    let here = context.frame.ekf_origin();
+    let whole = Geodetic {
+        lat_deg: if given(1) { asked.lat_deg } else { here.lat_deg },
+        lon_deg: if given(2) { asked.lon_deg } else { here.lon_deg },
+        alt_m: if given(4) { asked.alt_m } else { here.alt_m },
+    };
+    if !whole.is_valid() {
+        return None;
+    }
+    let enu = context.frame.enu_of_geodetic(&whole);
+    if given(1) && given(2) {
+        (position.x, position.y) = (enu.x, enu.y);
+    }
+    if given(4) {
+        position.z = enu.z;
+    }
+    let velocity = masked(fields, 16, mask >> 3);
+    let acceleration = masked(fields, 28, mask >> 6);
+    finish(fields, mask, position, velocity, acceleration, context)
+}
+
+fn masked(fields: &Fields<'_>, at: usize, mask: u16) -> Vector3<f64> {
+    let axis = |k: usize| {
+        if mask >> k & 1 == 0 { f64::from(fields.f32(at + 4 * k)) } else { f64::NAN }
+    };
+    Vector3::new(axis(0), axis(1), axis(2))
+}
+
+fn turned(v: Vector3<f64>, heading: f32) -> Vector3<f64> {
+    let (sin, cos) = libm::sincos(f64::from(heading));
+    Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z)
+}
+
+/// Maps a NED vector to ENU by `map`, axis by axis as far as it is given: north and east only together, down alone.
+fn keep_nan(ned: Vector3<f64>, map: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Vector3<f64> {
+    let across = ned.x.is_finite() && ned.y.is_finite();
+    let mapped = map(&ned.map(|x| if x.is_finite() { x } else { 0.0 }));
+    let nan = f64::NAN;
+    Vector3::new(
+        if across { mapped.x } else { nan },
+        if across { mapped.y } else { nan },
+        if ned.z.is_finite() { mapped.z } else { nan },
+    )
+}
+
+fn finish(
+    fields: &Fields<'_>,
+    mask: u16,
+    position: Vector3<f64>,
+    velocity: Vector3<f64>,
+    acceleration: Vector3<f64>,
+    context: &Context<'_>,
+) -> Option<Setpoint> {
+    if mask & MASK_NOTHING == MASK_NOTHING || mask & MASK_FORCE != 0 {
+        return None;
+    }
+    let velocity = keep_nan(velocity, |ned| context.frame.enu_rate(ned));
+    let acceleration = keep_nan(acceleration, |ned| context.frame.enu_rate(ned));
+    let any = |v: &Vector3<f64>| v.iter().any(|x| x.is_finite());
+    if !any(&position) && !any(&velocity) && !any(&acceleration) {
+        return None;
+    }
+    let optional = |bit: u16, at: usize| {
+        let value = fields.f32(at);
+        if mask & bit == 0 && value.is_finite() { value } else { f32::NAN }
+    };
+    Some(Setpoint {
+        position: position.cast::<f32>(),
+        velocity: velocity.cast::<f32>(),
+        acceleration: acceleration.cast::<f32>(),
+        heading: wrap(optional(MASK_YAW, 40)),
+        heading_rate: optional(MASK_YAW_RATE, 44),
+    })
+}
+
+/// Any finite angle into ±π; NaN stays.
+fn wrap(angle: f32) -> f32 {
+    angle - core::f32::consts::TAU * libm::roundf(angle / core::f32::consts::TAU)
+}
