@@ -79,7 +79,8 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
     let mut chance = |share: f64| f64::from(rng.next_u32()) < share * f64::from(u32::MAX);
     let (mut camera, mut links, mut fake) = (Camera::default(), Links::default(), Fake::default());
     let (mut framer, mut now, mut at_m, mut held) = (Framer::default(), Instant::ZERO, 0.0, 0);
-    let mut settle = 0;
+    // Of a command's tries one is heard: one that is not is given up and reported.
+    let (mut settle, mut lost) = (0, 0);
     while settle < 60 {
         now = now + Duration::from_millis(50);
         // A pause holds the vehicle where it is.
@@ -102,9 +103,11 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
         let mut bytes = &out[..length];
         while let Some(frame) = framer.next(now, &mut bytes) {
             let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
-            if chance(loss) {
+            if lost < TRIES - 1 && chance(loss) {
+                lost += 1;
                 continue;
             }
+            lost = 0;
             fake.command(&command, at_m);
             if !chance(loss) {
                 let ack = Ack { command: command.command as u32 as u16, result: ACCEPTED, to: (1, 191) };
