@@ -112,7 +112,8 @@ const AT_GATE_M: f32 = 0.1;
 /// A vehicle that brakes comes to stand beyond its reference, by so much of the speed that it is faster than the second: 0.5 m were
 /// seen from 5.8 m/s.
 const LEADS_S: f32 = 0.2;
-const SLOW_MPS: f32 = 3.0;
+/// Below this cruise speed, m/s, it adds nothing.
+const LEADS_ABOVE_MPS: f32 = 3.0;
 
 /// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
 /// each gate within reach, and for each neighbour without a plan 16 points (`LOOKS`) of the own path.
@@ -209,7 +210,7 @@ impl Ahead {
         n: &Neighbour,
     ) -> Option<f32> {
         let now = (n.position + n.velocity * n.age_s - own.position).norm_squared();
-        let apart_m = cfg.safety_distance_m + LEADS_S * fmaxf(cfg.cruise_mps - SLOW_MPS, 0.0);
+        let apart_m = cfg.safety_distance_m + LEADS_S * fmaxf(cfg.cruise_mps - LEADS_ABOVE_MPS, 0.0);
         let near = fminf(apart_m * apart_m, now);
         // No more than this do both fly from one look to the next.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();

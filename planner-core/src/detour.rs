@@ -21,9 +21,9 @@ use crate::search::{self, SearchError, SearchWorkspace};
 use crate::{ConfigError, Point};
 
 /// Coming nearer by less than this is none: a hovering vehicle sways, metres.
-const SWAY_M: f32 = 0.05;
+const HOVER_SWAY_M: f32 = 0.05;
 /// The same of a way that is planned: rounding. The safety filter allows no more.
-const NEARER_M: f32 = 0.002;
+const WAY_NEARER_M: f32 = 0.002;
 
 /// A stretch to stay away from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,7 +152,7 @@ pub fn is_blocked<const W: usize>(
     obstacle: &KeepOff,
 ) -> bool {
     let (Some(first), Some(last)) = (path.waypoints().first(), path.waypoints().last()) else { return false };
-    let obstacle = obstacle.seen_from(here, SWAY_M);
+    let obstacle = obstacle.seen_from(here, HOVER_SWAY_M);
     let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
     let (along_m, until_m) = (ahead.start, ahead.end);
     let climbs = along_m < 0.0 && obstacle.touches(&(first.position - up(climb_m)), &first.position);
@@ -346,7 +346,7 @@ pub fn plan<const N: usize, const W: usize>(
 /// Of what is nearer already than it should be, no more distance than there is.
 pub(crate) fn shorten(obstacles: &mut [KeepOff], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
-        *obstacle = obstacle.seen_from(here, NEARER_M);
+        *obstacle = obstacle.seen_from(here, WAY_NEARER_M);
     }
 }
 

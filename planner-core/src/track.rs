@@ -109,6 +109,7 @@ const LEAD_LEAST_M: f32 = 0.4;
 /// In the open, faster than it walks, it lags so much further: what is sent, answered and reported late, seconds, and twice
 /// that before the reference slows.
 const LEAD_S: f32 = 0.8;
+/// A walk, m/s.
 const WALKS_MPS: f32 = 2.0;
 /// This near its end the path is flown, metres.
 const END_M: f32 = 0.01;

@@ -15,7 +15,7 @@ use super::limits::Limits;
 use super::motion::{Motion, shortened};
 
 /// A setpoint keeps so far inside, metres: the autopilot's frame rounds it by up to 1.4 mm, 30 km from its origin.
-const ROUNDING_M: f32 = 2e-3;
+const FRAME_ROUNDING_M: f32 = 2e-3;
 /// The follower turns so far before the fence, metres: steps of finite length overshoot by millimetres.
 const TURNS_BEFORE_M: f32 = 0.02;
 /// Part of the jerk that an axis may take to brake, and that its stops are planned with.
@@ -42,7 +42,7 @@ struct Brake {
 impl Fence {
     /// Inside the mission's box; in the middle of one that is thinner than what is rounded.
     pub(super) fn new((low, high): (Point, Point)) -> Self {
-        let slack = (high - low).map(|size| fminf(ROUNDING_M, 0.25 * size));
+        let slack = (high - low).map(|size| fminf(FRAME_ROUNDING_M, 0.25 * size));
         Self { low: low + slack, high: high - slack }
     }
 

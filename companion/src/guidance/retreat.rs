@@ -20,17 +20,19 @@ use crate::swarm::sweep::Sweep;
 pub const BESIDE_M: f32 = 0.6;
 /// What two may stray together, metres.
 const FOLLOWER_M: f32 = 0.6;
-/// Spacing and number of the places looked at.
-const STEP_M: f32 = 0.25;
+/// Spacing of the places looked at, metres.
+const PLACE_STEP_M: f32 = 0.25;
+/// How many are looked at.
 const STEPS: u16 = 48;
 /// What a search may cost in one step: neighbours, columns, and [`PLACE_COST`] for each place.
 const BUDGET: u16 = 96;
 const PLACE_COST: u16 = 4;
-/// Fastest on a straight leg, and through its ends, m/s: a right angle is strayed from by 0.47 m then.
+/// Fastest on a straight leg, m/s.
 const FAST_MPS: f32 = 1.5;
+/// Fastest through its ends, m/s: a right angle is strayed from by 0.47 m then.
 const CORNER_MPS: f32 = 0.6;
 /// Acceleration, m/s².
-const ACCEL_MPS2: f32 = 1.0;
+const RETREAT_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
 const BRAKES_MPS2: f32 = 1.5;
 
@@ -67,7 +69,7 @@ impl Search {
         tell: impl Fn(usize, &mut dyn FnMut(KeepOff)),
     ) {
         // A vehicle that steps back while it searches waits ever further back; one that waits further ahead asks again.
-        let from_m = self.from_m.filter(|from_m| wait_m <= from_m + STEP_M).unwrap_or_else(|| {
+        let from_m = self.from_m.filter(|from_m| wait_m <= from_m + PLACE_STEP_M).unwrap_or_else(|| {
             self.held = 0;
             self.sweep.restart();
             wait_m
@@ -75,7 +77,7 @@ impl Search {
         self.from_m = Some(from_m);
         let mut budget = BUDGET;
         let found = loop {
-            let along_m = from_m - f32::from(self.held) * STEP_M;
+            let along_m = from_m - f32::from(self.held) * PLACE_STEP_M;
             let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
             let Some(place) = place.filter(|_| self.held <= STEPS) else { break Shelter::Nowhere };
             budget = budget.saturating_sub(PLACE_COST);
@@ -105,7 +107,7 @@ pub fn step<const W: usize>(
     dt_s: f32,
 ) -> Option<Point> {
     let here = path.point_at(tracker.along_m)?;
-    let back = path.point_at(tracker.along_m - STEP_M)?;
+    let back = path.point_at(tracker.along_m - PLACE_STEP_M)?;
     if tracker.speed_mps > 0.0 {
         // It flies on, and brakes first.
         tracker.speed_mps = (tracker.speed_mps - BRAKES_MPS2 * dt_s).max(0.0);
@@ -120,10 +122,10 @@ pub fn step<const W: usize>(
         return None;
     }
     let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
-    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * ACCEL_MPS2 * left_m);
+    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * RETREAT_MPS2 * left_m);
     let ahead = allowed(CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // The tracker's speed is that of flying on; back is below zero.
-    let speed = ahead.min(FAST_MPS).min(ACCEL_MPS2 * dt_s - tracker.speed_mps.min(0.0));
+    let speed = ahead.min(FAST_MPS).min(RETREAT_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
     at(path, tracker)

@@ -28,7 +28,7 @@ pub const LOOKS: u32 = 2000;
 /// Most rings of an area.
 pub const RINGS: usize = 128;
 /// Clearance that every leg is taken to have, metres: over the fields there are no walls.
-const CLEARANCE_M: f32 = 10.0;
+const OPEN_FIELD_M: f32 = 10.0;
 
 /// Memory for areas of at most `X` vertices, `L` lanes and `K` vehicles.
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
@@ -288,7 +288,7 @@ pub fn plan<
     let swarm = Swarm {
         pads: &pads,
         manner: Manner { waypoint_m: header.spacing.waypoint_m, look, trigger: header.trigger },
-        clearance_m: CLEARANCE_M,
+        clearance_m: OPEN_FIELD_M,
         schedule: mission.header().schedule,
         gates_most,
         done: &[],

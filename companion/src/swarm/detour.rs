@@ -77,7 +77,7 @@ const UNHEARD: Duration = Duration::from_secs(10);
 /// A position older than this is vague.
 const FRESH: Duration = Duration::from_secs(2);
 /// What a vehicle may stray from its path, metres: a path that comes nearer to what lies there by that much is blocked.
-const STRAY_M: f32 = 0.25;
+const BLOCKED_WITHIN_M: f32 = 0.25;
 
 /// What a way around is asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -415,7 +415,7 @@ impl Detours {
         let here = if on_ground { view.mission.pad() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
         let cost = detour::stretches_ahead(&plan.path, along_m) + THING_COST;
-        let apart_m = view.config.safety_distance_m + STRAY_M;
+        let apart_m = view.config.safety_distance_m + BLOCKED_WITHIN_M;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.new_ones();
         self.sweep.go_on(

@@ -12,7 +12,7 @@ pub(crate) const OBSTACLES: usize = 16;
 /// The greatest radius of one, metres: a wrong digit must not close a whole building.
 pub(crate) const OBSTACLE_MAX_M: f32 = 20.0;
 /// Two nearer than this are one that was sent twice, metres; a revocation this near means it.
-const SAME_M: f32 = 0.1;
+const SAME_OBSTACLE_M: f32 = 0.1;
 
 /// Obstacles that were not on the map, and for how many of them a way around was planned.
 #[derive(Clone, Debug, Default)]
@@ -31,7 +31,7 @@ impl Obstacles {
 
     /// Forgets the obstacle at this place.
     fn revoke(&mut self, centre: &Point) {
-        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_M) {
+        while let Some(at) = self.known.iter().position(|o| (o.from - centre).norm() < SAME_OBSTACLE_M) {
             self.known.remove(at);
             self.avoided -= usize::from(at < self.avoided);
             self.requested -= usize::from(at < self.requested);
@@ -54,7 +54,7 @@ impl Obstacles {
             return ACCEPTED;
         }
         let radius_m = command.param1 + clearance_m;
-        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_M && o.radius_m >= radius_m;
+        let told = |o: &KeepOff| (o.from - centre).norm() < SAME_OBSTACLE_M && o.radius_m >= radius_m;
         if self.known.iter().any(told) {
             return ACCEPTED;
         }

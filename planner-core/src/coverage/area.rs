@@ -9,7 +9,7 @@ use libm::{fabs, sqrt};
 use super::Flat;
 
 /// Furthest coordinate, metres: at 100 km f32 steps by 8 mm.
-pub const MAX_COORDINATE_M: f32 = 150_000.0;
+pub const MAX_VERTEX_M: f32 = 150_000.0;
 /// Vertices nearer than this are one, metres.
 pub const SAME_M: f32 = 1e-3;
 /// Edges cross if each reaches so far beyond the other, metres: neighbouring fields share borders, and coordinates are
@@ -53,7 +53,7 @@ pub enum AreaError {
         /// The vertex.
         vertex: u16,
     },
-    /// A vertex is further than [`MAX_COORDINATE_M`] from the origin.
+    /// A vertex is further than [`MAX_VERTEX_M`] from the origin.
     TooFar {
         /// The vertex.
         vertex: u16,
@@ -191,7 +191,7 @@ impl<'a> Area<'a> {
             if !(vertex.x.is_finite() && vertex.y.is_finite()) {
                 return Err(AreaError::NotFinite { vertex: i as u16 });
             }
-            if vertex.amax() > MAX_COORDINATE_M {
+            if vertex.amax() > MAX_VERTEX_M {
                 return Err(AreaError::TooFar { vertex: i as u16 });
             }
         }

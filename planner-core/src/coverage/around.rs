@@ -27,7 +27,7 @@ const OUTWARD: f32 = 1.09;
 /// And this much more, metres: rounding.
 const OUTWARD_M: f32 = 0.05;
 /// Nearer than this is the same place, metres.
-const SAME_M: f32 = 0.01;
+const SAME_CORNER_M: f32 = 0.01;
 /// More samples of one leg are not taken: they are further apart then.
 const MOST_SAMPLES: f32 = 65_536.0;
 /// A leg is so high above the field at least, but for one straight up or down, metres.
@@ -64,7 +64,7 @@ impl<const N: usize> Clear<'_, '_, N> {
     fn is_high(&self, a: &Point, b: &Point) -> bool {
         let (Some(field), step) = (&self.field, b - a) else { return true };
         let length_m = step.xy().norm();
-        if length_m < SAME_M {
+        if length_m < SAME_CORNER_M {
             return true;
         }
         let count = fminf(ceilf(2.0 * length_m / field.shape().cell_m), MOST_SAMPLES) as u32;
@@ -224,7 +224,7 @@ impl Graph {
                 continue;
             }
             let far_m = obstacle.radius_m * OUTWARD + OUTWARD_M;
-            let twice = (obstacle.from - obstacle.to).xy().norm() > SAME_M;
+            let twice = (obstacle.from - obstacle.to).xy().norm() > SAME_CORNER_M;
             let ends = [Some(obstacle.from), twice.then_some(obstacle.to)];
             for end in ends.into_iter().flatten() {
                 for i in 0..CORNERS {
@@ -248,7 +248,7 @@ fn write<const W: usize>(
     out.push(request.here, request.leg_clearance_m)?;
     let mut before = request.here;
     for point in points {
-        if (point - before).norm() > SAME_M {
+        if (point - before).norm() > SAME_CORNER_M {
             out.push(*point, request.leg_clearance_m)?;
             before = *point;
         }

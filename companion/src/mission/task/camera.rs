@@ -25,7 +25,7 @@ const TRIES: u8 = 5;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
 /// A stretch that leads less far leads no way, metres.
-const LEG_LEAST_M: f32 = 0.1;
+const STRETCH_LEAST_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
@@ -211,7 +211,7 @@ pub(super) fn heading<const W: usize>(
     let mut found = None;
     for shots in photographs.stretches(path) {
         let way = path.point_at(shots.to_m)? - path.point_at(shots.from_m)?;
-        if way.xy().norm() > LEG_LEAST_M {
+        if way.xy().norm() > STRETCH_LEAST_M {
             found = Some(atan2f(way.y, way.x));
         }
         if shots.to_m >= along_m && found.is_some() {

@@ -4,7 +4,7 @@
 //! What follows from these numbers is computed: lanes, routes, flights. POWELL's shares W are planned on the desk.
 
 use planner_core::coverage::Flat;
-use planner_core::coverage::area::{MAX_COORDINATE_M, Ring, RingKind};
+use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind};
 use planner_core::coverage::footprint::{Footprint, Spacing};
 use planner_core::coverage::pack::{Heights, Unit};
 use planner_core::file::FileError;
@@ -229,7 +229,7 @@ impl<'a> CoverageView<'a> {
         if view.rings.iter().any(|ring| ring[2] > 2 || ring[3] != 0) {
             return refuse("rings");
         }
-        if view.vertices().any(|v| !v.iter().all(|c| libm::fabsf(*c) <= MAX_COORDINATE_M)) {
+        if view.vertices().any(|v| !v.iter().all(|c| libm::fabsf(*c) <= MAX_VERTEX_M)) {
             return refuse("vertices");
         }
         Ok(view)
@@ -288,7 +288,7 @@ impl CoverageHeader {
             return refuse("spacing");
         }
         let heights = [self.heights.mission_m, self.heights.layer_m];
-        if !heights.iter().all(|h| positive(*h, MAX_COORDINATE_M)) {
+        if !heights.iter().all(|h| positive(*h, MAX_VERTEX_M)) {
             return refuse("heights");
         }
         if self.looks > MAX_LOOKS {
@@ -297,14 +297,14 @@ impl CoverageHeader {
         if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {
             return refuse("angle_deg");
         }
-        if !(0.0..=MAX_COORDINATE_M).contains(&self.margin_m) {
+        if !(0.0..=MAX_VERTEX_M).contains(&self.margin_m) {
             return refuse("margin_m");
         }
         let sound = |ground: &Ground| {
             let ends = [ground.low_m, ground.high_m];
-            positive(ground.height_m, MAX_COORDINATE_M)
-                && positive(ground.tolerance_m, MAX_COORDINATE_M)
-                && ends.iter().all(|m| libm::fabsf(*m) <= MAX_COORDINATE_M)
+            positive(ground.height_m, MAX_VERTEX_M)
+                && positive(ground.tolerance_m, MAX_VERTEX_M)
+                && ends.iter().all(|m| libm::fabsf(*m) <= MAX_VERTEX_M)
                 && ground.low_m <= ground.high_m
                 && ground.high_m + ground.height_m <= self.heights.mission_m
         };

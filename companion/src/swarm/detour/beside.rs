@@ -24,8 +24,9 @@ const AGAIN: Duration = Duration::from_secs(30);
 const TURNS: u8 = 16;
 /// Things that are looked at.
 const THINGS: usize = 8;
-/// Looks along the path, and how far apart they are at least, metres.
+/// Looks along the path, at most.
 const LOOKS: usize = 100;
+/// They are so far apart at least, metres.
 const LOOK_M: f32 = 0.5;
 /// What is to be kept off begins a little before what blocks the path, metres.
 const FREE_M: f32 = 1.0;

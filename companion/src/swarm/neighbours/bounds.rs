@@ -52,7 +52,7 @@ pub(super) const LEVEL_M: f32 = 1.0;
 /// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
 pub(super) const VAGUE_M: f32 = 0.5;
 /// What two vehicles in the air may stray together, one of which hovers, metres.
-pub(super) const SWAY_M: f32 = 0.1;
+pub(super) const PAIR_SWAY_M: f32 = 0.1;
 /// A position counts as the vehicle's of the roster if an intent of our mission was heard from it within this time: ten intents
 /// at the lowest rate.
 pub(super) const BELONGS: Duration = Duration::from_secs(5);

@@ -286,7 +286,7 @@ impl Contact {
             let below = column(here, Nature::Solid);
             tell(KeepOff { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // Where it is it may not be come near from above or the side, whatever its column leaves.
-            tell(place(wide_m + SWAY_M));
+            tell(place(wide_m + PAIR_SWAY_M));
         } else if self.is_dead(now) && self.flies_on() {
             // Where the plan has it.
         } else if self.is_dead(now) {
@@ -307,7 +307,7 @@ impl Contact {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));
             }
-            tell(place(wide_m + SWAY_M));
+            tell(place(wide_m + PAIR_SWAY_M));
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use planner_core::coverage::area::{MAX_COORDINATE_M, Ring, RingKind, SAME_M};
+use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind, SAME_M};
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{CoverageError, Flat, area as core_area};
@@ -362,7 +362,7 @@ fn reason(error: core_area::AreaError, rings: &[Ring]) -> String {
         E::TooFewVertices { ring: r } => format!("{} has fewer than three vertices that differ", ring(r)),
         E::NotFinite { vertex: v } => format!("{} is not a finite number", vertex(v)),
         E::TooFar { vertex: v } => {
-            format!("{} is more than {} km from the origin", vertex(v), MAX_COORDINATE_M / 1e3)
+            format!("{} is more than {} km from the origin", vertex(v), MAX_VERTEX_M / 1e3)
         }
         E::Duplicate { vertex: v } => format!("{} repeats the one before it", vertex(v)),
         E::NoArea { ring: r } => format!("{} encloses nothing: its vertices lie on one line", ring(r)),

@@ -88,7 +88,7 @@ fn planned(
             assert!((end - request.here).norm() <= RINGS as f32 + 0.01 && points.len() == 2);
             assert!(!known.iter().any(|o| o.holds(end)), "{end:?} is no place to rest");
         } else {
-            assert!((end - OVER).norm() <= SAME_M, "{end:?}");
+            assert!((end - OVER).norm() <= SAME_CORNER_M, "{end:?}");
             // Up, along one height, down: never in the height of another's layer.
             let level = points[1..points.len() - 1].iter().all(|p| p.z == points[1].z);
             assert!(level && [LAYER_M, request.here.z].contains(&points[1].z), "{points:?}");
