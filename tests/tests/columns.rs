@@ -11,6 +11,7 @@ use host_sim::{scenario, swarm};
 use planner_core::Point;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
+use sim_autopilot::Estimator;
 
 /// How far `estimator = "rtk"` errs across, metres.
 const RTK_ERROR_M: f32 = 0.1;
@@ -104,6 +105,9 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         let Some(file) = shared_data(&format!("maps3d/{}", case.file)) else { return };
         let map = map::load(file.to_str().unwrap(), case.resolution_m).unwrap();
         let required_m = case.radius_m + case.margin_m;
+        // A margin below what a receiver errs by keeps no vehicle off a wall: there it is the columns alone that are tried.
+        let fits = case.margin_m >= RTK_ERROR_M;
+        let (estimator, cruise_mps) = if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
         let (mut planned, mut flown, mut contacts, mut refused, mut hints) = (0, 0, 0, 0, 0);
         for mission in 0..missions {
@@ -126,7 +130,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 let text = format!(
                     "seed = {mission}\n[map]\nfile = {file:?}\nresolution_m = {}\n\
                      [roadmap]\nnodes = 1500\nedge_min_m = 0.05\nedge_max_m = {}\nsafety_margin_m = {}\n\
-                     [mission]\nmode = \"labelled\"\ncruise_mps = 1.0\ngoals = [[{}, {}, {}]]\n\
+                     [mission]\nmode = \"labelled\"\ncruise_mps = {cruise_mps}\ngoals = [[{}, {}, {}]]\n\
                      [deconfliction]\nsafety_distance_m = 0.8\n\
                      [[vehicles]]\nid = 1\nstart = [{}, {}, {}]\nradius_m = {}\ngoal = 0\n",
                     case.resolution_m,
@@ -140,10 +144,9 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                     start.z,
                     case.radius_m
                 );
-                Mission::prepare(
-                    scenario::parse(&text, "columns.toml").expect("it is one"),
-                    &Progress::hidden(),
-                )
+                let mut scenario = scenario::parse(&text, "columns.toml").expect("it is one");
+                scenario.simulation.estimator = estimator;
+                Mission::prepare(scenario, &Progress::hidden())
             };
             for (start, goal) in [(&other, goal), (start, &other)] {
                 let error =
@@ -168,7 +171,6 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             case.file
         );
         assert!(100 * planned >= 99 * missions, "{}", case.file);
-        // A margin below what the estimate errs by keeps no vehicle off a wall.
-        assert!(contacts == 0 || case.margin_m < RTK_ERROR_M, "{}", case.file);
+        assert_eq!(contacts, 0, "{}", case.file);
     }
 }
