@@ -243,6 +243,26 @@ fn what_is_not_built_yet_is_refused_by_name() {
 }
 
 #[test]
+fn what_a_coverage_mission_does_not_act_on_is_refused_by_name() {
+    const TEXT: &str = "[area]\npolygon = [[0.0, 0.0], [100.0, 0.0], [100.0, 80.0], [0.0, 80.0]]\n\
+        coordinates = \"metres\"\nheight_m = 30.0\ncamera = { fov_deg = 73.7, aspect = 1.5 }\n\
+        overlap_front = 0.5\noverlap_side = 0.5\n[mission]\nmode = \"coverage\"\n\
+        [[vehicles]]\nid = 1\nstart = [-10.0, -10.0, 1.5]\nweight = 2.0\nendurance_s = 1500.0\n";
+    let scenario = |from: &str, to: &str| parse(&TEXT.replacen(from, to, 1), "area.toml").unwrap();
+    assert_eq!(scenario("", "").check_supported(), Ok(()));
+    for (from, to, why) in [
+        ("weight", "payload_kg = 1.0\nweight", "payload_kg"),
+        ("weight", "altitude_m = 40.0\nweight", "altitude_m"),
+        ("[mission]", "[formation]\npure = true\n[mission]", "[formation]"),
+        ("[[veh", "goals = [[1.0, 2.0, 3.0]]\n[[veh", "mission.goals beside [area]"),
+        ("[[veh", "goals_file = \"no.txt\"\n[[veh", "mission.goals_file beside [area]"),
+    ] {
+        let error = scenario(from, to).check_supported().unwrap_err();
+        assert_eq!(error.why, format!("not available yet: {why}"));
+    }
+}
+
+#[test]
 fn geodetic_goals_and_starts_are_metres_about_the_origin() {
     let place = "{ lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 712.5 }";
     let origin = "origin = { lat_deg = 40.3327, lon_deg = -3.7659, alt_m = 700.0 }\n[mission]";

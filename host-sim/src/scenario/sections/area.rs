@@ -10,7 +10,9 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
-use super::{Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, vehicles};
+use super::{
+    Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, not_yet, unbuilt, vehicles,
+};
 use crate::area::overlap::{self, Overlap};
 use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
@@ -43,11 +45,19 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let (mut area, terrain) = area(&root.need("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
-    // What goals missions leave to coverage.
     let mut unsupported = Vec::new();
     let mut vehicles = vehicles(&root.need("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    // What goals missions leave to coverage.
+    unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
+    let formation = unbuilt(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
-    let mission = self::mission(&mission.unwrap_or_else(|| empty(text, "mission")), &vehicles)?;
+    let mission = mission.unwrap_or_else(|| empty(text, "mission"));
+    for key in ["goals", "goals_file"] {
+        let goals = mission.get(key);
+        unsupported
+            .extend(goals.map(|goals| not_yet(text, &goals.span, &format!("mission.{key} beside [area]"))));
+    }
+    let mission = self::mission(&mission, &vehicles)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = super::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
     let faults = faults(root, &vehicles)?;
@@ -81,10 +91,13 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
         simulation,
         faults,
         area: Some(area),
-        formation: None,
-        unsupported: Vec::new(),
+        formation,
+        unsupported,
     })
 }
+
+/// Keys of a vehicle that only a coverage mission acts on.
+const FLOWN_KEYS: [&str; 4] = ["endurance_s", "weight", "climb_mps", "descend_mps"];
 
 /// Pads have to be so far apart, however high they lie: no vehicle climbs through another one.
 fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apart_m: f32) -> Result<()> {
