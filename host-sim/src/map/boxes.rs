@@ -8,6 +8,7 @@
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, Outside, VoxelGrid};
+use pulp::Arch;
 use rayon::prelude::*;
 
 /// Children of a node.
@@ -135,6 +136,8 @@ pub struct BoxTree {
     outside: Outside,
     /// The first is the root.
     nodes: Vec<Node>,
+    /// The vector instructions that this machine has.
+    arch: Arch,
 }
 
 /// A node to be opened, and the least square of a distance to what it holds.
@@ -147,7 +150,8 @@ struct Waiting {
 impl BoxTree {
     /// The tree over a map. O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
-        let mut tree = Self { shape: *grid.shape(), outside: grid.outside(), nodes: Vec::new() };
+        let mut tree =
+            Self { shape: *grid.shape(), outside: grid.outside(), nodes: Vec::new(), arch: Arch::new() };
         tree.add(&mut boxes(grid));
         tree
     }
@@ -195,12 +199,13 @@ impl BoxTree {
             limit = limit.min(segment.to_outside(self.shape.dims)).max(0.0);
         }
         let enough = (enough_m / resolution_m).max(0.0);
-        let nearest = self.nearest_square(&segment, limit * limit, enough * enough);
+        let nearest = self.arch.dispatch(|| self.nearest_square(&segment, limit * limit, enough * enough));
         let nearest = if nearest < limit * limit { nearest.sqrt() } else { limit };
         (nearest * resolution_m).min(max_m)
     }
 
     /// The squared distance to the nearest obstacle if it is below `bound`, else `bound`; any that is at most `enough`.
+    #[inline(always)]
     fn nearest_square(&self, segment: &Segment, mut bound: f32, enough: f32) -> f32 {
         let mut waiting = [Waiting::default(); WAITING];
         let mut count = 1;
