@@ -42,6 +42,7 @@ proptest! {
         let outside = if blocked { Outside::Blocked } else { Outside::Free };
         let grid = VoxelGrid::new(shape, outside, &words).unwrap();
         let tree = BoxTree::new(&grid);
+        let without_vectors = BoxTree { arch: Arch::Scalar, nodes: tree.nodes.clone(), ..tree };
         let size = shape.max() - shape.min;
         for case in 0..60 {
             let spill = if blocked { 0.0 } else { 0.2 };
@@ -61,6 +62,7 @@ proptest! {
             let want = segment_clearance(&grid, &a, &b, most_m);
             let got = tree.clearance_m(&a, &b, most_m, 0.0);
             prop_assert!((want - got).abs() < 2e-4, "{a} {b}: {want} m, by the tree {got} m");
+            prop_assert_eq!(got, without_vectors.clearance_m(&a, &b, most_m, 0.0));
             let enough_m = uniform(&mut rng, 0.0, 6.0);
             let early = tree.clearance_m(&a, &b, most_m, enough_m);
             prop_assert!(early == got || early >= got && early <= enough_m * 1.000_001);

@@ -1,0 +1,109 @@
+//! Numbers that are calculated with together: as many as the machine's vector instructions take.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+use pulp::Simd;
+
+/// So many f32, one beside another.
+#[derive(Clone, Copy)]
+pub(super) struct Lanes<S: Simd> {
+    simd: S,
+    numbers: S::f32s,
+}
+
+impl<S: Simd> Lanes<S> {
+    #[inline(always)]
+    fn new(simd: S, numbers: S::f32s) -> Self {
+        Self { simd, numbers }
+    }
+
+    /// The same number in all.
+    #[inline(always)]
+    pub(super) fn all(simd: S, x: f32) -> Self {
+        Self::new(simd, simd.splat_f32s(x))
+    }
+
+    /// Three numbers, each in all of its own.
+    #[inline(always)]
+    pub(super) fn triple(simd: S, [x, y, z]: [f32; 3]) -> [Self; 3] {
+        [Self::all(simd, x), Self::all(simd, y), Self::all(simd, z)]
+    }
+
+    /// As many zeros.
+    #[inline(always)]
+    pub(super) fn zero(self) -> Self {
+        Self::all(self.simd, 0.0)
+    }
+
+    /// A part of some numbers on three axes.
+    #[inline(always)]
+    pub(super) fn part<const N: usize>(simd: S, [x, y, z]: &[[f32; N]; 3], part: usize) -> [Self; 3] {
+        [
+            Self::new(simd, S::as_simd_f32s(x).0[part]),
+            Self::new(simd, S::as_simd_f32s(y).0[part]),
+            Self::new(simd, S::as_simd_f32s(z).0[part]),
+        ]
+    }
+
+    /// Writes them as a part of some numbers.
+    #[inline(always)]
+    pub(super) fn put(self, numbers: &mut [f32], part: usize) {
+        S::as_mut_simd_f32s(numbers).0[part] = self.numbers;
+    }
+
+    /// The greater ones; the other's where one is no number.
+    #[inline(always)]
+    pub(super) fn max(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.max_f32s(self.numbers, other.numbers))
+    }
+
+    /// The smaller ones; the other's where one is no number.
+    #[inline(always)]
+    pub(super) fn min(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.min_f32s(self.numbers, other.numbers))
+    }
+
+    /// Which of them are below the other's.
+    #[inline(always)]
+    pub(super) fn is_below(self, other: Self) -> S::m32s {
+        self.simd.less_than_f32s(self.numbers, other.numbers)
+    }
+
+    /// These where a mask is true, the other's elsewhere.
+    #[inline(always)]
+    pub(super) fn where_true(self, mask: S::m32s, other: Self) -> Self {
+        Self::new(self.simd, self.simd.select_f32s(mask, self.numbers, other.numbers))
+    }
+}
+
+impl<S: Simd> Add for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn add(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.add_f32s(self.numbers, other.numbers))
+    }
+}
+
+impl<S: Simd> Sub for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn sub(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.sub_f32s(self.numbers, other.numbers))
+    }
+}
+
+impl<S: Simd> Mul for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn mul(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.mul_f32s(self.numbers, other.numbers))
+    }
+}
+
+impl<S: Simd> Div for Lanes<S> {
+    type Output = Self;
+    #[inline(always)]
+    fn div(self, other: Self) -> Self {
+        Self::new(self.simd, self.simd.div_f32s(self.numbers, other.numbers))
+    }
+}
