@@ -8,6 +8,10 @@ use crate::bare_metal::{self, Board, Built};
 use crate::shell::{self, cargo};
 use crate::{emulate, install, size, structure};
 
+/// Packages and their examples, each a program that checks itself.
+const EXAMPLES: [(&str, &str); 3] =
+    [("planner-core", "ten_uavs"), ("companion", "run_loop"), ("firmware", "smallest_board")];
+
 /// Which steps to run.
 #[derive(clap::Args)]
 pub struct Args {
@@ -74,6 +78,12 @@ fn steps(args: &Args) -> Result<()> {
             tests.env("FLOCKMATE_FIRMWARE", firmware);
         }
         shell::run(&mut tests)
+    })?;
+    step("examples", || {
+        for (package, example) in EXAMPLES {
+            shell::run(cargo().args(["run", "--quiet", "--locked", "-p", package, "--example", example]))?;
+        }
+        Ok(())
     })?;
     let mut stack = 0;
     step("emulated flight", || {

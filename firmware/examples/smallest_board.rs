@@ -1,0 +1,134 @@
+//! The smallest board: all that the shell wants of a machine, here of a desk.
+//!
+//! A board has a clock (embassy-time's driver), two UARTs (embedded-io-async), a flash for files and parameters, and something
+//! that runs tasks. `src/boards/pico2` is the same with registers: links and setpoints in an interrupt above planning, and
+//! a watchdog that is fed while `Shell::is_alive`.
+//!
+//! `cargo run -p firmware --example smallest_board`
+
+use std::sync::OnceLock;
+use std::task::Waker;
+
+use companion::link::frame::{self, Header, MAX_SENT};
+use companion::storage::store::{Fault, Layout, ReadFlash, Store};
+use companion::{AUTOPILOT, Config, Link};
+use embassy_futures::block_on;
+use embassy_futures::join::{join, join5};
+use embassy_futures::select::select;
+use embassy_sync::blocking_mutex::raw::CriticalSectionRawMutex;
+use embassy_sync::pipe::Pipe;
+use embassy_time::{Duration, Timer};
+use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
+use firmware::flash::Flash;
+use firmware::planner::{Memory, Own, Planner};
+use firmware::scratch::Scratch;
+use firmware::shell::{Shell, hear_system_id};
+use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
+use planner_core::Point;
+use planner_core::frames::Geodetic;
+use planner_core::plan::SwarmPlan;
+use static_cell::{ConstStaticCell, StaticCell};
+
+/// The clock, microseconds from the start.
+struct Clock(OnceLock<std::time::Instant>);
+
+impl embassy_time_driver::Driver for Clock {
+    fn now(&self) -> u64 {
+        self.0.get_or_init(std::time::Instant::now).elapsed().as_micros() as u64
+    }
+
+    /// A board sets a timer here, and sleeps.
+    fn schedule_wake(&self, _at: u64, waker: &Waker) {
+        waker.wake_by_ref();
+    }
+}
+
+embassy_time_driver::time_driver_impl!(static CLOCK: Clock = Clock(OnceLock::new()));
+
+/// One direction of a serial line.
+type Line = Pipe<CriticalSectionRawMutex, 4096>;
+static FROM_AUTOPILOT: Line = Line::new();
+static TO_AUTOPILOT: Line = Line::new();
+static FROM_RADIO: Line = Line::new();
+static TO_RADIO: Line = Line::new();
+
+/// A flash that forgets: erased, its bytes are 0xff.
+const LAYOUT: Layout = Layout::PICO2;
+struct Ram(Vec<u8>);
+
+impl ReadFlash for Ram {
+    fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
+        let bytes = self.0.get(at as usize..at as usize + out.len()).ok_or(Fault)?;
+        out.copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+impl Flash for Ram {
+    async fn erase(&mut self, at: u32) -> Result<(), Fault> {
+        let sector = at as usize..(at + LAYOUT.sector_len) as usize;
+        self.0.get_mut(sector).ok_or(Fault)?.fill(0xff);
+        Ok(())
+    }
+
+    async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
+        let words = self.0.get_mut(at as usize..at as usize + bytes.len()).ok_or(Fault)?;
+        words.copy_from_slice(bytes);
+        Ok(())
+    }
+}
+
+// All that is large lies in statics.
+static SHELL: Shell = Shell::new();
+static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
+static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
+static SWARM: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
+static OWN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
+
+/// Brings a companion up and runs it; nothing is uploaded, so it has no mission.
+async fn board() {
+    let mut flash = Ram(vec![0xff; LAYOUT.len() as usize]);
+    let store = Store::mount(LAYOUT, &mut flash);
+    let system_id = hear_system_id(&mut &FROM_AUTOPILOT).await.expect("an autopilot is connected");
+    let nowhere = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+    let settings =
+        Config::new(system_id, Point::zeros(), nowhere).checked().expect("these settings are sound");
+    let companion = BoardCompanion::make_in(COMPANION.uninit(), settings);
+    companion.mount(store);
+    SHELL.start(companion);
+    let memory = Memory { scratch: SCRATCH.take(), swarm: SWARM.take(), own: OWN.take() };
+    let mut planner = Planner { roadmap: None, field: None, mission: None, system_id, files: 0, memory };
+    let links = join5(
+        SHELL.receive(Link::Autopilot, &FROM_AUTOPILOT, false),
+        SHELL.receive(Link::Swarm, &FROM_RADIO, false),
+        SHELL.transmit(Link::Autopilot, &TO_AUTOPILOT),
+        SHELL.transmit(Link::Swarm, &TO_RADIO),
+        SHELL.keep_time(),
+    );
+    join(links, SHELL.work(&mut planner, &mut flash)).await;
+}
+
+/// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is counted.
+async fn autopilot() -> usize {
+    let heartbeat = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
+    let (mut heard, mut bytes) = (0, [0; MAX_SENT]);
+    for sequence in 0..50 {
+        if sequence % 10 == 0 {
+            let header = Header { system: 7, component: AUTOPILOT, sequence };
+            let length = frame::encode(header, &heartbeat, &mut bytes);
+            FROM_AUTOPILOT.write_all(&bytes[..length]).await;
+        }
+        Timer::after(Duration::from_millis(100)).await;
+        while let Ok(length) = TO_AUTOPILOT.try_read(&mut bytes) {
+            heard += length;
+        }
+    }
+    heard
+}
+
+fn main() {
+    let heard = std::cell::Cell::new(0);
+    block_on(select(board(), async { heard.set(autopilot().await) }));
+    assert!(SHELL.is_alive() && heard.get() > 0, "the board lives, and talks to its autopilot");
+    println!("the board sent {} bytes to its autopilot", heard.get());
+}
