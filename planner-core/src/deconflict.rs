@@ -215,14 +215,17 @@ impl Ahead {
         // No more than this do both fly from one look to the next.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
         let looks_a_metre = 1.0 / (self.step_m + LOOK_EVERY_S * fastest_mps);
+        let away = |looks: usize, own: &Point| {
+            n.position + n.velocity * (n.age_s + looks as f32 * LOOK_EVERY_S) - own
+        };
         let mut i = 0;
         while let Some(there) = self.points.get(i) {
-            let after_s = (i + 1) as f32 * LOOK_EVERY_S;
-            let away = n.position + n.velocity * (n.age_s + after_s) - there;
-            if away.norm_squared() < near {
+            let before = if i == 0 { own.position } else { self.points[i - 1] };
+            let (from, to) = (away(i, &before), away(i + 1, there));
+            if least_square(&from, &to) < near {
                 return Some(i as f32 * self.step_m);
             }
-            let least_m = away.x.abs().max(away.y.abs()).max(away.z.abs());
+            let least_m = to.x.abs().max(to.y.abs()).max(to.z.abs());
             let room_m = least_m - apart_m - ROUNDING_M;
             // Not below zero, and 0 where it is no number.
             i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
@@ -231,9 +234,54 @@ impl Ahead {
     }
 }
 
+/// Square of the least distance from the origin on the way from one place to another, the first left out: it was the
+/// last of the way before.
+fn least_square(from: &Point, to: &Point) -> f32 {
+    let step = to - from;
+    let (behind, ahead) = (from.dot(&step), to.dot(&step));
+    if behind < 0.0 && ahead > 0.0 {
+        // Not below zero but by rounding: the square of the height of a triangle.
+        return from.norm_squared() - behind * behind / (ahead - behind);
+    }
+    to.norm_squared()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Against looks a millisecond apart, at closing speeds up to 40 m/s.
+        #[test]
+        fn no_contact_on_a_straight_course_is_missed(
+            cruise_mps in 0.5f32..15.0,
+            meet_s in 0.0f32..4.0,
+            off in proptest::array::uniform3(-1.5f32..1.5),
+            velocity in proptest::array::uniform3(-15.0f32..15.0),
+            age_s in 0.0f32..1.0,
+        ) {
+            let mut path = Path::<4>::new();
+            path.push(Point::zeros(), 1.0).unwrap();
+            path.push(Point::new(100.0, 0.0, 0.0), 1.0).unwrap();
+            let cfg = DeconflictConfig { cruise_mps, ..cfg(Method::Priority) };
+            let velocity = Point::from(velocity);
+            let meet = Point::new(cruise_mps * meet_s, 0.0, 0.0) + Point::from(off);
+            let n = Neighbour { velocity, age_s, ..neighbour(1, 0, meet - velocity * (age_s + meet_s)) };
+            let own = own(&path);
+            let distance = |ms: u32| {
+                let after_s = ms as f32 * 1e-3;
+                (n.position + n.velocity * (age_s + after_s) - Point::new(cruise_mps * after_s, 0.0, 0.0)).norm()
+            };
+            prop_assume!(distance(0) > cfg.safety_distance_m);
+            let contact = (0..4000).find(|&ms| distance(ms) < cfg.safety_distance_m - 0.01);
+            let found = Ahead::new(&cfg, &own).first_contact(&cfg, &own, &n);
+            if let Some(ms) = contact {
+                let within_m = found.expect("a contact is found");
+                prop_assert!(within_m <= cruise_mps * ms as f32 * 1e-3 + 1e-3);
+            }
+        }
+    }
 
     fn cfg(method: Method) -> DeconflictConfig {
         DeconflictConfig { method, safety_distance_m: 1.5, cruise_mps: 2.0, accel_mps2: 1.5 }
