@@ -45,6 +45,8 @@ pub struct Board {
     pub vehicles: usize,
     /// Gates of one vehicle.
     pub gates: usize,
+    /// Timed segments among which a vehicle steps aside.
+    pub pieces: usize,
     /// Bytes of a roadmap file.
     pub roadmap_bytes: usize,
     /// Vertices of an area.
@@ -60,31 +62,32 @@ const fn roadmap_bytes(layout: &Layout) -> usize {
     (layout.slot_len - DATA_AT) as usize
 }
 
-const NUCLEO_H743: Board = Board {
+/// The default board.
+pub const NUCLEO_H743: Board = Board {
     name: "nucleo-h743",
     nodes: 4096,
     half_edges: 65_536,
     vehicles: 32,
     gates: 128,
+    pieces: 2048,
     roadmap_bytes: roadmap_bytes(&Layout::H743),
     vertices: 256,
     lanes: 512,
 };
 
+/// The smaller board, with half the memory.
+pub const HALF: Board = Board {
+    name: "pico2",
+    nodes: 2048,
+    half_edges: 32_768,
+    vehicles: 16,
+    roadmap_bytes: roadmap_bytes(&Layout::PICO2),
+    lanes: 256,
+    ..NUCLEO_H743
+};
+
 /// All boards; the first holds the most.
-pub const BOARDS: [Board; 3] = [
-    NUCLEO_H743,
-    Board { name: "qemu", ..NUCLEO_H743 },
-    Board {
-        name: "pico2",
-        nodes: 2048,
-        half_edges: 32_768,
-        vehicles: 16,
-        roadmap_bytes: roadmap_bytes(&Layout::PICO2),
-        lanes: 256,
-        ..NUCLEO_H743
-    },
-];
+pub const BOARDS: [Board; 3] = [NUCLEO_H743, Board { name: "qemu", ..NUCLEO_H743 }, HALF];
 
 impl Board {
     /// The board of this name.

@@ -1,6 +1,6 @@
 //! Command line of `host-sim`.
 
-use std::io::IsTerminal as _;
+use std::io::{IsTerminal as _, Write as _};
 use std::process::ExitCode;
 
 use anyhow::bail;
@@ -53,7 +53,8 @@ fn main() -> ExitCode {
     // Results that nobody could read are none.
     let done = done.and_then(|code| progress::printed().map(|()| code));
     done.unwrap_or_else(|error| {
-        eprintln!("error: {}", quote::message(&format!("{error:#}")));
+        // Where that cannot be printed either, the exit code says it.
+        let _ = writeln!(std::io::stderr(), "error: {}", quote::message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
     })
 }

@@ -1,6 +1,7 @@
 //! From a scenario to what is flown: the map on the planning grid, the roadmap, and the request every companion plans.
 
 mod coverage;
+mod on_board;
 mod places;
 mod ready;
 pub mod stretches;
@@ -13,12 +14,12 @@ use companion::{PlanFailure, Wanted};
 use planner_core::Point;
 use planner_core::detour::{self, DetourError, DetourRequest, KeepOff};
 use planner_core::flight::{PathError, Task};
-use planner_core::plan::{self, PlanError, PlanRequest};
+use planner_core::plan::{self, PlanError};
 use planner_core::schedule::ScheduleError;
 use planner_core::search::SearchWorkspace;
 
+use self::ready::schedule_config;
 pub use self::ready::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
-use self::ready::{planner_mode, schedule_config};
 use crate::capacity::{Board, DeskCompanion, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::check_ground;
 use crate::map::{self, VoxelMap};
@@ -126,13 +127,7 @@ impl Mission {
             return Ok(plan);
         }
         let view = self.view();
-        let request = PlanRequest {
-            vehicles: &self.tasks,
-            descents_m: &self.descents_m,
-            mode: planner_mode(&self.scenario.mission),
-            schedule: self.schedule,
-            gates_most: self.board.map_or(GATES, |board| board.gates),
-        };
+        let request = self.request(self.gates_most());
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
         let mut goals = plan::Goals::new();
@@ -149,6 +144,11 @@ impl Mission {
         Ok(plan)
     }
 
+    /// Gates that one vehicle may have.
+    fn gates_most(&self) -> usize {
+        self.board.map_or(GATES, |board| board.gates)
+    }
+
     fn describe(&self, error: &PlanError) -> anyhow::Error {
         let path = &self.scenario.path;
         match error {
@@ -159,9 +159,15 @@ impl Mission {
                     .into())
             ),
             PlanError::Schedule(id, ScheduleError::GatesFull) => {
-                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {GATES} gates")
+                let most = self.gates_most();
+                anyhow!("vehicle {id} meets too many others: {path}: its plan holds at most {most} gates")
             }
-            PlanError::Schedule(id, ScheduleError::PiecesFull) | PlanError::Path(id, PathError::PathFull) => {
+            PlanError::Schedule(id, ScheduleError::PiecesFull) => {
+                anyhow!(
+                    "vehicle {id} meets too many others: {path}: the swarm has at most {PIECES} timed segments"
+                )
+            }
+            PlanError::Path(id, PathError::PathFull) => {
                 anyhow!(
                     "the flight of vehicle {id} is too long: {path}: a path holds at most {WAYPOINTS} waypoints\n\
                      hint: a larger roadmap.edge_max_m makes fewer of them"

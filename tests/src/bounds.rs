@@ -24,7 +24,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("frames::haversine_m", "constant"),
     ("frames::geodetic_to_ned", "constant"),
     ("frames::ned_to_geodetic", "constant"),
-    ("voxel::VoxelGrid::new", "constant"),
+    ("voxel::VoxelGrid::new", "words of the map"),
     ("voxel::VoxelGrid::is_blocked_at", "constant"),
     ("segment::segment_is_clear, 0 m", "cells along d"),
     ("segment::segment_is_clear, 0.8 m", "cells within the clearance of d"),

@@ -4,6 +4,8 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 use std::time::Instant;
 
+use anyhow::bail;
+
 use super::load;
 use crate::capacity::{BOARDS, Board, WAYPOINTS};
 use crate::files::Results;
@@ -41,6 +43,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let mut results = Results::open(&args.out, &[&output::NAMES[..], &names].concat())?;
     let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
+    if let Some((board, why)) = args.board.and_then(|board| Some((board, mission.excess(&plan, board)?))) {
+        bail!("the mission does not fit {}: {}: {why}", board.name, mission.scenario.path);
+    }
     let result = planned(&mission, &plan);
     let page = output::planned_page(&mission, &plan, &result)?;
     mission.timing.wall_s = began.elapsed().as_secs_f64();

@@ -3,7 +3,7 @@
 use std::sync::OnceLock;
 
 use anyhow::anyhow;
-use companion::storage::mission_file::{self, Block, Kind, MissionHeader, MissionVehicle, MissionView};
+use companion::storage::mission_file::{self, Block, MissionHeader, MissionVehicle, MissionView};
 use planner_core::Point;
 use planner_core::flight::VehiclePlan;
 use planner_core::frames::{Geodetic, enu_to_geodetic};
@@ -128,19 +128,6 @@ impl Mission {
             edges: self.roadmap.edges.len(),
             bytes: self.roadmap_file.len(),
         }
-    }
-
-    /// What of the files is more than a board holds: the first limit that is exceeded.
-    pub fn excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
-        let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
-        let mission = self.mission_view();
-        let files = match mission.kind() {
-            Kind::Goals => board.roadmap_excess(&self.view()),
-            Kind::Coverage(area) => self.area_excess(area, board),
-        };
-        files
-            .or_else(|| board.mission_excess(&mission))
-            .or_else(|| board.gates_excess((0..self.tasks.len()).map(gates).max().unwrap_or(0)))
     }
 
     /// Place of a vehicle in the scenario.

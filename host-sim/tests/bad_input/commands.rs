@@ -1,8 +1,8 @@
 //! Command lines: arguments left out, doubled and garbled, links that are none, results that cannot be written.
 
-use crate::{Cases, Output, scenarios};
+use crate::{Cases, Output, areas, scenarios};
 
-/// Every command with what it needs; `S` stands for a scenario, `O` for results.
+/// Every command with what it needs; `S` stands for a scenario, `A` for one with an area, `O` for results.
 const COMMANDS: &[&[&str]] = &[
     &["demo", "--out", "O"],
     &["map", "info", "builtin:building"],
@@ -11,6 +11,8 @@ const COMMANDS: &[&[&str]] = &[
     &["roadmap", "info", "S"],
     &["plan", "S", "--out", "O"],
     &["fly", "S", "--out", "O"],
+    &["cover", "A", "--out", "O"],
+    &["paper", "cpp", "--out", "O"],
     &["autopilot", "--listen", "udp-listen:127.0.0.1:0"],
     &["companion", "S", "--autopilot", "udp:127.0.0.1:9", "--id", "1"],
     &["upload", "S", "--link", "udp:127.0.0.1:9"],
@@ -19,6 +21,7 @@ const COMMANDS: &[&[&str]] = &[
 
 pub fn add(cases: &mut Cases) {
     let scenario = cases.file("toml", scenarios::good().as_bytes());
+    let area = cases.file("toml", areas::good().as_bytes());
     for (number, command) in COMMANDS.iter().enumerate() {
         let name = command[..command.len().min(2)].join(" ");
         let out = cases.out();
@@ -27,6 +30,8 @@ pub fn add(cases: &mut Cases) {
             .map(|arg| {
                 if *arg == "S" {
                     scenario.clone()
+                } else if *arg == "A" {
+                    area.clone()
                 } else {
                     arg.replacen('O', &out, usize::from(arg.starts_with('O')))
                 }
@@ -48,7 +53,7 @@ pub fn add(cases: &mut Cases) {
     for (name, args) in [
         ("no command", &[][..]),
         ("an unknown command", &["flyy"]),
-        ("a command to come", &["cover"]),
+        ("cover alone", &["cover"]),
         ("map alone", &["map"]),
         ("map of nothing", &["map", "show"]),
         ("roadmap alone", &["roadmap"]),
@@ -140,7 +145,9 @@ fn add_outputs(cases: &mut Cases, scenario: &str) {
             );
         }
     }
-    for (name, output) in [("full", Output::Full), ("closed", Output::Closed)] {
+    for (name, output) in
+        [("full", Output::Full), ("closed", Output::Closed), ("and errors full", Output::AllFull)]
+    {
         for (command, args) in [
             ("help", &["--help"][..]),
             ("version", &["--version"]),

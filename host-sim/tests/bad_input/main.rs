@@ -5,6 +5,7 @@
 //! format cut and flipped. Each runs in a process of its own with a limit of 1 GB.
 #![cfg(target_os = "linux")]
 
+mod areas;
 mod commands;
 mod files;
 mod scenarios;
@@ -33,6 +34,8 @@ enum Output {
     Full,
     /// A pipe whose reader has gone.
     Closed,
+    /// A disk without room, for errors too.
+    AllFull,
 }
 
 /// One wrong input.
@@ -94,11 +97,16 @@ fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> 
     // Of address space, which every thread reserves for itself.
     child.env("RAYON_NUM_THREADS", "2").env("MALLOC_ARENA_MAX", "2");
     child.stdout(match case.output {
-        Output::Full => std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into(),
+        Output::Full | Output::AllFull => {
+            std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap().into()
+        }
         Output::Pipe => Stdio::piped(),
         // Closed before the program begins.
         Output::Closed => std::io::pipe().unwrap().1.into(),
     });
+    if let Output::AllFull = case.output {
+        child.stderr(std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap());
+    }
     let mut child = child.spawn().unwrap();
     let reader = child.stdout.take();
     let status = loop {
@@ -124,6 +132,9 @@ fn judge(case: &Case, folder: &Path, number: usize) -> Result<Duration, String> 
     }
     if !printed.is_empty() {
         return fail("something was printed");
+    }
+    if let Output::AllFull = case.output {
+        return Ok(took);
     }
     let lines: Vec<&str> = text.lines().collect();
     let errors = lines.iter().filter(|line| line.starts_with("error: ")).count();
@@ -157,6 +168,7 @@ fn wrong_inputs_end_soon_with_one_short_line() {
     let mut cases = Cases { folder: folder.path().into(), cases: Vec::new(), files: 0 };
     scenarios::add(&mut cases);
     files::add(&mut cases);
+    areas::add(&mut cases);
     commands::add(&mut cases);
     let cases = cases.cases;
     let names: BTreeSet<&str> = cases.iter().map(|case| &*case.name).collect();

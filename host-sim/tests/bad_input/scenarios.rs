@@ -103,7 +103,7 @@ pub fn good() -> String {
 }
 
 /// Values that are wrong where a value like `good` is right.
-fn wrong(good: &str) -> &'static [&'static str] {
+pub fn wrong(good: &str) -> &'static [&'static str] {
     match good.as_bytes()[0] {
         b'"' => &["\"\"", "\"no such word\"", "\"a\\u001b[31m\\u202Eb\"", "3", "[]", "{ a = 1 }"],
         b'[' if good.starts_with("[[") => &["[]", "[[1, 2]]", "[[1, 2, nan]]", "\"x\"", "[[1e9, 0, 0]]", "7"],

@@ -5,6 +5,7 @@
 use companion::storage::store::{Fault, Layout, ReadFlash, WORD};
 use embassy_time::{Duration, Timer};
 
+use super::memory::Bank2;
 use crate::lent::{Lender, Lent};
 
 /// Where the bank lies.
@@ -32,6 +33,7 @@ pub struct Flash(Lender);
 impl Flash {
     /// To be called once, at the start: the bank is empty if the power was off.
     pub(super) fn new() -> Self {
+        assert!(Bank2::Programmed.claim(), "bank 2 is read as it lies, for measurements");
         // SAFETY: memory of this board; nobody else uses it yet.
         unsafe {
             if (MADE as *const u32).read_volatile() != MAGIC {

@@ -1,7 +1,7 @@
 //! What lies in memory beside the program.
 #![expect(unsafe_code, reason = "memory that the linker knows nothing of")]
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// Where `-device loader` puts a map for measurements: beyond all that the firmware uses.
 const MAP: usize = 0x6080_0000;
@@ -14,9 +14,30 @@ const BANK2: usize = 0x6000_0000;
 /// Its length.
 pub const BANK2_LEN: usize = 1 << 20;
 
-/// Bank 2, while nobody writes to it.
+/// What bank 2 is for, for good: it is either read as a whole, or programmed by the flash's driver.
+#[derive(Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub(super) enum Bank2 {
+    Read = 1,
+    Programmed,
+}
+
+impl Bank2 {
+    /// Whether it is for this: the first to ask decides.
+    pub(super) fn claim(self) -> bool {
+        static CLAIMED: AtomicU8 = AtomicU8::new(0);
+        let before = CLAIMED.compare_exchange(0, self as u8, Ordering::Relaxed, Ordering::Relaxed);
+        before.map_or_else(|claimed| claimed == self as u8, |_| true)
+    }
+}
+
+/// Bank 2, for measurements.
+///
+/// # Panics
+/// The flash's driver was started: it programs the bank.
 pub fn bank2() -> &'static [u8] {
-    // SAFETY: readable memory; only `measure` calls this, and writes nothing there.
+    assert!(Bank2::Read.claim(), "bank 2 belongs to the flash's driver");
+    // SAFETY: readable memory that nobody writes to: the flash's driver does not start any more.
     unsafe { core::slice::from_raw_parts(BANK2 as *const u8, BANK2_LEN) }
 }
 

@@ -1,0 +1,79 @@
+//! Whether a board that gets the files plans what the desk planned: it searches with less memory, so it may find no plan, or
+//! another one, with which it would take off with nobody.
+
+use companion::storage::mission_file::Kind;
+use planner_core::flight::PathError;
+use planner_core::plan::{self, PlanError, PlanRequest, PlanWorkspace};
+use planner_core::schedule::ScheduleError;
+
+use super::ready::{Mission, SwarmPlan, planner_mode};
+use crate::capacity::{Board, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
+
+impl Mission {
+    /// What of the mission is more than a board holds: the first limit that is exceeded.
+    pub fn excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
+        let mission = self.mission_view();
+        let of_mission = || board.mission_excess(&mission);
+        match mission.kind() {
+            Kind::Goals => board
+                .roadmap_excess(&self.view())
+                .or_else(of_mission)
+                .or_else(|| self.plan_excess(plan, board)),
+            Kind::Coverage(area) => {
+                let gates = |i| self.own_plan(plan, i).map_or(usize::MAX, |own| own.gates.len());
+                let most = (0..self.tasks.len()).map(gates).max().unwrap_or(0);
+                self.area_excess(area, board).or_else(of_mission).or_else(|| board.gates_excess(most))
+            }
+        }
+    }
+
+    /// What the swarm's planner is asked, for vehicles with room for `gates_most`.
+    pub(super) fn request(&self, gates_most: usize) -> PlanRequest<'_> {
+        PlanRequest {
+            vehicles: &self.tasks,
+            descents_m: &self.descents_m,
+            mode: planner_mode(&self.scenario.mission),
+            schedule: self.schedule,
+            gates_most,
+        }
+    }
+
+    /// What hinders a board from planning the same.
+    fn plan_excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
+        let planned = if board.nodes == NUCLEO_H743.nodes {
+            self.crc_on::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(board)
+        } else {
+            self.crc_on::<{ HALF.nodes }, { HALF.vehicles }, { HALF.pieces }>(board)
+        };
+        let name = board.name;
+        match planned {
+            Ok(crc) if crc == plan.crc => None,
+            Ok(_) => Some(format!("with the memory of {name} another plan is found")),
+            Err(PlanError::Schedule(id, ScheduleError::GatesFull)) => Some(format!(
+                "vehicle {id} meets too many others, {name} holds {} gates of one vehicle",
+                board.gates
+            )),
+            Err(PlanError::Schedule(id, ScheduleError::PiecesFull | ScheduleError::Blocked)) => {
+                Some(format!(
+                    "no schedule for vehicle {id} with the {} timed segments that {name} holds",
+                    board.pieces
+                ))
+            }
+            Err(PlanError::Path(id, PathError::PathFull)) => {
+                Some(format!("the flight of vehicle {id} is too long, {name} holds {WAYPOINTS} waypoints"))
+            }
+            Err(other) => Some(format!("{name} finds no plan: {other:?}")),
+        }
+    }
+
+    /// The CRC of the plan that is found with the memory of a board.
+    fn crc_on<const N: usize, const V: usize, const P: usize>(
+        &self,
+        board: &Board,
+    ) -> Result<u32, PlanError> {
+        let mut workspace = on_heap(PlanWorkspace::<N, V, P>::new);
+        let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
+        plan::plan_swarm(&self.view(), &self.request(board.gates), &mut workspace, &mut plan)?;
+        Ok(plan.crc)
+    }
+}
