@@ -8,7 +8,7 @@ use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::Context as _;
-use tempfile::NamedTempFile;
+use tempfile::{NamedTempFile, TempPath};
 
 use crate::quote::quoted_path;
 
@@ -137,17 +137,46 @@ impl Results {
         self.add(&path.file_name().unwrap_or_default().to_string_lossy(), bytes)
     }
 
-    /// Gives every file its name.
+    /// Gives every file its name. Where one cannot have it, what was there before comes back.
     ///
     /// # Errors
     /// One of them cannot be renamed.
     pub fn keep(mut self) -> anyhow::Result<()> {
-        for (file, target) in self.files.drain(..) {
-            file.persist(&target).with_context(|| format!("cannot write: {}", quoted_path(&target)))?;
-            self.made.clear();
+        let files = std::mem::take(&mut self.files);
+        let mut replaced = Vec::new();
+        for (file, target) in files {
+            let before = self.set_aside(&target);
+            let kept = before.and_then(|before| {
+                replaced.push((target.clone(), before));
+                file.persist(&target).map(drop).map_err(|error| error.error)
+            });
+            if let Err(error) = kept {
+                replaced.into_iter().rev().for_each(|(target, before)| put_back(&target, before));
+                return Err(error).with_context(|| format!("cannot write: {}", quoted_path(&target)));
+            }
         }
+        self.made.clear();
         Ok(())
     }
+
+    /// What has a name now, under another one until all is kept; it is gone when that is dropped.
+    fn set_aside(&self, target: &Path) -> io::Result<Option<TempPath>> {
+        if !target.try_exists()? {
+            return Ok(None);
+        }
+        let aside = tempfile::Builder::new().prefix(".flockmate-").tempfile_in(&self.dir)?.into_temp_path();
+        fs::rename(target, &aside)?;
+        Ok(Some(aside))
+    }
+}
+
+/// Undoes the keeping of one file.
+fn put_back(target: &Path, before: Option<TempPath>) {
+    // What cannot be undone stays as it is: the error says that the results are not whole.
+    let _ = match before {
+        Some(before) => before.persist(target).map_err(|error| error.error),
+        None => fs::remove_file(target),
+    };
 }
 
 impl Drop for Results {
@@ -193,6 +222,18 @@ mod tests {
         results.keep().unwrap();
         let names: Vec<_> = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!((names.len(), fs::read(out.join("two")).unwrap()), (2, b"2".to_vec()));
+
+        // One that cannot have its name, here since a folder has it by now, leaves all that was there before.
+        let mut results = Results::open(&out, &["one", "three", "last"]).unwrap();
+        for name in ["one", "three", "last"] {
+            results.add(name, b"new").unwrap();
+        }
+        fs::create_dir_all(out.join("last/full")).unwrap();
+        assert!(results.keep().is_err());
+        assert_eq!(fs::read(out.join("one")).unwrap(), b"1");
+        assert!(!out.join("three").exists() && out.join("last/full").is_dir());
+        assert_eq!(fs::read_dir(&out).unwrap().count(), 3, "one, two, and the folder");
+        fs::remove_dir_all(out.join("last")).unwrap();
 
         // Another run that fails leaves the results of the first.
         let mut results = Results::open(&out, &["one", "two"]).unwrap();
