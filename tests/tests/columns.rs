@@ -7,7 +7,7 @@ use flockmate_tests::shared_data;
 use host_sim::map::{self, Occupancy, OccupancyMap};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::{scenario, swarm};
+use host_sim::{scenario, shortage, swarm};
 use planner_core::Point;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -43,6 +43,8 @@ const CASES: [Case; 4] = [
         edge_max_m: 0.5,
     },
 ];
+/// Nodes of a roadmap, and more where these find no way.
+const NODES: [usize; 2] = [1500, 6000];
 /// Missions a map, where nothing else is asked for.
 const MISSIONS: usize = 3;
 
@@ -109,7 +111,8 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         let fits = case.margin_m >= RTK_ERROR_M;
         let (estimator, cruise_mps) = if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
-        let (mut planned, mut flown, mut contacts, mut refused, mut hints) = (0, 0, 0, 0, 0);
+        let (mut planned, mut flown, mut walled_off, mut missed) = (0, 0, 0, 0);
+        let (mut contacts, mut refused, mut hints) = (0, 0, 0);
         for mission in 0..missions {
             let (mut clear, mut other) = (Vec::new(), None);
             for _ in 0..20_000 {
@@ -126,10 +129,10 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             let ([start, goal], Some(other)) = (&clear[..], other) else {
                 panic!("{}: {} clear columns, another: {other:?}", case.file, clear.len())
             };
-            let prepare = |start: &Point, goal: &Point| {
+            let prepare = |start: &Point, goal: &Point, nodes: usize| {
                 let text = format!(
                     "seed = {mission}\n[map]\nfile = {file:?}\nresolution_m = {}\n\
-                     [roadmap]\nnodes = 1500\nedge_min_m = 0.05\nedge_max_m = {}\nsafety_margin_m = {}\n\
+                     [roadmap]\nnodes = {nodes}\nedge_min_m = 0.05\nedge_max_m = {}\nsafety_margin_m = {}\n\
                      [mission]\nmode = \"labelled\"\ncruise_mps = {cruise_mps}\ngoals = [[{}, {}, {}]]\n\
                      [deconfliction]\nsafety_distance_m = 0.8\n\
                      [[vehicles]]\nid = 1\nstart = [{}, {}, {}]\nradius_m = {}\ngoal = 0\n",
@@ -149,15 +152,28 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 Mission::prepare(scenario, &Progress::hidden())
             };
             for (start, goal) in [(&other, goal), (start, &other)] {
-                let error =
-                    prepare(start, goal).map(|_| ()).expect_err("its column is not clear").to_string();
+                let error = prepare(start, goal, NODES[0])
+                    .map(|_| ())
+                    .expect_err("its column is not clear")
+                    .to_string();
                 refused += 1;
                 hints += usize::from(error.contains("the nearest place that would do is"));
             }
-            let Ok(mut mission) = prepare(start, goal) else { continue };
-            let Ok(plan) = mission.plan() else { continue };
-            planned += 1;
+            // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
+            let plans = NODES.iter().map_while(|&nodes| {
+                let mut mission = prepare(start, goal, nodes).ok()?;
+                let plan = mission.plan().ok()?;
+                let lines = shortage::lines(&mission, &plan);
+                Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
+            });
+            let plans: Vec<_> = plans.collect();
+            planned += usize::from(!plans.is_empty());
+            let Some((_, mission, plan)) = plans.into_iter().find(|(lacks_nodes, ..)| !lacks_nodes) else {
+                missed += 1;
+                continue;
+            };
             if !plan.flights[0].task.flies() {
+                walled_off += 1;
                 continue;
             }
             let result =
@@ -166,11 +182,21 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             flown += 1;
         }
         println!(
-            "{}: {planned} of {missions} clear missions planned, {flown} flown, {contacts} contacts; {refused} others \
-             refused, {hints} with a place nearby",
-            case.file
+            "{}: {planned} of {missions} clear missions accepted: {flown} flown, {walled_off} without a way between on the \
+             map itself, {missed} with one that a roadmap of {} nodes lacks; {contacts} contacts; {refused} others refused, \
+             {hints} with a place nearby",
+            case.file, NODES[1]
         );
         assert!(100 * planned >= 99 * missions, "{}", case.file);
         assert_eq!(contacts, 0, "{}", case.file);
     }
+}
+
+/// The fifth scan is of a few rays: all beside them is unknown, so nothing stands anywhere.
+#[test]
+fn a_map_of_a_few_rays_has_no_clear_column() {
+    let Some(file) = shared_data("maps3d/wkentaro_test.bt") else { return };
+    let map = map::load(file.to_str().unwrap(), 0.1).unwrap();
+    let mut rng = Pcg32::seed_from_u64(1);
+    assert!((0..2000).all(|_| !is_clear(&map, &place(&map, &mut rng), 0.03, 0.05)));
 }
