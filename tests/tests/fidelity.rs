@@ -36,6 +36,32 @@ fn plain_flights_do_not_need_the_recorded_errors_to_come_near() {
 }
 
 #[test]
+fn setpoints_as_they_were_sent_are_flown_as_recorded_under_the_recorded_errors() {
+    for (recording, allowed_m) in plain() {
+        let c = recording.compare(Estimator::Recorded, Correction::Recorded);
+        let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
+        println!("{name}");
+        assert!(c.whole.rms <= allowed_m.min(0.25), "{name}");
+        assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
+        let in_follow_m = if recording.autopilot == Personality::Ardupilot { 0.08 } else { 0.2 };
+        assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
+    }
+}
+
+#[test]
+fn errors_of_another_flight_with_the_same_noise_do_as_well() {
+    // Nothing of the flight itself but its setpoints, and yet far nearer than without errors.
+    for recording in recordings("a_lobby") {
+        for other in ["a_demo", "x_drift_demo"].iter().flat_map(|run| recordings(run)) {
+            let alike = recording.err_alike(&other);
+            let c = recording.compare(Estimator::Of(&other), Correction::Recorded);
+            println!("{}: {alike:.2} {c:.2?}", other.run);
+            assert!(alike >= 0.8 && c.whole.rms <= 0.3, "{}: {alike} {c:?}", other.run);
+        }
+    }
+}
+
+#[test]
 fn setpoints_as_they_were_sent_bring_it_as_near_as_real_flights_repeat() {
     for (recording, _) in plain() {
         let c = recording.compare(Estimator::Perfect, Correction::Recorded);

@@ -1,10 +1,10 @@
 //! How nearly a simulated autopilot flies what a real one flew: recorded setpoints and commands are replayed into it, and where it
 //! believes to be is compared with the recorded *estimate*, from arming to disarming.
 //!
-//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate moves the vehicle: a replay either
-//! imposes the recorded errors (estimate minus truth) on the simulated estimate, or flies without any. And the companion answered
-//! that wandering in the accelerations it sent: a replay either sends those, or what the same law sends beside the simulated vehicle
-//! ([`Correction`]).
+//! Two things of a PX4 recording are no property of the autopilot. The wandering of its estimate moves the vehicle: a replay
+//! imposes the recorded errors (estimate minus truth) on the simulated estimate, or those of another flight, or flies without any
+//! ([`Estimator`]). And the companion answered that wandering in the accelerations it sent: a replay either sends those, or what the
+//! same law sends beside the simulated vehicle ([`Correction`]).
 //!
 //! The recordings are `data/flights/*.csv` of the shared data, described by the README beside them. Positions are NED
 //! metres about the vehicle's EKF origin, times are seconds of the wall clock.
@@ -13,11 +13,14 @@ mod read;
 mod recording;
 mod replay;
 
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 use self::read::read;
 pub use self::recording::{Recording, Sample};
 use crate::shared_data;
+
+/// East and north.
+type Across = Vector2<f64>;
 
 /// The recorded runs.
 pub const RUNS: [&str; 15] = [
@@ -38,12 +41,14 @@ pub const RUNS: [&str; 15] = [
     "f_ppa",
 ];
 /// What is wrong with the simulated estimate in a replay.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Estimator {
+#[derive(Clone, Copy, Debug)]
+pub enum Estimator<'a> {
     /// Nothing.
     Perfect,
     /// What was wrong with the recorded one.
     Recorded,
+    /// What was wrong in another recorded flight at the same times: nothing of this one is known.
+    Of(&'a Recording),
 }
 
 /// Whose estimate the accelerations of the replayed setpoints answer.
@@ -59,7 +64,8 @@ pub enum Correction {
     Simulated,
 }
 
-/// What a plain flight may differ by under the recorded errors, RMS metres; `None` where a person or a failsafe took the vehicle.
+/// What a plain flight may differ by under the recorded errors, its setpoints as they were sent, RMS metres; `None` where a person
+/// or a failsafe took the vehicle.
 pub fn allowed_m(recording: &Recording) -> Option<f64> {
     match recording.run.as_str() {
         "a_demo" => Some(0.45),
@@ -121,16 +127,37 @@ impl Recording {
         (squares / f64::from(n)).sqrt()
     }
 
-    /// How far the recorded errors alone move a replay: RMS, metres. So far a replay without them is off the recording, however
+    /// How far errors of the estimate alone move a replay: RMS, metres. So far a replay without them is off the recording, however
     /// well the autopilot is simulated.
-    pub fn moved(&self, correction: Correction) -> f64 {
-        let [with, without] =
-            [Estimator::Recorded, Estimator::Perfect].map(|errors| self.replay(errors, correction));
+    pub fn moved(&self, errors: Estimator<'_>, correction: Correction) -> f64 {
+        let [with, without] = [errors, Estimator::Perfect].map(|errors| self.replay(errors, correction));
         Difference::of(with.iter().zip(&without).map(|(a, b)| (a.position - b.position).norm())).rms
     }
 
+    /// How much the estimates of two flights erred alike across at the same times: coefficient of correlation. PX4's SIH draws the
+    /// noise of its sensors from `rand()` without a seed: it repeats in another flight, unless threads drew in another order.
+    pub fn err_alike(&self, other: &Self) -> f64 {
+        let (own, others) = (self.errors(), other.errors());
+        let mut later = others.as_slice();
+        let mut pairs = Vec::new();
+        for (t_s, error, _) in &own {
+            while later.len() > 1 && later[1].0 <= *t_s {
+                later = &later[1..];
+            }
+            if later.first().is_some_and(|(at_s, ..)| (t_s - at_s).abs() < 0.1) {
+                pairs.push((error.xy().cast::<f64>(), later[0].1.xy().cast::<f64>()));
+            }
+        }
+        let n = pairs.len() as f64;
+        let mean = |of: &dyn Fn(&(Across, Across)) -> Across| pairs.iter().map(of).sum::<Across>() / n;
+        let (a, b) = (mean(&|p| p.0), mean(&|p| p.1));
+        let product = |of: &dyn Fn(&(Across, Across)) -> f64| pairs.iter().map(of).sum::<f64>();
+        let both = product(&|p| (p.0 - a).dot(&(p.1 - b)));
+        both / (product(&|p| (p.0 - a).norm_squared()) * product(&|p| (p.1 - b).norm_squared())).sqrt()
+    }
+
     /// Replays and compares.
-    pub fn compare(&self, estimator: Estimator, correction: Correction) -> Comparison {
+    pub fn compare(&self, estimator: Estimator<'_>, correction: Correction) -> Comparison {
         let simulated = self.replay(estimator, correction);
         let pairs: Vec<_> = self.flown().zip(&simulated).collect();
         let apart = |(a, b): &(&Sample, &Sample)| (a.position - b.position).norm();

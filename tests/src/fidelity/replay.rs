@@ -71,8 +71,12 @@ impl Recording {
     ///
     /// # Panics
     /// None for a recording that was read.
-    pub fn replay(&self, estimator: Estimator, correction: Correction) -> Vec<Sample> {
-        let errors = if estimator == Estimator::Recorded { self.errors() } else { Vec::new() };
+    pub fn replay(&self, estimator: Estimator<'_>, correction: Correction) -> Vec<Sample> {
+        let errors = match estimator {
+            Estimator::Perfect => Vec::new(),
+            Estimator::Recorded => self.errors(),
+            Estimator::Of(other) => other.errors(),
+        };
         let mut errors = errors.iter().peekable();
         let (mut first, mut last) = (None, (0.0, Point::zeros()));
         let config = self.config();

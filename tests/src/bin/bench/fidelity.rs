@@ -1,14 +1,19 @@
 //! Simulated autopilots beside the recorded ones: recorded setpoints replayed, estimates compared.
 //!
-//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded errors of the estimate, "theirs"
-//! what is allowed. Flights in which a person or a failsafe took the vehicle are printed and not rated: each error of theirs adds up
-//! in what follows.
+//! In these rows "ours" is the difference from arming to disarming (RMS, metres) under the recorded errors of the estimate, the
+//! setpoints as they were sent, "theirs" what is allowed. Flights in which a person or a failsafe took the vehicle are printed and
+//! not rated: each error of theirs adds up in what follows.
 
 use flockmate_tests::fidelity::{
     Comparison, Correction, Difference, Estimator, RUNS, Recording, allowed_m, recordings,
 };
+use sim_autopilot::Personality;
 
 use crate::row::Row;
+
+const HEADER: &str = "RMS / greatest difference, metres. Setpoints as they were sent, under the recorded errors of the estimate; \
+\n\"closed\": accelerations as the recorded companion would have sent them beside the simulated vehicle; \"without\" errors; \
+\nand by how much the errors move a replay of the setpoints as they were sent";
 
 /// Flights of the same mission, by run and vehicle.
 const TWINS: [[(&str, usize); 2]; 3] = [
@@ -19,26 +24,22 @@ const TWINS: [[(&str, usize); 2]; 3] = [
 
 /// A row a plain flight; prints what makes it up.
 pub fn rows() -> Vec<Row> {
+    println!("{HEADER}");
     println!(
-        "RMS / greatest difference, metres: under the recorded errors of the estimate; without errors; without errors and with"
-    );
-    println!(
-        "the accelerations as they were sent, which answer the recorded errors; and by how much the errors move these two"
-    );
-    println!(
-        "{:20} {:>13} {:>13} {:>13} {:>13} {:>14} {:>13} {:>14}",
+        "{:20} {:>13} {:>13} {:>13} {:>13} {:>14} {:>14} {:>13} {:>14}",
         "recorded flight",
         "whole",
         "in Follow",
         "height up",
         "height down",
-        "without errors",
-        "as sent",
+        "closed",
+        "without, closed",
+        "without",
         "errors move"
     );
     let mut rows = Vec::new();
     for recording in RUNS.iter().flat_map(|run| recordings(run)) {
-        let c = recording.compare(Estimator::Recorded, Correction::Simulated);
+        let c = recording.compare(Estimator::Recorded, Correction::Recorded);
         print(&recording, &c);
         let Some(allowed_m) = allowed_m(&recording) else { continue };
         rows.push(Row {
@@ -62,17 +63,45 @@ pub fn rows() -> Vec<Row> {
             );
         }
     }
+    print_others();
     rows
+}
+
+/// PX4's plain flights under the errors of each flight that lasts as long: how alike both erred, how far the replay is off the
+/// recording, and how far these errors move it.
+fn print_others() {
+    println!(
+        "under the errors of another flight: correlation of the errors; off the recording; moved by them"
+    );
+    let all: Vec<Recording> = RUNS.iter().flat_map(|run| recordings(run)).collect();
+    let px4 = || all.iter().filter(|r| r.autopilot == Personality::Px4);
+    for recording in px4().filter(|r| allowed_m(r).is_some()) {
+        print!("{:20}", format!("{} {}", recording.run, recording.vehicle));
+        let lasts = |r: &&Recording| r.armed_s.1 >= recording.armed_s.1 - 3.0;
+        for other in px4().filter(lasts).filter(|r| !core::ptr::eq(*r, recording)) {
+            let errors = Estimator::Of(other);
+            print!(
+                "  {} {}: {:.2}; {:.2}; {:.2}",
+                other.run,
+                other.vehicle,
+                recording.err_alike(other),
+                recording.compare(errors, Correction::Recorded).whole.rms,
+                recording.moved(errors, Correction::Recorded)
+            );
+        }
+        println!();
+    }
 }
 
 fn print(recording: &Recording, c: &Comparison) {
     print!("{:20}", format!("{} {}", recording.run, recording.vehicle));
-    let without = |correction| recording.compare(Estimator::Perfect, correction).whole;
-    let [closed, sent] = [Correction::Simulated, Correction::Recorded].map(without);
-    for part in [&c.whole, &c.follow, &c.lift_off, &c.landing, &closed, &sent] {
+    let of = |errors, correction| recording.compare(errors, correction).whole;
+    let closed = of(Estimator::Recorded, Correction::Simulated);
+    let [without_closed, without] =
+        [Correction::Simulated, Correction::Recorded].map(|k| of(Estimator::Perfect, k));
+    for part in [&c.whole, &c.follow, &c.lift_off, &c.landing, &closed, &without_closed, &without] {
         let Difference { rms, max } = part;
         print!("   {rms:>4.2} / {max:>4.2}");
     }
-    let [closed, sent] = [Correction::Simulated, Correction::Recorded].map(|k| recording.moved(k));
-    println!("   {closed:>4.2},  {sent:>4.2}");
+    println!("   {:>4.2}", recording.moved(Estimator::Recorded, Correction::Recorded));
 }
