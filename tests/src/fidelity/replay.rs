@@ -67,6 +67,14 @@ impl Recording {
         errors
     }
 
+    /// The error of the position where the replay starts without one: as [`Self::start`] takes it, or the first.
+    fn zero(&self, errors: &[(f64, Point, Point)]) -> Point {
+        let before = || errors.iter().filter(|e| e.0 < self.armed_s.0 && e.0 > self.armed_s.0 - 1.0);
+        let first = errors.first().map_or(Point::zeros(), |e| e.1);
+        let n = before().count();
+        if n > 0 { before().map(|e| e.1).sum::<Point>() / n as f32 } else { first }
+    }
+
     /// Flies the recorded setpoints and commands: estimates at the times of the recorded ones from arming to disarming.
     ///
     /// # Panics
@@ -77,8 +85,9 @@ impl Recording {
             Estimator::Recorded => self.errors(),
             Estimator::Of(other) => other.errors(),
         };
+        let zero = self.zero(&errors);
         let mut errors = errors.iter().peekable();
-        let (mut first, mut last) = (None, (0.0, Point::zeros()));
+        let mut last = (0.0, Point::zeros());
         let config = self.config();
         let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
         autopilot.land_on_stream_loss();
@@ -111,7 +120,6 @@ impl Recording {
                     feed_setpoint(&mut autopilot, &sent, &mut sequence);
                 }
                 while let Some((t_s, position, velocity)) = errors.next_if(|e| due_us(e.0) <= now_us) {
-                    let zero: Point = *first.get_or_insert(*position);
                     let (was_s, was) = core::mem::replace(&mut last, (*t_s, *position));
                     let rate = (position.z - was.z) / (t_s - was_s).max(0.02) as f32;
                     let rate = if t_s - was_s < 0.2 { rate } else { 0.0 };
