@@ -2,6 +2,7 @@
 
 use planner_core::Point;
 
+use super::glide::{self, Glide};
 use super::params::Tuning;
 use super::{Commander, Mode, ReturnLeg, Sense};
 use crate::itinerary::{Leg, on_line};
@@ -23,16 +24,12 @@ const LAND_MPS: f32 = 1.3;
 const CRAWL_SHARE: f32 = 0.75;
 /// Seconds that the measured distance to the ground is late: it crawls from 0.85 m on, not from `MPC_LAND_ALT3`.
 const DISTANCE_LAG_S: f32 = 0.2;
-/// Deceleration with which PX4 stops for Hold, m/s² (`MPC_ACC_HOR`).
-const BRAKE_MPS2: f32 = 3.0;
 
 impl Commander {
     /// Fixes what the mode leans on: where it stops, which leg of the return is next.
     pub(super) fn enter(&mut self, mode: Mode, sense: &Sense) {
-        let speed = libm::hypotf(sense.velocity.x, sense.velocity.y);
-        self.hold = sense.position;
-        self.hold.x += sense.velocity.x * speed / (2.0 * BRAKE_MPS2);
-        self.hold.y += sense.velocity.y * speed / (2.0 * BRAKE_MPS2);
+        self.hold = sense.position + glide::stop(&sense.velocity);
+        self.glide = Glide::new(sense.now_us, &sense.position, &sense.velocity);
         self.hold_heading = sense.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
@@ -86,14 +83,33 @@ impl Commander {
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;
                     self.hold.z = up;
+                    self.glide = Glide::new(sense.now_us, &self.hold, &Point::zeros());
                 }
                 let position = Point::new(self.hold.x, self.hold.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
             Mode::Mission => self.mission_demand(sense, tuning, held),
-            Mode::Land => self.landing(sense, tuning, held),
+            Mode::Land => {
+                let across = self.glided(sense, tuning, &held);
+                let down = self.landing(sense, tuning, held);
+                with_up(across, &down)
+            }
+            Mode::Hold => self.glided(sense, tuning, &held),
             Mode::Return => self.returning(sense, tuning, held),
             _ => held,
+        }
+    }
+
+    /// What is held, approached as the automatic modes approach it across.
+    fn glided(&mut self, sense: &Sense, tuning: &Tuning, held: &Demand) -> Demand {
+        self.glide.advance(sense.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
+        let Glide { position, ramps: [east, north], .. } = self.glide;
+        let up = f32::NAN;
+        Demand {
+            position: Point::new(position.x, position.y, held.position.z),
+            velocity: Point::new(east.rate, north.rate, up),
+            acceleration: Point::new(east.change, north.change, up),
+            ..*held
         }
     }
 
@@ -198,5 +214,17 @@ impl Commander {
             }
             ReturnLeg::Land => self.landing(sense, tuning, held),
         }
+    }
+}
+
+/// A demand with the vertical part of another.
+fn with_up(across: Demand, up: &Demand) -> Demand {
+    let both = |a: Point, z: f32| Point::new(a.x, a.y, z);
+    Demand {
+        position: both(across.position, up.position.z),
+        velocity: both(across.velocity, up.velocity.z),
+        acceleration: both(across.acceleration, up.acceleration.z),
+        height_rate_share: up.height_rate_share,
+        ..across
     }
 }

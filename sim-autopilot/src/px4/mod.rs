@@ -12,6 +12,7 @@
 //! ends it. Times are microseconds since boot and arguments; nothing here reads a clock.
 
 mod flight;
+mod glide;
 mod modes;
 pub mod params;
 pub mod setpoint;
@@ -22,6 +23,7 @@ mod firmware;
 use planner_core::Point;
 
 pub use self::firmware::Px4;
+use self::glide::Glide;
 pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
@@ -84,6 +86,8 @@ pub struct Commander {
     setpoint: Option<Setpoint>,
     setpoint_us: u64,
     hold: Point,
+    /// On the way to `hold`.
+    glide: Glide,
     hold_heading: f32,
     takeoff_up: f32,
     cruise: Option<f32>,
@@ -117,6 +121,7 @@ impl Commander {
             setpoint: None,
             setpoint_us: 0,
             hold: Point::zeros(),
+            glide: Glide::new(0, &Point::zeros(), &Point::zeros()),
             hold_heading: 0.0,
             takeoff_up: f32::NAN,
             cruise: None,
