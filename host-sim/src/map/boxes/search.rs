@@ -72,9 +72,9 @@ impl WithSimd for Search<'_> {
             let node = &nodes[index as usize];
             let (least, most) = segment.squares(simd, node);
             if !node.is_leaf() {
-                for lane in 0..FAN {
-                    waiting[count] = Waiting { square: least[lane], node: index + node.child[lane] };
-                    count += usize::from(least[lane] < bound);
+                for (&square, child) in least.iter().zip(&node.child) {
+                    waiting[count] = Waiting { square, node: index + child };
+                    count += usize::from(square < bound);
                 }
                 continue;
             }
