@@ -50,9 +50,9 @@ pub fn add(cases: &mut Cases) {
     assert!(status.unwrap().success(), "the right area is planned");
     for (key, good) in GOOD {
         for value in scenarios::wrong(good).iter().filter(|value| !is_right(key, value)) {
-            cover(cases, format!("[area] {key} = {value}"), &with(key, value));
+            cover(cases, &format!("[area] {key} = {value}"), &with(key, value));
         }
-        cover(cases, format!("[area] {key} misspelt"), &with(&format!("{key}x"), good));
+        cover(cases, &format!("[area] {key} misspelt"), &with(&format!("{key}x"), good));
     }
     for (name, value) in [
         ("self-crossing", "[[0, 0], [120, 80], [120, 0], [0, 80]]"),
@@ -61,10 +61,10 @@ pub fn add(cases: &mut Cases) {
         ("of two vertices", "[[0, 0], [120, 0]]"),
         ("of a planet", "[[0, 0], [1e9, 0], [1e9, 1e9], [0, 1e9]]"),
     ] {
-        cover(cases, format!("an area {name}"), &with("polygon", value));
+        cover(cases, &format!("an area {name}"), &with("polygon", value));
     }
-    cover(cases, "an area without a border".into(), &scenario("height_m = 35.0"));
-    cover(cases, "degrees as metres".into(), &with("coordinates", "\"wgs84\""));
+    cover(cases, "an area without a border", &scenario("height_m = 35.0"));
+    cover(cases, "degrees as metres", &with("coordinates", "\"wgs84\""));
     add_files(cases);
 }
 
@@ -73,7 +73,7 @@ fn is_right(key: &str, value: &str) -> bool {
     matches!(key, "holes" | "no_fly") && value == "[]"
 }
 
-fn cover(cases: &mut Cases, name: String, text: &str) {
+fn cover(cases: &mut Cases, name: &str, text: &str) {
     let (file, out) = (cases.file("toml", text.as_bytes()), cases.out());
     cases.push(format!("cover, {name}"), &["cover", &file, "--out", &out]);
 }
@@ -105,14 +105,14 @@ fn add_files(cases: &mut Cases) {
             // Its ending says what it should be.
             let link = cases.path(&format!("{kind}-area.{end}"));
             let _ = std::os::unix::fs::symlink(path + ".txt", &link);
-            cover(cases, format!("{kind} as .{end}"), &text(&link));
+            cover(cases, &format!("{kind} as .{end}"), &text(&link));
         }
         for cut in [1, bytes.len() / 2, bytes.len() - 1] {
             let file = cases.file(end, &bytes[..cut]);
-            cover(cases, format!(".{end} cut to {cut}"), &text(&file));
+            cover(cases, &format!(".{end} cut to {cut}"), &text(&file));
         }
         let garbled: Vec<u8> = bytes.iter().map(|byte| byte ^ 0x15).collect();
         let file = cases.file(end, &garbled);
-        cover(cases, format!(".{end} garbled"), &text(&file));
+        cover(cases, &format!(".{end} garbled"), &text(&file));
     }
 }
