@@ -96,6 +96,7 @@ const EXCEPTIONS: &[(&str, &str, &str)] = &[
     ("sim-autopilot/src/px4/params.rs", "Tuning", SETTINGS),
     ("host-sim/src/commands/companion.rs", "run", "the loop of a shell, in the order of the drain contract"),
     ("sim-autopilot/src/ardupilot/mod.rs", "Copter", FIRMWARE),
+    ("sim-autopilot/src/px4/mod.rs", "Commander", FIRMWARE),
     (
         "host-sim/src/coverage/check.rs",
         "judge",
