@@ -81,6 +81,7 @@ pub const HALF: Board = Board {
     nodes: 2048,
     half_edges: 32_768,
     vehicles: 16,
+    pieces: 1024,
     roadmap_bytes: roadmap_bytes(&Layout::PICO2),
     lanes: 256,
     ..NUCLEO_H743
