@@ -14,6 +14,7 @@
 //!
 //! Cost: segments of one path × segments of all others, each a distance between two lines behind a cheap bound.
 
+mod blocks;
 mod config;
 mod near;
 mod pieces;
@@ -24,6 +25,7 @@ pub(crate) mod tests;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
+use self::blocks::{BLOCK, BLOCKS, Bits, Blocks, ones, pieces_of};
 pub use self::config::{ScheduleConfig, ScheduleError};
 pub use self::pieces::{PIECE_M, PIECES};
 use self::pieces::{Piece, conflict, cut};
@@ -40,13 +42,15 @@ const OFF_PAD_M: f32 = 0.02;
 pub struct ScheduleWorkspace {
     own: Vec<Piece, PIECES>,
     other: Vec<Piece, PIECES>,
+    /// Those of `own`.
+    blocks: Blocks,
     forbidden: Forbidden,
 }
 
 impl ScheduleWorkspace {
     /// Empty.
     pub const fn new() -> Self {
-        Self { own: Vec::new(), other: Vec::new(), forbidden: Vec::new() }
+        Self { own: Vec::new(), other: Vec::new(), blocks: Blocks::new(), forbidden: Vec::new() }
     }
 }
 
@@ -79,17 +83,24 @@ pub fn earliest_departure<'a, const W: usize>(
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
     cut(cfg, flight, &mut ws.own)?;
+    ws.blocks.of(&ws.own);
     ws.forbidden.clear();
     for other in scheduled {
         cut(cfg, other, &mut ws.other)?;
-        for q in &ws.other {
-            for p in ws.own.iter().filter(|p| conflict(cfg, p, q)) {
-                // Held together iff p.from + d < q.to and q.from < p.to + d.
-                forbid(
-                    &mut ws.forbidden,
-                    other.depart_s + q.from_s - p.to_s,
-                    other.depart_s + q.to_s - p.from_s,
-                );
+        for block in ws.other.chunks(BLOCK) {
+            let near = ws.blocks.near(cfg, block);
+            if near == 0 {
+                continue;
+            }
+            for q in block {
+                for p in pieces_of(near, &ws.own).filter(|p| conflict(cfg, p, q)) {
+                    // Held together iff p.from + d < q.to and q.from < p.to + d.
+                    forbid(
+                        &mut ws.forbidden,
+                        other.depart_s + q.from_s - p.to_s,
+                        other.depart_s + q.to_s - p.from_s,
+                    );
+                }
             }
         }
     }
@@ -187,6 +198,7 @@ pub(crate) fn merged_m<const W: usize>(
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
     cut(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
+    ws.blocks.of(&ws.own);
     for merged_m in MERGED_M {
         let mut count = 0;
         each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
@@ -199,6 +211,20 @@ pub(crate) fn merged_m<const W: usize>(
 
 /// How far along the path gates for one vehicle are merged, metres; the first that leaves few enough.
 const MERGED_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
+
+/// For each block of `ws.own` those of `ws.other` that may come too near; `None` where none does.
+#[inline(never)]
+fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; BLOCKS]> {
+    let mut near = [0; BLOCKS];
+    let mut some = false;
+    for (bit, block) in ws.other.chunks(BLOCK).enumerate() {
+        for own in ones(ws.blocks.near(cfg, block)) {
+            near[own] |= 1 << bit;
+            some = true;
+        }
+    }
+    some.then_some(near)
+}
 
 /// The gates of the flight in `ws.own`, one other vehicle after the other.
 fn each_gate<const W: usize>(
@@ -214,15 +240,17 @@ fn each_gate<const W: usize>(
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
         cut(cfg, other, &mut ws.other)?;
+        let Some(near) = near_blocks(cfg, ws) else { continue };
         // The gate found last, and when it is passed.
         let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;
-        for p in ws.own.iter().filter(moves) {
+        let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / BLOCK], p));
+        for (near, p) in own.filter(|(near, p)| *near != 0 && moves(p)) {
             let start_s = flight.depart_s + p.from_s;
             let earlier =
                 |q: &&Piece| other.depart_s + 0.5 * (q.from_s + q.to_s) < start_s && conflict(cfg, p, q);
             let (mut until_m, mut open_s) = (highest, f32::NEG_INFINITY);
-            for q in ws.other.iter().filter(moves).filter(earlier) {
+            for q in pieces_of(near, &ws.other).filter(moves).filter(earlier) {
                 let left_m = left_at_m(q, other);
                 if left_m > until_m {
                     (until_m, open_s) = (left_m, other.depart_s + q.to_s);

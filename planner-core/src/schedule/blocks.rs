@@ -1,0 +1,190 @@
+//! Which timed segments of two flights may come near each other: some in a row have a box and a capsule around them, and segments
+//! are compared only where those of two flights come near.
+//!
+//! What it leaves out is never in conflict, and what it gives out comes in order: schedules are, bit by bit, those of a
+//! comparison of all with all. Cost: one pass over both flights, and blocks × blocks.
+
+use heapless::Vec;
+use libm::{fmaxf, fminf};
+
+use super::config::ScheduleConfig;
+use super::pieces::{PIECES, Piece};
+use crate::Point;
+use crate::geometry::segments_distance_sq;
+
+/// Timed segments of a block: more make capsules wide at corners, fewer make more of them.
+pub(super) const BLOCK: usize = 8;
+/// Most blocks of a flight, a bit each.
+pub(super) const BLOCKS: usize = PIECES / BLOCK;
+/// What rounding may take from a distance between places kilometres away, metres.
+const ROUNDING_M: f32 = 0.1;
+
+/// Blocks of a flight, a bit each.
+pub(super) type Bits = u64;
+
+const _: () = assert!(BLOCKS <= Bits::BITS as usize && PIECES.is_multiple_of(BLOCK), "a bit for each block");
+
+/// Some timed segments in a row.
+#[derive(Clone, Copy, Debug)]
+struct Block {
+    low: Point,
+    high: Point,
+    /// From the beginning of the first to the end of the last.
+    line: (Point, Point),
+    /// How far the others lie beside that line at most, metres.
+    beside_m: f32,
+}
+
+impl Block {
+    fn of(pieces: &[Piece]) -> Self {
+        let mut block = Self {
+            low: pieces[0].from,
+            high: pieces[0].from,
+            line: (pieces[0].from, pieces[0].from),
+            beside_m: 0.0,
+        };
+        for piece in pieces {
+            for axis in 0..3 {
+                block.low[axis] = fminf(block.low[axis], piece.to[axis]);
+                block.high[axis] = fmaxf(block.high[axis], piece.to[axis]);
+            }
+            block.line.1 = piece.to;
+        }
+        block
+    }
+
+    /// The same with how far its segments lie beside its line.
+    fn with_line(mut self, pieces: &[Piece]) -> Self {
+        let beside =
+            |piece: &Piece| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
+        self.beside_m = libm::sqrtf(pieces.iter().map(beside).fold(0.0, fmaxf));
+        self
+    }
+
+    fn boxes_meet(&self, other: &Self, reach_m: f32) -> bool {
+        (0..3).all(|axis| {
+            self.low[axis] - other.high[axis] <= reach_m && other.low[axis] - self.high[axis] <= reach_m
+        })
+    }
+
+    fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
+        let apart_m = reach_m + self.beside_m + other.beside_m;
+        let (own, theirs) = (&self.line, &other.line);
+        segments_distance_sq((&own.0, &own.1), (&theirs.0, &theirs.1)) <= apart_m * apart_m
+    }
+}
+
+/// The blocks of one flight.
+#[derive(Debug, Default)]
+pub(super) struct Blocks {
+    blocks: Vec<Block, BLOCKS>,
+}
+
+impl Blocks {
+    pub(super) const fn new() -> Self {
+        Self { blocks: Vec::new() }
+    }
+
+    /// Makes those of a flight.
+    pub(super) fn of(&mut self, pieces: &[Piece]) {
+        self.blocks.clear();
+        // Cannot overflow: there are no more pieces than blocks have room for.
+        pieces.chunks(BLOCK).for_each(|some| _ = self.blocks.push(Block::of(some).with_line(some)));
+    }
+
+    /// The blocks that may come too near to these segments of another flight, which are at most [`BLOCK`] in a row.
+    #[inline(never)]
+    pub(super) fn near(&self, cfg: &ScheduleConfig, pieces: &[Piece]) -> Bits {
+        if pieces.is_empty() {
+            return 0;
+        }
+        let reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + ROUNDING_M;
+        let mut other = Block::of(pieces);
+        let (mut near, mut has_line) = (0, false);
+        for (bit, own) in self.blocks.iter().enumerate() {
+            if !own.boxes_meet(&other, reach_m) {
+                continue;
+            }
+            if !has_line {
+                (other, has_line) = (other.with_line(pieces), true);
+            }
+            if own.lines_meet(&other, reach_m) {
+                near |= 1 << bit;
+            }
+        }
+        near
+    }
+}
+
+/// Which bits are set, in order.
+pub(super) fn ones(mut bits: Bits) -> impl Iterator<Item = usize> {
+    core::iter::from_fn(move || {
+        let bit = bits.trailing_zeros() as usize;
+        bits &= bits.wrapping_sub(1);
+        (bit < Bits::BITS as usize).then_some(bit)
+    })
+}
+
+/// The segments of these blocks, in order.
+pub(super) fn pieces_of(near: Bits, pieces: &[Piece]) -> impl Iterator<Item = &Piece> {
+    ones(near).flat_map(|block| pieces.chunks(BLOCK).nth(block).unwrap_or_default())
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::vec::Vec as List;
+
+    use super::*;
+    use crate::schedule::pieces::conflict;
+    use proptest::prelude::*;
+
+    const CFG: ScheduleConfig =
+        ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
+
+    /// A flight of steps from a place, some of which are holds and some go straight on.
+    fn flight((from, steps): &((f32, f32), List<(f32, f32, f32, bool)>)) -> List<Piece> {
+        let mut at = Point::new(from.0, from.1, 1.0);
+        let mut way = Point::zeros();
+        let mut along_m = 0.0;
+        let piece = |&(x, y, z, on): &(f32, f32, f32, bool)| {
+            way = if on { way } else { Point::new(x, y, z) };
+            let (from, from_m) = (at, along_m);
+            at += way;
+            along_m += way.norm();
+            Piece { from, to: at, from_m, to_m: along_m, from_s: 0.0, to_s: 1.0, parked: false }
+        };
+        steps.iter().map(piece).collect()
+    }
+
+    fn steps() -> impl Strategy<Value = ((f32, f32), List<(f32, f32, f32, bool)>)> {
+        let step = (-24.0f32..24.0, -24.0f32..24.0, -3.0f32..3.0, any::<bool>());
+        ((-3000.0f32..3000.0, -50.0f32..50.0), proptest::collection::vec(step, 1..PIECES))
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(400))]
+        /// Blocks leave out no pair in conflict, give each once, and in order.
+        #[test]
+        fn none_in_conflict_is_missed(own in steps(), mut other in steps(), apart in (-90.0f32..90.0, -90.0f32..90.0)) {
+            other.0 = (own.0.0 + apart.0, own.0.1 + apart.1);
+            let (own, other) = (flight(&own), flight(&other));
+            let mut blocks = Blocks::new();
+            blocks.of(&own);
+            let all = |own: &mut dyn Iterator<Item = &Piece>, q: &Piece| -> List<f32> {
+                own.filter(|p| conflict(&CFG, p, q)).map(|p| p.from_m).collect()
+            };
+            let mut found = 0;
+            for some in other.chunks(BLOCK) {
+                let near = blocks.near(&CFG, some);
+                for q in some {
+                    let expected = all(&mut own.iter(), q);
+                    found += expected.len();
+                    prop_assert_eq!(all(&mut pieces_of(near, &own), q), expected);
+                }
+            }
+            prop_assume!(found > 0);
+        }
+    }
+}
