@@ -86,6 +86,9 @@ pub fn earliest_departure<'a, const W: usize>(
     ws.blocks.of(&ws.own);
     ws.forbidden.clear();
     for other in scheduled {
+        if ws.blocks.are_far_from(cfg, other) {
+            continue;
+        }
         cut(cfg, other, &mut ws.other)?;
         for block in ws.other.chunks(BLOCK) {
             let near = ws.blocks.near(cfg, block);
@@ -239,6 +242,9 @@ fn each_gate<const W: usize>(
     let moves = |piece: &&Piece| piece.parked || piece.to_m > piece.from_m;
     let flight = &flights[index];
     for (_, other) in flights.iter().enumerate().filter(|&(i, _)| i != index) {
+        if ws.blocks.are_far_from(cfg, other) {
+            continue;
+        }
         cut(cfg, other, &mut ws.other)?;
         let Some(near) = near_blocks(cfg, ws) else { continue };
         // The gate found last, and when it is passed.

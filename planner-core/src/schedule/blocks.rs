@@ -10,12 +10,17 @@ use libm::{fmaxf, fminf};
 use super::config::ScheduleConfig;
 use super::pieces::{PIECES, Piece};
 use crate::Point;
+use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
 /// Timed segments of a block: more make capsules wide at corners, fewer make more of them.
 pub(super) const BLOCK: usize = 8;
 /// Most blocks of a flight, a bit each.
 pub(super) const BLOCKS: usize = PIECES / BLOCK;
+/// Blocks of a group.
+const GROUP: usize = 8;
+/// Most groups of a flight.
+const GROUPS: usize = BLOCKS.div_ceil(GROUP);
 /// What rounding may take from a distance between places kilometres away, metres.
 const ROUNDING_M: f32 = 0.1;
 
@@ -27,8 +32,7 @@ const _: () = assert!(BLOCKS <= Bits::BITS as usize && PIECES.is_multiple_of(BLO
 /// Some timed segments in a row.
 #[derive(Clone, Copy, Debug)]
 struct Block {
-    low: Point,
-    high: Point,
+    around: Extent,
     /// From the beginning of the first to the end of the last.
     line: (Point, Point),
     /// How far the others lie beside that line at most, metres.
@@ -37,17 +41,10 @@ struct Block {
 
 impl Block {
     fn of(pieces: &[Piece]) -> Self {
-        let mut block = Self {
-            low: pieces[0].from,
-            high: pieces[0].from,
-            line: (pieces[0].from, pieces[0].from),
-            beside_m: 0.0,
-        };
+        let from = pieces[0].from;
+        let mut block = Self { around: Extent(from, from), line: (from, from), beside_m: 0.0 };
         for piece in pieces {
-            for axis in 0..3 {
-                block.low[axis] = fminf(block.low[axis], piece.to[axis]);
-                block.high[axis] = fmaxf(block.high[axis], piece.to[axis]);
-            }
+            block.around.with(&piece.to, &piece.to);
             block.line.1 = piece.to;
         }
         block
@@ -61,12 +58,6 @@ impl Block {
         self
     }
 
-    fn boxes_meet(&self, other: &Self, reach_m: f32) -> bool {
-        (0..3).all(|axis| {
-            self.low[axis] - other.high[axis] <= reach_m && other.low[axis] - self.high[axis] <= reach_m
-        })
-    }
-
     fn lines_meet(&self, other: &Self, reach_m: f32) -> bool {
         let apart_m = reach_m + self.beside_m + other.beside_m;
         let (own, theirs) = (&self.line, &other.line);
@@ -74,15 +65,33 @@ impl Block {
     }
 }
 
-/// The blocks of one flight.
+/// A box: its lowest and its highest corner.
+#[derive(Clone, Copy, Debug)]
+struct Extent(Point, Point);
+
+impl Extent {
+    fn with(&mut self, low: &Point, high: &Point) {
+        for axis in 0..3 {
+            self.0[axis] = fminf(self.0[axis], low[axis]);
+            self.1[axis] = fmaxf(self.1[axis], high[axis]);
+        }
+    }
+
+    fn meets(&self, other: &Self, reach_m: f32) -> bool {
+        (0..3).all(|axis| self.0[axis] - other.1[axis] <= reach_m && other.0[axis] - self.1[axis] <= reach_m)
+    }
+}
+
+/// The blocks of one flight, and boxes around groups of them.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
     blocks: Vec<Block, BLOCKS>,
+    groups: Vec<Extent, GROUPS>,
 }
 
 impl Blocks {
     pub(super) const fn new() -> Self {
-        Self { blocks: Vec::new() }
+        Self { blocks: Vec::new(), groups: Vec::new() }
     }
 
     /// Makes those of a flight.
@@ -90,6 +99,35 @@ impl Blocks {
         self.blocks.clear();
         // Cannot overflow: there are no more pieces than blocks have room for.
         pieces.chunks(BLOCK).for_each(|some| _ = self.blocks.push(Block::of(some).with_line(some)));
+        self.groups.clear();
+        for blocks in self.blocks.chunks(GROUP) {
+            let mut around = blocks[0].around;
+            blocks[1..].iter().for_each(|block| around.with(&block.around.0, &block.around.1));
+            // Cannot overflow either.
+            let _ = self.groups.push(around);
+        }
+    }
+
+    /// Whether another flight keeps so far away that no segment of it need be looked at: each of its legs, its climb and its
+    /// descent.
+    pub(super) fn are_far_from<const W: usize>(&self, cfg: &ScheduleConfig, flight: &Flight<W>) -> bool {
+        let waypoints = flight.path.waypoints();
+        let down =
+            |waypoint: &Waypoint, m: f32| (waypoint.position, waypoint.position - Point::new(0.0, 0.0, m));
+        let ends = [
+            waypoints.first().map(|first| down(first, flight.climb_m)),
+            waypoints.last().map(|last| down(last, flight.descent_m)),
+        ];
+        let legs = waypoints.windows(2).map(|leg| (leg[0].position, leg[1].position));
+        !ends.into_iter().flatten().chain(legs).any(|(from, to)| self.meet(cfg, &from, &to))
+    }
+
+    /// Whether a leg meets the box of any group.
+    #[inline(never)]
+    fn meet(&self, cfg: &ScheduleConfig, from: &Point, to: &Point) -> bool {
+        let mut leg = Extent(*from, *from);
+        leg.with(to, to);
+        self.groups.iter().any(|group| group.meets(&leg, reach_m(cfg)))
     }
 
     /// The blocks that may come too near to these segments of another flight, which are at most [`BLOCK`] in a row.
@@ -98,22 +136,32 @@ impl Blocks {
         if pieces.is_empty() {
             return 0;
         }
-        let reach_m = fmaxf(cfg.separation_m, cfg.parked_separation_m) + ROUNDING_M;
+        let reach_m = reach_m(cfg);
         let mut other = Block::of(pieces);
         let (mut near, mut has_line) = (0, false);
-        for (bit, own) in self.blocks.iter().enumerate() {
-            if !own.boxes_meet(&other, reach_m) {
+        for (group, (around, blocks)) in self.groups.iter().zip(self.blocks.chunks(GROUP)).enumerate() {
+            if !around.meets(&other.around, reach_m) {
                 continue;
             }
-            if !has_line {
-                (other, has_line) = (other.with_line(pieces), true);
-            }
-            if own.lines_meet(&other, reach_m) {
-                near |= 1 << bit;
+            for (bit, own) in blocks.iter().enumerate() {
+                if !own.around.meets(&other.around, reach_m) {
+                    continue;
+                }
+                if !has_line {
+                    (other, has_line) = (other.with_line(pieces), true);
+                }
+                if own.lines_meet(&other, reach_m) {
+                    near |= 1 << (group * GROUP + bit);
+                }
             }
         }
         near
     }
+}
+
+/// What is further apart is in no conflict, metres.
+fn reach_m(cfg: &ScheduleConfig) -> f32 {
+    fmaxf(cfg.separation_m, cfg.parked_separation_m) + ROUNDING_M
 }
 
 /// Which bits are set, in order.
@@ -137,7 +185,8 @@ mod tests {
     use std::vec::Vec as List;
 
     use super::*;
-    use crate::schedule::pieces::conflict;
+    use crate::flight::{Path, Task};
+    use crate::schedule::pieces::{conflict, cut};
     use proptest::prelude::*;
 
     const CFG: ScheduleConfig =
@@ -175,16 +224,57 @@ mod tests {
             let all = |own: &mut dyn Iterator<Item = &Piece>, q: &Piece| -> List<f32> {
                 own.filter(|p| conflict(&CFG, p, q)).map(|p| p.from_m).collect()
             };
-            let mut found = 0;
             for some in other.chunks(BLOCK) {
                 let near = blocks.near(&CFG, some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
-                    found += expected.len();
                     prop_assert_eq!(all(&mut pieces_of(near, &own), q), expected);
                 }
             }
-            prop_assume!(found > 0);
+        }
+    }
+
+    fn whole(points: &[(f32, f32, f32)], descent_m: f32) -> Flight<8> {
+        let mut path = Path::new();
+        points.iter().for_each(|(x, y, z)| path.push(Point::new(*x, *y, *z), 1.0).unwrap());
+        path.label(1.5, CFG.cruise_mps);
+        let mut flight = Flight {
+            id: 1,
+            task: Task::Goto(0),
+            path,
+            climb_m: 1.5,
+            descent_m,
+            depart_s: 0.0,
+            piece_m: crate::schedule::PIECE_M,
+        };
+        flight.fit_pieces();
+        flight
+    }
+
+    fn points() -> impl Strategy<Value = List<(f32, f32, f32)>> {
+        proptest::collection::vec((-90.0f32..90.0, -90.0f32..90.0, 2.0f32..60.0), 1..8)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(2000))]
+        /// A flight that is left out has no segment in conflict.
+        #[test]
+        fn who_is_far_is_in_no_conflict(
+            own in points(),
+            mut other in points(),
+            apart in (-150.0f32..150.0, -150.0f32..150.0),
+            descent_m in 0.0f32..60.0,
+        ) {
+            other.iter_mut().for_each(|point| (point.0, point.1) = (point.0 + apart.0, point.1 + apart.1));
+            let (own, other) = (whole(&own, 1.5), whole(&other, descent_m));
+            let (mut own_pieces, mut other_pieces) = (Vec::new(), Vec::new());
+            cut(&CFG, &own, &mut own_pieces).unwrap();
+            cut(&CFG, &other, &mut other_pieces).unwrap();
+            let mut blocks = Blocks::new();
+            blocks.of(&own_pieces);
+            let far = blocks.are_far_from(&CFG, &other);
+            let meet = other_pieces.iter().any(|q| own_pieces.iter().any(|p| conflict(&CFG, p, q)));
+            prop_assert!(!(far && meet));
         }
     }
 }
