@@ -28,6 +28,9 @@ pub(super) const FLIES_ON_S: f32 = 75.0;
 pub(super) const STANDS_UNHEARD: Duration = Duration::from_secs(15);
 /// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
 pub(super) const DOWN: Duration = Duration::from_secs(75);
+/// Over an area the column of a vehicle that left the plan in the air is kept off for so long after it was last heard: then it is
+/// down, whatever it flew there.
+pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
 /// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
 pub(super) const STRETCH_M: f32 = 6.0;
 /// And by so much for each second that messages are late, m/s.

@@ -282,7 +282,7 @@ impl Contact {
             tell(column(here, Nature::Lying));
         } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
             tell(place(apart_m));
-        } else if self.tells(OUT) {
+        } else if self.tells(OUT) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
             let below = column(here, Nature::Solid);
             tell(KeepOff { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // Where it is it may not be come near from above or the side, whatever its column leaves.

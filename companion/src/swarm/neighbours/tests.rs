@@ -425,3 +425,28 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
         }
     }
 }
+
+#[test]
+fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes() {
+    let mut rng = Pcg32::seed_from_u64(12);
+    for _ in 0..200 {
+        let mut table = joined(0);
+        let over_area = uniform(&mut rng, 0.0, 4.0) > 1.0;
+        if over_area {
+            table.form_fleet(64.0, None, 1.0);
+        }
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+        let told = Intent { floor_m: -30.0, ..intent(OUT, 1, 2) };
+        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        let here = table.contacts[1].state.position;
+        let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
+        let silent_s = uniform(&mut rng, 1.0, 1200.0);
+        let (mut kept, mut lies) = (false, false);
+        table.obstacle(1, Instant::from_millis((1000.0 * silent_s) as u64), 2.0, |off| {
+            kept |= off.from.z >= below.z && off.to.z <= below.z;
+            lies |= off.to.z <= -29.0;
+        });
+        assert_eq!(kept, !over_area || silent_s < 600.0, "{silent_s} s, {here:?}, {below:?}");
+        assert!(lies, "{silent_s} s: it lies there");
+    }
+}
