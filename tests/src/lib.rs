@@ -3,6 +3,7 @@
 pub mod areas;
 pub mod board;
 pub mod bounds;
+pub mod costs;
 pub mod covered;
 pub mod downfall;
 pub mod edge;

@@ -22,7 +22,7 @@ use anyhow::bail;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
 use planner_core::coverage::bound::lower_bound_s;
-use planner_core::coverage::pack::{PackWorkspace, Plan, Route, Unit, Vehicle, Work, binpat};
+use planner_core::coverage::pack::{PackWorkspace, Plan, Route, Unit, Vehicle, Work, binpat, by_shares};
 use planner_core::coverage::tracks::{self, Pattern, Tracks};
 use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
@@ -312,7 +312,10 @@ fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     }
 }
 
-/// Divides the path by a method. Returns the shares that it found, if it looks for some.
+/// The least share of the path, metres: far below any spacing of waypoints.
+const LEAST_SHARE_M: f32 = 1e-3;
+
+/// Divides the path by a method. Returns the shares by which companions divide it in the same way, if there are some.
 ///
 /// # Errors
 /// As the method.
@@ -338,9 +341,34 @@ pub fn divide<const L: usize, const N: usize, const K: usize>(
             let mut states = vec![(0, 0); states];
             let mut ws = exact::Workspace { ways_m: &mut ways_m, reaches: &mut reaches, states: &mut states };
             exact::exact(work, &mut ws, &mut PackWorkspace::<K>::new(), plan)?;
-            Ok(None)
+            as_shares(work, plan)
         }
     }
+}
+
+/// Shares by which BINPAT cuts the path as the exact division does, where the vehicles that it then gives the parts to take no
+/// longer: that plan is the exact one from then on. Companions plan by shares alone, so none means that they cannot plan it.
+fn as_shares<const L: usize, const N: usize, const K: usize>(
+    work: &Work<'_, L, N>,
+    exact: &mut Plan<K>,
+) -> Result<Option<Vec<f32>>, CoverageError> {
+    let mut shares = vec![0.0; work.vehicles.len()];
+    let mut packed_m = 0.0;
+    for (share, route) in shares.iter_mut().zip(&exact.routes) {
+        let end_m = work.tracks.along_m(route.end - 1);
+        // A bin without length would hold nothing: the first waypoint alone has none.
+        *share = (end_m - packed_m).max(LEAST_SHARE_M);
+        packed_m = end_m;
+    }
+    let mut plan = Plan::new();
+    by_shares(work, &shares, &mut PackWorkspace::<K>::new(), &mut plan)?;
+    let alike =
+        plan.routes.iter().map(|r| (r.first, r.end)).eq(exact.routes.iter().map(|r| (r.first, r.end)));
+    if !alike || plan.max_cost_s() > exact.max_cost_s() {
+        return Ok(None);
+    }
+    *exact = plan;
+    Ok(Some(shares))
 }
 
 /// Why there is no plan, for a person.

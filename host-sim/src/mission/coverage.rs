@@ -43,7 +43,8 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     let planned = Planned::flown(&scenario)?;
     let Some(shares) = planned.shares.clone() else {
         bail!(
-            "cannot be flown: {}: method \"exact\" has no shares that companions could plan with\nhint: \"powell-binpat\" does",
+            "cannot be flown: {}: companions give parts to vehicles by the least sum of their ways, and those of method \"exact\" would then \
+             take longer\nhint: `cover` writes its plans, which autopilots fly without a companion; \"powell-binpat\" can be flown",
             scenario.path
         );
     };

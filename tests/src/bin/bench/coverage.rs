@@ -14,6 +14,7 @@ use std::process::Command;
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
+use flockmate_tests::costs::Costs;
 use flockmate_tests::workspace;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -27,6 +28,8 @@ use planner_core::flight::Range;
 
 use crate::row::Row;
 
+/// Random areas of which the costs are compared.
+const AREAS: u64 = 1000;
 /// Runs of each round, of which the median counts.
 const RUNS: usize = 301;
 /// Rounds of ours and theirs in turn.
@@ -35,7 +38,7 @@ const LANES: usize = 512;
 const VEHICLES: usize = 32;
 const VERTICES: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 
-/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take.
+/// Plan and replanning at 3 and 10 vehicles; POWELL at 3, beside what it may take; the costs of all methods.
 ///
 /// # Errors
 /// Theirs cannot be built or run.
@@ -66,7 +69,29 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
     let ours = powell_us();
     let name = "coverage, POWELL".to_owned();
     rows.push(Row { name, ours, theirs: 5000.0, ratio: 5000.0 / ours, required: 1.0, unit: "us", n: 3 });
+    rows.extend(costs());
     Ok(rows)
+}
+
+/// The largest costs of the methods on random convex areas for 2 to 10 vehicles: shares of the areas beside what they must be, and the median
+/// gap of POWELL to the best division beside what it may be.
+fn costs() -> Vec<Row> {
+    let costs = Costs::of(0..AREAS);
+    println!("coverage: {costs:?}");
+    let share = |name: &str, but: usize, required: f64| {
+        let ours = 100.0 * (1.0 - but as f64 / costs.areas as f64);
+        let name = format!("coverage, {name}, areas");
+        Row { name, ours, theirs: required, ratio: ours / required, required: 1.0, unit: "%", n: costs.areas }
+    };
+    // At no gap at all the ratio is still a number.
+    let gap = f64::from(costs.gaps[2]).max(0.01);
+    let name = "coverage, gap of POWELL to exact, median".to_owned();
+    vec![
+        share("POWELL <= BINPAT", costs.powell_over_binpat, 100.0),
+        share("POWELL <= SIMPLE", costs.powell_over_simple, 95.0),
+        share("exact <= all", costs.below_exact, 100.0),
+        Row { name, ours: gap, theirs: 8.0, ratio: 8.0 / gap, required: 1.0, unit: "%", n: costs.areas },
+    ]
 }
 
 /// Builds our driver around their headers.

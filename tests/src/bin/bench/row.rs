@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-/// One line of the bench: `ratio` is theirs / ours, so more is better.
+/// One line of the bench: `ratio` is theirs / ours, or ours / theirs of a share that is to be large: more is better.
 #[derive(Clone, Debug, Serialize)]
 pub struct Row {
     /// What was done.
@@ -11,7 +11,7 @@ pub struct Row {
     pub ours: f64,
     /// Their median.
     pub theirs: f64,
-    /// theirs / ours.
+    /// theirs / ours, or the other way round.
     pub ratio: f64,
     /// What `ratio` must be at least.
     pub required: f64,

@@ -1,0 +1,67 @@
+//! The largest costs of the methods that divide an area, on random convex areas for 2 to 10 vehicles.
+
+use std::ops::Range;
+
+use host_sim::coverage::Planned;
+use host_sim::scenario;
+use host_sim::scenario::coverage::Method;
+use rand_core::SeedableRng as _;
+use rand_pcg::Pcg32;
+use rayon::prelude::*;
+
+use crate::areas::{self, Shape};
+
+/// A cost is greater than another one if it is so by more than rounding.
+const ROUNDING: f32 = 1.0001;
+
+/// What came of all areas.
+#[derive(Clone, Copy, Debug)]
+pub struct Costs {
+    /// Areas that all methods planned.
+    pub areas: usize,
+    /// Areas where POWELL-BINPAT costs more than BINPAT.
+    pub powell_over_binpat: usize,
+    /// Areas where it costs more than SIMPLE-BINPAT.
+    pub powell_over_simple: usize,
+    /// Areas where any of them costs less than `exact`.
+    pub below_exact: usize,
+    /// Medians of what SIMPLE-BINPAT, BINPAT and POWELL-BINPAT cost more than `exact`, percent.
+    pub gaps: [f32; 3],
+}
+
+impl Costs {
+    /// Plans the areas of these seeds by every method.
+    ///
+    /// # Panics
+    /// A cost is below the bound of all divisions, or no area could be planned.
+    pub fn of(seeds: Range<u64>) -> Self {
+        let mut all: Vec<[f32; 4]> = seeds.into_par_iter().filter_map(costs).collect();
+        assert!(!all.is_empty(), "no area could be planned");
+        let over = |a: usize, b: usize| all.iter().filter(|costs| costs[a] > costs[b] * ROUNDING).count();
+        let (powell_over_binpat, powell_over_simple) = (over(2, 1), over(2, 0));
+        let below_exact = (0..3).map(|method| over(3, method)).sum();
+        let gaps = [0, 1, 2].map(|method| {
+            let gap = |costs: &[f32; 4]| costs[method] / costs[3];
+            all.sort_by(|a, b| gap(a).total_cmp(&gap(b)));
+            100.0 * (gap(&all[all.len() / 2]) - 1.0)
+        });
+        Self { areas: all.len(), powell_over_binpat, powell_over_simple, below_exact, gaps }
+    }
+}
+
+/// Those of SIMPLE-BINPAT, BINPAT, POWELL-BINPAT and `exact` on one area, seconds.
+fn costs(seed: u64) -> Option<[f32; 4]> {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let text = areas::scenario(&mut random, Shape::Convex, 2 + (seed % 9) as usize);
+    let scenario = scenario::parse(&text, "random").ok()?;
+    let cost = |method| Planned::new(&scenario, method).map(|planned| planned.plan.max_cost_s()).ok();
+    let bound_s = Planned::new(&scenario, Method::Binpat).ok()?.lower_bound_s;
+    let costs = [
+        cost(Method::SimpleBinpat)?,
+        cost(Method::Binpat)?,
+        cost(Method::PowellBinpat)?,
+        cost(Method::Exact)?,
+    ];
+    assert!(costs.iter().all(|cost| *cost >= bound_s * 0.9999), "seed {seed}: {costs:?} below {bound_s}");
+    Some(costs)
+}
