@@ -40,8 +40,30 @@ struct Outcome {
 const KINDS: [&str; 6] =
     ["kill", "radio-cut", "battery-low", "pilot-takeover", "companion-reset", "return-order"];
 
-/// Draws an area for so many vehicles, with this share of messages lost; and until when one of them is struck, seconds.
-type Draw = (fn(&mut Pcg32, usize, f32) -> String, u32);
+/// What a mission is drawn from.
+#[derive(Clone, Copy)]
+struct Draw {
+    /// An area for so many vehicles, with this share of messages lost.
+    area: fn(&mut Pcg32, usize, f32) -> String,
+    /// Until when vehicles are struck, seconds.
+    until_s: u32,
+    /// How many are struck at once.
+    struck: usize,
+    radio: Radio,
+    /// Of three missions so many may not be whole.
+    most_in_three: usize,
+}
+
+/// The row of a vehicle that nobody heard for so long that its part was divided among the others.
+const GIVEN_AWAY: &str = "Its part was given away: landing";
+
+/// What the radio does beside losing messages one by one.
+#[derive(Clone, Copy, PartialEq)]
+enum Radio {
+    Even,
+    /// Vehicles hear and send nothing for seconds, or send without hearing, or hear without being heard.
+    Rough,
+}
 
 /// One with so many lanes that it is flown in stretches.
 fn large(random: &mut Pcg32, vehicles: usize, loss: f32) -> String {
@@ -50,21 +72,50 @@ fn large(random: &mut Pcg32, vehicles: usize, loss: f32) -> String {
     kept.map(|line| format!("{line}\n")).collect::<String>() + &format!("radio_loss = {loss}\n")
 }
 
-fn drawn((draw, until_s): Draw, seed: u64) -> (String, &'static str, u8) {
+/// Bursts in which a vehicle neither hears nor sends, and spells in which it does one of both: half of them are over before anybody
+/// is given up.
+fn rough(random: &mut Pcg32, vehicles: usize, until_s: u32) -> String {
+    let one = |k: u32| {
+        let vehicle = 1 + random.next_u32() % vehicles as u32;
+        let at_s = 10 + random.next_u32() % (2 * until_s);
+        let (direction, duration_s) = match k % 3 {
+            0 => ("both", 1 + random.next_u32() % 14),
+            1 => ("tx", 2 + random.next_u32() % 60),
+            _ => ("rx", 2 + random.next_u32() % 60),
+        };
+        format!(
+            "[[faults]]\nat_s = {at_s}.0\nduration_s = {duration_s}.0\nkind = \"radio-cut\"\n\
+             direction = \"{direction}\"\nvehicle = {vehicle}\n"
+        )
+    };
+    (0..6).map(one).collect()
+}
+
+/// The scenario, what strikes first, and whom.
+fn drawn(draw: Draw, seed: u64) -> (String, &'static str, Vec<u8>) {
     let mut random = Pcg32::seed_from_u64(seed);
     // Six seeds strike in every way, each half with 50 % loss and the next six with the other loss.
     let kind = KINDS[(seed % 6) as usize];
     let count = [3, 5][(seed / 12 % 2) as usize];
-    let mut text = draw(&mut random, count, if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 });
-    let vehicle = 1 + (random.next_u32() % count as u32) as u8;
+    let mut text =
+        (draw.area)(&mut random, count, if (seed + seed / 6).is_multiple_of(2) { 0.5 } else { 0.1 });
+    let first = (random.next_u32() % count as u32) as u8;
     // Beside others, of which some are in the air and some on their pads yet.
-    let at_s = 20.0 + (random.next_u32() % until_s) as f32;
-    text += &format!("[[faults]]\nat_s = {at_s}\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
-    (text, kind, vehicle)
+    let at_s = 20.0 + (random.next_u32() % draw.until_s) as f32;
+    let mut struck = Vec::new();
+    for k in 0..draw.struck {
+        let (vehicle, also) = (1 + (first + k as u8) % count as u8, KINDS[(seed as usize + 5 * k) % 6]);
+        text += &format!("[[faults]]\nat_s = {at_s}\nkind = \"{also}\"\nvehicle = {vehicle}\n");
+        struck.push(vehicle);
+    }
+    if draw.radio == Radio::Rough {
+        text += &rough(&mut random, count, draw.until_s);
+    }
+    (text, kind, struck)
 }
 
 fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
-    let (text, kind, vehicle) = drawn(draw, seed);
+    let (text, kind, struck) = drawn(draw, seed);
     if std::env::var("FLOCKMATE_LOSSES").is_ok_and(|n| n == "1") {
         println!("{text}");
     }
@@ -82,29 +133,51 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     let whole = ["Done", "no goal", "Aborted: Landed beside its goal"];
     let short = |end: &str| !whole.iter().any(|whole| end.starts_with(whole));
     // None of them waits to take over: a vehicle without a part takes none.
-    let had_none = |v: &VehicleResult| v.id == vehicle || v.end.starts_with("no goal");
+    let had_none = |v: &VehicleResult| struck.contains(&v.id) || v.end.starts_with("no goal");
     Some(Outcome {
         seed,
         kind,
         covered: coverage.covered_share,
         left: coverage.left,
         twice: coverage.twice,
-        landed_short: vehicles.iter().filter(|v| v.id != vehicle && short(&v.end)).count(),
+        landed_short: vehicles.iter().filter(|v| !struck.contains(&v.id) && short(&v.end)).count(),
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
-        explained: covered::EXPLAINED.iter().any(|row| log.contains(row)) || vehicles.iter().all(had_none),
+        explained: covered::EXPLAINED.iter().any(|row| log.contains(row))
+            || (draw.radio == Radio::Rough && log.contains(GIVEN_AWAY))
+            || vehicles.iter().all(had_none),
         text: log,
     })
 }
 
 #[test]
 fn what_a_lost_vehicle_leaves_is_photographed_by_the_others() {
-    are_whole((areas::lost, 220));
+    are_whole(EVEN);
+}
+
+#[test]
+fn what_a_lost_vehicle_leaves_is_photographed_over_a_radio_with_bursts_and_one_way_links() {
+    are_whole(Draw { radio: Radio::Rough, ..EVEN });
+}
+
+#[test]
+fn what_two_vehicles_leave_that_are_lost_at_once_is_photographed() {
+    are_whole(TWO);
+}
+
+#[test]
+fn what_two_vehicles_leave_that_are_lost_at_once_over_a_rough_radio_is_photographed() {
+    are_whole(Draw { radio: Radio::Rough, ..TWO });
 }
 
 #[test]
 fn what_a_lost_vehicle_leaves_of_a_large_area_is_photographed_too() {
-    are_whole((large, 900));
+    are_whole(Draw { area: large, until_s: 900, ..EVEN });
 }
+
+/// One vehicle is lost among others with radios that lose messages one by one.
+const EVEN: Draw = Draw { area: areas::lost, until_s: 220, struck: 1, radio: Radio::Even, most_in_three: 1 };
+/// Two of three or of five are lost at once. Of three the last one has no majority: it lands.
+const TWO: Draw = Draw { struck: 2, most_in_three: 2, ..EVEN };
 
 fn are_whole(draw: Draw) {
     let (from, count) = (number("FLOCKMATE_LOSSES_FROM", 0), number("FLOCKMATE_LOSSES", MISSIONS));
@@ -133,7 +206,11 @@ fn are_whole(draw: Draw) {
     let (wrong, short) = (all.iter().filter(wrong).count(), all.iter().filter(short).count());
     println!("{} flown, {short} not whole for a reason that is named, {wrong} wrong", all.len());
     assert_eq!(wrong, 0);
-    assert!(3 * short <= all.len(), "{short} not whole");
+    // Where the rule lands whom a rough radio cuts off, or who is alone, the area may be whole all the same.
+    let incomplete = all.iter().filter(|o| o.covered < 1.0).count();
+    println!("{incomplete} incomplete");
+    let rare = if draw.radio == Radio::Rough || draw.struck > 1 { incomplete } else { short };
+    assert!(draw.most_in_three * all.len() >= 3 * rare, "{rare} not whole");
 }
 
 /// Places of the pictures that a flight takes up to a place of its path.
