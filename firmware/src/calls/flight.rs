@@ -5,14 +5,18 @@
 
 use companion::link::frame::{self, Header, MAX_SENT};
 use companion::link::intent::{self, Intent};
-use companion::{Config, Duration, Event, Instant, Link, PlanFailure, RosterEntry};
+use companion::link::roster::{self, Entry, Roster};
+use companion::{Duration, Event, Instant, Link, PlanFailure};
 use heapless::Vec;
-use planner_core::flight::{Gate, Path, Task, VehiclePlan};
+use planner_core::flight::{Task, VehiclePlan};
 use planner_core::frames::{self, Geodetic};
 use planner_core::{Point, frames::swap_enu_ned};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
+mod drawn;
+
+pub use self::drawn::{area_config, config, random_area_plan, random_path, random_plan};
 use super::Meter;
 use crate::capacity::BoardCompanion;
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
@@ -26,6 +30,8 @@ pub const STEP: &str = "Companion::handle_timeout, 32 speak";
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
 /// The same where all are near and off the plan, and few are on the path: the safety filter looks at all of them.
 pub const NEAR_STEP: &str = "a control step, 32 near";
+/// One of a coverage mission, in flight or while it divides, beside as many.
+pub const AREA_STEP: &str = "a control step, coverage, 32 near";
 /// The safety filter alone, which is part of each of them.
 pub const FILTER: &str = "Companion::ask_filter, 32 near";
 /// Any other, and what else is due.
@@ -80,55 +86,6 @@ pub struct Flight<'a, M> {
     sequences: [u8; 256],
     others: Vec<Other, VEHICLES>,
     plan: &'a VehiclePlan<WAYPOINTS, GATES>,
-}
-
-/// The settings of vehicle 1 of a swarm as large as this board's.
-pub fn config() -> Config<VEHICLES> {
-    let start = Point::new(0.0, 0.0, 10.0);
-    let mut config = Config::new(SYSTEM, start, ORIGIN);
-    config.mission_crc = MISSION_CRC;
-    config.cruise_mps = CRUISE_MPS;
-    for id in 2..=VEHICLES as u8 {
-        config.roster.push(RosterEntry { system_id: id, start }).expect("there is room");
-    }
-    config
-}
-
-/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight on or to and fro.
-pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
-    let leg_m = [0.2, 1.0, 5.0][below(rng, 3)];
-    let onward = anywhere(rng, leg_m);
-    let straight = below(rng, 2) == 0;
-    let mut path = Path::new();
-    let mut at = Point::new(0.0, 0.0, 10.0);
-    for _ in 0..[4, 8, WAYPOINTS][below(rng, 3)] {
-        path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
-        at += if straight { onward + anywhere(rng, 0.01 * leg_m) } else { anywhere(rng, leg_m) };
-    }
-    path
-}
-
-/// A random plan with as many gates as a board's may have.
-pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
-    let path = random_path(rng);
-    let length_m = path.length_m();
-    let mut gates: Vec<_, GATES> = (0..GATES)
-        .map(|_| Gate {
-            at_m: uniform(rng, 0.0, length_m),
-            id: 2 + below(rng, VEHICLES) as u8,
-            until_m: uniform(rng, 0.0, 60.0),
-        })
-        .collect();
-    gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
-    VehiclePlan {
-        task: Task::Goto(0),
-        path,
-        climb_m: 1.0,
-        descent_m: 1.0,
-        depart_s: 0.0,
-        gates,
-        plan_crc: PLAN_CRC,
-    }
 }
 
 /// Whether most of a flight's neighbours leave the plan or fall silent.
@@ -276,7 +233,11 @@ impl<'a, M: Meter> Flight<'a, M> {
 
     fn flies(&self) -> bool {
         use companion::State::*;
-        matches!(self.companion.state(), Follow | Blocked | Replanning)
+        matches!(self.companion.state(), Follow | Blocked | Replanning | Dividing)
+    }
+
+    fn has_area(&self) -> bool {
+        matches!(self.plan.task, Task::Photograph(_))
     }
 
     fn take_off(&mut self) {
@@ -303,6 +264,7 @@ impl<'a, M: Meter> Flight<'a, M> {
     /// So much time passes: the companion's step, then the autopilot's.
     fn tick(&mut self, name: &'static str, time: Duration) {
         self.now = self.now + time;
+        let name = if self.has_area() { AREA_STEP } else { name };
         let (now, companion) = (self.now, &mut *self.companion);
         self.meter.call(name, size_of::<BoardCompanion>(), || companion.handle_timeout(now));
         self.drain();
@@ -373,6 +335,9 @@ impl<'a, M: Meter> Flight<'a, M> {
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);
         self.hear(Link::Swarm, (system_id, companion::COMPONENT), TUNNEL, &payload[..len]);
+        if self.has_area() {
+            self.tell_roster(system_id);
+        }
         let at = frames::enu_to_geodetic(&ORIGIN, &place);
         let mut position = [0; 28];
         position[..4].copy_from_slice(&self.now.boot_ms().to_le_bytes());
@@ -384,6 +349,19 @@ impl<'a, M: Meter> Flight<'a, M> {
             to.copy_from_slice(&(uniform(rng, -200.0, 200.0) as i16).to_le_bytes());
         }
         self.hear(Link::Swarm, (system_id, companion::COMPONENT), GLOBAL_POSITION_INT, &position);
+    }
+
+    /// What it knows of all: that they fly.
+    fn tell_roster(&mut self, system_id: u8) {
+        for first in (0..VEHICLES).step_by(roster::ENTRIES) {
+            let known = VEHICLES.min(first + roster::ENTRIES) - first;
+            let entries = core::iter::repeat_n(Entry::default(), known).collect();
+            let mission_crc = MISSION_CRC;
+            let roster = Roster { system_id, first: first as u8, mission_crc, entries, ..Roster::default() };
+            let mut payload = [0; roster::LENGTH];
+            let len = roster.encode(&mut payload);
+            self.hear(Link::Swarm, (system_id, companion::COMPONENT), TUNNEL, &payload[..len]);
+        }
     }
 
     /// Takes all that the companion has to say, and does as it asks.
@@ -452,44 +430,4 @@ fn put(to: &mut [u8], numbers: &[f32]) {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[derive(Default)]
-    struct Counts {
-        steps: usize,
-        filtered: usize,
-    }
-
-    impl Meter for Counts {
-        fn call<T>(&mut self, name: &'static str, _bytes: usize, work: impl FnOnce() -> T) -> T {
-            self.steps += usize::from(name == STEP || name == HARD_STEP);
-            self.filtered += usize::from(name == FILTER);
-            work()
-        }
-    }
-
-    #[test]
-    fn the_filter_is_counted_in_flight() {
-        let mut meter = Counts::default();
-        for seed in 0..10 {
-            let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
-            let mut companion = BoardCompanion::new(config()).expect("the settings are good");
-            filter(seed, &plan, &mut companion, &mut meter);
-        }
-        assert_eq!(meter.filtered, 10 * ROUNDS);
-    }
-
-    #[test]
-    fn most_steps_of_a_flight_are_flown() {
-        let mut meter = Counts::default();
-        let mut flown = 0;
-        for seed in 0..10 {
-            let plan = random_plan(&mut Pcg32::seed_from_u64(seed));
-            let mut companion = BoardCompanion::new(config()).expect("the settings are good");
-            flown += fly(seed, &plan, &mut companion, &mut meter);
-        }
-        assert_eq!(meter.steps, flown);
-        assert!(flown > 8 * STEPS, "{flown}");
-    }
-}
+mod tests;

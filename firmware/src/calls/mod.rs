@@ -4,6 +4,7 @@
 //! table. On the desk the same runs without counting, as a test.
 
 pub mod coverage;
+pub mod coverage_flights;
 pub mod flight;
 pub mod limits;
 mod limits_area_flights;

@@ -4,11 +4,13 @@ use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
 use companion::link::frame::{self, Framer, Header, MAX_SENT};
 use companion::link::intent::{self, Intent};
+use companion::link::roster::{self, Roster};
 use companion::services::parameters::{self, Parameters};
 use companion::storage::mission_file::{
     self, Block, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
 use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash, Store};
+use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
 use firmware::calls::{Meter, flight};
@@ -47,6 +49,7 @@ const GROUND: (u8, u8) = (255, 190);
 pub fn run(meter: &mut impl Meter) {
     bytes(meter);
     missions(meter);
+    fleets(meter);
     values(meter);
     let companion = BoardCompanion::new(flight::config()).expect("the settings are good");
     let flash = Ram(memory::spare().expect("it is taken once"));
@@ -141,6 +144,43 @@ fn missions(meter: &mut impl Meter) {
     let _ = meter.call("config::Config::check, 32", 0, || config.check());
     let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
     meter.call("mission_file::MissionView::fits", 0, || view.fits(&roadmap));
+}
+
+/// The agreement on what lost vehicles leave, among as many as there may be, each of which reports something new.
+fn fleets(meter: &mut impl Meter) {
+    let mut fleet = Fleet::<VEHICLES>::new(0, VEHICLES, Limits::of_flight(Duration::from_secs(60)));
+    let bytes = size_of_val(&fleet);
+    let mut now = Instant::ZERO;
+    fleet.begin(now);
+    for round in 0..120_u16 {
+        now = now + Duration::from_secs(1);
+        // The last ones fall silent one by one, those before them promise and hold.
+        let hearing = |rank: usize| {
+            let speaks = rank < VEHICLES - usize::from(round / 10);
+            Hearing { direct_at: speaks.then_some(now), hears_us: speaks, by_others: speaks }
+        };
+        let promise_dm = Some(100 + round);
+        let own = Own { done_dm: 10 * round, promise_dm, holds: true, ..Own::default() };
+        meter.call("fleet::Fleet::step, 32", bytes, || fleet.step(now, &own, hearing));
+        if meter.call("fleet::Fleet::wants_hash", bytes, || fleet.wants_hash()) {
+            meter.call("fleet::Fleet::take_plan_crc", bytes, || fleet.take_plan_crc(7));
+        }
+        meter.call("fleet::Fleet::fingerprint", bytes, || fleet.fingerprint());
+        for first in [0, roster::ENTRIES] {
+            let mut told = meter.call("fleet::Fleet::message", bytes, || fleet.message(first));
+            let mut payload = [0; roster::LENGTH];
+            meter.call("roster::Roster::encode", 0, || told.encode(&mut payload));
+            let mut padded = [0; 255];
+            padded[..roster::LENGTH].copy_from_slice(&payload);
+            let read = meter.call("roster::Roster::decode", 0, || Roster::decode(&padded, told.system_id));
+            assert!(read.is_some_and(|read| read == told));
+            for entry in &mut told.entries {
+                (entry.done_dm, entry.promise_dm, entry.holds) = (10 * round + 5, promise_dm, true);
+            }
+            let sender = 1 + usize::from(round) % (VEHICLES / 2);
+            meter.call("fleet::Fleet::handle, 32", bytes, || fleet.handle(sender, &told, false));
+        }
+    }
 }
 
 fn values(meter: &mut impl Meter) {

@@ -27,7 +27,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 /// Flights in which the safety filter is counted.
 const FILTERED: u64 = 100;
 /// Most rows.
-const ROWS: usize = 128;
+const ROWS: usize = 160;
 
 /// Counts instructions, those of asking the clock left out.
 struct Instructions {
@@ -52,9 +52,11 @@ impl Meter for Instructions {
 fn main() -> ! {
     clock::start();
     let mut meter = Instructions { rows: Vec::new() };
-    println!("coverage {:08x}", planner_calls::run(&mut meter));
+    let [calls, flights] = planner_calls::run(&mut meter);
+    println!("coverage {calls:08x} {flights:08x}");
     companion_calls::run(&mut meter);
     fly(&mut meter);
+    fly_areas(&mut meter);
     filter(&mut meter);
     for (name, bytes, count) in &meter.rows {
         println!("call {count} {bytes} {name}");
@@ -77,6 +79,20 @@ fn fly(meter: &mut Instructions) {
         steps[kind] += flight::fly(seed, &plan, &mut companion, meter);
         if steps.iter().all(|&steps| steps >= cases::STEPS) {
             println!("steps {steps:?}");
+            return;
+        }
+    }
+}
+
+/// Control steps of coverage missions in flight.
+#[inline(never)]
+fn fly_areas(meter: &mut Instructions) {
+    let mut steps = 0;
+    for seed in 0.. {
+        let plan = flight::random_area_plan(&mut Pcg32::seed_from_u64(seed));
+        let mut companion = BoardCompanion::new(flight::area_config()).expect("the settings are good");
+        steps += flight::fly(seed, &plan, &mut companion, meter);
+        if steps >= cases::STEPS {
             return;
         }
     }

@@ -1,7 +1,7 @@
 //! The calls of planner-core.
 
 use firmware::boards::chosen::memory;
-use firmware::calls::{Meter, coverage, flight};
+use firmware::calls::{Meter, coverage, coverage_flights, flight};
 use firmware::capacity::{GATES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase, anywhere, below, uniform};
 use firmware::scratch::{Planner, Scratch};
@@ -58,9 +58,9 @@ static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
     lengths: [0.0; 2048],
 });
 
-/// All of them; the sum of the answers of a coverage mission.
+/// All of them; the sums of the answers of a coverage mission: of its calls, of its flights.
 #[inline(never)]
-pub fn run(meter: &mut impl Meter) -> u32 {
+pub fn run(meter: &mut impl Meter) -> [u32; 2] {
     let scratch = SCRATCH.take();
     let beside = BESIDE.take();
     let view = meter
@@ -86,7 +86,8 @@ pub fn run(meter: &mut impl Meter) -> u32 {
     builds(meter, &grid, scratch);
     let search = &mut scratch.planner().search;
     desk(meter, &grid, search, beside);
-    coverage::run(meter, scratch.coverage())
+    let flights = coverage_flights::run(meter, scratch, &mut beside.plan);
+    [coverage::run(meter, scratch.coverage()), flights]
 }
 
 fn geodetic(rng: &mut Pcg32) -> Geodetic {

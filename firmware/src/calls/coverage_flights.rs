@@ -1,0 +1,306 @@
+//! A coverage mission planned whole, as a board does where its companion asks for a plan, and divided again after a loss: lanes,
+//! routes and the flights of all vehicles with their departures. What is planned is summed up bit by bit, to be compared with the desk's.
+
+use companion::planner::coverage::{self, Request};
+use companion::storage::mission_file::coverage::{CoverageHeader, CoverageParts, Heading, Parts, Share};
+use companion::storage::mission_file::{self, Block, Kind, MissionHeader, MissionVehicle, MissionView};
+use companion::swarm::fleet::Lot;
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::coverage::Flat;
+use planner_core::coverage::area::{Area, Ring, RingKind};
+use planner_core::coverage::flights::{self, Manner, Pad, Swarm};
+use planner_core::coverage::footprint::{Footprint, Spacing};
+use planner_core::coverage::losses::{self, Fate, Loss};
+use planner_core::coverage::pack::{self, Heights, Unit, Vehicle, Work};
+use planner_core::coverage::tracks::{self, Pattern};
+use planner_core::coverage::transit::Transit;
+use planner_core::deconflict::Method;
+use planner_core::flight::{Look, Trigger};
+use planner_core::plan::{SwarmPlan, VehicleTask};
+use planner_core::schedule::ScheduleConfig;
+
+use super::{Meter, flight};
+use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
+use crate::scratch;
+
+/// The flights of a swarm as large as this board's.
+pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
+
+/// Vehicles of the plans that have a limit.
+const FEW: usize = 3;
+const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
+const CRUISE_MPS: f32 = 5.0;
+const CLIMB_MPS: f32 = 3.0;
+const DESCEND_MPS: f32 = 1.0;
+const SCHEDULE: ScheduleConfig = ScheduleConfig {
+    separation_m: 2.0,
+    parked_separation_m: 1.75,
+    cruise_mps: CRUISE_MPS,
+    vertical_mps: DESCEND_MPS,
+};
+/// So high above its pad a path begins, metres.
+const CLIMB_M: f32 = 2.0;
+/// From pad to pad, metres.
+const PADS_M: f32 = 5.0;
+/// Five vertices, 300 by 150 m.
+const FIVE: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
+/// No-fly zones within them.
+const ZONES: [[[f32; 2]; 4]; 2] = [
+    [[80.0, 40.0], [110.0, 45.0], [105.0, 80.0], [75.0, 70.0]],
+    [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
+];
+
+/// Makes all of them; the sum of the answers.
+#[inline(never)]
+pub fn run(meter: &mut impl Meter, lent: &mut scratch::Scratch, out: &mut Flights) -> u32 {
+    whole(meter, lent.area(), out) ^ parts(meter, lent.coverage(), out)
+}
+
+/// Whole plans.
+#[inline(never)]
+fn whole(meter: &mut impl Meter, lent: &mut scratch::Area, out: &mut Flights) -> u32 {
+    let mut sum = 1;
+    for zones in [&[][..], &ZONES[..]] {
+        mission(meter, zones, lent, out, &mut sum);
+    }
+    sum
+}
+
+fn add(sum: &mut u32, flights: &Flights) {
+    *sum = sum.rotate_left(5).wrapping_mul(0x9e37_79b1) ^ flights.crc;
+}
+
+/// The rings of an area with so many zones.
+fn rings(zones: usize) -> Vec<Ring, 4> {
+    let zone = |k: usize| Ring { end: (FIVE.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
+    let outer = Ring { end: FIVE.len() as u16, kind: RingKind::Outer };
+    core::iter::once(outer).chain((0..zones).map(zone)).collect()
+}
+
+/// The mission file of three vehicles.
+fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
+    let header = MissionHeader {
+        roadmap_crc: 0,
+        mode: crate::cases::MODE,
+        method: Method::Priority,
+        origin: flight::ORIGIN,
+        cruise_mps: CRUISE_MPS,
+        schedule: SCHEDULE,
+        safety_distance_m: 1.5,
+        geofence: None,
+        ground_stations: companion::config::USUAL_GROUND_STATIONS,
+    };
+    let vehicle = |k: usize| MissionVehicle {
+        task: VehicleTask { id: 1 + k as u8, required_clearance_m: 1.5, climb_m: CLIMB_M, goal: None },
+        start: Point::new(PADS_M * k as f32, -10.0, CLIMB_M),
+        radius_m: 0.3,
+        speed_max_mps: 8.0,
+    };
+    let vehicles: Vec<_, FEW> = (0..FEW).map(vehicle).collect();
+    let area = CoverageHeader {
+        unit: Unit::Waypoint,
+        parts: Parts::Anyone,
+        heading: Heading::Sweep,
+        trigger: Trigger::Distance,
+        looks: super::coverage::LOOKS,
+        heights: HEIGHTS,
+        spacing: spacing(10.0),
+        angle_deg: None,
+        margin_m: 0.0,
+        ground: None,
+    };
+    let share = Share { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
+    let corners = FIVE.iter().chain(zones.iter().flatten());
+    let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
+    let parts = CoverageParts {
+        header: area,
+        shares: &[share; FEW],
+        rings: &rings(zones.len()),
+        vertices: &vertices,
+    };
+    mission_file::write(&header, &vehicles, &Block::Coverage(parts), out).expect("a good mission")
+}
+
+fn spacing(lane_m: f32) -> Spacing {
+    Spacing { footprint: Footprint { along_m: lane_m, across_m: lane_m }, lane_m, waypoint_m: lane_m }
+}
+
+/// What a board plans from its mission file, before the start and after two losses.
+fn mission(
+    meter: &mut impl Meter,
+    zones: &[[[f32; 2]; 4]],
+    lent: &mut scratch::Area,
+    out: &mut Flights,
+    sum: &mut u32,
+) {
+    let mut bytes = [0; 1024];
+    let len = file(zones, &mut bytes);
+    let view = MissionView::parse(&bytes[..len]).expect("it was written");
+    let Kind::Coverage(area) = view.kind() else { return };
+    let request = Request { mission: &view, view: area, field: None, gates_most: GATES, done: &[] };
+    let names = match zones.is_empty() {
+        true => ["planner::coverage::plan, 3", "planner::coverage::plan, 3 after two losses"],
+        false => ["planner::coverage::plan, 3, zones", "planner::coverage::plan, 3 after two losses, zones"],
+    };
+    let lent_bytes = size_of::<scratch::Area>();
+    let mut losses: Vec<[Lot; FEW], 2> = Vec::new();
+    for lost in [None, Some(0), Some(1)] {
+        if let Some(lost) = lost {
+            // Each in the air stands in the middle of its path; who fell out before is on the ground.
+            let lot = |k: usize| {
+                let flies = out.flights[k].task.flies();
+                let along_dm = if flies { (out.flights[k].path.length_m() * 5.0) as u16 } else { 0 };
+                Lot { lives: k > lost, along_dm }
+            };
+            losses.push(core::array::from_fn(lot)).expect("there is room");
+        }
+        let name = names[usize::from(lost.is_some())];
+        meter
+            .call(name, lent_bytes, || {
+                coverage::plan::<AREA_VERTICES, LANES, VEHICLES, AREA_CORNERS, VEHICLES, WAYPOINTS>(
+                    &request,
+                    losses.iter().map(|lots| &lots[..]),
+                    &mut lent.area,
+                    &mut lent.schedule,
+                    out,
+                )
+            })
+            .expect("a plan");
+        add(sum, out);
+    }
+}
+
+/// The flights of routes alone, and divisions of what a vehicle leaves.
+#[inline(never)]
+fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights) -> u32 {
+    let mut sum = 1;
+    let names = ["flights::plan, 3", "losses::again, 3"];
+    for zones in [&[][..], &ZONES[..]] {
+        let corners = FIVE.iter().chain(zones.iter().flatten());
+        let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
+        let rings = rings(zones.len());
+        let case = Case {
+            area: Area::new(&vertices, &rings).expect("an area"),
+            angle_deg: None,
+            lane_m: 10.0,
+            count: FEW,
+        };
+        divided(meter, &case, names, lent, out, &mut sum);
+    }
+    // As many lanes as there may be, for as many vehicles.
+    let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
+    let rings = [Ring { end: 4, kind: RingKind::Outer }];
+    let case = Case {
+        area: Area::new(&wide, &rings).expect("an area"),
+        angle_deg: Some(90.0),
+        lane_m: 5.0,
+        count: VEHICLES,
+    };
+    divided(meter, &case, ["flights::plan, 32", "losses::again, 32"], lent, out, &mut sum);
+    sum
+}
+
+/// An area, its lanes, and how many vehicles photograph it.
+struct Case<'a> {
+    area: Area<'a>,
+    angle_deg: Option<f32>,
+    lane_m: f32,
+    count: usize,
+}
+
+fn vehicles(count: usize) -> (Vec<Vehicle, VEHICLES>, Vec<Pad, VEHICLES>) {
+    let place = |k: usize| Flat::new(PADS_M * k as f32, -10.0);
+    let vehicle = |k: usize| Vehicle {
+        place: place(k),
+        home: place(k),
+        cruise_mps: CRUISE_MPS,
+        climb_mps: CLIMB_MPS,
+        descend_mps: DESCEND_MPS,
+        weight: 1.0,
+    };
+    let pad = |k: usize| Pad {
+        id: 1 + k as u8,
+        start: Point::new(place(k).x, place(k).y, CLIMB_M),
+        climb_m: CLIMB_M,
+        end_z_m: CLIMB_M,
+        descent_m: CLIMB_M,
+        aloft: false,
+    };
+    ((0..count).map(vehicle).collect(), (0..count).map(pad).collect())
+}
+
+fn divided(
+    meter: &mut impl Meter,
+    case: &Case<'_>,
+    [flights_name, again_name]: [&'static str; 2],
+    lent: &mut scratch::Coverage,
+    out: &mut Flights,
+    sum: &mut u32,
+) {
+    let mut transit = Transit::<AREA_CORNERS>::empty();
+    transit.learn(case.area).expect("they fit");
+    let scratch::Coverage { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
+    let pack = &mut powell.pack;
+    let looks = super::coverage::LOOKS;
+    let pattern = Pattern { spacing: spacing(case.lane_m), angle_deg: case.angle_deg, margin_m: 0.0, looks };
+    tracks::build(&case.area, &pattern, &transit, build, tracks).expect("lanes");
+    let (vehicles, pads) = vehicles(case.count);
+    let work =
+        Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: Unit::Waypoint };
+    losses.begin(tracks, &transit, &[]).expect("nothing is done");
+    pack::binpat(&work, pack, routes).expect("routes");
+    let swarm = Swarm {
+        pads: &pads,
+        manner: Manner { waypoint_m: case.lane_m, look: Look::Fixed(0.0), trigger: Trigger::Distance },
+        clearance_m: 10.0,
+        schedule: SCHEDULE,
+        gates_most: GATES,
+        done: &[],
+        layers_held: 0,
+        following: None,
+    };
+    meter
+        .call(flights_name, size_of_val(schedule), || flights::plan(&work, routes, &swarm, schedule, out))
+        .expect("flights");
+    add(sum, out);
+    let bytes = size_of_val(losses) + size_of_val(pack) + size_of_val(schedule);
+    // Each lives on from where it holds, and the first is lost.
+    let fate = |k: usize| Fate { lives: k > 0, along_m: 0.5 * out.flights[k].path.length_m() };
+    let fates: Vec<Fate, VEHICLES> = (0..case.count).map(fate).collect();
+    let loss = Loss { work: &work, swarm: &swarm, fates: &fates };
+    meter
+        .call(again_name, bytes, || losses::again(&loss, losses, pack, schedule, routes, out))
+        .expect("a division");
+    add(sum, out);
+}
+
+#[cfg(test)]
+mod tests {
+    extern crate std;
+
+    use std::boxed::Box;
+
+    use super::*;
+
+    struct Desk;
+
+    impl Meter for Desk {
+        fn call<T>(&mut self, name: &'static str, _: usize, work: impl FnOnce() -> T) -> T {
+            let began = std::time::Instant::now();
+            let result = work();
+            std::println!("{name}: {:?}", began.elapsed());
+            result
+        }
+    }
+
+    #[test]
+    fn all_flights_are_planned_and_the_sum_is_the_same_again() {
+        let mut out = Box::new(Flights::new());
+        let mut area = Box::<scratch::Area>::default();
+        let mut lent = Box::<scratch::Coverage>::default();
+        let mut sums = || [whole(&mut Desk, &mut area, &mut out), parts(&mut Desk, &mut lent, &mut out)];
+        let first = sums();
+        assert_eq!(sums(), first);
+    }
+}

@@ -1,0 +1,84 @@
+//! What the flights are drawn from: settings and plans.
+
+use companion::{Config, RosterEntry};
+use heapless::Vec;
+use planner_core::Point;
+use planner_core::flight::{Gate, Look, Path, Photographs, Range, Task, Trigger, VehiclePlan};
+use rand_pcg::Pcg32;
+
+use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
+use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
+use crate::cases::{anywhere, below, uniform};
+
+/// A lost vehicle is down after so many seconds.
+const DOWN_S: f32 = 60.0;
+/// From one picture to the next, metres; how many there are on a lane, and in all.
+const LANE_M: f32 = 1.0;
+const LANE_PICTURES: u32 = 4;
+const PICTURES: u32 = 200;
+
+/// The settings of vehicle 1 of a swarm as large as this board's.
+pub fn config() -> Config<VEHICLES> {
+    let start = Point::new(0.0, 0.0, 10.0);
+    let mut config = Config::new(SYSTEM, start, ORIGIN);
+    config.mission_crc = MISSION_CRC;
+    config.cruise_mps = CRUISE_MPS;
+    for id in 2..=VEHICLES as u8 {
+        config.roster.push(RosterEntry { system_id: id, start }).expect("there is room");
+    }
+    config
+}
+
+/// A random path of few legs, or as many as a board's may have: short or long ones, nearly straight on or to and fro.
+pub fn random_path(rng: &mut Pcg32) -> Path<WAYPOINTS> {
+    let leg_m = [0.2, 1.0, 5.0][below(rng, 3)];
+    let onward = anywhere(rng, leg_m);
+    let straight = below(rng, 2) == 0;
+    let mut path = Path::new();
+    let mut at = Point::new(0.0, 0.0, 10.0);
+    for _ in 0..[4, 8, WAYPOINTS][below(rng, 3)] {
+        path.push(at, uniform(rng, 0.4, 2.0)).expect("there is room");
+        at += if straight { onward + anywhere(rng, 0.01 * leg_m) } else { anywhere(rng, leg_m) };
+    }
+    path
+}
+
+/// A random plan with as many gates as a board's may have.
+pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
+    let path = random_path(rng);
+    let length_m = path.length_m();
+    let mut gates: Vec<_, GATES> = (0..GATES)
+        .map(|_| Gate {
+            at_m: uniform(rng, 0.0, length_m),
+            id: 2 + below(rng, VEHICLES) as u8,
+            until_m: uniform(rng, 0.0, 60.0),
+        })
+        .collect();
+    gates.sort_unstable_by(|a, b| a.at_m.total_cmp(&b.at_m));
+    VehiclePlan {
+        task: Task::Goto(0),
+        path,
+        climb_m: 1.0,
+        descent_m: 1.0,
+        depart_s: 0.0,
+        gates,
+        plan_crc: PLAN_CRC,
+    }
+}
+
+/// The same settings for an area that is divided again where a vehicle is lost.
+pub fn area_config() -> Config<VEHICLES> {
+    Config { division: Some(DOWN_S), ..config() }
+}
+
+/// A random plan of a coverage mission: every second leg is a lane.
+pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
+    let mut plan = random_plan(rng);
+    let mut photographs = Photographs::new(LANE_M, Look::Ahead, Trigger::Distance).of_area(PICTURES, false);
+    for (lane, from) in (1..plan.path.waypoints().len() - 1).step_by(2).enumerate() {
+        let first = LANE_PICTURES * lane as u32;
+        photographs.mark(from, from + 1, Range { first, end: first + LANE_PICTURES }).expect("there is room");
+    }
+    plan.task = Task::Photograph(photographs);
+    plan
+}
