@@ -201,11 +201,11 @@ impl Task {
         *self != Self::Stay
     }
 
-    /// Index of the goal flown to.
+    /// Index of the goal flown to. One that flies without a goal ends over its own pad.
     pub fn goal(&self) -> Option<u16> {
         match self {
             Self::Goto(goal) => Some(*goal),
-            Self::Stay | Self::Photograph(_) => None,
+            _ => None,
         }
     }
 }
