@@ -8,7 +8,7 @@
 
 use core::fmt::Write as _;
 
-use companion::storage::mission_file::{self, Kind, MissionError, MissionView};
+use companion::storage::mission_file::{self, MissionError, MissionView};
 use companion::storage::store::{ReadFlash, Store};
 use companion::{Config, Link};
 use cortex_m_rt::{ExceptionFrame, entry, exception};
@@ -211,11 +211,8 @@ fn find_mission(
     let read = MissionView::parse(bytes);
     crash::finish();
     let refused = read.err();
-    let fits = |mission: &MissionView<'_>| match mission.kind() {
-        Kind::Goals => roadmap.is_some_and(|roadmap| mission.fits(roadmap)),
-        Kind::Coverage(_) => true,
-    };
-    FoundMission { mission: read.ok().filter(fits), files, refused, aside: false }
+    let mission = read.ok().filter(|mission| mission.fits(roadmap));
+    FoundMission { mission, files, refused, aside: false }
 }
 
 fn start_links(links: SendSpawner, shell: &'static Shell, for_autopilot: bool, autopilot: Ends, swarm: Ends) {

@@ -377,8 +377,16 @@ impl<'a> MissionView<'a> {
         self.vehicles().position(|vehicle| vehicle.task.id == system_id)
     }
 
+    /// Whether it can be planned beside this roadmap, or beside none.
+    pub fn fits(&self, roadmap: Option<&RoadmapView<'_>>) -> bool {
+        match self.kind {
+            Kind::Goals => roadmap.is_some_and(|roadmap| self.is_of(roadmap)),
+            Kind::Coverage(_) => true,
+        }
+    }
+
     /// Whether it was made for this roadmap.
-    pub fn fits(&self, roadmap: &RoadmapView<'_>) -> bool {
+    fn is_of(&self, roadmap: &RoadmapView<'_>) -> bool {
         let terminals = (usize::from(roadmap.header().starts), usize::from(roadmap.header().goals));
         self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
     }

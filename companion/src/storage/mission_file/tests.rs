@@ -4,6 +4,7 @@ extern crate std;
 use std::vec;
 use std::vec::Vec as List;
 
+use planner_core::roadmap::{self, RoadmapHeader};
 use proptest::prelude::*;
 
 use super::*;
@@ -74,6 +75,38 @@ fn comes_back_as_written() {
     );
     let whole = [file.as_slice(), &[0xFF; 40]].concat();
     assert_eq!(MissionView::parse(&whole).unwrap().crc(), view.crc(), "as it lies in flash");
+}
+
+/// A roadmap of so many starts and goals, without edges.
+fn roadmap(starts: u16, goals: u16) -> List<u8> {
+    let header = RoadmapHeader {
+        origin: header().origin,
+        edge_min_m: 0.5,
+        edge_max_m: 5.0,
+        tested_clearance_m: 0.5,
+        max_clearance_m: 10.0,
+        starts,
+        goals,
+    };
+    let nodes: List<_> = (0..starts + goals).map(|i| Point::new(f32::from(i), 0.0, 1.5)).collect();
+    let mut out = vec![0; roadmap::encoded_len(nodes.len(), 0, 0).unwrap()];
+    roadmap::write(&header, &nodes, &[], &mut out).unwrap();
+    out
+}
+
+#[test]
+fn goals_are_flown_to_on_the_roadmap_they_are_made_for() {
+    for (starts, goals, same_crc, fits) in
+        [(3, 2, true, true), (3, 2, false, false), (2, 2, true, false), (3, 1, true, false)]
+    {
+        let bytes = roadmap(starts, goals);
+        let roadmap = RoadmapView::parse(&bytes).unwrap();
+        let crc = roadmap.crc() ^ u32::from(!same_crc);
+        let file = forged(16, &crc.to_le_bytes());
+        let view = MissionView::parse(&file).unwrap();
+        assert_eq!(view.fits(Some(&roadmap)), fits, "{starts} {goals} {same_crc}");
+        assert!(!view.fits(None));
+    }
 }
 
 #[test]

@@ -143,7 +143,7 @@ fn missions(meter: &mut impl Meter) {
     });
     let _ = meter.call("config::Config::check, 32", 0, || config.check());
     let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
-    meter.call("mission_file::MissionView::fits", 0, || view.fits(&roadmap));
+    meter.call("mission_file::MissionView::fits", 0, || view.fits(Some(&roadmap)));
 }
 
 /// The agreement on what lost vehicles leave, among as many as there may be, each of which reports something new.

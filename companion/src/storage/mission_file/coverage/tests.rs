@@ -118,6 +118,7 @@ fn planned(file: &[u8], memory: &mut Memory) -> Option<Result<(), coverage::Erro
 fn comes_back_as_written_and_is_planned() {
     let file = file();
     let view = MissionView::parse(&file).unwrap();
+    assert!(view.fits(None), "it is planned without a roadmap");
     let Kind::Coverage(area) = view.kind() else { panic!("a coverage mission") };
     assert_eq!(area.header(), &header());
     assert_eq!(area.shares().collect::<List<_>>(), shares());
