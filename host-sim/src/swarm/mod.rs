@@ -21,7 +21,7 @@ use anyhow::Context;
 use companion::config::REACHES_ALL_M;
 use companion::{Config, PlanFailure, State, Wanted};
 use planner_core::Point;
-use planner_core::flight::{Range, Task};
+use planner_core::flight::Range;
 use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
 use sim_autopilot as autopilot;
@@ -260,11 +260,11 @@ impl<'a> Run<'a> {
             {
                 let off = places[i] - end.position;
                 let nearest_m = &mut self.nearest_goal_m[i];
-                *nearest_m = match plan.flights[i].task {
+                *nearest_m = match plan.flights[i].task.goal() {
+                    Some(_) => nearest_m.min(off.norm()),
                     // It began where it ends: over its pad.
-                    Task::Photograph(_) if off.xy().norm() > AWAY_M => f32::INFINITY,
-                    Task::Photograph(_) => nearest_m.min(off.xy().norm()),
-                    _ => nearest_m.min(off.norm()),
+                    None if off.xy().norm() > AWAY_M => f32::INFINITY,
+                    None => nearest_m.min(off.xy().norm()),
                 };
             }
         }
