@@ -18,6 +18,7 @@ use super::*;
 use crate::autopilot::px4;
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
+use planner_core::flight::{Look, Photographs, Range, Task, Trigger};
 
 /// Rule of every flight: from before Offboard until the landing no gap between setpoints above 100 ms.
 pub(super) fn assert_no_gap(bench: &Bench) {
@@ -56,6 +57,28 @@ fn flies_the_mission_and_lands_at_the_goal() {
     for (_, at, mask) in &bench.setpoints {
         assert_eq!(*mask, px4::MASK_POSITION_VELOCITY_ACCELERATION);
         assert!((at.y - 12.0).abs() < 0.02 && at.x > 7.98 && at.x < 16.02 && at.z < 3.52, "{at:?}");
+    }
+}
+
+/// At every setpoint with a place; without a heading it looks where it did.
+#[test]
+fn looks_where_its_task_says() {
+    for look in [None, Some(0.7f32), Some(-2.5)] {
+        let mut bench = Bench::new(config());
+        if let Some(heading) = look {
+            let mut photographs = Photographs::new(2.0, Look::Fixed(heading), Trigger::None);
+            photographs.mark(1, 2, Range { first: 0, end: 2 }).unwrap();
+            bench.answer_plan = Some(Ok(Plan { task: Task::Photograph(photographs), ..field_plan() }));
+        }
+        bench.until(State::Ready, 6.0);
+        bench.start();
+        bench.until(State::Done, 90.0);
+        assert!(bench.headings.len() > 200 && bench.headings.len() == bench.setpoints.len());
+        for ((at, _, mask), heading) in bench.setpoints.iter().zip(&bench.headings) {
+            let wanted = look.filter(|_| *mask != px4::MASK_VELOCITY);
+            let near = |(a, b): (f32, f32)| (a - b).abs() < 1e-3;
+            assert!(*heading == wanted || heading.zip(wanted).is_some_and(near), "{heading:?} at {at:?}");
+        }
     }
 }
 

@@ -29,7 +29,11 @@ mod telemetry;
 
 pub(crate) use self::mission::*;
 
-pub type Small = Companion<4, 16, 8>;
+pub type Small = Companion<4, WAYPOINTS, GATES>;
+/// A plan for it.
+pub type Plan = VehiclePlan<WAYPOINTS, GATES>;
+pub const WAYPOINTS: usize = 32;
+pub const GATES: usize = 8;
 
 /// The autopilot, the radio's other end, and the companion between them.
 pub struct Bench {
@@ -79,6 +83,8 @@ pub struct Bench {
     pub never_lands: bool,
     pub events: Vec<Event>,
     pub setpoints: Vec<(Instant, Point, u16)>,
+    /// Where it is to look at each of them, radians from east to the left; none: as it does.
+    pub headings: Vec<Option<f32>>,
     pub commands: Vec<(u16, f32, f32, f32)>,
     pub texts: Vec<std::string::String>,
     pub swarm: Vec<Frame>,
@@ -92,13 +98,13 @@ pub struct Bench {
     landed_at: Option<Instant>,
     idle_since: Option<Instant>,
     pub origin: Geodetic,
-    pub answer_plan: Option<Result<VehiclePlan<16, 8>, crate::PlanFailure>>,
+    pub answer_plan: Option<Result<Plan, crate::PlanFailure>>,
     /// Whether there is a way around: by y = 16; over a field as planned.
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
     /// Its plan before it asked for a way around.
-    own_plan: Option<VehiclePlan<16, 8>>,
+    own_plan: Option<Plan>,
     /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
     /// flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
@@ -141,6 +147,7 @@ impl Bench {
             never_lands: false,
             events: Vec::new(),
             setpoints: Vec::new(),
+            headings: Vec::new(),
             commands: Vec::new(),
             texts: Vec::new(),
             swarm: Vec::new(),

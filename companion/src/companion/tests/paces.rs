@@ -7,7 +7,7 @@ use proptest::prelude::ProptestConfig;
 use super::*;
 
 /// A way back and forth over a field, lanes `apart_m` apart.
-fn lanes(long_m: f32, apart_m: f32) -> VehiclePlan<16, 8> {
+fn lanes(long_m: f32, apart_m: f32) -> Plan {
     let mut path = Path::new();
     path.push(START, 1.2).unwrap();
     for lane in 0..4 {
@@ -24,7 +24,7 @@ fn lanes(long_m: f32, apart_m: f32) -> VehiclePlan<16, 8> {
     VehiclePlan { path, descent_m: START.z, ..plan() }
 }
 
-fn beside_m(path: &Path<16>, place: &Point) -> f32 {
+fn beside_m(path: &Path<WAYPOINTS>, place: &Point) -> f32 {
     let legs = path.waypoints().windows(2);
     let off = legs.map(|leg| {
         let along = leg[1].position - leg[0].position;

@@ -1,5 +1,7 @@
 //! What the companion sends: setpoints and commands with their answers, and frames to the radio.
 
+use core::f32::consts::FRAC_PI_2;
+
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
@@ -10,6 +12,9 @@ use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;
 use crate::autopilot::Kind;
 use crate::link::frame::{self, Frame, Header, MAX_SENT};
+
+/// Bit of a setpoint's mask: it says nothing of the heading.
+const YAW_IGNORED: u16 = 0x400;
 
 impl Bench {
     pub(super) fn receive(&mut self, link: Link, frame: Frame) {
@@ -44,8 +49,10 @@ impl Bench {
         // ArduCopter gives a take-off up for a setpoint that comes before the lift-off.
         self.took_off &= !self.on_ground();
         assert!(enu.iter().all(|c| c.is_finite()));
-        self.target = (s.type_mask.bits() == self.kind.move_mask()).then_some(enu);
-        self.setpoints.push((self.now, enu, s.type_mask.bits()));
+        let mask = s.type_mask.bits();
+        self.target = (mask | YAW_IGNORED == self.kind.move_mask()).then_some(enu);
+        self.setpoints.push((self.now, enu, mask));
+        self.headings.push((mask & YAW_IGNORED == 0).then_some(FRAC_PI_2 - s.yaw));
     }
 
     fn handle_command(&mut self, c: &COMMAND_LONG_DATA) {

@@ -5,6 +5,7 @@ use planner_core::deconflict::Method;
 use planner_core::flight::{Look, Path, Photographs, Range, Task, Trigger, VehiclePlan};
 use planner_core::frames::Geodetic;
 
+use super::Plan;
 use crate::{Config, RosterEntry};
 
 pub(crate) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
@@ -27,7 +28,7 @@ pub(crate) fn two_vehicles() -> Config<4> {
     config
 }
 
-pub(crate) fn plan() -> VehiclePlan<16, 8> {
+pub(crate) fn plan() -> Plan {
     let mut path = Path::new();
     for point in [START, Point::new(16.0, 12.0, 1.5), GOAL] {
         path.push(point, 1.2).unwrap();
@@ -37,7 +38,7 @@ pub(crate) fn plan() -> VehiclePlan<16, 8> {
 }
 
 /// One picture of a field, and home: up to its layer, out, back, and down over its pad.
-pub(crate) fn field_plan() -> VehiclePlan<16, 8> {
+pub(crate) fn field_plan() -> Plan {
     let mut path = Path::new();
     for point in [
         START,

@@ -14,7 +14,7 @@ pub(super) fn over_a_field(state: State) -> Bench {
 }
 
 /// The same by this plan.
-pub(super) fn over_a_field_with(plan: VehiclePlan<16, 8>, state: State) -> Bench {
+pub(super) fn over_a_field_with(plan: Plan, state: State) -> Bench {
     let mut config = two_vehicles();
     config.division = Some(60.0);
     let mut bench = Bench::new(config);

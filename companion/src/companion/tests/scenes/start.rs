@@ -5,7 +5,7 @@ use planner_core::flight::{Gate, Task};
 use super::State::*;
 use super::*;
 
-fn answered(answer: Option<Result<VehiclePlan<16, 8>, PlanFailure>>) -> Bench {
+fn answered(answer: Option<Result<Plan, PlanFailure>>) -> Bench {
     let mut bench = Bench::new(config());
     bench.answer_plan = answer;
     bench
