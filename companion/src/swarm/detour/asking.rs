@@ -59,7 +59,12 @@ impl Detours {
                 }
                 None => view.mission.home(),
             },
-            None => (Goal::Node(plan.task.goal()?), plan.descent_m),
+            None => match plan.task.goal() {
+                Some(goal) => (Goal::Node(goal), plan.descent_m),
+                // It ends over its own pad.
+                None if plan.task.flies() => view.mission.home(),
+                None => return None,
+            },
         };
         Some(DetourRequest {
             aside: self.aside,

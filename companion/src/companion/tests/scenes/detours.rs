@@ -60,6 +60,19 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
         b.neighbour = on_pad(ON_PLAN);
     };
     scenes.play(accompanied(Follow, 1.0), for_a_while, Done, 60.0);
+    // Without a goal the way around leads home.
+    let mut bench = Bench::new(two_vehicles());
+    (bench.answer_plan, bench.neighbour) = (Some(Ok(field_plan())), on_pad(ON_PLAN));
+    bench.until(Ready, 6.0);
+    bench.start();
+    bench.until(Follow, 30.0);
+    bench.run(1.0);
+    let flown_home = |b: &mut Bench| {
+        blocked(b);
+        b.until(Done, 60.0);
+        assert!((b.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{}", b.enu);
+    };
+    scenes.play(bench, flown_home, Done, 1.0);
     let unanswered = |b: &mut Bench| {
         b.answer_detour = None;
         blocked(b);
