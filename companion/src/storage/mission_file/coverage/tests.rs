@@ -197,7 +197,7 @@ fn what_is_not_sound_is_refused_by_name() {
         assert_eq!(MissionView::parse(&file).err(), Some(why));
     }
     let mut other = file();
-    other[23] = 2;
+    other[23] = 0xFF;
     assert_eq!(MissionView::parse(&sealed(other)).err(), Some(FileError::Header("kind").into()));
     let mut old = file();
     old[8] = 2;
