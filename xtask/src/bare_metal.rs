@@ -155,6 +155,8 @@ pub fn build(board: Board) -> Result<Built> {
     // A tenth less code than level 3, for no more instructions of a control step.
     building.args(["--config", "profile.release.opt-level=2"]);
     building.args(["--config", "profile.release.package.planner-core.opt-level=3"]);
+    // The chip's drivers set registers: small is as fast.
+    building.args(["--config", "profile.release.package.embassy-stm32.opt-level='s'"]);
     let warnings = compile(&mut building)?;
     // Programs of two boards have one name, and what they are made of is shared: so the programs are put aside.
     let aside = products.join(board.name());

@@ -22,7 +22,7 @@ const GROUP: usize = 8;
 /// Most groups of a flight.
 const GROUPS: usize = BLOCKS.div_ceil(GROUP);
 /// What rounding may take from a distance between places kilometres away, metres.
-const ROUNDING_M: f32 = 0.1;
+const BLOCK_ROUNDING_M: f32 = 0.1;
 
 /// Blocks of a flight, a bit each.
 pub(super) type Bits = u64;
@@ -161,7 +161,7 @@ impl Blocks {
 
 /// What is further apart is in no conflict, metres.
 fn reach_m(cfg: &ScheduleConfig) -> f32 {
-    fmaxf(cfg.separation_m, cfg.parked_separation_m) + ROUNDING_M
+    fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M
 }
 
 /// Which bits are set, in order.
@@ -192,8 +192,11 @@ mod tests {
     const CFG: ScheduleConfig =
         ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.7, cruise_mps: 2.0, vertical_mps: 1.0 };
 
+    /// A place, and steps from there: which way, and whether straight on instead.
+    type Steps = ((f32, f32), List<(f32, f32, f32, bool)>);
+
     /// A flight of steps from a place, some of which are holds and some go straight on.
-    fn flight((from, steps): &((f32, f32), List<(f32, f32, f32, bool)>)) -> List<Piece> {
+    fn flight((from, steps): &Steps) -> List<Piece> {
         let mut at = Point::new(from.0, from.1, 1.0);
         let mut way = Point::zeros();
         let mut along_m = 0.0;
@@ -207,7 +210,7 @@ mod tests {
         steps.iter().map(piece).collect()
     }
 
-    fn steps() -> impl Strategy<Value = ((f32, f32), List<(f32, f32, f32, bool)>)> {
+    fn steps() -> impl Strategy<Value = Steps> {
         let step = (-24.0f32..24.0, -24.0f32..24.0, -3.0f32..3.0, any::<bool>());
         ((-3000.0f32..3000.0, -50.0f32..50.0), proptest::collection::vec(step, 1..PIECES))
     }
