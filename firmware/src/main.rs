@@ -129,7 +129,8 @@ async fn work(
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
     let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
     // Neither the stack nor the task's own memory has room for another.
-    let settings = config.checked().expect("every setting was checked");
+    // `expect` would print the error, and printing one that has a name in it takes 3 kB of flash.
+    let Ok(settings) = config.checked() else { panic!("every setting was checked") };
     let companion = BoardCompanion::make_in(COMPANION.uninit(), settings);
     companion.mount(store);
     if let Some(text) = said.crashed {
