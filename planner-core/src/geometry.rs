@@ -22,3 +22,12 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
     let t = share(b * s + f, e);
     (r + d1 * s - d2 * t).norm_squared()
 }
+
+/// Squared distance from a segment to a point: what [`segments_distance_sq`] gives for a second segment without length, bit
+/// by bit.
+pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
+    let (d, r) = (p.1 - p.0, p.0 - q);
+    let a = d.norm_squared();
+    let s = if a > 0.0 { (-d.dot(&r) / a).clamp(0.0, 1.0) } else { 0.0 };
+    (r + d * s).norm_squared()
+}

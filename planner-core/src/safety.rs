@@ -4,17 +4,20 @@
 //! its present speed, then a stop at its limits along its reference. The set of a neighbour ([`Heard::set`]) follows
 //! from what was last heard and from nothing else: no gate, no progress, no advice.
 //!
-//! Two sets conflict ([`conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a
+//! Two sets conflict ([`OwnSet::conflicts`]) where they come nearer than the safety distance. A motion that does not reduce a
 //! distance that is already too small never does. A vehicle that stops as soon as its set conflicts stays inside the
 //! set of the step before, which did not: that is the safety argument (`docs/safety.md`).
 //!
 //! ENU metres. Sets are not compared by time, so an order in which two vehicles pass is no reason to come near. Cost:
-//! the segments of one set times those of the other; [`Heard::reach_m`] is a cheap bound for the many that are far.
+//! the segments of one set times those of the other; [`Heard::reach_m`] is a cheap bound for the many that are far. The
+//! own set is prepared once ([`OwnSet`]), so that most segments of the others are seen to be apart without a distance.
+
+mod own;
 
 use heapless::Vec;
 use libm::sqrtf;
 
-use crate::geometry::segments_distance_sq;
+pub use self::own::OwnSet;
 use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision to the first motion that follows it, seconds: two setpoints.
@@ -26,8 +29,6 @@ pub const FRESH_S: f32 = 1.0;
 /// Further than this from the points that it reports a vehicle does not fly along them, metres: real vehicles lag by
 /// up to 0.5 m and stray by 0.4 m.
 pub const OFF_M: f32 = 0.9;
-/// Coming nearer by less than this is none, metres: rounding, and nothing that a vehicle could creep by.
-const NEARER_M: f32 = 0.003;
 /// Most points of a set: a vehicle's place and the eight points that it reports.
 const POINTS: usize = 9;
 
@@ -56,8 +57,6 @@ pub struct Set {
     points: Vec<Point, POINTS>,
     /// Lower end of the column.
     foot: Option<Point>,
-    /// Around points and column.
-    span: Span,
     /// How far beside the line it can be, metres.
     pub grow_m: f32,
 }
@@ -69,12 +68,11 @@ impl Set {
         let mut points = Vec::new();
         // The first of nine.
         let _ = points.push(place);
-        Self { points, foot: None, span: Span { low: place, high: place }, grow_m: 0.0 }
+        Self { points, foot: None, grow_m: 0.0 }
     }
 
     /// Goes on straight to a point; whether there is room for it.
     fn push(&mut self, to: Point) -> bool {
-        self.span.take(&to);
         self.points.push(to).is_ok()
     }
 
@@ -125,76 +123,17 @@ impl Set {
     fn add_column(&mut self, to_m: Option<f32>) {
         let first = self.points[0];
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
-        if let Some(foot) = &self.foot {
-            self.span.take(foot);
-        }
+    }
+
+    /// Its first point and its last.
+    fn ends(&self) -> (&Point, &Point) {
+        (&self.points[0], &self.points[self.points.len() - 1])
     }
 
     /// Its legs, at least one, and the column.
     fn segments(&self) -> impl Iterator<Item = (&Point, &Point)> {
         let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
         self.points.iter().zip(next).chain(self.foot.as_ref().map(|foot| (&self.points[0], foot)))
-    }
-
-    /// Square of the least distance to a segment, or `within_sq` if it is not less.
-    fn distance_sq(&self, from: &Point, to: &Point, within_sq: f32) -> f32 {
-        let span = Span::of(from, to);
-        if span.is_apart(&self.span.low, &self.span.high, within_sq) {
-            return within_sq;
-        }
-        let mut least = within_sq;
-        self.segments().for_each(|(a, b)| {
-            if !span.is_apart(a, b, least) {
-                least = least.min(segments_distance_sq((a, b), (from, to)));
-            }
-        });
-        least
-    }
-
-    /// Square of the least distance to another set's line, or `within_sq` if it is not less.
-    fn least_sq(&self, other: &Self, within_sq: f32) -> f32 {
-        if self.span.is_apart(&other.span.low, &other.span.high, within_sq) {
-            return within_sq;
-        }
-        // Where the second leg begins a first one without length is.
-        let double = self.points.len() > 2 && self.points[0] == self.points[1];
-        let segments = self.segments().skip(usize::from(double));
-        segments.fold(within_sq, |least, (a, b)| other.distance_sq(a, b, least))
-    }
-}
-
-/// Lowest and highest coordinates: most is apart by those, which is cheaper to see than a distance.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Span {
-    low: Point,
-    high: Point,
-}
-
-impl Span {
-    fn of(a: &Point, b: &Point) -> Self {
-        let mut span = Self { low: *a, high: *a };
-        span.take(b);
-        span
-    }
-
-    fn take(&mut self, p: &Point) {
-        // Not `min`: what that does about numbers that are none takes a board three times as long.
-        let less = |a: f32, b: f32| if a < b { a } else { b };
-        let more = |a: f32, b: f32| if a > b { a } else { b };
-        let (low, high) = (&mut self.low, &mut self.high);
-        (low.x, low.y, low.z) = (less(p.x, low.x), less(p.y, low.y), less(p.z, low.z));
-        (high.x, high.y, high.z) = (more(p.x, high.x), more(p.y, high.y), more(p.z, high.z));
-    }
-
-    /// Whether the box around `a` and `b` is no nearer than the root of `within_sq`.
-    fn is_apart(&self, a: &Point, b: &Point, within_sq: f32) -> bool {
-        let gap = |low: f32, high: f32, a: f32, b: f32| {
-            (a - high).min(b - high).max((low - a).min(low - b)).max(0.0)
-        };
-        let x = gap(self.low.x, self.high.x, a.x, b.x);
-        let y = gap(self.low.y, self.high.y, a.y, b.y);
-        let z = gap(self.low.z, self.high.z, a.z, b.z);
-        x * x + y * y + z * z >= within_sq
     }
 }
 
@@ -213,6 +152,8 @@ pub struct Heard<'a> {
     pub delay_s: f32,
     /// Points that it flies along next; empty if somebody else flies it.
     pub points: &'a [Point],
+    /// Where it is on them.
+    pub joint: Joint,
     /// How far from the first of them they lead at most, metres.
     pub extent_m: f32,
     /// How far along its points it may have stopped since, unheard for long, metres; 0 for one that is
@@ -222,6 +163,52 @@ pub struct Heard<'a> {
     pub grounded: bool,
     /// Height down to which its column counts, metres; none while it stays on its points.
     pub column_to_m: Option<f32>,
+}
+
+/// Where a vehicle is on the points that it reports: the same as long as neither is heard again.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Joint {
+    /// To be looked for.
+    #[default]
+    Unknown,
+    /// Further than [`OFF_M`] beside them.
+    Beside,
+    /// On the leg that ends at the point of this number.
+    On(u8),
+}
+
+impl Joint {
+    /// Looks for the nearest place on the points.
+    pub fn find(position: &Point, points: &[Point]) -> Self {
+        let (mut least_sq, mut best) = (OFF_M * OFF_M, Self::Beside);
+        let Some(mut from) = points.first() else { return best };
+        for (i, to) in points.iter().enumerate() {
+            let apart_sq = (position - nearest(position, from, to)).norm_squared();
+            if apart_sq < least_sq {
+                (least_sq, best) = (apart_sq, Self::On(i as u8));
+            }
+            from = to;
+        }
+        best
+    }
+
+    /// That place, and the points from there on; none where it is beside them.
+    fn ahead<'a>(&self, position: &Point, points: &'a [Point]) -> Option<(Point, &'a [Point])> {
+        let Self::On(leg) = *self else { return None };
+        let ahead = points.get(usize::from(leg)..)?;
+        let to = ahead.first()?;
+        let from = &points[usize::from(leg.saturating_sub(1))];
+        Some((nearest(position, from, to), ahead))
+    }
+}
+
+/// The place on a leg that is nearest to another place.
+#[inline]
+fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
+    let leg = to - from;
+    let length_sq = leg.norm_squared();
+    let share = if length_sq > 0.0 { (position - from).dot(&leg) / length_sq } else { 0.0 };
+    from + leg * share.clamp(0.0, 1.0)
 }
 
 /// What a neighbour can do at most.
@@ -310,8 +297,8 @@ impl Heard<'_> {
         }
         if self.age_s > FRESH_S {
             set.grow_m = self.ball_m(bounds);
-        } else if let Some((leg, nearest)) = self.nearest() {
-            let ahead = core::iter::once(nearest).chain(self.points[leg..].iter().copied());
+        } else if let Some((nearest, ahead)) = self.joint().ahead(&self.position, self.points) {
+            let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
             set.follow(ahead, self.along_m(bounds, ahead_s));
         } else {
             let share = if self.speed_mps > 0.0 { self.along_m(bounds, 0.0) / self.speed_mps } else { 0.0 };
@@ -322,44 +309,13 @@ impl Heard<'_> {
         set
     }
 
-    /// The nearest place on the points that it reports, and the first point behind it; none where it is not on them.
-    fn nearest(&self) -> Option<(usize, Point)> {
-        let mut best = (OFF_M * OFF_M, None);
-        let mut from = *self.points.first()?;
-        for (i, to) in self.points.iter().enumerate() {
-            let leg = to - from;
-            let length_sq = leg.norm_squared();
-            let share = if length_sq > 0.0 { (self.position - from).dot(&leg) / length_sq } else { 0.0 };
-            let place = from + leg * share.clamp(0.0, 1.0);
-            let apart_sq = (self.position - place).norm_squared();
-            if apart_sq < best.0 {
-                best = (apart_sq, Some((i, place)));
-            }
-            from = *to;
-        }
-        best.1
+    #[inline]
+    fn joint(&self) -> Joint {
+        if self.joint == Joint::Unknown { Joint::find(&self.position, self.points) } else { self.joint }
     }
 }
 
-/// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place` now, and nearer than the
-/// vehicle is already.
-pub fn conflicts(own: &Set, other: &Set, place: &Point, apart_m: f32) -> bool {
-    let here = own.points[0];
-    let most_m = apart_m + other.grow_m + own.grow_m;
-    let most_sq = most_m * most_m;
-    let motion_sq = own.least_sq(other, most_sq);
-    if motion_sq >= most_sq {
-        return false;
-    }
-    let now_m = sqrtf(other.distance_sq(&here, &here, most_sq));
-    if own.grow_m > 0.0 || sqrtf(motion_sq) < now_m - NEARER_M {
-        return true;
-    }
-    // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
-    let least_sq = own.distance_sq(place, place, f32::INFINITY);
-    let limit_m = sqrtf((here - place).norm_squared()).min(2.0 * most_m);
-    sqrtf(least_sq) < limit_m - NEARER_M
-}
-
+#[cfg(test)]
+mod plain_tests;
 #[cfg(test)]
 mod tests;

@@ -18,6 +18,7 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
+use planner_core::safety::Joint;
 
 pub(crate) use self::bounds::STANDING_MPS;
 use self::bounds::*;
@@ -152,6 +153,7 @@ impl<const V: usize> Neighbours<V> {
             late: Lateness::default(),
             belongs_at: None,
             points: Vec::new(),
+            joint: Joint::Unknown,
             extent_m: 0.0,
             column: false,
             clear_m: f32::NEG_INFINITY,
@@ -251,6 +253,7 @@ impl<const V: usize> Neighbours<V> {
         contact.heard_at = Some(now);
         contact.position_at = Some(now);
         contact.state.position = frames::geodetic_to_enu(origin, &place);
+        contact.join();
         contact.at_edge = (contact.state.position - own).norm_squared() >= edge_m * edge_m;
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
@@ -297,6 +300,7 @@ impl<const V: usize> Neighbours<V> {
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
         contact.extent_m = libm::sqrtf(intent.points.iter().fold(0.0, most));
+        contact.join();
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.clear_m = if shared { intent.clear_m } else { f32::NEG_INFINITY };
         contact.clear_in_s = intent.clear_in_s;

@@ -9,7 +9,7 @@ use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Neighbour
 use planner_core::flight::{Done, Look, Path, Photographs, Range, Task, Trigger};
 use planner_core::frames::{self, Geodetic, Projection};
 use planner_core::prm::{self, Config, PrmError, Sampling};
-use planner_core::safety::{Bounds, Braking, Heard, Set, conflicts};
+use planner_core::safety::{Bounds, Braking, Heard, Joint, OwnSet, Set};
 use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
@@ -471,6 +471,7 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
                 age_s: p.x,
                 delay_s: 0.3,
                 points: &ahead[..i % 3],
+                joint: to.call("safety::Joint::find", || Joint::find(&p, &ahead[..i % 3])),
                 extent_m: hard,
                 rests_within_m: 0.0,
                 grounded: i % 5 == 0,
@@ -481,8 +482,10 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
             let other = to.call("safety::Heard::set", || heard.set(&bounds, hard));
             for own in &own {
                 let reach_m = to.call("safety::Set::reach_m", || own.reach_m());
+                let own = to.call("safety::OwnSet::new", || OwnSet::new(own));
                 to.add(reach_m);
-                let near = to.call("safety::conflicts", || conflicts(own, &other, &p, hard));
+                to.add(own.reach_m());
+                let near = to.call("safety::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
                 to.is(near);
             }
         }

@@ -46,7 +46,7 @@ proptest! {
         let motion_m = least(&here, &there) - grow_m;
         let now_m = least(&here[..1], &there) - grow_m;
         let place = there[0];
-        let conflict = conflicts(&own, &other, &place, APART_M);
+        let conflict = OwnSet::new(&own).conflicts(&other, &place, APART_M);
         if motion_m > APART_M + 0.05 {
             prop_assert!(!conflict, "{motion_m} apart");
         } else if motion_m < APART_M - 0.05 && motion_m < now_m - 0.05 {
@@ -71,6 +71,7 @@ proptest! {
             age_s,
             delay_s: 0.0,
             points: &path,
+            joint: Joint::Unknown,
             extent_m: extent_m(&path),
             rests_within_m: 0.0,
             grounded: false,
@@ -101,6 +102,7 @@ proptest! {
             age_s,
             delay_s: 0.2,
             points: &path,
+            joint: Joint::Unknown,
             extent_m: extent_m(&path),
             rests_within_m: 0.0,
             grounded: false,
@@ -203,12 +205,13 @@ fn two_that_stop_where_their_sets_conflict_never_come_near() {
                     age_s: now_s - at_s,
                     delay_s: 0.0,
                     points: &other.path[next..],
+                    joint: Joint::Unknown,
                     extent_m: extent_m(&other.path[next..]),
                     rests_within_m: 0.0,
                     grounded: false,
                     column_to_m: None,
                 };
-                conflicts(&fliers[i].set(), &heard.set(&BOUNDS, 0.0), &position, APART_M)
+                OwnSet::new(&fliers[i].set()).conflicts(&heard.set(&BOUNDS, 0.0), &position, APART_M)
             });
             for (flier, stop) in fliers.iter_mut().zip(stop) {
                 flier.step(stop, 0.05);

@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{self, Bounds, REACTION_S, Set};
+use planner_core::safety::{self, Bounds, OwnSet, REACTION_S, Set};
 
 use super::super::{Guidance, Phase, Scene};
 use super::{Found, STRANGER};
@@ -67,7 +67,7 @@ impl Guidance {
         state: State,
         scene: &Scene<'_, W, G>,
         neighbours: &Neighbours<V>,
-        own: &Set,
+        own: &OwnSet<'_>,
         bounds: &Bounds,
         now: Instant,
     ) -> Option<Found> {
@@ -75,8 +75,9 @@ impl Guidance {
         let place = scene.telemetry.position;
         let own_reach_m = own.reach_m();
         let lands = matches!(state, State::Land | State::LandingHeld);
-        let deaf = lands && neighbours.is_deaf(now);
-        let floor_m = scene.plan.map(|plan| self.lands_at_m(state, scene, plan));
+        let hears_nobody = neighbours.is_deaf(now);
+        let deaf = lands && hears_nobody;
+        let floor_m = scene.plan.filter(|_| lands).map(|plan| self.lands_at_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m =
@@ -87,12 +88,13 @@ impl Guidance {
             bounds,
             ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
             on_plan,
+            deaf: hears_nobody,
+            lands,
         };
-        for i in 0..neighbours.len() {
-            if neighbours.is_beyond(i, now, &reach) {
-                continue;
-            }
-            let Some(mut met) = neighbours.met(i, now) else { continue };
+        let mut next = 0;
+        while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
+            next = i + 1;
+            let mut met = neighbours.met(contact, now);
             let by_gates = met.on_plan && on_plan;
             if met.far && (by_gates || lands) {
                 // Not within radio range, and where the plan has it.
@@ -102,7 +104,7 @@ impl Guidance {
                 // The gates keep two on the plan apart, however late their messages are.
                 met.heard.delay_s = 0.0;
             }
-            if met.lost && !lands && neighbours.is_deaf(now) {
+            if met.lost && !lands && hears_nobody {
                 // Where nobody is heard it may be this vehicle's receiver that fails: the others fly on.
                 (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
             }
@@ -152,8 +154,8 @@ impl Guidance {
                 // Between two on the plan the gates keep the order.
                 let ahead = ahead_s > 0.0 && !by_gates && self.yields_to(state, scene, &met);
                 let other = met.heard.set(bounds, if ahead { ahead_s } else { 0.0 });
-                let low = |low: Point| safety::conflicts(own, &Set::at(low), &low, apart_m);
-                safety::conflicts(own, &other, &met.heard.position, apart_m) || met.low.is_some_and(low)
+                let low = |low: Point| own.conflicts(&Set::at(low), &low, apart_m);
+                own.conflicts(&other, &met.heard.position, apart_m) || met.low.is_some_and(low)
             };
             if near > NEAR_MOST || meets() {
                 let yields = self.yields_to(state, scene, &met);

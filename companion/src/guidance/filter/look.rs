@@ -3,7 +3,7 @@
 use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::flight::{Path, VehiclePlan};
-use planner_core::safety::{REACTION_S, Set};
+use planner_core::safety::{OwnSet, REACTION_S, Set};
 
 use super::super::limits::bounds;
 use super::super::motion::within;
@@ -28,12 +28,12 @@ impl Guidance {
             return;
         };
         let position = &scene.telemetry.position;
-        let ground_m = self.lands_at_m(state, scene, plan);
-        let top_m = plan.path.point_at(0.0).map_or(position.z, |p| p.z);
+        let ground_m = || self.lands_at_m(state, scene, plan);
+        let top_m = || plan.path.point_at(0.0).map_or(position.z, |p| p.z);
         let way = match state {
-            State::Scheduled => Way::Vertical { to_m: top_m, speed_mps: 0.0 },
-            State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m, speed_mps: 0.0 },
-            State::Climb => Way::Vertical { to_m: top_m, speed_mps: self.door.velocity().z.max(0.0) },
+            State::Scheduled => Way::Vertical { to_m: top_m(), speed_mps: 0.0 },
+            State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m(), speed_mps: 0.0 },
+            State::Climb => Way::Vertical { to_m: top_m(), speed_mps: self.door.velocity().z.max(0.0) },
             State::Follow
             | State::Paused
             | State::Alone
@@ -45,7 +45,7 @@ impl Guidance {
             {
                 // What stopped its descent is looked at on while it stands.
                 match self.descends() {
-                    true => Way::Vertical { to_m: ground_m, speed_mps: (-self.door.velocity().z).max(0.0) },
+                    true => Way::Vertical { to_m: ground_m(), speed_mps: (-self.door.velocity().z).max(0.0) },
                     false => Way::Path { back: self.flies_back(&plan.path) },
                 }
             }
@@ -69,7 +69,7 @@ impl Guidance {
         let stopped = self.filter.is_stopped();
         let extra_m = if stopped { RESUME_M } else { 0.0 };
         let bounds = bounds(&self.track);
-        let own = match way {
+        let set = match way {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
             Way::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
@@ -88,6 +88,7 @@ impl Guidance {
             Way::Path { back } => self.own_set(&plan.path, scene.telemetry, &bounds, extra_m, back),
             Way::Stands => return,
         };
+        let own = OwnSet::new(&set);
         let found = self.first_conflict(state, scene, neighbours, &own, &bounds, now);
         if whole_column {
             self.filter.note_column(found.as_ref(), now);

@@ -5,6 +5,7 @@ use planner_core::Point;
 use planner_core::deconflict::Neighbour;
 use planner_core::detour::{KeepOff, Nature};
 use planner_core::flight::PROGRESS_ERROR_M;
+use planner_core::safety::Joint;
 
 use super::bounds::*;
 use crate::autopilot::telemetry::SequenceFilter;
@@ -25,7 +26,7 @@ pub(super) struct Field {
 }
 
 #[derive(Clone, Debug)]
-pub(super) struct Contact {
+pub(crate) struct Contact {
     pub(super) id: u8,
     pub(super) rank: u16,
     pub(super) sequence: SequenceFilter,
@@ -48,6 +49,8 @@ pub(super) struct Contact {
     /// When an intent of our mission was last heard from it.
     pub(super) belongs_at: Option<Instant>,
     pub(super) points: Vec<Point, POINTS>,
+    /// Where its position is on them.
+    pub(super) joint: Joint,
     /// How far from the first of them they lead, metres.
     pub(super) extent_m: f32,
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
@@ -79,6 +82,11 @@ pub(super) struct Contact {
 }
 
 impl Contact {
+    /// Notes where its position is on its points: to be called when either was heard, so that no step has to look for it.
+    pub(super) fn join(&mut self) {
+        self.joint = Joint::find(&self.state.position, &self.points);
+    }
+
     pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
         self.heard_at.is_some_and(|at| now - at < span)
     }

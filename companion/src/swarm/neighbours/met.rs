@@ -1,7 +1,7 @@
 //! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{Bounds, Heard, OFF_M};
+use planner_core::safety::{Bounds, Heard, Joint, OFF_M};
 
 use super::*;
 
@@ -42,71 +42,137 @@ pub(crate) struct Reach<'a> {
     pub(crate) ahead_s: f32,
     /// Whether it follows the shared plan: gates keep it apart from those that do.
     pub(crate) on_plan: bool,
+    /// Whether it hears nobody: then those that it does not hear fly on.
+    pub(crate) deaf: bool,
+    /// Whether it lands: then it looks for where those that it does not hear may lie.
+    pub(crate) lands: bool,
 }
 
-impl<const V: usize> Neighbours<V> {
-    /// Whether contact `i` stays out of reach wherever it can be, or was never placed: what most of them do, seen without
-    /// making a set of it. Never where [`Self::met`] and its reach say otherwise.
-    pub(crate) fn is_beyond(&self, i: usize, now: Instant, reach: &Reach<'_>) -> bool {
-        let Some((contact, placed_at)) = self.contacts.get(i).and_then(|c| Some((c, c.position_at?))) else {
-            return true;
-        };
-        let grounded = contact.tells(GROUNDED | LANDED);
-        let away = contact.state.position - reach.place;
+impl Contact {
+    /// Whether it stays out of reach wherever it can be: what most of them do, seen without making a set of it. Never where
+    /// [`Neighbours::met`] and its reach say otherwise.
+    #[inline(always)]
+    fn is_beyond(&self, placed_at: Instant, now: Instant, reach: &Reach<'_>) -> bool {
+        let away = self.state.position - reach.place;
         let across_sq = away.x * away.x + away.y * away.y;
         let mut heard = Heard {
-            position: contact.state.position,
-            velocity: contact.state.velocity,
-            speed_mps: contact.speed_mps,
+            position: self.state.position,
+            velocity: self.state.velocity,
+            speed_mps: self.speed_mps,
             age_s: 0.0,
-            delay_s: if reach.on_plan && contact.on_plan() { 0.0 } else { contact.late.delay_s },
-            points: &contact.points,
-            extent_m: contact.extent_m,
+            delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.late.delay_s },
+            points: &self.points,
+            joint: self.joint,
+            extent_m: self.extent_m,
             rests_within_m: 0.0,
-            grounded,
+            grounded: self.tells(GROUNDED | LANDED),
             column_to_m: None,
         };
         let age = now - placed_at;
-        if age <= FRESHLY {
-            heard.age_s = age.secs_f32();
-            let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
-            let column = !grounded && (contact.column || contact.tells(OUT) || contact.floor_m.is_nan());
-            let above_m = if column { 0.0 } else { away.z };
-            return across_sq + above_m * above_m >= most_m * most_m;
+        if age > FRESHLY {
+            return self.is_silent_beyond(age, across_sq, now, reach);
         }
-        // Silent, or known by its intents alone. Seen from above it is where it was, at the first of its points, or as far from
-        // either as it can have flown.
-        let told_sq = contact.points.first().map_or(f32::INFINITY, |p| (p - reach.place).xy().norm_squared());
-        (heard.speed_mps, heard.points, heard.grounded) = (0.0, &[], false);
-        let ball_m = reach.bounds.speed_max_mps * (reach.bounds.silent_s + 2.0 * contact.late.delay_s);
-        heard.delay_s = contact.late.delay_s.max(BEYOND_TOP_S);
-        let rests_m = heard.reach_m(reach.bounds, reach.ahead_s);
-        let most_m =
-            reach.within_m + ball_m.max(rests_m).max(contact.stretch_m() + OFF_M).max(contact.extent_m);
-        across_sq.min(told_sq) >= most_m * most_m
+        heard.age_s = age.secs_f32();
+        let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
+        let column = !heard.grounded && (self.column || self.tells(OUT) || self.floor_m.is_nan());
+        let above_m = if column { 0.0 } else { away.z };
+        across_sq + above_m * above_m >= most_m * most_m
     }
 
-    /// Contact `i` as the safety filter sees it; none if its place was never heard.
+    /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
+    /// or as far from there as it can have flown: as long as it may not have noticed that nobody hears it, in a climb to its top
+    /// and a little further, and once it counts as dead along its points alone.
+    fn is_silent_beyond(&self, age: Duration, across_sq: f32, now: Instant, reach: &Reach<'_>) -> bool {
+        let delay_s = self.late.delay_s;
+        let dead = self.rests_silently(age, now);
+        let mut most_m = 0.0;
+        let mut reaches = |far_m: f32| most_m = if far_m > most_m { far_m } else { most_m };
+        if reach.deaf || !dead {
+            let silent_s = reach.bounds.silent_s;
+            let age_s = if reach.deaf { silent_s } else { age.secs_f32().min(silent_s) };
+            reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
+        }
+        if reach.lands || dead {
+            reaches(self.stretch_m() + OFF_M);
+        }
+        if reach.lands || self.climbs_to().is_some() {
+            reaches(self.rests_m(reach));
+        }
+        let mut away_sq = across_sq;
+        let told = self.belongs_at.is_some_and(|at| now - at <= FRESHLY);
+        if let Some(first) = self.points.first().filter(|_| told) {
+            away_sq = away_sq.min((first - reach.place).xy().norm_squared());
+            reaches(self.extent_m);
+        }
+        most_m += reach.within_m;
+        away_sq >= most_m * most_m
+    }
+
+    /// How far it is at most from where it stopped unheard, metres.
+    #[inline(never)]
+    fn rests_m(&self, reach: &Reach<'_>) -> f32 {
+        let rests = Heard {
+            position: self.state.position,
+            velocity: self.state.velocity,
+            speed_mps: 0.0,
+            age_s: 0.0,
+            delay_s: self.late.delay_s.max(BEYOND_TOP_S),
+            points: &[],
+            joint: Joint::Beside,
+            extent_m: 0.0,
+            rests_within_m: 0.0,
+            grounded: false,
+            column_to_m: None,
+        };
+        rests.reach_m(reach.bounds, reach.ahead_s)
+    }
+
+    /// Whether it counts as dead and rests on its points, its place so old.
+    #[inline]
+    fn rests_silently(&self, age: Duration, now: Instant) -> bool {
+        age >= DEAD && !self.points.is_empty() && (self.is_dead(now) || !self.is_far(now))
+    }
+}
+
+impl<const V: usize> Neighbours<V> {
+    /// The first contact from number `from` on that was placed and may be within reach, and its number.
+    pub(crate) fn next_within(
+        &self,
+        from: usize,
+        now: Instant,
+        reach: &Reach<'_>,
+    ) -> Option<(usize, &Contact)> {
+        let within = |c: &Contact| c.position_at.is_some_and(|at| !c.is_beyond(at, now, reach));
+        self.contacts.iter().enumerate().skip(from).find(|(_, contact)| within(contact))
+    }
+
+    /// A contact as the safety filter sees it; one that was never placed as if it had been at the start.
     #[inline(always)]
-    pub(crate) fn met(&self, i: usize, now: Instant) -> Option<Met<'_>> {
-        let contact = self.contacts.get(i)?;
-        let placed_s = (now - contact.position_at?).secs_f32();
+    pub(crate) fn met<'a>(&'a self, contact: &'a Contact, now: Instant) -> Met<'a> {
+        let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
+        let placed_s = placed_for.secs_f32();
+        // Most are heard: then nothing of what follows is so.
+        let silent = placed_for >= FRESHLY;
         // Where positions are lost, an intent says as well where it is: at its setpoint.
-        let told_at = contact.belongs_at.filter(|_| placed_s > OLD_S && !contact.points.is_empty());
+        let told_at = contact.belongs_at.filter(|_| silent && placed_s > OLD_S && !contact.points.is_empty());
         let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < OLD_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
-        let unplaced_for = now - contact.position_at?;
-        let unplaced = unplaced_for >= DEAD && !contact.is_far(now);
-        let dead = (contact.is_dead(now) || unplaced) && !contact.points.is_empty();
-        let down = unplaced_for >= self.down || (contact.tells(GROUNDED) && contact.is_vague());
-        let lies = (dead || contact.tells(GROUNDED)) && down && !contact.floor_m.is_nan();
+        let dead = silent && contact.rests_silently(placed_for, now);
+        let down = silent && (placed_for >= self.down || (contact.tells(GROUNDED) && contact.is_vague()));
+        let lies = down && (dead || contact.tells(GROUNDED)) && !contact.floor_m.is_nan();
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
-        let top = contact.climbs_to().filter(|_| age_s > OLD_S && !lies);
-        let highest_m = self.field().map_or(contact.floor_m, |field| contact.lies_at_most_m(field, &here));
-        here.z = if lies { libm::fminf(highest_m, here.z) } else { top.unwrap_or(here.z) };
+        let top = if silent && age_s > OLD_S && !lies { contact.climbs_to() } else { None };
+        let mut highest_m = contact.floor_m;
+        if lies {
+            highest_m = self.field().map_or(contact.floor_m, |field| contact.lies_at_most_m(field, &here));
+            here.z = libm::fminf(highest_m, here.z);
+        } else if let Some(top) = top {
+            here.z = top;
+        }
+        let moved = by_intent || lies || top.is_some();
         let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
         let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
         let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
@@ -123,27 +189,29 @@ impl<const V: usize> Neighbours<V> {
                 _ => contact.late.delay_s,
             },
             points: if top.is_some() || lies { &[] } else { &contact.points },
+            joint: if moved { Joint::Unknown } else { contact.joint },
             extent_m: contact.extent_m,
             rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
             column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
         };
-        Some(Met {
+        Met {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.on_plan(),
-            far: contact.is_far(now)
-                || (contact.at_edge
-                    && contact.on_plan()
-                    && !contact.tells(GROUNDED)
-                    && !contact.heard_within(now, FRESHLY)
-                    && (contact.flies_on() || contact.heard_within(now, STANDS_UNHEARD))),
+            far: silent
+                && (contact.is_far(now)
+                    || (contact.at_edge
+                        && contact.on_plan()
+                        && !contact.tells(GROUNDED)
+                        && !contact.heard_within(now, FRESHLY)
+                        && (contact.flies_on() || contact.heard_within(now, STANDS_UNHEARD)))),
             shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
             stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
             heard,
             low: top.map(|_| contact.state.position),
-        })
+        }
     }
 }

@@ -319,12 +319,14 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             bounds: &bounds,
             ahead_s: if stopped { 3.0 } else { 0.0 },
             on_plan: rng.next_u32().is_multiple_of(2),
+            deaf: rng.next_u32().is_multiple_of(4),
+            lands,
         };
-        let mut met = table.met(1, now).expect("it was placed");
+        let mut met = table.met(&table.contacts[1], now);
         if met.on_plan && reach.on_plan {
             met.heard.delay_s = 0.0;
         }
-        if met.lost && !lands && rng.next_u32().is_multiple_of(2) {
+        if met.lost && !lands && reach.deaf {
             // As a vehicle that hears nobody sees it.
             (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
         }
@@ -339,7 +341,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
         let below = lands && silent && table.may_lie_below(1, &reach.place, -COLUMN_M, reach.within_m);
-        if table.is_beyond(1, now, &reach) {
+        if table.next_within(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
         } else {

@@ -1,0 +1,176 @@
+//! A vehicle's own set, prepared once to be compared with those of many neighbours.
+//!
+//! Most pairs of legs are far apart, and a board sees that without their distance: by the box around the own set, by the
+//! line from its first to its last point and how far the others lie beside that, and by balls around the legs. What is
+//! left is compared leg by leg. Each of these bounds is a little wider than it has to be, so rounding skips no pair
+//! that counts.
+
+use heapless::Vec;
+use libm::sqrtf;
+
+use super::{POINTS, Set};
+use crate::Point;
+use crate::geometry::{point_distance_sq, segments_distance_sq};
+
+/// Coming nearer by less than this is none, metres: rounding, and nothing that a vehicle could creep by.
+const NEARER_M: f32 = 0.003;
+/// Bounds are wider by this, metres: more than a coordinate of the mission frame is rounded by.
+const WIDER_M: f32 = 0.01;
+/// More legs than this are worth the look at the line between their ends.
+const FEW: usize = 2;
+
+/// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
+#[inline]
+fn root_above(square: f32) -> f32 {
+    f32::from_bits((square.to_bits() >> 1) + (127 << 22))
+}
+
+/// A leg, its middle, and no less than half its length.
+#[derive(Clone, Copy, Debug)]
+struct Leg {
+    from: Point,
+    to: Point,
+    middle: Point,
+    half_m: f32,
+}
+
+impl Leg {
+    #[inline]
+    fn new(from: &Point, to: &Point) -> Self {
+        let half = (to - from) * 0.5;
+        Self { from: *from, to: *to, middle: from + half, half_m: root_above(half.norm_squared()) }
+    }
+
+    /// Whether two cannot come nearer than `apart_m`.
+    #[inline]
+    fn is_apart(&self, other: &Self, apart_m: f32) -> bool {
+        let most_m = self.half_m + other.half_m + apart_m;
+        (self.middle - other.middle).norm_squared() >= most_m * most_m
+    }
+}
+
+/// The own set.
+#[derive(Clone, Debug)]
+pub struct OwnSet<'a> {
+    set: &'a Set,
+    legs: Vec<Leg, POINTS>,
+    /// How far it reaches from its first point, metres.
+    reach_m: f32,
+    /// How far from the line between its first point and its last it lies at most, metres.
+    beside_m: f32,
+    /// Middle and size of the box around it.
+    middle: Point,
+    size: Point,
+}
+
+impl<'a> OwnSet<'a> {
+    /// What a vehicle can no longer take back.
+    pub fn new(set: &'a Set) -> Self {
+        let (first, last) = set.ends();
+        // Filled in place: a board takes long to copy it.
+        let mut own = Self {
+            set,
+            legs: Vec::new(),
+            reach_m: set.reach_m(),
+            beside_m: 0.0,
+            middle: *first,
+            size: *first,
+        };
+        // Where the second leg begins a first one without length is.
+        let double = set.points.len() > 2 && set.points[0] == set.points[1];
+        let (mut low, mut high) = (*first, *first);
+        for (from, to) in set.segments().skip(usize::from(double)) {
+            // As many as there are points at most.
+            let _ = own.legs.push(Leg::new(from, to));
+            (low, high) = (each(&low, to, |a, b| a < b), each(&high, to, |a, b| a > b));
+        }
+        if own.legs.len() > FEW {
+            let mut beside_sq = 0.0;
+            for leg in &own.legs {
+                let apart_sq = point_distance_sq((first, last), &leg.to);
+                beside_sq = if apart_sq > beside_sq { apart_sq } else { beside_sq };
+            }
+            own.beside_m = root_above(beside_sq);
+        }
+        (own.middle, own.size) = ((low + high) * 0.5, high - low);
+        own
+    }
+
+    /// How far from its first point it reaches at most, metres.
+    #[inline]
+    pub fn reach_m(&self) -> f32 {
+        self.reach_m
+    }
+
+    /// Whether a segment stays outside the box around this set, by `apart_m`.
+    #[inline]
+    fn is_outside(&self, from: &Point, to: &Point, apart_m: f32) -> bool {
+        let apart = |axis: usize| {
+            let (a, b) = (from[axis] - self.middle[axis], to[axis] - self.middle[axis]);
+            // Twice: from middle to middle, less half of each.
+            (a + b).abs() - (b - a).abs() >= self.size[axis] + 2.0 * apart_m
+        };
+        apart(0) || apart(1) || apart(2)
+    }
+
+    /// Square of the least distance to another set's line, or `most_m` squared if it is not less.
+    fn least_sq(&self, other: &Set, most_m: f32) -> f32 {
+        let wide_m = most_m + WIDER_M;
+        let mut least_sq = most_m * most_m;
+        for (from, to) in other.segments() {
+            if self.is_outside(from, to, wide_m) {
+                continue;
+            }
+            if self.legs.len() > FEW {
+                let line_m = wide_m + self.beside_m;
+                if segments_distance_sq((from, to), self.set.ends()) >= line_m * line_m {
+                    continue;
+                }
+            }
+            let other = Leg::new(from, to);
+            for leg in &self.legs {
+                if !leg.is_apart(&other, wide_m) {
+                    let apart_sq = segments_distance_sq((from, to), (&leg.from, &leg.to));
+                    least_sq = if apart_sq < least_sq { apart_sq } else { least_sq };
+                }
+            }
+        }
+        least_sq
+    }
+
+    /// Whether this vehicle's set comes nearer than `apart_m` to a neighbour's, which is at `place` now, and nearer than the
+    /// vehicle is already.
+    pub fn conflicts(&self, other: &Set, place: &Point, apart_m: f32) -> bool {
+        let most_m = apart_m + other.grow_m + self.set.grow_m;
+        let most_sq = most_m * most_m;
+        let motion_sq = self.least_sq(other, most_m);
+        motion_sq < most_sq && self.comes_nearer(motion_sq, other, place, most_m)
+    }
+
+    /// Whether a motion that comes too near comes nearer than the vehicle is.
+    #[inline(never)]
+    fn comes_nearer(&self, motion_sq: f32, other: &Set, place: &Point, most_m: f32) -> bool {
+        if self.set.grow_m > 0.0 {
+            return true;
+        }
+        let here = &self.set.points[0];
+        let now_sq =
+            other.segments().fold(most_m * most_m, |least, leg| least.min(point_distance_sq(leg, here)));
+        if sqrtf(motion_sq) < sqrtf(now_sq) - NEARER_M {
+            return true;
+        }
+        // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
+        let least = |least: f32, leg| least.min(point_distance_sq(leg, place));
+        let least_sq = self.set.segments().fold(f32::INFINITY, least);
+        let limit_m = sqrtf((here - place).norm_squared()).min(2.0 * most_m);
+        sqrtf(least_sq) < limit_m - NEARER_M
+    }
+}
+
+/// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a
+/// board three times as long.
+#[inline]
+fn each(a: &Point, b: &Point, more: impl Fn(f32, f32) -> bool) -> Point {
+    let of = |a: f32, b: f32| if more(b, a) { b } else { a };
+    Point::new(of(a.x, b.x), of(a.y, b.y), of(a.z, b.z))
+}
