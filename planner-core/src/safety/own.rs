@@ -156,15 +156,21 @@ impl<'a> OwnSet<'a> {
         let here = &self.set.points[0];
         let now_sq =
             other.segments().fold(most_m * most_m, |least, leg| least.min(point_distance_sq(leg, here)));
-        if sqrtf(motion_sq) < sqrtf(now_sq) - NEARER_M {
+        if is_nearer(motion_sq, now_sq) {
             return true;
         }
         // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
         let least = |least: f32, leg| least.min(point_distance_sq(leg, place));
         let least_sq = self.set.segments().fold(f32::INFINITY, least);
-        let limit_m = sqrtf((here - place).norm_squared()).min(2.0 * most_m);
-        sqrtf(least_sq) < limit_m - NEARER_M
+        is_nearer(least_sq, (here - place).norm_squared().min(4.0 * most_m * most_m))
     }
+}
+
+/// Whether a distance is less than another one, both squared.
+#[inline]
+fn is_nearer(least_sq: f32, than_sq: f32) -> bool {
+    // Most are not, and take no root.
+    least_sq < than_sq && sqrtf(least_sq) < sqrtf(than_sq) - NEARER_M
 }
 
 /// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a

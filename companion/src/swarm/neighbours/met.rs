@@ -52,7 +52,7 @@ impl Contact {
     /// Whether it stays out of reach wherever it can be: what most of them do, seen without making a set of it. Never where
     /// [`Neighbours::met`] and its reach say otherwise.
     #[inline(always)]
-    fn is_beyond(&self, placed_at: Instant, now: Instant, reach: &Reach<'_>) -> bool {
+    fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &Reach<'_>) -> bool {
         let away = self.state.position - reach.place;
         let across_sq = away.x * away.x + away.y * away.y;
         let mut heard = Heard {
@@ -70,7 +70,8 @@ impl Contact {
         };
         let age = now - placed_at;
         if age > FRESHLY {
-            return self.is_silent_beyond(age, across_sq, now, reach);
+            let lies = age >= down && !self.floor_m.is_nan();
+            return self.is_silent_beyond((age, lies), across_sq, now, reach);
         }
         heard.age_s = age.secs_f32();
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
@@ -81,8 +82,14 @@ impl Contact {
 
     /// The same where its place is old. Seen from above it is where it was or, known by its intents, at the first of its points;
     /// or as far from there as it can have flown: as long as it may not have noticed that nobody hears it, in a climb to its top
-    /// and a little further, and once it counts as dead along its points alone.
-    fn is_silent_beyond(&self, age: Duration, across_sq: f32, now: Instant, reach: &Reach<'_>) -> bool {
+    /// and a little further, and once it counts as dead along its points alone. What lies after so long moves no more.
+    fn is_silent_beyond(
+        &self,
+        (age, lies): (Duration, bool),
+        across_sq: f32,
+        now: Instant,
+        reach: &Reach<'_>,
+    ) -> bool {
         let delay_s = self.late.delay_s;
         let dead = self.rests_silently(age, now);
         let mut most_m = 0.0;
@@ -92,7 +99,7 @@ impl Contact {
             let age_s = if reach.deaf { silent_s } else { age.secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
-        if reach.lands || dead {
+        if reach.lands || (dead && !lies) {
             reaches(self.stretch_m() + OFF_M);
         }
         if reach.lands || self.climbs_to().is_some() {
@@ -142,7 +149,7 @@ impl<const V: usize> Neighbours<V> {
         now: Instant,
         reach: &Reach<'_>,
     ) -> Option<(usize, &Contact)> {
-        let within = |c: &Contact| c.position_at.is_some_and(|at| !c.is_beyond(at, now, reach));
+        let within = |c: &Contact| c.position_at.is_some_and(|at| !c.is_beyond(at, self.down, now, reach));
         self.contacts.iter().enumerate().skip(from).find(|(_, contact)| within(contact))
     }
 
