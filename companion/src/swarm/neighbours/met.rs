@@ -134,6 +134,14 @@ impl Contact {
         rests.reach_m(reach.bounds, reach.ahead_s)
     }
 
+    /// Whether it follows the plan out of range, as others report or as it was heard last.
+    fn is_out_of_range(&self, now: Instant) -> bool {
+        let silent = !self.tells(GROUNDED) && !self.heard_within(now, FRESHLY);
+        let unheard = silent && self.at_edge && self.on_plan();
+        let flies_on = || self.flies_on() || self.heard_within(now, STANDS_UNHEARD);
+        self.is_far(now) || (unheard && flies_on())
+    }
+
     /// Whether it counts as dead and rests on its points, its place so old.
     #[inline]
     fn rests_silently(&self, age: Duration, now: Instant) -> bool {
@@ -206,13 +214,7 @@ impl<const V: usize> Neighbours<V> {
             id: contact.id,
             stranger: contact.rank == STRANGER,
             on_plan: contact.on_plan(),
-            far: silent
-                && (contact.is_far(now)
-                    || (contact.at_edge
-                        && contact.on_plan()
-                        && !contact.tells(GROUNDED)
-                        && !contact.heard_within(now, FRESHLY)
-                        && (contact.flies_on() || contact.heard_within(now, STANDS_UNHEARD)))),
+            far: silent && contact.is_out_of_range(now),
             shares_plan: contact.shares_plan,
             lost: dead,
             waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
