@@ -209,24 +209,29 @@ impl Ahead {
         own: &Own<'_, W>,
         n: &Neighbour,
     ) -> Option<f32> {
-        let now = (n.position + n.velocity * n.age_s - own.position).norm_squared();
-        let apart_m = cfg.safety_distance_m + LEADS_S * fmaxf(cfg.cruise_mps - LEADS_ABOVE_MPS, 0.0);
-        let near = fminf(apart_m * apart_m, now);
-        // No more than this do both fly from one look to the next.
-        let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
-        let looks_a_metre = 1.0 / (self.step_m + LOOK_EVERY_S * fastest_mps);
         let away = |looks: usize, own: &Point| {
             n.position + n.velocity * (n.age_s + looks as f32 * LOOK_EVERY_S) - own
         };
-        let mut i = 0;
+        let now = away(0, &own.position);
+        let apart_m = cfg.safety_distance_m + LEADS_S * fmaxf(cfg.cruise_mps - LEADS_ABOVE_MPS, 0.0);
+        let near = fminf(apart_m * apart_m, now.norm_squared());
+        // No more than this do both fly from one look to the next.
+        let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
+        let look_m = self.step_m + LOOK_EVERY_S * fastest_mps;
+        let looks_a_metre = 1.0 / look_m;
+        let (mut i, mut last) = (0, (0, now));
         while let Some(there) = self.points.get(i) {
-            let before = if i == 0 { own.position } else { self.points[i - 1] };
-            let (from, to) = (away(i, &before), away(i + 1, there));
-            if least_square(&from, &to) < near {
-                return Some(i as f32 * self.step_m);
-            }
+            let to = away(i + 1, there);
             let least_m = to.x.abs().max(to.y.abs()).max(to.z.abs());
             let room_m = least_m - apart_m - ROUNDING_M;
+            let comes_near = || {
+                let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
+                least_square_between(&from, &to).is_some_and(|square| square < near)
+            };
+            if to.norm_squared() < near || room_m < look_m && comes_near() {
+                return Some(i as f32 * self.step_m);
+            }
+            last = (i + 1, to);
             // Not below zero, and 0 where it is no number.
             i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
         }
@@ -234,16 +239,16 @@ impl Ahead {
     }
 }
 
-/// Square of the least distance from the origin on the way from one place to another, the first left out: it was the
-/// last of the way before.
-fn least_square(from: &Point, to: &Point) -> f32 {
+/// Square of the least distance from the origin on the way from one place to another, if it is at neither of them.
+fn least_square_between(from: &Point, to: &Point) -> Option<f32> {
     let step = to - from;
-    let (behind, ahead) = (from.dot(&step), to.dot(&step));
-    if behind < 0.0 && ahead > 0.0 {
-        // Not below zero but by rounding: the square of the height of a triangle.
-        return from.norm_squared() - behind * behind / (ahead - behind);
+    let ahead = to.dot(&step);
+    if ahead <= 0.0 {
+        return None;
     }
-    to.norm_squared()
+    let behind = from.dot(&step);
+    // The square of the height of a triangle, below zero by rounding alone.
+    (behind < 0.0).then(|| from.norm_squared() - behind * behind / (ahead - behind))
 }
 
 #[cfg(test)]
