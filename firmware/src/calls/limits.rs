@@ -482,10 +482,11 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
             let other = to.call("safety::Heard::set", || heard.set(&bounds, hard));
             for own in &own {
                 let reach_m = to.call("safety::Set::reach_m", || own.reach_m());
-                let own = to.call("safety::OwnSet::new", || OwnSet::new(own));
+                let own = to.call("own::OwnSet::new", || OwnSet::new(own));
                 to.add(reach_m);
-                to.add(own.reach_m());
-                let near = to.call("safety::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
+                let reach_m = to.call("own::OwnSet::reach_m", || own.reach_m());
+                to.add(reach_m);
+                let near = to.call("own::OwnSet::conflicts", || own.conflicts(&other, &p, hard));
                 to.is(near);
             }
         }
