@@ -91,6 +91,8 @@ impl Contact {
         self.heard_at.is_some_and(|at| now - at < span)
     }
 
+    // One copy of it, and of what else many ask: a board has little room.
+    #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most are heard.
         let dead = Duration::from_millis(DEAD_MS + (1000.0 * self.flies_on_s()) as u64);
@@ -120,6 +122,7 @@ impl Contact {
     }
 
     /// Whether it flies its plan unheard, or did.
+    #[inline(never)]
     pub(super) fn flies_on(&self) -> bool {
         self.state
             .progress_m

@@ -128,6 +128,7 @@ impl Contact {
     }
 
     /// Whether it is out of range, and was lately reported to follow the plan.
+    #[inline(never)]
     pub(super) fn is_far(&self, now: Instant) -> bool {
         self.relayed_at.is_some_and(|at| now - at < RECENT)
             && !self.heard_within(now, FAR)
