@@ -156,7 +156,7 @@ fn what_a_lost_vehicle_leaves_is_photographed_by_the_others() {
 
 #[test]
 fn what_a_lost_vehicle_leaves_is_photographed_over_a_radio_with_bursts_and_one_way_links() {
-    // Seed 3 is left with one waypoint and no reason: known, not mended (docs/coverage.md). A sweep finds it again.
+    // One of ten is not whole and names no reason, seed 3 it seems: not mended (docs/coverage.md). A sweep finds it again.
     if std::env::var_os("FLOCKMATE_LOSSES").is_none() {
         println!("skipped: FLOCKMATE_LOSSES=N flies it");
         return;
