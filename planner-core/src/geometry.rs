@@ -24,7 +24,8 @@ pub(crate) fn segments_distance_sq(p: (&Point, &Point), q: (&Point, &Point)) -> 
 }
 
 /// Squared distance from a segment to a point: what [`segments_distance_sq`] gives for a second segment without length, bit
-/// by bit.
+/// by bit. One copy of it: a board has little room.
+#[inline(never)]
 pub(crate) fn point_distance_sq(p: (&Point, &Point), q: &Point) -> f32 {
     let (d, r) = (p.1 - p.0, p.0 - q);
     let a = d.norm_squared();

@@ -179,6 +179,7 @@ pub enum Joint {
 
 impl Joint {
     /// Looks for the nearest place on the points.
+    #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
         let (mut least_sq, mut best) = (OFF_M * OFF_M, Self::Beside);
         let Some(mut from) = points.first() else { return best };
@@ -202,8 +203,8 @@ impl Joint {
     }
 }
 
-/// The place on a leg that is nearest to another place.
-#[inline]
+/// The place on a leg that is nearest to another place. One copy of it: a board has little room.
+#[inline(never)]
 fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
     let leg = to - from;
     let length_sq = leg.norm_squared();

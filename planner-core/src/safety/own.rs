@@ -66,7 +66,7 @@ pub struct OwnSet<'a> {
 impl<'a> OwnSet<'a> {
     /// What a vehicle can no longer take back.
     pub fn new(set: &'a Set) -> Self {
-        let (first, last) = set.ends();
+        let (first, _) = set.ends();
         // Filled in place: a board takes long to copy it.
         let mut own = Self {
             set,
@@ -79,21 +79,28 @@ impl<'a> OwnSet<'a> {
         // Where the second leg begins a first one without length is.
         let double = set.points.len() > 2 && set.points[0] == set.points[1];
         let (mut low, mut high) = (*first, *first);
-        for (from, to) in set.segments().skip(usize::from(double)) {
-            // As many as there are points at most.
-            let _ = own.legs.push(Leg::new(from, to));
-            (low, high) = (each(&low, to, |a, b| a < b), each(&high, to, |a, b| a > b));
-        }
+        set.segments()
+            .skip(usize::from(double))
+            .for_each(|(from, to)| own.add(from, to, &mut low, &mut high));
         if own.legs.len() > FEW {
-            let mut beside_sq = 0.0;
-            for leg in &own.legs {
-                let apart_sq = point_distance_sq((first, last), &leg.to);
-                beside_sq = if apart_sq > beside_sq { apart_sq } else { beside_sq };
-            }
-            own.beside_m = root_above(beside_sq);
+            own.beside_m = own.lies_beside_m();
         }
         (own.middle, own.size) = ((low + high) * 0.5, high - low);
         own
+    }
+
+    #[inline(never)]
+    fn add(&mut self, from: &Point, to: &Point, low: &mut Point, high: &mut Point) {
+        // As many as there are points at most.
+        let _ = self.legs.push(Leg::new(from, to));
+        (*low, *high) = (each(low, to, |a, b| a < b), each(high, to, |a, b| a > b));
+    }
+
+    /// No less than what its points lie beside the line between its ends, metres.
+    #[inline(never)]
+    fn lies_beside_m(&self) -> f32 {
+        let beside_sq = |leg: &Leg| point_distance_sq(self.set.ends(), &leg.to);
+        root_above(self.legs.iter().map(beside_sq).fold(0.0, |most, sq| if sq > most { sq } else { most }))
     }
 
     /// How far from its first point it reaches at most, metres.
@@ -154,16 +161,23 @@ impl<'a> OwnSet<'a> {
             return true;
         }
         let here = &self.set.points[0];
-        let now_sq =
-            other.segments().fold(most_m * most_m, |least, leg| least.min(point_distance_sq(leg, here)));
-        if is_nearer(motion_sq, now_sq) {
+        if is_nearer(motion_sq, distance_sq(other, here, most_m * most_m)) {
             return true;
         }
         // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
-        let least = |least: f32, leg| least.min(point_distance_sq(leg, place));
-        let least_sq = self.set.segments().fold(f32::INFINITY, least);
-        is_nearer(least_sq, (here - place).norm_squared().min(4.0 * most_m * most_m))
+        let now_sq = (here - place).norm_squared();
+        is_nearer(distance_sq(self.set, place, f32::INFINITY), now_sq.min(4.0 * most_m * most_m))
     }
+}
+
+/// Square of the least distance from a set's line to a place, or `most_sq` if it is not less.
+#[inline(never)]
+fn distance_sq(set: &Set, place: &Point, most_sq: f32) -> f32 {
+    let nearer = |least: f32, leg| {
+        let apart_sq = point_distance_sq(leg, place);
+        if apart_sq < least { apart_sq } else { least }
+    };
+    set.segments().fold(most_sq, nearer)
 }
 
 /// Whether a distance is less than another one, both squared.

@@ -143,7 +143,7 @@ impl Contact {
     }
 
     /// Whether it counts as dead and rests on its points, its place so old.
-    #[inline]
+    #[inline(never)]
     fn rests_silently(&self, age: Duration, now: Instant) -> bool {
         age >= DEAD && !self.points.is_empty() && (self.is_dead(now) || !self.is_far(now))
     }
