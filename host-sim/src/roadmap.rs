@@ -4,6 +4,9 @@
 //! Edges come in the same order whatever the number of threads, because pieces of work are joined in their order.
 
 pub mod cap;
+pub mod passages;
+#[cfg(test)]
+mod passages_tests;
 
 use std::cell::Cell;
 use std::ops::Range;
@@ -50,6 +53,8 @@ pub struct Parts {
     pub nodes_s: f64,
     /// Which pairs of them are joined, and the clearance of each.
     pub edges_s: f64,
+    /// Nodes of passages that random ones miss.
+    pub passages_s: f64,
     /// Which of the edges a board gets.
     pub cap_s: f64,
     /// The file: ways to the landmarks, rows, CRC-32.
@@ -60,10 +65,9 @@ pub struct Parts {
 /// threads.
 pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Result<(Roadmap, Parts)> {
     let grid = map.grid();
-    let height_m = |node: &Point| map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m);
     let sampled = || {
         let nodes = sample(map, terminals, config)?;
-        let heights_m: Vec<f32> = nodes.iter().map(height_m).collect();
+        let heights_m: Vec<f32> = nodes.iter().map(|node| height_m(map, node)).collect();
         anyhow::Ok((nodes, heights_m))
     };
     let ((tree, boxes_s), (sampled, nodes_s)) =
@@ -72,8 +76,37 @@ pub fn build(map: &VoxelMap, terminals: &[Point], config: &Config) -> anyhow::Re
     let joining = Instant::now();
     let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
     let edges = join(&grid, &tree, &nodes, config, &mut workspace).map_err(|e| describe(&e))?;
-    let parts = Parts { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), cap_s: 0.0, file_s: 0.0 };
+    let parts = Parts { boxes_s, nodes_s, edges_s: joining.elapsed().as_secs_f64(), ..Parts::default() };
     Ok((Roadmap { nodes, edges, heights_m }, parts))
+}
+
+/// Adds the nodes of passages between starts and goals that random nodes have missed, and joins them as all others; returns
+/// how many there are. Nothing changes where none is missing.
+pub fn add_passages(
+    map: &VoxelMap,
+    roadmap: &mut Roadmap,
+    config: &Config,
+    wanted: &[passages::Wanted],
+) -> anyhow::Result<usize> {
+    let (grid, tree) = (map.grid(), BoxTree::new(&map.grid()));
+    let added = passages::missing(map, &tree, &roadmap.nodes, &roadmap.edges, config, wanted);
+    if added.is_empty() {
+        return Ok(0);
+    }
+    let total = roadmap.nodes.len() + added.len();
+    if total > ROADMAP_NODES {
+        bail!("the roadmap would have {total} nodes: this build plans on at most {ROADMAP_NODES}");
+    }
+    roadmap.heights_m.extend(added.iter().map(|node| height_m(map, node)));
+    roadmap.nodes.extend(&added);
+    let mut workspace = Box::new(Workspace::<ROADMAP_NODES, ROADMAP_CUBES>::new());
+    roadmap.edges = join(&grid, &tree, &roadmap.nodes, config, &mut workspace).map_err(|e| describe(&e))?;
+    Ok(added.len())
+}
+
+/// Height of a node over the ground below it, metres; infinite where there is none.
+fn height_m(map: &VoxelMap, node: &Point) -> f32 {
+    map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
 }
 
 /// What some work gives, and how long it took, seconds.

@@ -119,10 +119,12 @@ fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
     };
     let half_m = mission.map.shape.resolution_m / 2.0;
     if widest_m >= required_m {
-        let nodes = mission.scenario.roadmap.nodes;
+        let settings = &mission.scenario.roadmap;
+        let passages = if settings.passages { "" } else { ", or roadmap.passages = true," };
         format!(
             "the map has one with the {required_m:.2} m to the nearest obstacle that are needed: \
-             more roadmap.nodes ({nodes}) would help"
+             more roadmap.nodes ({}){passages} would help",
+            settings.nodes
         )
     } else if widest_m > radius_m {
         let margin_m = ((widest_m - radius_m - half_m).max(0.0) * 100.0).floor() / 100.0;
@@ -192,6 +194,15 @@ fn widths_m(
     if cells > MOST_CELLS {
         return None;
     }
+    let steps_at = |place: &Point| {
+        let most_m = STEP_M * steps as f32;
+        if at_least_m(place) >= most_m {
+            return steps;
+        }
+        ((point_clearance(&grid, place, most_m) / STEP_M + 1e-3) as usize).min(steps)
+    };
+    // A start or goal may be nearer to an obstacle than the centre of its cell, and above all to the ground.
+    let (at_start, at_goals) = (steps_at(from), goals.iter().map(steps_at).collect::<Vec<_>>());
     let from = shape.cell_of(from)?;
     let goals: Vec<_> = goals.iter().map(|goal| shape.cell_of(goal)).collect();
     let mut widths = vec![0.0; goals.len()];
@@ -199,16 +210,11 @@ fn widths_m(
     let at = |[i, j, k]: [u32; 3]| (k as usize * ny + j as usize) * nx + i as usize;
     let step = |[i, j, k]: [u32; 3]| {
         let r = shape.resolution_m;
-        let centre = shape.min + Point::new(i as f32 + 0.5, j as f32 + 0.5, k as f32 + 0.5) * r;
-        let most_m = STEP_M * steps as f32;
-        if at_least_m(&centre) >= most_m {
-            return steps;
-        }
-        ((point_clearance(&grid, &centre, most_m) / STEP_M + 1e-3) as usize).min(steps)
+        steps_at(&(shape.min + Point::new(i as f32 + 0.5, j as f32 + 0.5, k as f32 + 0.5) * r))
     };
     let mut seen = vec![0u64; cells.div_ceil(64)];
     let mut open: Vec<Vec<[u32; 3]>> = vec![Vec::new(); steps + 1];
-    let mut width = step(from);
+    let mut width = step(from).min(at_start);
     open[width].push(from);
     seen[at(from) / 64] |= 1 << (at(from) % 64);
     while width > 0 && missing > 0 {
@@ -216,8 +222,8 @@ fn widths_m(
             width -= 1;
             continue;
         };
-        for (found, _) in widths.iter_mut().zip(&goals).filter(|(_, goal)| **goal == Some(cell)) {
-            *found = width as f32 * STEP_M;
+        for goal in (0..goals.len()).filter(|&goal| goals[goal] == Some(cell)) {
+            widths[goal] = width.min(at_goals[goal]) as f32 * STEP_M;
             missing -= 1;
         }
         for axis in 0..3 {
@@ -257,6 +263,16 @@ mod tests {
             map.set([i, j, k], if wall { Occupancy::Occupied } else { Occupancy::Free });
         }
         map.voxel_map(Unknown::Free)
+    }
+
+    /// A start or goal near the floor of its cell is as near to the floor as it is, not as the centre of its cell.
+    #[test]
+    fn a_way_is_no_wider_than_its_ends() {
+        let (from, to) = (Point::new(1.0, 1.0, 1.0), Point::new(5.0, 3.0, 1.0));
+        let low = |p: &Point| Point::new(p.x, p.y, 0.2);
+        let widths = |from: &Point, to: &Point| widths_m(&rooms(8), |_| 0.0, from, &[*to], 0.15).unwrap()[0];
+        assert!(widths(&from, &to) > 0.14);
+        assert!(widths(&low(&from), &to) <= 0.101 && widths(&from, &low(&to)) <= 0.101);
     }
 
     #[test]

@@ -24,7 +24,9 @@ fn too_few_nodes_and_too_wide_a_margin_are_told_apart() {
     let few = reasons("[roadmap]\nnodes = 10");
     assert!(few.len() == 4 && few[..2].iter().all(|l| l.contains("more roadmap.nodes (10)")), "{few:?}");
     assert!(few[0].starts_with("goal 0 at [28, 3, 1.8] (lobby.toml:10): "), "{few:?}");
+    assert!(few[..2].iter().all(|l| l.contains("or roadmap.passages = true, would help")), "{few:?}");
     assert_eq!(reasons("[roadmap]\nnodes = 2300"), [""; 0]);
+    assert_eq!(reasons("[roadmap]\nnodes = 10\npassages = true"), [""; 0]);
     // No door of the demo's rooms leaves 1.5 m.
     let margin = DEMO.replace("safety_margin_m = 0.5", "safety_margin_m = 1.2");
     assert!(margin.contains("safety_margin_m = 1.2"));

@@ -25,7 +25,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use self::config::LengthRange;
-pub use self::config::{Config, Edge, PrmError, Sampling, TRIES_PER_NODE, squared_length};
+pub use self::config::{Config, Edge, PrmError, Sampling, TRIES_PER_BRIDGE, TRIES_PER_NODE, squared_length};
 use self::free_box::Sight;
 pub use self::neighbours::Workspace;
 use crate::Point;
@@ -57,18 +57,40 @@ pub fn sample_nodes(
     }
     let mut draws = Draws::new(config);
     let (min, size) = (grid.shape().min, grid.shape().max() - grid.shape().min);
+    let is_free = |p: &Point| {
+        let never = never_sample.is_some_and(|never| never.is_blocked_at(p));
+        grid.shape().cell_of(p).is_some_and(|cell| !grid.is_occupied(cell))
+            && !never
+            && keeps_clear(grid, config, p)
+    };
     for (found, node) in nodes[terminals.len()..total].iter_mut().enumerate() {
-        let free = (0..TRIES_PER_NODE).find_map(|_| {
-            let p = min + draws.next().component_mul(&size);
-            let cell = grid.shape().cell_of(&p)?;
-            let blocked = grid.is_occupied(cell)
-                || never_sample.is_some_and(|never| never.is_blocked_at(&p))
-                || config.clearance_m > 0.0 && !segment_is_clear(grid, &p, &p, config.clearance_m);
-            (!blocked).then_some(p)
-        });
+        let draw = |draws: &mut Draws| Some(min + draws.next().component_mul(&size)).filter(&is_free);
+        let tries = if config.sampling == Sampling::Bridge && found % 2 == 1 { TRIES_PER_BRIDGE } else { 0 };
+        let bridge =
+            (0..tries).find_map(|_| draw(&mut draws).filter(|p| bridges(grid, config, p, draws.next())));
+        let free = bridge.or_else(|| (0..TRIES_PER_NODE).find_map(|_| draw(&mut draws)));
         *node = free.ok_or(PrmError::NoFreeSpace(found))?;
     }
     Ok(total)
+}
+
+/// Whether a point keeps the clearance that edges keep; where they keep none, whether it is outside obstacles.
+fn keeps_clear(grid: &VoxelGrid<'_>, config: &Config, p: &Point) -> bool {
+    match config.clearance_m > 0.0 {
+        true => segment_is_clear(grid, p, p, config.clearance_m),
+        false => !grid.is_blocked_at(p),
+    }
+}
+
+/// The bridge test: whether the points on either side of a clear one, at the same random offset, are both not clear.
+/// `draw` is of the unit cube. The offset is at most twice the clearance on each axis: a passage that is as wide
+/// leaves half of its width to fly in; where no clearance is asked for, an eighth of the longest edge.
+fn bridges(grid: &VoxelGrid<'_>, config: &Config, p: &Point, draw: Point) -> bool {
+    let reach_m = (2.0 * config.clearance_m).max(config.edge_max_m / 8.0);
+    let offset = (draw - Point::new(0.5, 0.5, 0.5)) * (2.0 * reach_m);
+    [p + offset, p - offset]
+        .iter()
+        .all(|end| grid.shape().cell_of(end).is_some() && !keeps_clear(grid, config, end))
 }
 
 /// Points of the unit cube, [0, 1) on each axis.
@@ -89,7 +111,7 @@ impl Draws {
 
     fn next(&mut self) -> Point {
         match self.sampling {
-            Sampling::Uniform => uniform(&mut self.rng),
+            Sampling::Uniform | Sampling::Bridge => uniform(&mut self.rng),
             Sampling::Halton => {
                 self.index = self.index.wrapping_add(1);
                 let p = Point::new(

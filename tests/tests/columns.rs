@@ -43,8 +43,8 @@ const CASES: [Case; 4] = [
         edge_max_m: 0.5,
     },
 ];
-/// Nodes of a roadmap, and more where these find no way.
-const NODES: [usize; 2] = [1500, 6000];
+/// Nodes of a roadmap, and more where these find no way, with `roadmap.passages` then.
+const NODES: [(usize, bool); 2] = [(1500, false), (6000, true)];
 /// Missions a map, where nothing else is asked for.
 const MISSIONS: usize = 3;
 
@@ -89,6 +89,14 @@ fn uniform(rng: &mut Pcg32) -> f32 {
     (rng.next_u32() >> 8) as f32 / (1 << 24) as f32
 }
 
+/// Whether a place is so near to the ground that no edge can lead there, whatever its column.
+fn is_low(map: &OccupancyMap, p: &Point, required_m: f32) -> bool {
+    let shape = map.shape();
+    let Some([i, j, top]) = shape.cell_of(p) else { return true };
+    let below = (0..top).rev().find(|&k| map.at([i, j, k]) != Occupancy::Free);
+    below.is_some_and(|below| p.z - shape.min.z - (below + 1) as f32 * shape.resolution_m <= required_m)
+}
+
 /// A random free place over something that was seen.
 fn place(map: &OccupancyMap, rng: &mut Pcg32) -> Point {
     let (min, size) = (map.shape().min, map.shape().max() - map.shape().min);
@@ -111,7 +119,7 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
         let fits = case.margin_m >= RTK_ERROR_M;
         let (estimator, cruise_mps) = if fits { (Estimator::Rtk, 1.0) } else { (Estimator::Perfect, 0.3) };
         let mut rng = Pcg32::seed_from_u64(1);
-        let (mut planned, mut flown, mut walled_off, mut missed) = (0, 0, 0, 0);
+        let (mut flown, mut walled_off, mut missed) = (0, 0, 0);
         let (mut contacts, mut refused, mut hints) = (0, 0, 0);
         for mission in 0..missions {
             let (mut clear, mut other) = (Vec::new(), None);
@@ -121,6 +129,8 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 }
                 let p = place(&map, &mut rng);
                 match is_clear(&map, &p, case.radius_m, required_m) {
+                    // The program reports what such a place is short of; the unit tests of `shortage` have it.
+                    true if is_low(&map, &p, required_m) => {}
                     true if clear.len() < 2 => clear.push(p),
                     false => other = Some(p),
                     true => {}
@@ -129,10 +139,10 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             let ([start, goal], Some(other)) = (&clear[..], other) else {
                 panic!("{}: {} clear columns, another: {other:?}", case.file, clear.len())
             };
-            let prepare = |start: &Point, goal: &Point, nodes: usize| {
+            let prepare = |start: &Point, goal: &Point, (nodes, passages): (usize, bool)| {
                 let text = format!(
                     "seed = {mission}\n[map]\nfile = {file:?}\nresolution_m = {}\n\
-                     [roadmap]\nnodes = {nodes}\nedge_min_m = 0.05\nedge_max_m = {}\nsafety_margin_m = {}\n\
+                     [roadmap]\nnodes = {nodes}\npassages = {passages}\nedge_min_m = 0.05\nedge_max_m = {}\nsafety_margin_m = {}\n\
                      [mission]\nmode = \"labelled\"\ncruise_mps = {cruise_mps}\ngoals = [[{}, {}, {}]]\n\
                      [deconfliction]\nsafety_distance_m = 0.8\n\
                      [[vehicles]]\nid = 1\nstart = [{}, {}, {}]\nradius_m = {}\ngoal = 0\n",
@@ -159,16 +169,15 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
                 refused += 1;
                 hints += usize::from(error.contains("the nearest place that would do is"));
             }
-            // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
-            let plans = NODES.iter().map_while(|&nodes| {
+            let plan = |nodes| {
                 let mut mission = prepare(start, goal, nodes).ok()?;
                 let plan = mission.plan().ok()?;
                 let lines = shortage::lines(&mission, &plan);
                 Some((lines.iter().any(|line| line.contains("the map has one")), mission, plan))
-            });
-            let plans: Vec<_> = plans.collect();
-            planned += usize::from(!plans.is_empty());
-            let Some((_, mission, plan)) = plans.into_iter().find(|(lacks_nodes, ..)| !lacks_nodes) else {
+            };
+            // More nodes where the map itself has a way that the roadmap has not: as the program suggests.
+            let plan = plan(NODES[0]).and_then(|first| if first.0 { plan(NODES[1]) } else { Some(first) });
+            let Some((false, mission, plan)) = plan else {
                 missed += 1;
                 continue;
             };
@@ -182,12 +191,11 @@ fn starts_and_goals_with_clear_columns_are_flown_and_others_refused() {
             flown += 1;
         }
         println!(
-            "{}: {planned} of {missions} clear missions accepted: {flown} flown, {walled_off} without a way between on the \
-             map itself, {missed} with one that a roadmap of {} nodes lacks; {contacts} contacts; {refused} others refused, \
-             {hints} with a place nearby",
-            case.file, NODES[1]
+            "{}: of {missions} clear missions {flown} flown, {walled_off} without a way between on the map itself, {missed} \
+             not planned; {contacts} contacts; {refused} others refused, {hints} with a place nearby",
+            case.file
         );
-        assert!(100 * planned >= 99 * missions, "{}", case.file);
+        assert!(100 * missed <= missions, "{}", case.file);
         assert_eq!(contacts, 0, "{}", case.file);
     }
 }

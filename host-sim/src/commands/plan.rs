@@ -69,14 +69,16 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             Some(why) => say!("board      {} does not hold the files: {why}", board.name),
         }
     }
-    let Parts { boxes_s, nodes_s, edges_s, cap_s, file_s } = mission.timing.roadmap_parts;
+    let Parts { boxes_s, nodes_s, edges_s, passages_s, cap_s, file_s } = mission.timing.roadmap_parts;
     say!(
-        "times      map {:.1} ms, roadmap {:.1} ms: boxes {:.1}, nodes {:.1}, edges {:.1}, capping {:.1}, file {:.1}",
+        "times      map {:.1} ms, roadmap {:.1} ms: boxes {:.1}, nodes {:.1}, edges {:.1}, passages {:.1}, capping {:.1}, \
+         file {:.1}",
         mission.timing.map_s * 1e3,
         mission.timing.roadmap_s * 1e3,
         boxes_s * 1e3,
         nodes_s * 1e3,
         edges_s * 1e3,
+        passages_s * 1e3,
         cap_s * 1e3,
         file_s * 1e3
     );

@@ -1,5 +1,7 @@
 //! Starts, goals and the roadmap between them, from a scenario and its map.
 
+use std::time::Instant;
+
 use anyhow::bail;
 use planner_core::Point;
 use planner_core::plan::VehicleTask;
@@ -10,6 +12,7 @@ use planner_core::segment::segment_is_clear;
 
 use crate::map::VoxelMap;
 use crate::map::column::{ColumnError, column, nearest_column};
+use crate::roadmap::passages::Wanted;
 use crate::roadmap::{self, Parts, Roadmap};
 use crate::scenario::{self, Scenario, Terminals};
 
@@ -141,6 +144,17 @@ fn edge_lengths(scenario: &Scenario, map: &VoxelMap) -> anyhow::Result<(f32, f32
     Ok((min_m, max_m))
 }
 
+/// Which starts and goals are to be joined: a vehicle and its own goal, or else each of them with each.
+fn wanted(scenario: &Scenario, goals: usize) -> Vec<Wanted> {
+    let vehicles = scenario.vehicles.len();
+    let pairs = scenario.vehicles.iter().enumerate().flat_map(|(start, vehicle)| {
+        let required_m = vehicle.radius_m + scenario.roadmap.safety_margin_m;
+        let own = move |goal: &usize| vehicle.goal.is_none_or(|own| own == *goal);
+        (0..goals).filter(own).map(move |goal| Wanted { start, goal: vehicles + goal, required_m })
+    });
+    pairs.collect()
+}
+
 pub(super) fn build(
     scenario: &Scenario,
     map: &VoxelMap,
@@ -160,7 +174,12 @@ pub(super) fn build(
         seed: scenario.seed,
         sampling: settings.sampling,
     };
-    let (mut roadmap, parts) = roadmap::build(map, &terminals, &config)?;
+    let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
+    if settings.passages {
+        let searching = Instant::now();
+        roadmap::add_passages(map, &mut roadmap, &config, &wanted(scenario, goals.len()))?;
+        parts.passages_s = searching.elapsed().as_secs_f64();
+    }
     if settings.terminals == Terminals::Apart {
         let is_terminal = |node: u16| usize::from(node) < terminals.len();
         roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));

@@ -217,6 +217,10 @@ impl<'a> Table<'a> {
         self.get(key).map_or(Ok(default), |v| v.whole(range))
     }
 
+    pub(super) fn boolean(&self, key: &'static str) -> Result<bool> {
+        self.get(key).map_or(Ok(false), |v| v.boolean())
+    }
+
     pub(super) fn word<T: Copy>(&self, key: &'static str, default: T, words: &[(&str, T)]) -> Result<T> {
         self.get(key).map_or(Ok(default), |v| v.word(words))
     }

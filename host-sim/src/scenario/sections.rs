@@ -248,8 +248,9 @@ fn roadmap(table: &Table<'_>) -> Result<Roadmap> {
         sampling: table.word(
             "sampling",
             Sampling::Uniform,
-            &[("uniform", Sampling::Uniform), ("halton", Sampling::Halton)],
+            &[("uniform", Sampling::Uniform), ("halton", Sampling::Halton), ("bridge", Sampling::Bridge)],
         )?,
+        passages: table.boolean("passages")?,
     };
     table.finish()?;
     let in_metres = roadmap.edge_min_share.is_none() && roadmap.edge_max_share.is_none();

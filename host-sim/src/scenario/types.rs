@@ -87,6 +87,8 @@ pub struct Roadmap {
     pub safety_margin_m: f32,
     /// How nodes are drawn.
     pub sampling: Sampling,
+    /// Whether passages that they miss get nodes of their own.
+    pub passages: bool,
 }
 
 /// Whether edges join two starts or goals.

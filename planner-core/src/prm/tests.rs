@@ -163,6 +163,32 @@ fn nodes_are_free_and_repeat_with_the_seed() {
     }
 }
 
+/// A wall across the map with a door that leaves 0.2 m to fly in. The edges of the rooms draw bridges as well.
+#[test]
+fn bridges_lie_in_doors() {
+    let (mut in_doors, mut by_chance) = (0, 0);
+    for seed in 0..10 {
+        let shape = GridShape { dims: [60, 40, 20], min: Point::new(-2.0, 1.0, 0.0), resolution_m: 0.1 };
+        let mut words = vec![0; shape.brick_count()];
+        let door = 5 + seed as u32 * 2..13 + seed as u32 * 2;
+        for (j, k) in (0..40).flat_map(|j| (0..20).map(move |k| (j, k))).filter(|(j, _)| !door.contains(j)) {
+            let (word, mask) = shape.address([30, j, k]);
+            words[word] |= mask;
+        }
+        let grid = VoxelGrid::new(shape, Outside::Blocked, &words).unwrap();
+        let count = |sampling| {
+            let config = Config { clearance_m: 0.3, nodes: 200, sampling, ..config(seed) };
+            let mut nodes = vec![Point::zeros(); 200];
+            sample_nodes(&grid, None, &[], &config, &mut nodes).unwrap();
+            assert!(nodes.iter().all(|p| segment_is_clear(&grid, p, p, 0.3)));
+            nodes.iter().filter(|p| (p.x - 1.05).abs() < 0.35).count()
+        };
+        in_doors += count(Sampling::Bridge);
+        by_chance += count(Sampling::Uniform);
+    }
+    assert!(2 * in_doors > 3 * by_chance, "{in_doors} in doors, {by_chance} by chance");
+}
+
 #[test]
 fn never_sampled_space_stays_empty() {
     let (shape, words) = rooms(&mut Pcg32::seed_from_u64(4), 0.25);

@@ -178,7 +178,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
         terrain: None,
         angle_deg: table.optional_f32("angle_deg", -360.0..=360.0)?,
         margin_m: table.f32("margin_m", 0.0, 0.0..=1000.0)?,
-        batteries: table.get("batteries").map(|v| v.boolean()).transpose()?.unwrap_or(false),
+        batteries: table.boolean("batteries")?,
         method: method.unwrap_or(Method::PowellBinpat),
         heading: table.word(
             "heading",

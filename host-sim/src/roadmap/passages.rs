@@ -1,0 +1,227 @@
+//! Nodes in passages that random nodes miss: where the roadmap does not join a start to a goal and the map does, the corners
+//! of a way over the map's cells become nodes.
+//!
+//! A passage hardly wider than a vehicle and its margin takes up next to nothing of the space that nodes are drawn from, so
+//! no number of random nodes is sure to find it. A cell's centre is what nodes lie on here, and every step between two of them keeps the
+//! clearance, so what is joined is as clear as any edge.
+//!
+//! Cost: a search over the map's cells (A*) for each pair of parts that are not joined; missions whose roadmap joins all of
+//! their starts and goals pay nothing but the look.
+
+use std::cmp::Reverse;
+use std::collections::{BTreeSet, BinaryHeap};
+
+use planner_core::Point;
+use planner_core::prm::Config;
+use planner_core::roadmap::Edge;
+use planner_core::voxel::GridShape;
+
+use crate::map::{BoxTree, VoxelMap};
+
+/// What a way keeps beyond the clearance, metres: more than rounding.
+const SLACK_M: f32 = 2e-4;
+/// Larger grids are not searched: the search keeps nine bytes a cell.
+const MOST_CELLS: usize = 1 << 25;
+
+/// A start and a goal, by their nodes, and the clearance that the vehicle between them needs, metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wanted {
+    /// The start's node.
+    pub start: usize,
+    /// The goal's node.
+    pub goal: usize,
+    /// Radius and margin.
+    pub required_m: f32,
+}
+
+/// Nodes that join what is wanted and not joined yet, where the map has a way for it.
+pub fn missing(
+    map: &VoxelMap,
+    tree: &BoxTree,
+    nodes: &[Point],
+    edges: &[Edge],
+    config: &Config,
+    wanted: &[Wanted],
+) -> Vec<Point> {
+    let mut wanted = wanted.to_vec();
+    // What is wide enough for a large vehicle is so for a smaller one.
+    wanted.sort_by(|a, b| b.required_m.total_cmp(&a.required_m));
+    let mut found = Vec::new();
+    let mut ways: Vec<Wanted> = Vec::new();
+    for class in wanted.chunk_by(|a, b| a.required_m == b.required_m) {
+        let required_m = class[0].required_m;
+        let mut parts = Parts::new(nodes.len(), edges, required_m);
+        ways.iter().for_each(|way| parts.join(way.start, way.goal));
+        let mut walled_off = BTreeSet::new();
+        for pair in class {
+            let (from, to) = (parts.of(pair.start), parts.of(pair.goal));
+            if from == to || walled_off.contains(&(from, to)) {
+                continue;
+            }
+            let ends = (nodes[pair.start], nodes[pair.goal]);
+            let cells = Search::new(map, tree, required_m).and_then(|search| search.way(&ends.0, &ends.1));
+            match cells.and_then(|way| corners(tree, &way, config, required_m)) {
+                Some(corners) => {
+                    found.extend(corners);
+                    ways.push(*pair);
+                    parts.join(pair.start, pair.goal);
+                }
+                None => drop(walled_off.insert((from, to))),
+            }
+        }
+    }
+    found
+}
+
+/// Which nodes edges of some clearance join: union by the lowest node.
+pub(super) struct Parts(Vec<usize>);
+
+impl Parts {
+    pub(super) fn new(nodes: usize, edges: &[Edge], required_m: f32) -> Self {
+        let mut parts = Self((0..nodes).collect());
+        for edge in edges.iter().filter(|edge| edge.clearance_m > required_m) {
+            parts.join(usize::from(edge.a), usize::from(edge.b));
+        }
+        parts
+    }
+
+    pub(super) fn of(&mut self, mut node: usize) -> usize {
+        while self.0[node] != node {
+            self.0[node] = self.0[self.0[node]];
+            node = self.0[node];
+        }
+        node
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.of(a), self.of(b));
+        self.0[a.max(b)] = a.min(b);
+    }
+}
+
+/// Whether a straight flight keeps the clearance, by more than rounding.
+fn is_clear(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
+    let enough_m = required_m + SLACK_M;
+    tree.clearance_m(a, b, 2.0 * enough_m, enough_m) > enough_m
+}
+
+/// A search over the centres of the map's cells.
+struct Search<'a> {
+    shape: &'a GridShape,
+    map: &'a VoxelMap,
+    tree: &'a BoxTree,
+    required_m: f32,
+}
+
+impl<'a> Search<'a> {
+    /// None where the map is too large.
+    fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
+        let cells = map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
+        (cells <= MOST_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })
+    }
+
+    fn index(&self, [i, j, k]: [u32; 3]) -> usize {
+        let [nx, ny, _] = self.shape.dims.map(|d| d as usize);
+        (k as usize * ny + j as usize) * nx + i as usize
+    }
+
+    fn cell(&self, index: usize) -> [u32; 3] {
+        let [nx, ny, _] = self.shape.dims.map(|d| d as usize);
+        [index % nx, index / nx % ny, index / nx / ny].map(|c| c as u32)
+    }
+
+    fn centre(&self, cell: [u32; 3]) -> Point {
+        let [i, j, k] = cell.map(|c| c as f32 + 0.5);
+        self.shape.min + Point::new(i, j, k) * self.shape.resolution_m
+    }
+
+    /// The cell itself and those that touch it.
+    fn around(&self, cell: [u32; 3]) -> impl Iterator<Item = [u32; 3]> {
+        let dims = self.shape.dims;
+        (0..27).filter_map(move |n| {
+            let step = [n % 3, n / 3 % 3, n / 9];
+            let mut next = [0; 3];
+            for axis in 0..3 {
+                next[axis] = (cell[axis] + step[axis]).checked_sub(1).filter(|&c| c < dims[axis])?;
+            }
+            Some(next)
+        })
+    }
+
+    /// Cells from whose centres a place is seen.
+    fn at(&self, place: &Point) -> Vec<usize> {
+        let Some(cell) = self.shape.cell_of(place) else { return Vec::new() };
+        let sees = |next: &[u32; 3]| is_clear(self.tree, place, &self.centre(*next), self.required_m);
+        self.around(cell).filter(sees).map(|next| self.index(next)).collect()
+    }
+
+    /// The places of a shortest way over cells, both ends among them.
+    fn way(&self, from: &Point, to: &Point) -> Option<Vec<Point>> {
+        let ends: BTreeSet<usize> = self.at(to).into_iter().collect();
+        let grid = self.map.grid();
+        let never_sample = self.map.never_sample();
+        let cells = self.shape.dims.iter().map(|&d| d as usize).product();
+        let (mut cost, mut came) = (vec![f32::INFINITY; cells], vec![u32::MAX; cells]);
+        let mut open = BinaryHeap::new();
+        // The bits of floats that are not negative are in their order.
+        let rank = |cost_m: f32, at: &Point| Reverse((cost_m + (to - at).norm()).to_bits());
+        for index in self.at(from) {
+            let centre = self.centre(self.cell(index));
+            cost[index] = (centre - from).norm();
+            open.push((rank(cost[index], &centre), index));
+        }
+        let mut done = vec![0_u64; cells.div_ceil(64)];
+        while let Some((_, index)) = open.pop() {
+            if done[index / 64] >> (index % 64) & 1 == 1 {
+                continue;
+            }
+            done[index / 64] |= 1 << (index % 64);
+            let (cell, centre) = (self.cell(index), self.centre(self.cell(index)));
+            if ends.contains(&index) {
+                let back =
+                    std::iter::successors(Some(index), |&i| Some(came[i] as usize).filter(|&i| i < cells));
+                let mut way: Vec<Point> = back.map(|i| self.centre(self.cell(i))).collect();
+                way.reverse();
+                return Some(std::iter::once(*from).chain(way).chain([*to]).collect());
+            }
+            for next in self.around(cell) {
+                let (i, place) = (self.index(next), self.centre(next));
+                let cost_m = cost[index] + (place - centre).norm();
+                if cost_m < cost[i]
+                    && !grid.is_occupied(next)
+                    && !never_sample.is_blocked_at(&place)
+                    && is_clear(self.tree, &centre, &place, self.required_m)
+                {
+                    (cost[i], came[i]) = (cost_m, index as u32);
+                    open.push((rank(cost_m, &place), i));
+                }
+            }
+        }
+        None
+    }
+}
+
+/// The places between the ends of a way that the fewest edges join: each is clear and as long as edges may be.
+fn corners(tree: &BoxTree, way: &[Point], config: &Config, required_m: f32) -> Option<Vec<Point>> {
+    let last = way.len() - 1;
+    let mut hops = vec![u32::MAX; way.len()];
+    let mut came = vec![0; way.len()];
+    hops[0] = 0;
+    for i in 1..=last {
+        for j in (0..i).filter(|&j| (j, i) != (0, last)) {
+            let length_m = (way[i] - way[j]).norm();
+            let fits = (config.edge_min_m..=config.edge_max_m).contains(&length_m);
+            let hops_here = hops[j].saturating_add(1);
+            if fits && hops_here < hops[i] && is_clear(tree, &way[j], &way[i], required_m) {
+                (hops[i], came[i]) = (hops_here, j);
+            }
+        }
+    }
+    if hops[last] == u32::MAX {
+        return None;
+    }
+    let back = std::iter::successors(Some(came[last]), |&i| Some(came[i]).filter(|_| i > 0));
+    let mut corners: Vec<Point> = back.take_while(|&i| i > 0).map(|i| way[i]).collect();
+    corners.reverse();
+    Some(corners)
+}
