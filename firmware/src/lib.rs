@@ -4,6 +4,9 @@
 //! board and desk compute alike. It is built and tested on the desk too; [`boards`] is built for a board alone.
 #![no_std]
 
+#[cfg(test)]
+extern crate std;
+
 pub mod boards;
 pub mod calls;
 pub mod capacity;

@@ -8,6 +8,11 @@ use firmware::calls::flight;
 use flockmate_tests::bounds::{self, BOUNDS};
 use flockmate_tests::{board, workspace};
 
+use self::public_functions::public_functions;
+
+#[path = "../../firmware/src/calls/public_functions.rs"]
+mod public_functions;
+
 /// Another compiler's code may need so much more, and what has grown a little needs no new table.
 const SLACK: f64 = 1.25;
 /// Instructions of a control step among 32 neighbours, whatever they do.
@@ -52,21 +57,6 @@ fn page() -> String {
     fs::read_to_string(workspace().join(bounds::PAGE)).expect("it is there")
 }
 
-/// The type whose functions an `impl` line begins.
-fn implemented(line: &str) -> Option<String> {
-    let mut rest = line.strip_prefix("impl")?;
-    if rest.starts_with('<') {
-        let mut depth = 0;
-        let end = rest.find(|c| {
-            depth += i32::from(c == '<') - i32::from(c == '>');
-            depth == 0
-        })?;
-        rest = &rest[end + 1..];
-    }
-    let of = rest.split_once(" for ").map_or(rest, |(_, of)| of).trim_start();
-    Some(of.split(['<', ' ', '{']).next()?.to_owned())
-}
-
 /// The public functions in a folder's sources.
 fn public_calls(folder: &Path, path: &[String], calls: &mut Vec<Call>) {
     for entry in fs::read_dir(folder).expect("a folder of sources").map(|entry| entry.expect("readable")) {
@@ -82,24 +72,10 @@ fn public_calls(folder: &Path, path: &[String], calls: &mut Vec<Call>) {
             continue;
         }
         let source = fs::read_to_string(&file).expect("readable");
-        let source = source.split("#[cfg(test)]\nmod tests {").next().unwrap_or_default();
-        let mut of = None;
-        for line in source.lines() {
-            match line {
-                "}" => of = None,
-                _ if line.starts_with("impl") => of = implemented(line),
-                _ => {}
-            }
-            let Some(public) = line.trim_start().strip_prefix("pub ") else { continue };
-            let public = public.strip_prefix("const ").unwrap_or(public);
-            let Some(name) = public.strip_prefix("fn ").and_then(|name| name.split(['(', '<']).next()) else {
-                continue;
-            };
-            calls.push(Call {
-                path: inside.iter().cloned().chain(of.clone()).collect(),
-                name: name.to_owned(),
-            });
-        }
+        calls.extend(public_functions(&source).into_iter().map(|(owner, name)| Call {
+            path: inside.iter().cloned().chain(owner).collect(),
+            name: name.to_owned(),
+        }));
     }
 }
 

@@ -39,7 +39,18 @@ const SCHEDULE: ScheduleConfig = ScheduleConfig {
     cruise_mps: CRUISE_MPS,
     vertical_mps: DESCEND_MPS,
 };
-/// So high above its pad a path begins, metres.
+/// A swarm without vehicles, on lanes 10 m apart.
+pub(super) const SWARM: Swarm<'static> = Swarm {
+    pads: &[],
+    manner: Manner { waypoint_m: 10.0, look: Look::Fixed(0.0), trigger: Trigger::Distance },
+    clearance_m: 10.0,
+    schedule: SCHEDULE,
+    gates_most: GATES,
+    done: &[],
+    layers_held: 0,
+    following: None,
+};
+/// Height of a path's first point above the pad, metres.
 const CLIMB_M: f32 = 2.0;
 /// From pad to pad, metres.
 const PADS_M: f32 = 5.0;
@@ -250,16 +261,8 @@ fn divided(
         Work { tracks, transit: &transit, vehicles: &vehicles, heights: HEIGHTS, unit: Unit::Waypoint };
     losses.begin(tracks, &transit, &[]).expect("nothing is done");
     pack::binpat(&work, pack, routes).expect("routes");
-    let swarm = Swarm {
-        pads: &pads,
-        manner: Manner { waypoint_m: case.lane_m, look: Look::Fixed(0.0), trigger: Trigger::Distance },
-        clearance_m: 10.0,
-        schedule: SCHEDULE,
-        gates_most: GATES,
-        done: &[],
-        layers_held: 0,
-        following: None,
-    };
+    let manner = Manner { waypoint_m: case.lane_m, ..SWARM.manner };
+    let swarm = Swarm { pads: &pads, manner, ..SWARM };
     meter
         .call(flights_name, size_of_val(schedule), || flights::plan(&work, routes, &swarm, schedule, out))
         .expect("flights");

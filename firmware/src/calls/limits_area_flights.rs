@@ -12,6 +12,7 @@ use planner_core::flight::{Look, Path, Range, Trigger, VehiclePlan};
 use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 
+use super::coverage_flights;
 use super::limits::{Answers, HARD, Listener, points};
 use super::limits_coverage::{self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, Ways};
 
@@ -41,8 +42,6 @@ impl Lent {
     }
 }
 
-const SCHEDULE: ScheduleConfig =
-    ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.75, cruise_mps: 5.0, vertical_mps: 1.0 };
 const PAD: Pad = Pad {
     id: 1,
     start: Point::new(-5.0, -5.0, 1.5),
@@ -59,12 +58,8 @@ const PADS: [Pad; VEHICLES] = [
 const SWARM: Swarm<'_> = Swarm {
     pads: &PADS,
     manner: Manner { waypoint_m: 10.0, look: Look::Ahead, trigger: Trigger::None },
-    clearance_m: 10.0,
-    schedule: SCHEDULE,
     gates_most: GATES,
-    done: &[],
-    layers_held: 0,
-    following: None,
+    ..coverage_flights::SWARM
 };
 
 /// Makes all calls on coverage.
@@ -147,7 +142,7 @@ fn plans(
                 assert!(is_good(hard) || planned.is_err());
             }
         }
-        let schedule = ScheduleConfig { separation_m: hard, ..SCHEDULE };
+        let schedule = ScheduleConfig { separation_m: hard, ..SWARM.schedule };
         let planned = plan(good, routes, &Swarm { schedule, ..SWARM });
         assert!(is_good(hard) || matches!(planned, Err(PlanError::Config(_))));
     }

@@ -1,5 +1,3 @@
-extern crate std;
-
 use std::boxed::Box;
 use std::collections::BTreeSet;
 use std::format;
@@ -9,6 +7,7 @@ use std::string::{String, ToString};
 
 use super::limits::{Answers, Listener, places};
 use super::limits_routes::{Lent, routes};
+use super::public_functions::public_functions;
 
 #[derive(Default)]
 struct Called(BTreeSet<&'static str>);
@@ -17,21 +16,6 @@ impl Listener for Called {
     fn next(&mut self, name: &'static str) {
         self.0.insert(name);
     }
-}
-
-/// The type that an `impl` is for, without its parameters; none where it is a trait's.
-fn type_of(line: &str) -> Option<String> {
-    let mut rest = line.strip_prefix("impl")?;
-    if rest.starts_with('<') {
-        let mut depth = 0;
-        let end = rest.find(|c| {
-            depth += i32::from(c == '<') - i32::from(c == '>');
-            depth == 0
-        })?;
-        rest = &rest[end + 1..];
-    }
-    let name = rest.trim_start().split(['<', ' ']).next()?;
-    (!rest.contains(" for ")).then(|| name.to_string())
 }
 
 /// The public functions in a folder's sources: file, type if there is one, name.
@@ -46,23 +30,8 @@ fn public(folder: &Path, names: &mut BTreeSet<String>) {
             continue;
         }
         let source = fs::read_to_string(&path).expect("readable");
-        let mut owner = None;
-        // A module of tests in the file itself comes last.
-        let tests = source.match_indices("#[cfg(test)]\n").find(|(at, head)| {
-            source[at + head.len()..].lines().next().is_some_and(|line| line.ends_with('{'))
-        });
-        for line in source[..tests.map_or(source.len(), |(at, _)| at)].lines() {
-            if line.starts_with("impl") {
-                owner = type_of(line);
-            } else if line.starts_with('}') {
-                owner = None;
-            }
-            let Some(item) = line.trim_start().strip_prefix("pub ") else { continue };
-            let Some(item) = item.strip_prefix("const ").unwrap_or(item).strip_prefix("fn ") else {
-                continue;
-            };
-            let name = item.split(['(', '<']).next().unwrap_or_default();
-            names.insert(match &owner {
+        for (owner, name) in public_functions(&source) {
+            names.insert(match owner {
                 Some(owner) => format!("{file}::{owner}::{name}"),
                 None => format!("{file}::{name}"),
             });

@@ -14,6 +14,8 @@ mod limits_graph;
 pub mod limits_routes;
 #[cfg(test)]
 mod limits_tests;
+#[cfg(test)]
+mod public_functions;
 
 /// Counts what calls cost: a board its instructions, the desk nothing.
 pub trait Meter {
