@@ -18,9 +18,9 @@ use crate::mission::Mission;
 use crate::progress::Progress;
 use crate::say;
 use crate::shortage;
-use crate::swarm::companion_config;
 use crate::swarm::ground_station::mission_start;
 use crate::swarm::member::is_finished;
+use crate::swarm::vehicles::companion_config;
 
 /// Arguments of `host-sim companion`.
 #[derive(Debug, clap::Args)]

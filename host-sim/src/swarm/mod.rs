@@ -14,19 +14,16 @@ pub mod monitor;
 pub mod radio;
 pub mod serial;
 pub mod step;
+pub mod vehicles;
 
 use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
-use companion::config::REACHES_ALL_M;
-use companion::{Config, PlanFailure, State, Wanted};
+use companion::{PlanFailure, State, Wanted};
 use planner_core::Point;
 use planner_core::flight::Range;
-use planner_core::frames::enu_to_geodetic;
 use planner_core::roadmap::RoadmapView;
-use sim_autopilot as autopilot;
 
-use self::board::Board;
 use self::divisions::{Division, Divisions};
 use self::faults::{Script, World};
 use self::gateway::Gateway;
@@ -34,13 +31,11 @@ use self::ground_station::GroundStation;
 use self::member::{Member, Planner, is_finished};
 use self::monitor::{Monitor, Sample};
 use self::radio::{Radio, RadioConfig};
-use self::serial::SerialConfig;
 use self::step::STEP_US;
-use crate::capacity::VEHICLES;
+use self::vehicles::members;
 use crate::coverage::check::Picture;
-use crate::flash::DeskFlash;
 use crate::margins;
-use crate::mission::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan};
+use crate::mission::{Mission, OwnPlan, SwarmPlan};
 use crate::progress::Progress;
 use crate::report::{self, Level};
 use crate::result::{Left, MissionResult, Safety, Totals, VehicleResult, rounded};
@@ -53,10 +48,6 @@ const REACHED_M: f32 = 0.5;
 const AWAY_M: f32 = 2.0;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
-/// A simulated radio of this range, the default, reaches everybody, metres.
-const DEFAULT_RANGE_M: f32 = 500.0;
-/// The least range that a companion may be given, metres.
-const RANGE_LEAST_M: f32 = 1.0;
 /// When all have stood still for this long after a fault, no one will fly any more, seconds: longer than from a gate's
 /// opening to the take-off.
 const STILL_S: f64 = 30.0;
@@ -416,87 +407,4 @@ fn vehicle_result(
         flight_time_s: rounded(flight_time_s as f32),
         end,
     }
-}
-
-/// The vehicles of a mission, each on its pad, in the order of the scenario.
-///
-/// # Errors
-/// The configuration of a vehicle names what is wrong.
-pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
-    let scenario = &mission.scenario;
-    let settings = &scenario.simulation;
-    let serial = SerialConfig {
-        baud: settings.serial_baud,
-        latency_s: 0.001,
-        corruption: f64::from(settings.serial_corruption),
-        buffer: 4096,
-    };
-    scenario
-        .vehicles
-        .iter()
-        .zip(&mission.tasks)
-        .map(|(vehicle, task)| {
-            let pad = vehicle.start - Point::new(0.0, 0.0, task.climb_m);
-            let limits = autopilot::VehicleLimits {
-                radius_m: vehicle.radius_m,
-                speed_max_mps: vehicle.speed_max_mps,
-                endurance_s: vehicle.endurance_s.unwrap_or(autopilot::VehicleLimits::default().endurance_s),
-                ..autopilot::VehicleLimits::default()
-            };
-            let mut config = autopilot::Config {
-                system_id: vehicle.id,
-                personality: vehicle.personality,
-                world_origin: scenario.map.origin,
-                // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
-                ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
-                home: vehicle.home,
-                start: pad,
-                vehicle: limits,
-                wind: Point::new(settings.wind_mps, 0.0, 0.0),
-                gust_mps: settings.gust_mps,
-                position_noise_m: settings.position_noise_m,
-                estimator: settings.estimator,
-                seed: scenario.seed,
-                ..autopilot::Config::default()
-            };
-            if vehicle.ekf_origin.is_none() {
-                // The receiver set it, with the error that its heights have.
-                config.ekf_origin.alt_m += f64::from(config.height_error_m());
-            }
-            let mut member =
-                Member::new(&config, companion_config(mission, vehicle.id)?, serial, scenario.seed)?;
-            member.autopilot.land_on_stream_loss();
-            match &vehicle.companion {
-                Companion::InProcess { flash: None } => {}
-                Companion::InProcess { flash: Some(file) } => {
-                    member.keep_flash(DeskFlash::open(Some(file))?)?;
-                }
-                Companion::Url { autopilot, radio } => {
-                    member.put_on(Board::open(autopilot, radio.as_ref())?);
-                }
-                Companion::Emulated { program, log } => {
-                    let (roadmap, file) = (&mission.roadmap_file, &mission.mission_file);
-                    member.put_on(Board::emulate(program, log, roadmap, file)?);
-                }
-            }
-            Ok(member)
-        })
-        .collect()
-}
-
-/// The settings of the companion of one vehicle; the same whether it runs in a swarm simulation or alone.
-pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHICLES>> {
-    mission.index_of(id)?;
-    let config = mission.mission_view().config(id);
-    let config = config.map_err(|e| anyhow::anyhow!("no companion: {}: {e}", mission.scenario.path))?;
-    // One plan may be flown by other rules and inside another fence than its mission file says.
-    let scenario = &mission.scenario;
-    let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
-    // The operator knows how far the radio reaches.
-    let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < DEFAULT_RANGE_M => range_m.max(RANGE_LEAST_M),
-        _ => REACHES_ALL_M,
-    };
-    let method = scenario.deconfliction.method;
-    Ok(Config { accel_mps2: ACCEL_MPS2, method, geofence, radio_range_m, ..config })
 }
