@@ -153,7 +153,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether the setpoint is in a stop by the safety filter, which may use twice the jerk.
     pub fn stops_urgently(&self) -> bool {
-        self.guidance.door.stops_urgently()
+        self.guidance.smoother.stops_urgently()
     }
 
     /// Way made along the own path, metres.
@@ -165,7 +165,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// What the setpoints came to since the start.
     pub fn setpoint_stats(&self) -> Stats {
-        self.guidance.door.stats
+        self.guidance.smoother.stats
     }
 
     /// What a link's framer counted.

@@ -52,7 +52,7 @@ pub struct Config<const V: usize> {
     pub method: Method,
     /// The least error of the position estimate that is reckoned with, by which the operator vouches for the receiver, metres.
     pub estimate_m: f32,
-    /// How far the swarm's radio reaches for sure, metres: who falls silent further away than most of that is out of range.
+    /// How far the swarm's radio reaches for sure, metres: a vehicle that falls silent further away than most of that is out of range.
     /// [`REACHES_ALL_M`]: it reaches everybody, so any silence is a failure.
     pub radio_range_m: f32,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.

@@ -1,13 +1,12 @@
-//! Where to go now: the raw point of each state, made from the path, the neighbours and the autopilot's position. The door
+//! Where to go now: the raw point of each state, made from the path, the neighbours and the autopilot's position. The smoother
 //! makes the setpoint of it.
 //!
 //! A flight has phases: the climb straight up from where the vehicle stands, the join to the path's start, the path, the
 //! descent. The phase is guidance's own state. A pause, a lost position or a pilot interrupts it; afterwards it goes on
-//! where it was. A stop slows the door's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
+//! where it was. A stop slows the smoother's clock, so the raw point stays where it is. Once the setpoint stands, the raw point
 //! is taken back to it, and going on begins with a straight way back to where the phase was left.
 
 mod brakes;
-mod door;
 mod fence;
 pub(crate) mod filter;
 mod follower;
@@ -21,32 +20,34 @@ mod phase;
 mod progress;
 mod raw;
 pub(crate) mod retreat;
+mod scene;
 mod setpoint;
+mod smoother;
 mod waypoints;
 
 use planner_core::Point;
 use planner_core::deconflict::{self, Advice, DeconflictConfig, Method, Own};
-use planner_core::flight::{Path, VehiclePlan};
+use planner_core::flight::Path;
 use planner_core::track::{TrackConfig, Tracker};
 
-use self::door::{Door, Pace, TICK_S};
 use self::filter::Filter;
 use self::hold::Hold;
 use self::limits::{Limits, Settings};
 use self::nearest::nearest_m;
 use self::phase::Phase;
 use self::setpoint::correction;
+use self::smoother::{Pace, Smoother, TICK_S};
 use self::waypoints::Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
-use crate::autopilot::telemetry::Telemetry;
 use crate::config::Config;
 use crate::guidance::retreat::Search;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-pub use self::door::Stats;
+pub use self::scene::Scene;
 pub use self::setpoint::Setpoint;
+pub use self::smoother::Stats;
 
 /// This near the end of the climb or of the path counts as there, metres.
 const ARRIVED_M: f32 = 0.35;
@@ -86,7 +87,7 @@ const LEG_LEAST_M: f32 = 1e-3;
 /// Before the neighbours were asked: wait.
 const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
-/// The raw point's course, and the door that makes setpoints of it.
+/// The raw point's course, and the smoother that makes setpoints of it.
 #[derive(Clone, Debug)]
 pub struct Guidance {
     track: TrackConfig,
@@ -95,8 +96,8 @@ pub struct Guidance {
     deconflict: DeconflictConfig,
     /// Share of the speed that the estimate allows: 0 stops.
     pub pace: f32,
-    /// The door for setpoints.
-    pub door: Door,
+    /// What makes setpoints of raw points.
+    pub smoother: Smoother,
     phase: Phase,
     tracker: Tracker,
     /// The straight way of a climb, a join or a descent; none while it is to be made from where the setpoint stands.
@@ -162,43 +163,16 @@ pub struct Guidance {
     sent_acceleration: Point,
 }
 
-/// What guidance reads beside its own state.
-pub struct Scene<'a, const W: usize, const G: usize> {
-    /// The plan, if there is one with a path.
-    pub plan: Option<&'a VehiclePlan<W, G>>,
-    /// The autopilot.
-    pub telemetry: &'a Telemetry,
-    /// Rank in the roster.
-    pub rank: u16,
-    /// MAVLink system id.
-    pub id: u8,
-    /// Whether the path is one of its own around something.
-    pub detours: bool,
-}
-
-impl<'a, const W: usize, const G: usize> Scene<'a, W, G> {
-    /// What is known of a vehicle of this rank and id; a plan without a path is none.
-    pub fn new(
-        plan: Option<&'a VehiclePlan<W, G>>,
-        telemetry: &'a Telemetry,
-        (rank, id): (u16, u8),
-        detours: bool,
-    ) -> Self {
-        let plan = plan.filter(|plan| !plan.path.waypoints().is_empty());
-        Self { plan, telemetry, rank, id, detours }
-    }
-}
-
 impl Guidance {
     pub fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
-        let door = Door::new(Limits::new(config, autopilot), config.geofence);
+        let smoother = Smoother::new(Limits::new(config, autopilot), config.geofence);
         let Settings { track, leg_track, deconflict } = Settings::new(config, autopilot);
         Self {
             track,
             leg_track,
             deconflict,
             pace: 1.0,
-            door,
+            smoother,
             phase: Phase::Hold,
             tracker: Tracker::default(),
             leg: None,
@@ -242,7 +216,7 @@ impl Guidance {
     pub fn tune<const V: usize>(&mut self, config: &Config<V>, autopilot: &AutopilotLimits) {
         let Self { track, leg_track, deconflict, .. } = Self::new(config, autopilot);
         (self.track, self.leg_track, self.deconflict) = (track, leg_track, deconflict);
-        self.door.tune(Limits::new(config, autopilot), config.geofence);
+        self.smoother.tune(Limits::new(config, autopilot), config.geofence);
     }
 
     /// Forgets a former flight.
@@ -264,8 +238,8 @@ impl Guidance {
     pub fn hold_at(&mut self, point: Point) {
         // Where places are sent again it brakes from the last one.
         let lost = core::mem::take(&mut self.lost) && self.unsent_s > 0.0;
-        if lost || !self.door.is_live() {
-            self.door.resume_at(point, self.unsent_s);
+        if lost || !self.smoother.is_live() {
+            self.smoother.resume_at(point, self.unsent_s);
             self.settle();
         }
     }
@@ -280,8 +254,8 @@ impl Guidance {
     pub fn begin_climb(&mut self, position: &Point) {
         self.reset();
         self.phase = Phase::Climb;
-        if !self.door.is_live() {
-            self.door.begin_at(*position, self.unsent_s);
+        if !self.smoother.is_live() {
+            self.smoother.begin_at(*position, self.unsent_s);
         }
     }
 
@@ -300,7 +274,7 @@ impl Guidance {
         self.fenced && self.stands()
     }
 
-    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one asked for; if not, the door held
+    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one asked for; if not, the smoother held
     /// the last one.
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
@@ -327,7 +301,7 @@ impl Guidance {
             if next.is_some_and(|gate| neighbours.has_passed(gate, now)) {
                 self.opened += 1;
             }
-            let place = self.door.position();
+            let place = self.smoother.position();
             let along_m = self.tracker.along_m;
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
@@ -336,14 +310,14 @@ impl Guidance {
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
-                _ => self.setpoint_m + self.door.braking_m(false),
+                _ => self.setpoint_m + self.smoother.braking_m(false),
             };
         }
         self.filter(state, scene, neighbours, now);
         let urgent = self.filter.stops(now);
         let known = scene.telemetry.position_at.is_some();
         if !state.streams_setpoints() {
-            self.door.close();
+            self.smoother.stop();
             return true;
         }
         let kind = scene.telemetry.kind();
@@ -352,25 +326,25 @@ impl Guidance {
         self.lost |= !known || state == State::PositionLost;
         let flies = scene.telemetry.on_ground == Some(false);
         let taken_before = core::mem::replace(&mut self.taken, taken);
-        if known && (taken || taken_before || !self.door.is_live()) {
+        if known && (taken || taken_before || !self.smoother.is_live()) {
             // The autopilot does not follow, or nothing was sent: begin where the vehicle is, and as it moves.
             if taken {
-                self.door.go_with(position, self.unsent_s);
-            } else if !self.door.is_live() {
-                self.door.resume_at(position, self.unsent_s);
+                self.smoother.go_with(position, self.unsent_s);
+            } else if !self.smoother.is_live() {
+                self.smoother.resume_at(position, self.unsent_s);
             } else if flies {
-                self.door.move_on(&scene.telemetry.velocity);
+                self.smoother.move_on(&scene.telemetry.velocity);
             }
             self.settle();
             self.lost = false;
         }
         let sends = known && state != State::PositionLost;
-        if !self.door.is_live() || taken {
+        if !self.smoother.is_live() || taken {
             self.sent_acceleration = Point::zeros();
             self.count_unsent(sends);
             return true;
         }
-        let up = state == State::Follow && self.phase == Phase::Descent && self.filter.backs_up(now);
+        let up = state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.up;
         let goes = known && !turns && matches!(state, State::Climb | State::Follow) && (!urgent || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
@@ -388,20 +362,20 @@ impl Guidance {
             && self.on_path
             && matches!(self.phase, Phase::Path | Phase::Join | Phase::Descent)
             && state.holds_place()
-            && self.door.stands();
+            && self.smoother.stands();
         let yields = self.filter.yields() || state != State::Follow;
         let late_s = if holds { neighbours.latest_s() } else { 0.0 };
         self.turned |= self.hold.step(holds, yields, late_s, now);
         let moves = wanted && !self.hold.binds(now);
-        if !moves && self.door.stands() && !self.settled {
+        if !moves && self.smoother.stands() && !self.settled {
             if let (Some(path), Phase::Path) = (path, self.phase) {
                 let near_m = self.tracker.along_m;
-                self.tracker.along_m = nearest_m(path, &self.door.position(), near_m, SETTLE_WINDOW_M);
+                self.tracker.along_m = nearest_m(path, &self.smoother.position(), near_m, SETTLE_WINDOW_M);
             }
-            self.door.rest();
+            self.smoother.rest();
             self.settle();
         }
-        let lead_m = (position - self.door.position()).norm();
+        let lead_m = (position - self.smoother.position()).norm();
         let share = ((self.lead_m - lead_m) / (0.5 * self.lead_m)).clamp(0.0, 1.0);
         let share = match moves {
             true if flies || state == State::Climb => share.min(self.pace),
@@ -411,11 +385,11 @@ impl Guidance {
             false => 0.0,
         };
         let mut blocked = false;
-        let dt_s = if self.door.resumes() { self.unsent_s } else { dt_s };
+        let dt_s = if self.smoother.resumes() { self.unsent_s } else { dt_s };
         // Where it stops stays where it is, however many raw points this step takes.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.fenced &= !moves;
-        for _ in 0..self.door.begin(Pace { share, urgent }, dt_s) {
+        for _ in 0..self.smoother.begin(Pace { share, urgent }, dt_s) {
             if self.phase == Phase::Path && !self.is_algorithm2() {
                 advice.stop_within_m = (stops_at_m - self.tracker.along_m).max(0.0);
             }
@@ -424,25 +398,25 @@ impl Guidance {
                     self.next_raw(state, scene, plan, &advice, neighbours, now, &mut blocked)
                 }
                 _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
-                    let away = position - self.door.raw();
+                    let away = position - self.smoother.raw();
                     let most = DRIFT_MPS * TICK_S;
                     let share = most / away.norm().max(most);
-                    self.door.raw() + away * share
+                    self.smoother.raw() + away * share
                 }
                 Some(plan) if sends && !self.settled => self.braked_raw(&plan.path),
-                _ => self.door.raw(),
+                _ => self.smoother.raw(),
             };
-            self.door.push(raw);
+            self.smoother.push(raw);
         }
         self.mark_trapped(blocked, now);
-        let sound = self.door.finish();
+        let sound = self.smoother.finish();
         let correction = if flies && state != State::PilotControl && known {
-            correction(&self.door.position(), &self.door.velocity(), scene.telemetry)
+            correction(&self.smoother.position(), &self.smoother.velocity(), scene.telemetry)
         } else {
             Point::zeros()
         };
-        let change = self.door.acceleration() + correction - self.sent_acceleration;
-        let most = self.door.jerk_mps3(urgent) * dt_s;
+        let change = self.smoother.acceleration() + correction - self.sent_acceleration;
+        let most = self.smoother.jerk_mps3(urgent) * dt_s;
         self.sent_acceleration += change * (most / change.norm().max(most).max(1e-6));
         if self.tracker.along_m > self.progress_m + PROGRESS_M {
             self.progress_m = self.tracker.along_m;
@@ -457,8 +431,8 @@ impl Guidance {
 
     /// Ends a step: `sends` says whether its setpoint has a place.
     fn count_unsent(&mut self, sends: bool) {
-        if sends && self.door.is_live() {
-            self.door.mark_sent();
+        if sends && self.smoother.is_live() {
+            self.smoother.mark_sent();
             self.unsent_s = 0.0;
         }
     }

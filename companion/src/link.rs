@@ -1,5 +1,6 @@
 //! The two links, to the autopilot and to the swarm: what comes in as frames, what waits to go out, and who is answered how often.
 
+pub(crate) mod answer_limits;
 pub mod budget;
 pub mod commands;
 pub mod done;
@@ -8,14 +9,13 @@ pub mod frame;
 pub mod intent;
 pub mod outbox;
 pub mod roster;
-pub(crate) mod senders;
 
+use self::answer_limits::{Kind, Rates, Sender};
 use self::budget::Budget;
 use self::commands::{Command, Repeats};
 use self::echo::{Echo, Sent};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
-use self::senders::{Kind, Rates, Sender};
 use crate::events::Link;
 use crate::time::Instant;
 

@@ -1,6 +1,6 @@
 //! What ground tools use of a companion beside commands: files, parameters, time, a restart. Served on either link, to frames
 //! addressed to our own system and component, so a ground station may come by the radio or through the autopilot's routing.
-//! Only a ground station of the mission sets parameters and uses files; what others may request is in `senders`.
+//! Only a ground station of the mission sets parameters and uses files; what others may request is in `answer_limits`.
 
 pub mod ftp;
 pub mod parameters;
@@ -16,9 +16,9 @@ use self::parameters::{Parameters, Refused};
 use crate::config::Config;
 use crate::events::Link;
 use crate::link::Links;
+use crate::link::answer_limits::{Kind, Sender};
 use crate::link::frame::Frame;
 use crate::link::outbox::Outgoing;
-use crate::link::senders::{Kind, Sender};
 use crate::storage::store::{self, Erasing, Fault, FlashRequest, Store};
 use crate::time::Instant;
 

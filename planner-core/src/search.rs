@@ -258,7 +258,7 @@ pub fn dijkstra_row<const N: usize>(
 }
 
 /// Settles every node that can be reached from `from` over any edge.
-pub(crate) fn ways_from<const N: usize>(
+pub(crate) fn shortest_path_tree<const N: usize>(
     view: &RoadmapView<'_>,
     from: u16,
     ws: &mut SearchWorkspace<N>,

@@ -272,7 +272,7 @@ impl Body {
         Some(Point::new(east, north, if command.z.is_finite() { enu.z } else { f32::NAN }))
     }
 
-    /// DO_SET_HOME; whether the place is one.
+    /// Executes DO_SET_HOME; false where its position is not valid.
     pub(super) fn set_home(&mut self, command: &Command) -> bool {
         let [lat_deg, lon_deg] = command.place;
         let home = if command.param[0] == 1.0 {

@@ -188,7 +188,7 @@ impl SetpointCheck {
         let before = self.last.filter(|last| ((at_s - last.at_s) as f32) < GAP_S);
         let calm = if self.urgent { 0 } else { before.map_or(u8::MAX, |last| last.calm.saturating_add(1)) };
         self.stats.urgent += u64::from(self.urgent);
-        // The sums of the door are rounded like what is sent.
+        // The sums of the smoother are rounded like what is sent.
         let rounded_m = self.rounded_m + 2.0 * rounding_m(data);
         let mut next = Last {
             at_s,

@@ -6,9 +6,9 @@ use crate::time::{Duration, Instant};
 
 /// A denied arming is requested again after this long.
 const RETRY_EVERY: Duration = Duration::from_millis(1000);
-/// The armed bit of HEARTBEAT (1 Hz) comes this long after the ack at most.
-const ARMED_BIT: Duration = Duration::from_millis(2500);
-/// So often arming is requested without any answer.
+/// Longest time from the ack of arming to the first HEARTBEAT (1 Hz) with the armed bit.
+const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
+/// Arming requests that may stay without an answer; then arming has failed.
 const ARMING_TRIES: u8 = 2;
 /// Different refusals reported in one state.
 const REFUSALS: usize = 4;
@@ -72,12 +72,12 @@ impl Handshake {
 
     /// Whether the armed bit is overdue after an accepted request.
     pub(crate) fn is_armed_unseen(&self, now: Instant) -> bool {
-        self.accepted_at.is_some_and(|at| now - at >= ARMED_BIT)
+        self.accepted_at.is_some_and(|at| now - at >= ARMED_TIMEOUT)
     }
 
     /// Whether arming was requested as often as allowed without any answer.
     pub(crate) fn is_unanswered(&self, now: Instant) -> bool {
-        let waited = self.asked_at.is_some_and(|at| now - at >= ARMED_BIT);
+        let waited = self.asked_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
         let silent = !self.denied && self.accepted_at.is_none();
         waited && silent && (self.unanswered >= ARMING_TRIES || self.gap)
     }
@@ -87,7 +87,7 @@ impl Handshake {
         let due = match self.asked_at {
             None => true,
             Some(at) if self.denied => now - at >= RETRY_EVERY,
-            Some(at) => now - at >= ARMED_BIT && self.unanswered < ARMING_TRIES && !self.gap,
+            Some(at) => now - at >= ARMED_TIMEOUT && self.unanswered < ARMING_TRIES && !self.gap,
         };
         let asks = due && !armed && self.accepted_at.is_none();
         if asks {

@@ -35,7 +35,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.fleet().into_iter().flat_map(Fleet::losses)
     }
 
-    /// Looks at who still flies, and what is to be divided.
+    /// Updates which vehicles still fly, and what of the area is to be divided again.
     pub(super) fn step_division(&mut self) {
         let now = self.now;
         if self.neighbours.fleet().is_none() {
@@ -57,7 +57,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             fleet.wants_hash() || ((behind || self.detours.beside.flies()) && self.may_take_division());
         let fingerprint = fleet.fingerprint();
         self.guidance.halt_at(halt_m);
-        if wants && self.mission.asks_division(fingerprint, now, ASK_AGAIN) {
+        if wants && self.mission.should_request_division(fingerprint, now, ASK_AGAIN) {
             // Full only if the shell does not drain; then it is asked again.
             let _ = self.events.push_back(Event::PlanRequested(Wanted::Division));
         }
@@ -214,7 +214,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn take_division(&mut self, outcome: Result<&VehiclePlan<W, G>, PlanFailure>) {
         let may_take = self.may_take_division();
         let Some(fleet) = self.neighbours.fleet_mut() else { return };
-        if !self.mission.asked_division(fleet.fingerprint()) {
+        if !self.mission.take_division_request(fleet.fingerprint()) {
             return;
         }
         let (division, along_m) = (fleet.division(), f32::from(fleet.held_at_dm()) / 10.0);

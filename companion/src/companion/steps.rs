@@ -38,7 +38,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.links.set_due(Link::Swarm, Fresh::Intent, true);
         }
         self.step_division();
-        self.name_who_never_starts();
+        self.report_unstarted_vehicle();
         self.look_around();
         self.run_table();
         self.step_task();
@@ -69,8 +69,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.mission.step_task(along, self.now, &mut self.links);
     }
 
-    /// Names a vehicle that never starts while this one waits for it.
-    fn name_who_never_starts(&mut self) {
+    /// Reports a vehicle that has not started while this one waits for it.
+    fn report_unstarted_vehicle(&mut self) {
         let flies = matches!(self.mission.state(), State::Scheduled | State::Follow | State::Blocked);
         let waited = Some(self.guidance.advice.waiting_for).filter(|id| flies && *id != 0);
         let id = waited.filter(|id| self.neighbours.is_not_started(*id)).unwrap_or(0);
@@ -230,8 +230,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                     self.guidance.go_on(plan, climbs, &position, now);
                 }
                 if to == State::Blocked {
-                    // Until it was looked at again.
-                    self.detours.look_again();
+                    // Until the next scan has checked the path.
+                    self.detours.assume_blocked();
                 }
                 if !matches!(to, State::Climb | State::Follow) {
                     self.guidance.brake();

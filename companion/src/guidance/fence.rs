@@ -1,4 +1,4 @@
-//! The geofence of the door: a box that no setpoint leaves, and that the follower does not run into.
+//! The geofence of the smoother: a box that no setpoint leaves, and that the follower does not run into.
 //!
 //! A point keeps inside without a jerk if it can always still stop: in each axis the distance that a stop takes, by a part of
 //! the vehicle's acceleration and jerk, is no longer than what is left to the wall. A step that would break this is
@@ -200,8 +200,8 @@ fn share_what_is_left(
     *jerk = braking + others;
 }
 
-/// Distance until a motion stands, metres, of this speed and acceleration towards a wall: its acceleration falls to −a, stays,
-/// and ends at 0 with the speed.
+/// Stopping distance towards a wall, metres, from this speed and acceleration: the acceleration falls to −a at the greatest jerk,
+/// stays there, and returns to 0 as the speed does.
 fn stop_m(speed: f32, accel: f32, brake: Brake) -> f32 {
     let Brake { accel_mps2: most, jerk_mps3: jerk } = brake;
     let accel = fmaxf(accel, -most);

@@ -13,19 +13,19 @@ mod look;
 
 use crate::time::{Duration, Instant};
 
-/// So much of the way has to be free before the vehicle goes on, metres.
+/// Length of the way ahead that has to be free before a stopped vehicle goes on, metres.
 const RESUME_M: f32 = 1.0;
-/// And for so long.
+/// The way has to be free for so long before the vehicle goes on.
 const CLEAR: Duration = Duration::from_millis(300);
-/// So much lower than below pad and goal the ground between may be, less than a storey, metres.
+/// The ground between pad and goal may be this much lower than below both, metres: less than a storey.
 const LOWER_M: f32 = 2.0;
-/// Before a vehicle that the roster does not name it stands no longer than this; then it goes on slowly.
+/// For a vehicle that the roster does not name this one stands still no longer than this; then it goes on slowly.
 const STRANGER: Duration = Duration::from_secs(10);
-/// How fast.
+/// It then goes on at this share of its speed.
 const SLOW_SHARE: f32 = 0.15;
 /// A setpoint slower than this may turn, m/s.
 const TURNS_MPS: f32 = 0.05;
-/// And where no more than this is left to the reference, metres.
+/// A setpoint no further than this from the reference may turn, metres.
 const TURNS_M: f32 = 0.03;
 /// A stop this near is a standstill, metres: a little more than the way that advice looks ahead.
 const WAITS_M: f32 = 0.6;
@@ -33,8 +33,8 @@ const WAITS_M: f32 = 0.6;
 const LATELY: Duration = Duration::from_millis(500);
 /// A vehicle that flew on for so long was not kept from going on.
 const FREE: Duration = Duration::from_secs(5);
-/// The vehicle that yields in a descent flies back up after this.
-const BACK_UP: Duration = Duration::from_secs(1);
+/// A vehicle that yields in its descent climbs back up its column after it was stopped for so long.
+const CLIMB_BACK_AFTER: Duration = Duration::from_secs(1);
 
 /// A neighbour whose set meets that of the vehicle.
 struct Found {
@@ -51,7 +51,7 @@ pub(crate) struct Filter {
     stopped_since: Option<Instant>,
     /// Since when the way has been free again.
     clear_since: Option<Instant>,
-    /// For which vehicle.
+    /// MAVLink system id of the vehicle that it stops for; 0 for none.
     blocker: u8,
     /// Whether this vehicle is the one that yields.
     yields: bool,
@@ -60,16 +60,17 @@ pub(crate) struct Filter {
     stranger: bool,
     /// Whether the sets met in the last step.
     meets: bool,
-    /// Whether it looked back along the path.
+    /// Whether it checked the path backwards: the vehicle is about to fly back.
     back: bool,
-    /// Since when the column is, or is not, free.
+    /// Whether the column between vehicle and ground is free of others.
     column_clear: bool,
+    /// Since when `column_clear` has had its value.
     column_since: Option<Instant>,
-    /// Since when a vehicle that rests has been in it.
+    /// Since when a vehicle that stands for good has been in that column.
     barred_since: Option<Instant>,
-    /// Since when a landing has been waiting, now and then.
+    /// Since when a landing has been waiting for the column; short gaps do not end the wait.
     held_since: Option<Instant>,
-    /// Since when it has kept the vehicle from going on for good, and when it last did.
+    /// Since when it has kept the vehicle from going on, and when it last did; short gaps do not count.
     hindered_since: Option<Instant>,
     hindered_at: Instant,
     /// Whether it was to yield then.
@@ -108,7 +109,7 @@ impl Filter {
         since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long it has kept the vehicle from going on for one that rests.
+    /// For how long it has kept the vehicle from going on because of a vehicle that stands for good.
     pub(crate) fn barred_for(&self, now: Instant) -> Duration {
         if self.rests { self.hindered_for(now) } else { Duration::default() }
     }
@@ -192,9 +193,9 @@ impl Filter {
         self.stranger && self.stopped_for(now) >= STRANGER
     }
 
-    /// Whether the vehicle flies back up its column.
-    pub(super) fn backs_up(&self, now: Instant) -> bool {
-        self.yields && self.stopped_for(now) >= BACK_UP
+    /// Whether the vehicle, stopped in its descent, is to climb back up its column.
+    pub(super) fn climbs_back(&self, now: Instant) -> bool {
+        self.yields && self.stopped_for(now) >= CLIMB_BACK_AFTER
     }
 }
 

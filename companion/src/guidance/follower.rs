@@ -1,4 +1,4 @@
-//! The last stage of the door: a point that follows the curve and never exceeds the vehicle's acceleration and jerk.
+//! The last stage of the smoother: a point that follows the curve and never exceeds the vehicle's acceleration and jerk.
 //!
 //! The curve is within the limits but for rare moments: corners that come close together, a clock that changes its speed in
 //! a corner. There the follower falls behind it by centimetres and comes up again. It integrates a jerk that is constant

@@ -16,7 +16,7 @@ pub const URGENT_JERK_MPS3: f32 = 8.0;
 /// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
 const CORNER_SHARE: f32 = 1.5;
 
-/// The door smooths over this time at most: lower limits of jerk lower the acceleration, seconds.
+/// The smoother smooths over this time at most: lower limits of jerk lower the acceleration, seconds.
 pub(crate) const SMOOTH_MOST_S: f32 = 1.2;
 /// An unheard vehicle has stopped by then, seconds: it notices after 1.8 s and brakes.
 const SILENT_S: f32 = 3.0;
@@ -47,7 +47,7 @@ impl Limits {
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
         let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
-        // What the door's longest average smooths to that jerk.
+        // What the smoother's longest average smooths to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =

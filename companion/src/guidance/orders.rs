@@ -1,8 +1,8 @@
 //! What guidance is ordered: to begin the path, to go on, to turn back, to settle where it stands.
 
-use super::door::TICK_S;
 use super::nearest::nearest_m;
 use super::phase::Phase;
+use super::smoother::TICK_S;
 use super::waypoints::Waypoints;
 use super::{ARRIVED_M, Guidance, REJOIN_WINDOW_M, STANDING_SETPOINT_MPS};
 use crate::time::Instant;
@@ -53,12 +53,12 @@ impl Guidance {
 
     /// Whether the setpoint stands, if only on its way down.
     pub(crate) fn pauses(&self) -> bool {
-        self.door.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
+        self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
     /// Where along its path it could stop now, metres.
     pub(crate) fn stops_by_m(&self) -> f32 {
-        let braking_m = self.door.braking_m(false);
+        let braking_m = self.smoother.braking_m(false);
         self.tracker.along_m.max(self.setpoint_m + braking_m)
     }
 
@@ -76,7 +76,7 @@ impl Guidance {
             self.phase = Phase::Climb;
             return;
         }
-        let (path, place) = (&plan.path, self.door.position());
+        let (path, place) = (&plan.path, self.smoother.position());
         let below = path
             .point_at(path.length_m())
             .is_some_and(|end| end.z > place.z && (end - place).xy().norm_squared() < ARRIVED_M * ARRIVED_M);

@@ -17,21 +17,21 @@ impl Guidance {
         if !state.streams_setpoints() {
             return Setpoint::None;
         }
-        let door = &self.door;
+        let smoother = &self.smoother;
         let still = Point::zeros();
         if scene.telemetry.position_at.is_none() || state == State::PositionLost {
-            return Setpoint::Stop(if door.is_live() { door.velocity() } else { still });
+            return Setpoint::Stop(if smoother.is_live() { smoother.velocity() } else { still });
         }
-        if !door.is_live() {
+        if !smoother.is_live() {
             // The state is newer than the step: the next one begins where the vehicle is.
             return Setpoint::None;
         }
         // Guided is not sent the acceleration: the velocity looks ahead instead, no faster than the setpoint will be.
         let lead_s = scene.telemetry.kind.map_or(0.0, Kind::velocity_lead_s);
-        let velocity = door.velocity() + door.acceleration() * lead_s;
-        let most = door.velocity().norm().max(door.raw_speed_mps());
+        let velocity = smoother.velocity() + smoother.acceleration() * lead_s;
+        let most = smoother.velocity().norm().max(smoother.raw_speed_mps());
         let velocity = velocity * (most / velocity.norm().max(most).max(1e-6));
         let heading = scene.plan.and_then(|plan| task::heading(&plan.task, &plan.path, self.setpoint_m));
-        Setpoint::Move(door.position(), velocity, self.sent_acceleration, heading)
+        Setpoint::Move(smoother.position(), velocity, self.sent_acceleration, heading)
     }
 }

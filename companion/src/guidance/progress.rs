@@ -115,9 +115,9 @@ impl Guidance {
         self.phase == Phase::Climb
             && self.leg_done()
             && top.is_some_and(|top| {
-                let apart = self.door.position() - scene.telemetry.position;
+                let apart = self.smoother.position() - scene.telemetry.position;
                 // Both setpoint and vehicle at the top: a low climb must not count as done on the pad.
-                (self.door.position().z - top.position.z).abs() < CLIMBED_M
+                (self.smoother.position().z - top.position.z).abs() < CLIMBED_M
                     && self.stands()
                     && apart.norm() < 2.0 * ARRIVED_M
                     && apart.z.abs() < CLIMBED_M
@@ -148,7 +148,7 @@ impl Guidance {
             && self.stands()
             && plan.path.point_at(plan.path.length_m()).is_some_and(|end| {
                 (end - scene.telemetry.position).norm() < ARRIVED_M
-                    && (end - self.door.position()).norm() < ARRIVED_M
+                    && (end - self.smoother.position()).norm() < ARRIVED_M
             })
             && scene.telemetry.velocity.norm() < RESTS_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)

@@ -5,8 +5,8 @@ use planner_core::deconflict::Advice;
 use planner_core::flight::{Path, VehiclePlan};
 use planner_core::track::{self, Reference, Tracker};
 
-use super::door::TICK_S;
 use super::limits::JOIN_MPS;
+use super::smoother::TICK_S;
 use super::{FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
 use crate::guidance::retreat;
 use crate::mission::State;
@@ -27,7 +27,7 @@ impl Guidance {
         blocked: &mut bool,
     ) -> Point {
         let path = &plan.path;
-        let raw = self.door.raw();
+        let raw = self.smoother.raw();
         if core::mem::replace(&mut self.settled, false) && self.phase == Phase::Path {
             (self.phase, self.leg) = (Phase::Join, None);
         }
@@ -84,7 +84,7 @@ impl Guidance {
             }
             _ => None,
         };
-        reference.map_or(self.door.raw(), |reference| reference.position)
+        reference.map_or(self.smoother.raw(), |reference| reference.position)
     }
 
     /// The next raw point on the path, back from below a vehicle that comes down where it has to.
@@ -115,7 +115,8 @@ impl Guidance {
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
-        if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+        if path.point_at(self.tracker.along_m + braking_m).is_some_and(|ahead| !self.smoother.allows(&ahead))
+        {
             advice.stop_within_m = advice.stop_within_m.min(braking_m);
             self.fenced = true;
         }
@@ -132,7 +133,7 @@ impl Guidance {
         position: &Point,
         advice: &Advice,
     ) -> Option<Point> {
-        let (raw, before) = (self.door.raw(), self.waypoints);
+        let (raw, before) = (self.smoother.raw(), self.waypoints);
         let target = self.waypoints.next(path, position);
         let mut advice = *advice;
         match target {
@@ -157,7 +158,7 @@ impl Guidance {
         let speed = self.leg_tracker.speed_mps.max(0.0);
         let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
         let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + LEG_LEAST_M;
-        if leg.point_at(ahead_m).is_some_and(|ahead| !self.door.allows(&ahead)) {
+        if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.allows(&ahead)) {
             advice.stop_within_m = braking_m;
             self.fenced = true;
         }

@@ -1,7 +1,7 @@
 //! Commands to the companion: COMMAND_LONG and COMMAND_INT, read by field, since the crate refuses a whole message whose
 //! command it does not know and UNSUPPORTED must still be answered.
 //!
-//! Obeyed on either link, from a ground station that the mission names (`senders`), when addressed to our system or to all (0),
+//! Obeyed on either link, from a ground station that the mission names (`answer_limits`), when addressed to our system or to all (0),
 //! and to our component or to all (0). From others a command that acts is DENIED. Answered only
 //! when addressed to our system: a broadcast to the swarm acts on each and is answered by none. A command to all
 //! components that we do not know is somebody else's and stays unanswered.

@@ -238,8 +238,13 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.fresh = false;
     }
 
-    /// Whether the shell is to be asked for this division: unless it was, less than `again` ago.
-    pub(crate) fn asks_division(&mut self, fingerprint: u32, now: Instant, again: Duration) -> bool {
+    /// Whether the shell is to be asked for this division now; true at most once within `again`.
+    pub(crate) fn should_request_division(
+        &mut self,
+        fingerprint: u32,
+        now: Instant,
+        again: Duration,
+    ) -> bool {
         let asked = self.asked.is_some_and(|(of, at)| of == fingerprint && now - at < again);
         if !asked {
             self.asked = Some((fingerprint, now));
@@ -247,8 +252,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         !asked
     }
 
-    /// Whether it was, and has not answered yet; now it has.
-    pub(crate) fn asked_division(&mut self, fingerprint: u32) -> bool {
+    /// Ends the open request for this division; false where there is none.
+    pub(crate) fn take_division_request(&mut self, fingerprint: u32) -> bool {
         let asked = self.asked.is_some_and(|(of, _)| of == fingerprint);
         self.asked = self.asked.filter(|_| !asked);
         asked

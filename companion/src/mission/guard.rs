@@ -328,15 +328,15 @@ pub struct Inputs {
     pub at_goal: bool,
     /// The way back to the path is free.
     pub near_path: bool,
-    /// Time that the column to the ground, or before take-off to the top, was not free of other vehicles.
+    /// Time for which another vehicle has been in the column to the ground, or before take-off in the column to its top.
     pub column_blocked: Duration,
-    /// Time that a vehicle was in it that rests, or is lost.
+    /// Time for which a vehicle that stands for good, or is lost, has been in that column.
     pub column_barred: Duration,
-    /// Time that it was free.
+    /// Time for which that column has been free.
     pub column_clear: Duration,
     /// On its path, and not on the way back yet; over a field only while it finds no way home.
     pub can_turn_back: bool,
-    /// Time for which something has stopped the descent to its pad, or a vehicle that rests the way there.
+    /// Time for which the descent to the own pad, or the way to that pad, has been blocked: the way by a vehicle that stands for good.
     pub pad_taken: Duration,
     /// A place aside to land at may be sought.
     pub can_land_aside: bool,

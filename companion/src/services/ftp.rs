@@ -155,7 +155,7 @@ impl Ftp {
             (Doing::Read(request, true), Answer::Bytes(bytes)) => match self.stream {
                 Some(stream) if stream.request().is(&request) => {
                     let due = due(&request, Some(&stream));
-                    self.stream = stream.after(bytes.len());
+                    self.stream = stream.advanced_by(bytes.len());
                     self.put(&due, ACK, u8::from(self.stream.is_none()), bytes);
                 }
                 _ => self.ack(&request, bytes),

@@ -157,8 +157,8 @@ impl Detours {
         self.obstacles.forget_avoided();
     }
 
-    /// It counts as blocked until it was looked at again.
-    pub(crate) fn look_again(&mut self) {
+    /// Takes the path as blocked until the next scan has checked it.
+    pub(crate) fn assume_blocked(&mut self) {
         (self.blocked, self.in_the_way) = (true, true);
     }
 

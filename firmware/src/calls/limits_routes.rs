@@ -136,7 +136,7 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
         let tasks = [TASK, VehicleTask { goal: Some(goal), ..TASKS[1] }];
         assert_eq!(plan::plan_swarm(view, &request(&tasks, &heights), ws, out), Err(PlanError::BadGoal(2)));
     }
-    // More or fewer than the roadmap has, and more than the memory.
+    // More or fewer vehicles than the roadmap has terminals, and more vehicles than the workspace holds.
     let crowd = [5, 6, 7, 8].map(|id| VehicleTask { id, goal: None, ..TASK });
     for (vehicles, goals) in [(&TASKS[..1], 2), (&TASKS[..], 1), (&crowd[..3], 2), (&crowd[..], 4), (&[], 0)]
     {

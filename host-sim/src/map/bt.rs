@@ -13,7 +13,7 @@ use super::error::MapError;
 use super::octree::{DEPTH, INNER, Inner, Octree};
 use crate::files;
 
-/// Trees that are read: a coloured one is written without its colours.
+/// Values of the header's `id` that are read; the colours of a ColorOcTree are dropped.
 const IDS: [&str; 2] = ["OcTree", "ColorOcTree"];
 const MAGIC: &str = "# Octomap OcTree binary file";
 /// Longest file read: four times its length is what it takes in memory. The largest public scans have a tenth of it.

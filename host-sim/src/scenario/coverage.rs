@@ -21,7 +21,7 @@ pub const ORIGIN_HINT: &str =
 /// `[area]`
 #[derive(Clone, Debug)]
 pub struct Area {
-    /// Where the table or its file stands, as `FILE:LINE`.
+    /// Source of the area for error messages, as `FILE:LINE`.
     pub place: String,
     /// Vertices of all rings, metres east and north of the origin.
     pub vertices: Vec<Flat>,

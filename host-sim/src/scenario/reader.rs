@@ -181,7 +181,7 @@ impl<'a> Table<'a> {
     }
 
     /// The value, or an error at the table.
-    pub(super) fn need(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
+    pub(super) fn required(&self, key: &'static str, hint: &str) -> Result<Value<'a>> {
         self.get(key).ok_or_else(|| {
             // A misspelt key is what the user sees in the file; that it is missing is only what follows from it.
             let misspelt = |(given, _): &(&Spanned<_>, _)| {

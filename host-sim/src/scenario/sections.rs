@@ -70,14 +70,14 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
         common(text, root, (margins::STRAY_M, LIMIT_S))?;
-    let map_table = root.need("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
+    let map_table = root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
     let roadmap = self::roadmap(&roadmap.unwrap_or_else(|| empty(text, "roadmap")))?;
     let origin = has_origin.then_some(map.origin);
     let mission_value = root.get("mission");
     let vehicles = vehicles(
-        &root.need("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
+        &root.required("vehicles", "add a `[[vehicles]]` with `id` and `start` for each")?,
         origin.as_ref(),
         &mut unsupported,
     )?;
@@ -194,16 +194,16 @@ fn unbuilt(
 fn geodetic(value: &Value<'_>) -> Result<Geodetic> {
     let table = value.table()?;
     let hint = "a position is { lat_deg = …, lon_deg = …, alt_m = … }";
-    let lat_deg = table.need("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
-    let lon_deg = table.need("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
-    let alt_m = table.need("alt_m", hint)?.f64(&(-1000.0..=20_000.0))?;
+    let lat_deg = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
+    let lon_deg = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
+    let alt_m = table.required("alt_m", hint)?.f64(&(-1000.0..=20_000.0))?;
     table.finish()?;
     Ok(Geodetic { lat_deg, lon_deg, alt_m })
 }
 
 /// The map, and whether its origin was given.
 fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
-    let file_value = table.need("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
+    let file_value = table.required("file", "a path to an OctoMap `.bt` file, or \"builtin:building\"")?;
     let name = file_value.str()?;
     if let Err(error) = Source::parse(name) {
         return Err(file_value.error(&format!("is not a map that can be read: {error}")));
@@ -406,7 +406,7 @@ fn goals_file(value: &Value<'_>, folder: &Path) -> Result<Vec<(Point, String)>> 
 fn geofence(value: &Value<'_>) -> Result<Geofence> {
     let table = value.table()?;
     let hint = "a geofence is { min = [x, y, z], max = [x, y, z] }";
-    let (min, max) = (point(&table.need("min", hint)?)?, point(&table.need("max", hint)?)?);
+    let (min, max) = (point(&table.required("min", hint)?)?, point(&table.required("max", hint)?)?);
     table.finish()?;
     if (0..3).any(|axis| min[axis] >= max[axis]) {
         return Err(value.error("must have every coordinate of min below that of max"));
@@ -422,7 +422,7 @@ fn vehicles(
     let mut vehicles: Vec<(Vehicle, VehicleSpans)> = Vec::new();
     for item in value.items()? {
         let table = item.table()?;
-        let id_value = table.need("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
+        let id_value = table.required("id", "each vehicle has its own MAVLink system id, 1 to 250")?;
         let id = id_value.whole(1..=MAX_ID)? as u8;
         if vehicles.iter().any(|(v, _)| v.id == id) {
             return Err(id_value.error(&format!("is {id}, which another vehicle already has")));
@@ -441,7 +441,7 @@ fn vehicle(
     origin: Option<&Geodetic>,
     unsupported: &mut Vec<ScenarioError>,
 ) -> Result<(Vehicle, VehicleSpans)> {
-    let start = table.need(
+    let start = table.required(
         "start",
         "where its path begins: [east, north, up] in metres, or { lat_deg, lon_deg, alt_m }",
     )?;

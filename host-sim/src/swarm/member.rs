@@ -326,14 +326,14 @@ impl Member {
 
     /// Passes on to a board without a radio what a ground station sends its companion: by the autopilot, as that forwards it.
     pub fn forward(&mut self, now_us: u64, frame: &[u8]) {
-        if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_mute(now_us) {
+        if self.board.as_ref().is_some_and(|board| !board.has_radio()) && !self.is_down(now_us) {
             self.up.write(now_us, frame);
         }
     }
 
     /// Takes what a ground station sent.
     pub fn hear_ground(&mut self, now_us: u64, bytes: &[u8]) {
-        if !self.is_mute(now_us) {
+        if !self.is_down(now_us) {
             self.autopilot.handle_ground_bytes(bytes);
         }
     }
@@ -341,11 +341,11 @@ impl Member {
     /// Moves what a ground station gets into `out`, whole frames; the bytes moved.
     pub fn tell_ground(&mut self, now_us: u64, out: &mut [u8]) -> usize {
         let length = self.autopilot.poll_ground_transmit(out);
-        if self.is_mute(now_us) { 0 } else { length }
+        if self.is_down(now_us) { 0 } else { length }
     }
 
-    /// Without power, or booting.
-    fn is_mute(&self, now_us: u64) -> bool {
+    /// Whether the vehicle is without power, or boots.
+    fn is_down(&self, now_us: u64) -> bool {
         self.killed || now_us < self.boots_until_us
     }
 

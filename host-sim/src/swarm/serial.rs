@@ -124,7 +124,7 @@ impl SerialLink {
         }
     }
 
-    /// The next write that arrives by `until_us`, and when; the time may lie ahead.
+    /// Takes the next write whose last byte arrives by `until_us`: its time of arrival, which may be in the future, and its bytes.
     pub fn next_by(&mut self, until_us: u64) -> Option<(u64, Vec<u8>)> {
         let &(arrives_us, length) = self.writes.front()?;
         if arrives_us > until_us || until_us < self.stalled_until_us {
@@ -134,7 +134,7 @@ impl SerialLink {
         Some((arrives_us.max(self.stalled_until_us), self.bytes.drain(..length).collect()))
     }
 
-    /// Changes the share of bytes that arrive changed.
+    /// Sets the share of bytes that arrive corrupted.
     pub fn corrupt(&mut self, corruption: f64) {
         self.config.corruption = corruption;
     }

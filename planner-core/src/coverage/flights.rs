@@ -297,8 +297,8 @@ fn part_of(lane: &Lane, route: &Route) -> (u32, u32) {
     (lane.first.max(route.first), (lane.first + lane.count).min(route.end) - 1)
 }
 
-/// Where a vehicle looks on this route. A lane of one waypoint has no direction of its own: who is to look ahead on one looks
-/// along the other lanes all the way.
+/// Heading of a vehicle on this route. A lane of one waypoint has no direction of its own: with the heading along the path, such a
+/// route keeps the direction of the other lanes all the way.
 fn look<const L: usize, const N: usize>(work: &Work<'_, L, N>, route: &Route, swarm: &Swarm<'_>) -> Look {
     let lanes = work.tracks.lane_of(route.first)..=work.tracks.lane_of(route.end - 1);
     let alone = |lane: usize| {

@@ -17,9 +17,9 @@ pub struct Pattern {
     pub spacing: Spacing,
     /// Direction of the lanes, degrees from east to the left; the one of least width where absent.
     pub angle_deg: Option<f32>,
-    /// Lanes begin and end so far beyond the edge, metres.
+    /// Distance beyond the area's edge at which lanes begin and end, metres.
     pub margin_m: f32,
-    /// Changes of the lanes' order that are looked at, at most: each costs a few distances.
+    /// Most changes of the lanes' order whose length is compared; each costs a few distances.
     pub looks: u32,
 }
 

@@ -228,7 +228,7 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     Err(ScheduleError::Blocked)
 }
 
-/// Departures tried for one vehicle.
+/// Departure times tried for one vehicle, at most.
 const DEPARTURES: usize = 6;
 /// A longer wait in one place in the air is avoided where it can be, seconds: half of what counts as a standstill (20 s).
 const LONG_WAIT_S: f32 = 10.0;

@@ -6,7 +6,7 @@ use super::{
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
-use crate::search::{SearchWorkspace, ways_from};
+use crate::search::{SearchWorkspace, shortest_path_tree};
 use crate::sort;
 
 /// An undirected edge to be written.
@@ -76,7 +76,7 @@ pub fn write_with_landmarks<const N: usize>(
     let ways = &mut rest.as_chunks_mut::<WORD_LEN>().0[..nodes.len() * LANDMARKS];
     let mut landmark = 0;
     for column in 0..LANDMARKS {
-        ways_from(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
+        shortest_path_tree(&view, landmark, ws).map_err(|_| RoadmapError::WorkspaceTooSmall)?;
         let mut farthest_m = 0.0;
         for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARKS)) {
             let reached = Some(ws.distance_m(node)).filter(|way| way.is_finite());

@@ -38,7 +38,7 @@ pub struct Px4 {
 impl Px4 {
     /// As PX4 boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
-        let params = params::params(system_id, limits);
+        let params = params::defaults(system_id, limits);
         Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
     }
 

@@ -11,7 +11,7 @@ const DELAY_S: f32 = 0.6;
 /// A mode that did not ask for it for longer does not count, seconds.
 const MOST_S: f32 = 0.1;
 
-/// From a velocity (m/s) to where a vehicle is told to stop with it, metres. With 1.85 m/s recorded vehicles went 0.9 m in the first
+/// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is. With 1.85 m/s recorded vehicles went 0.9 m in the first
 /// second and 1.1 to 1.7 m in all.
 pub fn stop(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);

@@ -60,7 +60,7 @@ proptest::proptest! {
         let mut fly = |bench: &mut Bench, ticks: u32| {
             for _ in 0..ticks {
                 bench.tick();
-                off_m = off_m.max(bench.companion.guidance.door.off_curve_m());
+                off_m = off_m.max(bench.companion.guidance.smoother.off_curve_m());
             }
         };
         for (flown, paused) in stops {

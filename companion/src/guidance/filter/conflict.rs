@@ -15,10 +15,11 @@ use crate::time::{Duration, Instant};
 const AHEAD_S: f32 = 3.0;
 /// More neighbours than this are not compared in one step: with more nearby the vehicle stops.
 const NEAR_MOST: usize = 6;
-/// What two vehicles in the air overshoot their stops together, metres; the schedule leaves 0.5 m for it and for the rest.
-const STRAY_M: f32 = 0.25;
-/// What this vehicle alone strays from its path, metres.
-const STRAYS_M: f32 = 0.1;
+/// By how much two vehicles in the air overshoot their stops, added up, metres; the schedule leaves 0.5 m for this and for
+/// tracking errors.
+const OVERSHOOT_MARGIN_M: f32 = 0.25;
+/// Tracking error of this vehicle alone, off its path, metres.
+const TRACKING_MARGIN_M: f32 = 0.1;
 /// Distance between two hulls that is kept from a stranger then, metres.
 const HULLS_M: f32 = 0.3;
 /// What a vehicle may fly faster than its reference and yet stop with it, m/s.
@@ -42,11 +43,11 @@ impl Guidance {
         let joins = self.phase == Phase::Join || (self.phase == Phase::Path && self.settled);
         let join = path.point_at(self.tracker.along_m).filter(|_| joins);
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
-        let reference_mps = self.door.velocity().norm();
+        let reference_mps = self.smoother.velocity().norm();
         let speed_mps = reference_mps.max(velocity_mps - SWAY_MPS);
-        let braking_m = bounds.braking.stop_m(speed_mps).max(self.door.braking_m(true));
+        let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.braking_m(true));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
-        let here = self.door.position();
+        let here = self.smoother.position();
         let points = path.waypoints();
         if back {
             let next = points.partition_point(|w| w.along_m < along_m);
@@ -80,8 +81,8 @@ impl Guidance {
         let floor_m = scene.plan.filter(|_| lands).map(|plan| self.lands_at_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
-        let most_apart_m =
-            (safety_m + STRAY_M.max(neighbours.stray_m())).max(2.0 * self.track.radius_m + HULLS_M);
+        let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m()))
+            .max(2.0 * self.track.radius_m + HULLS_M);
         let reach = Reach {
             place,
             within_m: own_reach_m + most_apart_m,
@@ -133,11 +134,11 @@ impl Guidance {
                 safety_m
             } else if met.heard.grounded {
                 let vertical = lands || state == State::Climb || self.descends();
-                safety_m + if vertical { 0.0 } else { STRAYS_M }
+                safety_m + if vertical { 0.0 } else { TRACKING_MARGIN_M }
             } else if by_gates || met.lost {
-                safety_m + STRAY_M
+                safety_m + OVERSHOOT_MARGIN_M
             } else {
-                safety_m + STRAY_M.max(neighbours.stray_m())
+                safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m())
             };
             let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
             if lands && silent && !deaf && !met.stranger && floor_m.is_some_and(may_lie_below) {

@@ -33,7 +33,7 @@ impl Guidance {
         let way = match state {
             State::Scheduled => Way::Vertical { to_m: top_m(), speed_mps: 0.0 },
             State::Land | State::LandingHeld => Way::Vertical { to_m: ground_m(), speed_mps: 0.0 },
-            State::Climb => Way::Vertical { to_m: top_m(), speed_mps: self.door.velocity().z.max(0.0) },
+            State::Climb => Way::Vertical { to_m: top_m(), speed_mps: self.smoother.velocity().z.max(0.0) },
             State::Follow
             | State::Paused
             | State::Alone
@@ -45,7 +45,9 @@ impl Guidance {
             {
                 // What stopped its descent is looked at on while it stands.
                 match self.descends() {
-                    true => Way::Vertical { to_m: ground_m(), speed_mps: (-self.door.velocity().z).max(0.0) },
+                    true => {
+                        Way::Vertical { to_m: ground_m(), speed_mps: (-self.smoother.velocity().z).max(0.0) }
+                    }
                     false => Way::Path { back: self.flies_back(&plan.path) },
                 }
             }
@@ -73,11 +75,11 @@ impl Guidance {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
             Way::Vertical { to_m, speed_mps } => {
                 let speed_mps = if stopped { 0.0 } else { speed_mps };
-                let stop_m = if stopped { 0.0 } else { self.door.braking_m(true) };
+                let stop_m = if stopped { 0.0 } else { self.smoother.braking_m(true) };
                 let braking_m = bounds.braking.stop_m(speed_mps).max(stop_m);
                 let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
                 let down = to_m < position.z;
-                let reference_m = self.door.position().z;
+                let reference_m = self.smoother.position().z;
                 let end_m = if down {
                     (reference_m - fly_m).max(to_m).min(reference_m)
                 } else {
@@ -146,7 +148,7 @@ impl Guidance {
     /// reference that turns back leaves the setpoint on its way.
     fn flies_back<const W: usize>(&self, path: &Path<W>) -> bool {
         let along_m = self.tracker.along_m;
-        let velocity = self.door.velocity();
+        let velocity = self.smoother.velocity();
         let beside = |by_m: f32| path.point_at(within(self.setpoint_m + by_m, 0.0, path.length_m()));
         let onward = match (beside(-TURNS_M), beside(TURNS_M)) {
             (Some(from), Some(to)) => velocity.dot(&(to - from)),

@@ -15,12 +15,12 @@ pub struct Stream {
 }
 
 impl Stream {
-    /// One of which nothing was sent yet.
+    /// A burst of which nothing was sent yet.
     pub fn new(request: &Request) -> Self {
         Self { request: *request, offset: request.offset, sequence: request.sequence, left: BURST }
     }
 
-    /// What asked for it.
+    /// The request that started the burst.
     pub fn request(&self) -> Request {
         self.request
     }
@@ -30,8 +30,8 @@ impl Stream {
         Request { sequence: self.sequence, offset: self.offset, ..self.request }
     }
 
-    /// The same after a packet of as many bytes; `None` where that was the last.
-    pub fn after(&self, len: usize) -> Option<Self> {
+    /// The burst after a packet of `len` data bytes; `None` where that packet was the last.
+    pub fn advanced_by(&self, len: usize) -> Option<Self> {
         let last = self.left == 1 || len < chunk(&self.request);
         let (offset, sequence) = (self.offset + len as u32, self.sequence.wrapping_add(1));
         (!last).then_some(Self { offset, sequence, left: self.left - 1, ..*self })

@@ -196,7 +196,9 @@ impl Store {
                 let more = self.window.front() + done < self.window.file_len();
                 self.job = if more { Job::FlushRest { slot, done } } else { self.begin_check(slot) };
             }
-            (Job::Check { slot, done, sum, tail }, Ok(bytes)) => self.check(slot, done, sum, tail, bytes),
+            (Job::Check { slot, done, sum, tail }, Ok(bytes)) => {
+                self.check_upload_crc(slot, done, sum, tail, bytes);
+            }
             (Job::Seal(area, seal), Ok(_)) => self.job = Job::SealCheck(area, seal),
             (Job::SealCheck(area, seal), Ok(bytes)) => {
                 if bytes == area::seal(&self.layout, area, &seal).1 {
@@ -242,7 +244,7 @@ impl Store {
         }
     }
 
-    fn check(&mut self, slot: Area, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
+    fn check_upload_crc(&mut self, slot: Area, done: u32, sum: u32, mut tail: [u8; 4], bytes: &[u8]) {
         let len = self.window.file_len();
         let field = matches!(self.upload, Some((File::Field, _)));
         if (done == 0 && !Self::declares(field, bytes, len)) || bytes.is_empty() {

@@ -59,7 +59,8 @@ pub(crate) struct Beside {
 }
 
 impl Beside {
-    /// It seeks its way to the place of its path that it was on its way to, or to `back_m`. Whether there is such a place.
+    /// Starts to seek a path back to the plan: to the place that the vehicle was flying to if it was stopped on such a path, else to
+    /// `back_m`, metres along the plan. False where there is no such place.
     pub(crate) fn seek(&mut self, back_m: Option<f32>) -> bool {
         self.phase = match self.phase {
             Phase::Flies(back_m) | Phase::SeeksAgain(back_m) => Phase::SeeksAgain(back_m),

@@ -56,12 +56,12 @@ impl Homeward {
         self.seeks_since.is_some()
     }
 
-    /// For how long it has.
+    /// For how long the vehicle has been seeking its path home.
     pub(crate) fn sought_for(&self, now: Instant) -> Option<Duration> {
         self.seeks_since.map(|since| now - since)
     }
 
-    /// Whether it may ask for its way home now.
+    /// Whether the shell may be asked for the path home now: not within [`AGAIN`] of the last failure.
     pub(crate) fn may_ask(&self, now: Instant) -> bool {
         self.seeks() && self.missed_at.is_none_or(|at| now - at >= AGAIN)
     }

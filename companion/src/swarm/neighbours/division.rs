@@ -28,7 +28,7 @@ impl<const V: usize> Neighbours<V> {
         self.fleet.as_mut()
     }
 
-    /// Looks at who is heard.
+    /// Updates which vehicles of the fleet are heard.
     pub(crate) fn step_fleet(&mut self, own: &Own, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];

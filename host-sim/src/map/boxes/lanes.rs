@@ -17,7 +17,7 @@ impl<S: Simd> Lanes<S> {
         Self { simd, numbers }
     }
 
-    /// The same number in all.
+    /// A vector with `x` in every SIMD lane.
     #[inline(always)]
     pub(super) fn all(simd: S, x: f32) -> Self {
         Self::new(simd, simd.splat_f32s(x))
@@ -71,7 +71,7 @@ impl<S: Simd> Lanes<S> {
 
     /// These where a mask is true, the other's elsewhere.
     #[inline(always)]
-    pub(super) fn where_true(self, mask: S::m32s, other: Self) -> Self {
+    pub(super) fn select(self, mask: S::m32s, other: Self) -> Self {
         Self::new(self.simd, self.simd.select_f32s(mask, self.numbers, other.numbers))
     }
 }

@@ -192,15 +192,14 @@ impl Segment {
                     let t = ((face - boxes.start[axis]) * per_d[axis]).max(from).min(to);
                     let (_, rate) = boxes.at(t);
                     let falls = rate.is_below(zero);
-                    (from, to) = (t.where_true(falls, from), to.where_true(falls, t));
-                    (rate_from, rate_to) =
-                        (rate.where_true(falls, rate_from), rate_to.where_true(falls, rate));
+                    (from, to) = (t.select(falls, from), to.select(falls, t));
+                    (rate_from, rate_to) = (rate.select(falls, rate_from), rate_to.select(falls, rate));
                 }
             }
             // Between them it falls, then rises, and its rate is linear.
             let between = from + (to - from) * (rate_from / (rate_from - rate_to));
-            let t = between.where_true(rate_from.is_below(zero), from);
-            let t = t.where_true(zero.is_below(rate_to), to);
+            let t = between.select(rate_from.is_below(zero), from);
+            let t = t.select(zero.is_below(rate_to), to);
             boxes.at(t).0.put(&mut squares, part);
         }
         squares

@@ -43,10 +43,10 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let Common { seed, deconfliction, simulation, estimator_span } =
         common(text, root, (margins::STRAY_OVER_FIELDS_M, LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
-    let (mut area, terrain) = area(&root.need("area", hint)?.table()?, folder)?;
+    let (mut area, terrain) = area(&root.required("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     let mut unsupported = Vec::new();
-    let mut vehicles = vehicles(&root.need("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
+    let mut vehicles = vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
     // What goals missions leave to coverage.
     unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
     let formation = unbuilt(root, "formation", &mut unsupported)?;
@@ -254,8 +254,8 @@ fn ring(value: &Value<'_>) -> Result<(RingXy, Coordinates)> {
             true => {
                 let table = item.table()?;
                 let hint = "a place is { lat_deg = …, lon_deg = … }";
-                let lat = table.need("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
-                let lon = table.need("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
+                let lat = table.required("lat_deg", hint)?.f64(&(-90.0..=90.0))?;
+                let lon = table.required("lon_deg", hint)?.f64(&(-180.0..=180.0))?;
                 table.expect(&["alt_m"]);
                 table.finish()?;
                 [lon, lat]
@@ -395,7 +395,7 @@ fn camera(value: &Value<'_>) -> Result<Camera> {
             let side = 0.1..=1000.0;
             let sides_mm = pair(sensor, |v| v.f64(&side).map(|n| n as f32))?;
             let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
-            let focal_mm = table.need("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
+            let focal_mm = table.required("focal_mm", hint)?.f64(&(0.1..=10_000.0))? as f32;
             let pixels = match table.get("pixels") {
                 Some(pixels) => pair(&pixels, |v| v.whole(1..=1_000_000).map(|n| n as u32))?,
                 None => return Err(value.error("needs pixels beside sensor_mm")),
@@ -404,7 +404,7 @@ fn camera(value: &Value<'_>) -> Result<Camera> {
         }
         None => {
             let hint = "a camera is { fov_deg, aspect } or { sensor_mm = [w, h], focal_mm, pixels = [w, h] }";
-            let fov_deg = table.need("fov_deg", hint)?.f64(&(0.1..=175.0))? as f32;
+            let fov_deg = table.required("fov_deg", hint)?.f64(&(0.1..=175.0))? as f32;
             Camera::Diagonal { fov_deg, aspect: table.f32("aspect", 1.5, 0.05..=20.0)? }
         }
     };

@@ -44,8 +44,8 @@ pub(super) fn simulation(table: &Table<'_>, limit_s: f32) -> Result<Simulation> 
 pub(super) fn fault(table: &Table<'_>, ids: &[u8]) -> Result<Fault> {
     let words: Vec<(&str, &'static str)> =
         FAULT_KINDS.iter().chain([&FAULT_OBSTACLE]).map(|&kind| (kind, kind)).collect();
-    let kind = table.need("kind", "what happens, for example \"kill\"")?.word(&words)?;
-    let at_s = table.need("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
+    let kind = table.required("kind", "what happens, for example \"kill\"")?.word(&words)?;
+    let at_s = table.required("at_s", "when it strikes, in seconds")?.f64(&(0.0..=1e6))? as f32;
     let vehicle = table.get("vehicle");
     if let Some(value) = &vehicle
         && !ids.contains(&(value.whole(1..=MAX_ID)? as u8))

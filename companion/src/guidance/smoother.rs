@@ -1,7 +1,7 @@
-//! The one door for setpoints: every setpoint with a position or a velocity is made here.
+//! The setpoint smoother: every setpoint with a position or a velocity is made here.
 //!
 //! Guidance moves a *raw* point within limits of speed and acceleration, one step each [`TICK_S`]. The raw point changes
-//! its velocity at once in a corner and its acceleration at once where it begins to brake. The door makes a setpoint of it
+//! its velocity at once in a corner and its acceleration at once where it begins to brake. The smoother makes a setpoint of it
 //! that the vehicle can fly:
 //!
 //! - Two moving averages over T = `n` · [`TICK_S`] each, then a uniform cubic B-spline through the averages. Position,
@@ -16,7 +16,7 @@
 //! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly, beside
 //!   the geofence too ([`super::fence`]).
 //!
-//! ENU metres, seconds. Work: 2·[`MOST_N`] vector sums for each tick, at most [`TICKS`] ticks a step.
+//! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most [`TICKS`] ticks a step.
 
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
@@ -29,21 +29,21 @@ use super::motion::{Motion, shortened, within};
 pub const TICK_S: f32 = 0.05;
 /// Raw points taken in one call at most: a step that is later moves the setpoint no further.
 pub const TICKS: u8 = 4;
-/// Longest average, in ticks.
-const MOST_N: usize = (SMOOTH_MOST_S / TICK_S + 0.5) as usize;
-/// Shortest.
-const LEAST_N: usize = 8;
+/// Longest window of each moving average, in ticks of [`TICK_S`].
+const MAX_WINDOW_TICKS: usize = (SMOOTH_MOST_S / TICK_S + 0.5) as usize;
+/// Shortest window of each moving average, in ticks.
+const MIN_WINDOW_TICKS: usize = 8;
 /// The averages leave so much of the jerk to corners and to the clock.
 const JERK_ROOM: f32 = 1.12;
 /// Raw velocities that count for one value of both averages.
-const LEN: usize = 2 * MOST_N - 1;
+const LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
 /// The clock takes this share of the jerk that the curve leaves: its own steps are 50 ms long.
 const CLOCK_SHARE: f32 = 0.7;
 /// The clock leaves the rest of the jerk to what it cannot foresee: the next raw point.
 const JERK_USED: f32 = 0.9;
 /// The end of a change of speed is planned with this share of the jerk: the curve may need the rest.
 const END_SHARE: f32 = 0.4;
-/// The same where it speeds up: nothing depends on how soon it runs again.
+/// The share of the jerk with which a speeding up ends: nothing depends on how soon the clock runs at 1 again.
 const RISE_SHARE: f32 = 0.15;
 /// Below this speed of the curve the clock's acceleration is that of this speed, m/s.
 const SLOW_MPS: f32 = 0.2;
@@ -73,7 +73,7 @@ pub struct Pace {
     pub urgent: bool,
 }
 
-/// What setpoints came to since the start: greatest values, and how often the door had to hold.
+/// What setpoints came to since the start: greatest values, and how often the smoother had to hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stats {
     /// Setpoints made.
@@ -92,7 +92,7 @@ pub struct Stats {
 
 /// The last setpoint, and the curve it moves along.
 #[derive(Clone, Debug)]
-pub struct Door {
+pub struct Smoother {
     limits: Limits,
     fence: Option<Fence>,
     n: usize,
@@ -129,7 +129,7 @@ pub struct Door {
     pub stats: Stats,
 }
 
-impl Door {
+impl Smoother {
     pub(crate) fn new(limits: Limits, fence: Option<(Point, Point)>) -> Self {
         Self {
             limits,
@@ -167,8 +167,8 @@ impl Door {
         self.live
     }
 
-    /// Nothing is sent any more.
-    pub(crate) fn close(&mut self) {
+    /// Setpoints end: there is no last one to go on from.
+    pub(crate) fn stop(&mut self) {
         self.live = false;
     }
 
@@ -459,7 +459,7 @@ impl Door {
 /// Ticks of each average: long enough for the autopilot's jerk.
 fn average(limits: &Limits) -> usize {
     let n = libm::ceilf(2.0 * JERK_ROOM * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
-    n.clamp(LEAST_N, MOST_N)
+    n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
 }
 
 #[cfg(test)]

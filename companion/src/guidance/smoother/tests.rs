@@ -1,4 +1,4 @@
-//! The door over random paths, paces and steps: what it makes of them is finite, smooth, inside the fence and on the path.
+//! The smoother over random paths, paces and steps: what it makes of them is finite, smooth, inside the fence and on the path.
 
 extern crate std;
 
@@ -39,8 +39,8 @@ proptest! {
         let first = path.point_at(0.0).unwrap();
         let fence = fenced.then(|| (first - Point::new(5.0, 5.0, 1.0), first + Point::new(5.0, 5.0, 1.0)));
         let cfg = TrackConfig::default();
-        let (mut tracker, mut door) = (Tracker::default(), Door::new(LIMITS, fence));
-        door.begin_at(first, 0.0);
+        let (mut tracker, mut smoother) = (Tracker::default(), Smoother::new(LIMITS, fence));
+        smoother.begin_at(first, 0.0);
         for (step, (kind, share, steps)) in
             paces.iter().flat_map(|p| (0..p.2).map(move |_| (p.0, p.1, p.2))).enumerate()
         {
@@ -52,32 +52,32 @@ proptest! {
             };
             // Most steps are on time.
             let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
-            let (at, velocity, acceleration) = (door.position(), door.velocity(), door.acceleration());
-            for _ in 0..door.begin(pace, dt_s) {
+            let (at, velocity, acceleration) = (smoother.position(), smoother.velocity(), smoother.acceleration());
+            for _ in 0..smoother.begin(pace, dt_s) {
                 let mut advice = Advice { stop_within_m: if steps % 3 == 0 { 0.0 } else { f32::INFINITY }, ..Advice::FREE };
                 // Guidance stops before the fence.
                 let v = tracker.speed_mps;
                 let braking_m = v * v / 3.0 + 2.0 * v * TICK_S + 0.05;
-                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !door.allows(&ahead)) {
+                if path.point_at(tracker.along_m + braking_m).is_some_and(|ahead| !smoother.allows(&ahead)) {
                     advice.stop_within_m = advice.stop_within_m.min(braking_m);
                 }
                 let reference = track::advance(&cfg, &path, &mut tracker, &advice, TICK_S).unwrap();
-                door.push(reference.position);
+                smoother.push(reference.position);
             }
-            door.finish();
+            smoother.finish();
             let dt_s = dt_s.min(0.2);
-            let place = door.position();
-            let moved = (door.position() - at).norm();
+            let place = smoother.position();
+            let moved = (smoother.position() - at).norm();
             prop_assert!(moved <= 2.1 * dt_s + 1e-3, "{moved} m in {dt_s} s");
             // The velocity is that of the positions.
-            let mean = (door.velocity() + velocity) * 0.5;
-            let off = ((door.position() - at) / dt_s - mean).norm();
+            let mean = (smoother.velocity() + velocity) * 0.5;
+            let off = ((smoother.position() - at) / dt_s - mean).norm();
             prop_assert!(off < 0.02 + 0.12 * dt_s / TICK_S * dt_s / TICK_S, "velocity off by {off} m/s in {dt_s} s");
-            let a = door.acceleration();
+            let a = smoother.acceleration();
             let [across, up] = LIMITS.most_mps2;
             prop_assert!(a.xy().norm() <= across + 1e-4 && a.z.abs() <= up + 1e-4, "{a:?}");
             let jerk = (a - acceleration).norm() / dt_s;
-            let most = LIMITS.jerk(door.stopping);
+            let most = LIMITS.jerk(smoother.stopping);
             prop_assert!(jerk <= most * 1.001 + 1e-3, "{jerk} m/s³ of {most}, {pace:?}");
             if let Some((low, high)) = fence {
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]));
@@ -85,7 +85,7 @@ proptest! {
             // Corners are rounded, stops are not overshot: never far from the path that the raw point has drawn, though
             // every seventh step of a hairpin is late.
             if fence.is_none() && step % 16 == 0 {
-                let place = door.position();
+                let place = smoother.position();
                 let near = path.project(&place, tracker.along_m, path.length_m());
                 let off = (path.point_at(near).unwrap() - place).norm();
                 prop_assert!(off < 0.3, "{off} m off the path");
@@ -110,14 +110,14 @@ proptest! {
         let limits = if slow_climber { Limits { accel_z_mps2: 1.0, most_mps2: [2.25, 1.0], ..LIMITS } } else { LIMITS };
         let (low, size) = (Point::new(-7.0, 12.0, 0.0), Point::new(size.0, size.1, size.2));
         let high = low + size;
-        let mut door = Door::new(limits, Some((low, high)));
+        let mut smoother = Smoother::new(limits, Some((low, high)));
         let came_at = Point::new(came_at.0, came_at.1, came_at.2);
         let place = low + size.component_mul(&Point::new(share.0, share.1, share.2));
         for step in 0..8 {
-            door.go_with(place + came_at * (TICK_S * step as f32), TICK_S);
-            door.mark_sent();
+            smoother.go_with(place + came_at * (TICK_S * step as f32), TICK_S);
+            smoother.mark_sent();
         }
-        door.move_on(&came_at);
+        smoother.move_on(&came_at);
         let mut step = 0;
         for (x, y, z, speed_mps, steps) in targets {
             let target = low + size.component_mul(&Point::new(x, y, z));
@@ -130,20 +130,20 @@ proptest! {
                     _ => Pace { share: 1.0, urgent: false },
                 };
                 let dt_s = if step % 7 == 0 { late[step % late.len()] } else { TICK_S };
-                let before = door.acceleration();
-                for _ in 0..door.begin(pace, dt_s) {
-                    let raw = door.raw();
-                    door.push(raw + shortened(target - raw, speed_mps * TICK_S));
+                let before = smoother.acceleration();
+                for _ in 0..smoother.begin(pace, dt_s) {
+                    let raw = smoother.raw();
+                    smoother.push(raw + shortened(target - raw, speed_mps * TICK_S));
                 }
-                door.finish();
-                let place = door.position();
+                smoother.finish();
+                let place = smoother.position();
                 prop_assert!((0..3).all(|a| place[a] >= low[a] && place[a] <= high[a]), "{place:?}");
-                let a = door.acceleration();
+                let a = smoother.acceleration();
                 let [across, up] = limits.most_mps2;
                 // Two axes that begin to brake at once pass the disc's edge by a hair.
                 prop_assert!(a.xy().norm() <= across * 1.02 && a.z.abs() <= up + 1e-3, "{a:?}");
                 let jerk = (a - before).norm() / dt_s.min(0.2);
-                let most = limits.jerk(door.stopping);
+                let most = limits.jerk(smoother.stopping);
                 prop_assert!(jerk <= most * 1.001 + 1e-3, "{jerk} m/s³ of {most} at {place:?} of {low:?} {high:?}");
             }
         }

@@ -1,4 +1,4 @@
-//! Whose words count, and how often each kind of answer goes out.
+//! Which senders may command, and how often each of them is answered.
 //!
 //! Three kinds of senders: a ground station that the mission file names, the own vehicle's autopilot side, and everybody
 //! else. Only a ground station commands, sets parameters and moves files. Others are answered too, but each kind of sender
