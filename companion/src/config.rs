@@ -14,6 +14,9 @@ pub const GROUND_STATIONS: usize = 4;
 /// The ground stations of a mission that names none: the id that QGroundControl, MAVProxy and pymavlink use.
 pub const USUAL_GROUND_STATIONS: [u8; GROUND_STATIONS] = [255, 0, 0, 0];
 
+/// Default safety distance between the centres of two vehicles, metres: two airframes of 0.3 m radius, and 0.9 m of air.
+pub const SAFETY_DISTANCE_M: f32 = 1.5;
+
 /// One vehicle of the mission.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RosterEntry {
@@ -126,7 +129,7 @@ impl<const V: usize> Config<V> {
             accel_mps2: 1.5,
             radius_m: 0.3,
             required_clearance_m: 0.8,
-            safety_distance_m: 1.5,
+            safety_distance_m: SAFETY_DISTANCE_M,
             method: Method::Priority,
             estimate_m: margins::ESTIMATE_M,
             radio_range_m: REACHES_ALL_M,

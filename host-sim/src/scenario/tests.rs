@@ -75,6 +75,13 @@ fn wrong_scenarios_are_told_where_and_why() {
             "mission.ground_stations takes 1 to 4 MAVLink system ids",
             None,
         ),
+        (
+            "[mission]",
+            "[deconfliction]\nsafety_distance_m = 0\n[mission]",
+            "5:21",
+            "deconfliction.safety_distance_m must be a number from 0.01 to 1000",
+            None,
+        ),
         ("[map]", "sede = 1\n[map]", "2:1", "unknown key `sede`", Some("did you mean `seed`?")),
         (
             "start = [8.0, 15.0",

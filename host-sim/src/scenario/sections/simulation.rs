@@ -1,5 +1,6 @@
 //! The tables of how a mission is flown: deconfliction, simulation, faults.
 
+use companion::config::SAFETY_DISTANCE_M;
 use planner_core::deconflict::Method;
 use sim_autopilot::Estimator;
 
@@ -11,7 +12,8 @@ use crate::scenario::types::{Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, 
 pub(super) fn deconfliction(table: &Table<'_>, stray_m: f32) -> Result<Deconfliction> {
     let methods = [("priority", Method::Priority), ("algorithm2", Method::Algorithm2), ("off", Method::Off)];
     let method = table.word("method", Method::Priority, &methods)?;
-    let safety_distance_m = table.f32("safety_distance_m", 1.5, 0.0..=1000.0)?;
+    // Companions refuse a distance of 0.
+    let safety_distance_m = table.f32("safety_distance_m", SAFETY_DISTANCE_M, 0.01..=1000.0)?;
     let separation_m =
         table.f32("separation_m", safety_distance_m + stray_m, f64::from(safety_distance_m)..=1000.0)?;
     let deconfliction = Deconfliction { method, safety_distance_m, separation_m };
