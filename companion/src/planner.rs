@@ -13,21 +13,47 @@ use planner_core::search::SearchError;
 use crate::config::PlanFailure;
 use crate::storage::mission_file::MissionView;
 
-/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`.
+/// A step of a plan with goals.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// Lengths of the shortest paths from starts to goals.
+    Search,
+    /// Which vehicle flies to which goal.
+    Assignment,
+    /// When the vehicles fly.
+    Schedule,
+}
+
+/// Plans a mission with goals on its roadmap, for vehicles with room for `gates_most`. `done` is called after each step: the
+/// desk measures their times.
 ///
 /// # Errors
-/// Why there is no plan.
+/// Why there is no plan; [`PlanError::SwarmFull`] for a mission of more than `V` vehicles or goals.
 pub fn goals<const N: usize, const V: usize, const W: usize, const P: usize>(
     mission: &MissionView<'_>,
     roadmap: &RoadmapView<'_>,
     gates_most: usize,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
-) -> Result<(), PlanFailure> {
+    mut done: impl FnMut(Step),
+) -> Result<(), PlanError> {
     let (mut tasks, mut descents_m) = (Vec::<_, V>::new(), Vec::<_, V>::new());
     let request =
-        mission.request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanFailure::Capacity)?;
-    plan::plan_swarm(roadmap, &request, ws, out).map_err(|error| failure(&error))
+        mission.request(&mut tasks, &mut descents_m, gates_most).map_err(|_| PlanError::SwarmFull)?;
+    let mut goals = plan::Goals::new();
+    plan::costs(roadmap, &request, ws)?;
+    done(Step::Search);
+    plan::assign(&request, ws, &mut goals)?;
+    done(Step::Assignment);
+    plan::schedule(roadmap, &request, &goals, ws, out)?;
+    done(Step::Schedule);
+    Ok(())
+}
+
+impl From<PlanError> for PlanFailure {
+    fn from(error: PlanError) -> Self {
+        failure(&error)
+    }
 }
 
 /// What an error of the planner is to a companion.

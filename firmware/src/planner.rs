@@ -154,7 +154,7 @@ impl Planner<'_> {
             .map_err(|_| PlanFailure::Unreachable)?;
             return Ok(&own.plan);
         }
-        planner::goals(mission, roadmap, GATES, ws, swarm)?;
+        planner::goals(mission, roadmap, GATES, ws, swarm, |_| {})?;
         plan::vehicle_plan(swarm, index, schedule, &mut ws.schedule, &mut own.plan)
             .map_err(|_| PlanFailure::Capacity)?;
         Ok(&own.plan)

@@ -9,6 +9,7 @@ pub mod stretches;
 use std::time::Instant;
 
 use anyhow::{anyhow, bail};
+use companion::planner::{self, Step};
 use companion::storage::mission_file::{Block, MissionGoal};
 use companion::{PlanFailure, Wanted};
 use planner_core::Point;
@@ -127,18 +128,19 @@ impl Mission {
             return Ok(plan);
         }
         let view = self.view();
-        let request = self.request(self.gates_most());
+        let mission = self.mission_view();
         let mut workspace = on_heap(PlanWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
-        let mut goals = plan::Goals::new();
-        // The steps of `plan_swarm`, each with its time.
-        let searching = Instant::now();
-        plan::costs(&view, &request, &mut workspace).map_err(|e| self.describe(&e))?;
-        let search_s = searching.elapsed().as_secs_f64();
-        let assigning = Instant::now();
-        plan::assign(&request, &mut workspace, &mut goals).map_err(|e| self.describe(&e))?;
-        let assignment_s = assigning.elapsed().as_secs_f64();
-        plan::schedule(&view, &request, &goals, &mut workspace, &mut plan).map_err(|e| self.describe(&e))?;
+        let (mut step_begun, mut search_s, mut assignment_s) = (Instant::now(), 0.0, 0.0);
+        planner::goals(&mission, &view, self.gates_most(), &mut workspace, &mut plan, |step| {
+            let took_s = core::mem::replace(&mut step_begun, Instant::now()).elapsed().as_secs_f64();
+            match step {
+                Step::Search => search_s = took_s,
+                Step::Assignment => assignment_s = took_s,
+                Step::Schedule => {}
+            }
+        })
+        .map_err(|e| self.describe(&e))?;
         (self.timing.search_s, self.timing.assignment_s) = (search_s, assignment_s);
         self.timing.plan_s = begun.elapsed().as_secs_f64();
         Ok(plan)

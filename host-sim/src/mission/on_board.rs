@@ -1,12 +1,13 @@
 //! Whether a board that gets the files plans what the desk planned: it searches with less memory, so it may find no plan, or
 //! another one, with which it would take off with nobody.
 
+use companion::planner;
 use companion::storage::mission_file::Kind;
 use planner_core::flight::PathError;
-use planner_core::plan::{self, PlanError, PlanRequest, PlanWorkspace};
+use planner_core::plan::{self, PlanError, PlanWorkspace};
 use planner_core::schedule::ScheduleError;
 
-use super::ready::{Mission, SwarmPlan, planner_mode};
+use super::ready::{Mission, SwarmPlan};
 use crate::capacity::{Board, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
 
 impl Mission {
@@ -24,17 +25,6 @@ impl Mission {
                 let most = (0..self.tasks.len()).map(gates).max().unwrap_or(0);
                 self.area_excess(area, board).or_else(of_mission).or_else(|| board.gates_excess(most))
             }
-        }
-    }
-
-    /// What the swarm's planner is asked, for vehicles with room for `gates_most`.
-    pub(super) fn request(&self, gates_most: usize) -> PlanRequest<'_> {
-        PlanRequest {
-            vehicles: &self.tasks,
-            descents_m: &self.descents_m,
-            mode: planner_mode(&self.scenario.mission),
-            schedule: self.schedule,
-            gates_most,
         }
     }
 
@@ -73,7 +63,7 @@ impl Mission {
     ) -> Result<u32, PlanError> {
         let mut workspace = on_heap(PlanWorkspace::<N, V, P>::new);
         let mut plan = on_heap(plan::SwarmPlan::<V, WAYPOINTS>::new);
-        plan::plan_swarm(&self.view(), &self.request(board.gates), &mut workspace, &mut plan)?;
+        planner::goals(&self.mission_view(), &self.view(), board.gates, &mut workspace, &mut plan, |_| {})?;
         Ok(plan.crc)
     }
 }

@@ -189,7 +189,7 @@ fn parsed(roadmap_file: &[u8]) -> RoadmapView<'_> {
     RoadmapView::parse(roadmap_file).expect("we wrote it ourselves")
 }
 
-pub(super) fn planner_mode(mission: &scenario::Mission) -> Mode {
+fn planner_mode(mission: &scenario::Mission) -> Mode {
     match (mission.mode, mission.objective) {
         (scenario::Mode::Labelled, _) => Mode::Labelled,
         (_, scenario::Objective::Total) => Mode::Unlabelled(Objective::TotalDistance),
