@@ -7,6 +7,7 @@
 //! is taken back to it, and going on begins with a straight way back to where the phase was left.
 
 mod brakes;
+pub(crate) mod evade;
 mod fence;
 pub(crate) mod filter;
 mod follower;
@@ -19,7 +20,6 @@ mod output;
 mod phase;
 mod progress;
 mod raw;
-pub(crate) mod retreat;
 mod scene;
 mod setpoint;
 mod smoother;
@@ -40,7 +40,7 @@ use self::smoother::{Pace, Smoother, TICK_S};
 use self::waypoints::Waypoints;
 use crate::autopilot::limits::AutopilotLimits;
 use crate::config::Config;
-use crate::guidance::retreat::Search;
+use crate::guidance::evade::Search;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
@@ -80,7 +80,7 @@ const PROGRESS_M: f32 = 0.25;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
 /// However wide the margin, a descent leads so far down before the autopilot lands by itself, metres over the ground.
-const LOW_MOST_M: f32 = 1.2;
+const MAX_LAND_HANDOVER_M: f32 = 1.2;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -140,9 +140,9 @@ pub struct Guidance {
     pub returning: bool,
     /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
     linked_m: f32,
-    shelter: Search,
+    evade_search: Search,
     /// Whether it keeps out from under a vehicle that comes down.
-    pub retreating: bool,
+    pub evading: bool,
     /// How far ahead it waits, for the neighbours' sake, metres.
     waits_m: f32,
     /// It flies no further along its path for now, metres.
@@ -198,8 +198,8 @@ impl Guidance {
             reported_m: f32::NEG_INFINITY,
             returning: false,
             linked_m: f32::INFINITY,
-            shelter: Search::default(),
-            retreating: false,
+            evade_search: Search::default(),
+            evading: false,
             waits_m: f32::INFINITY,
             halt_m: f32::INFINITY,
             back_to_m: None,
@@ -207,7 +207,7 @@ impl Guidance {
             trapped_since: None,
             aside: false,
             lowest_ground_m: config.ground.map_or(f32::INFINITY, |ground| ground.low_m),
-            low_m: libm::fminf(config.required_clearance_m - config.radius_m, LOW_MOST_M),
+            low_m: libm::fminf(config.required_clearance_m - config.radius_m, MAX_LAND_HANDOVER_M),
             sent_acceleration: Point::zeros(),
         }
     }
@@ -351,7 +351,7 @@ impl Guidance {
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
         let path = scene.plan.map(|plan| &plan.path);
         if let (Some(path), true) = (path, known && self.on_path && !self.is_algorithm2()) {
-            self.retreat(state, path, &mut advice, neighbours, now);
+            self.evade(state, path, &mut advice, neighbours, now);
         }
         if self.leg.is_none() {
             self.up = up;

@@ -1,21 +1,21 @@
 //! The two links, to the autopilot and to the swarm: what comes in as frames, what waits to go out, and who is answered how often.
 
 pub(crate) mod answer_limits;
-pub mod budget;
 pub mod commands;
 pub mod done;
 pub mod echo;
 pub mod frame;
 pub mod intent;
 pub mod outbox;
+pub mod rate_limit;
 pub mod roster;
 
 use self::answer_limits::{Kind, Rates, Sender};
-use self::budget::Budget;
 use self::commands::{Command, Repeats};
 use self::echo::{Echo, Sent};
 use self::frame::{Counters, Frame, Framer, Header};
 use self::outbox::{Outbox, Outgoing};
+use self::rate_limit::RateLimit;
 use crate::events::Link;
 use crate::time::Instant;
 
@@ -55,7 +55,7 @@ pub(crate) struct Links {
     outboxes: [Outbox; 2],
     /// Bits of [`Fresh`].
     due: [u16; 2],
-    radio: Budget,
+    radio: RateLimit,
     sent: Sent,
     rates: Rates,
     repeats: Repeats,
@@ -157,12 +157,12 @@ impl Links {
         self.repeats.remember(frame, result, now);
     }
 
-    /// Whether the radio's budget lets another frame out.
+    /// Whether the radio's rate limit lets another frame out.
     pub(crate) fn radio_allows(&mut self, now: Instant, armed: bool) -> bool {
         self.radio.allows(now, armed)
     }
 
-    /// Whether half of the radio's budget is left.
+    /// Whether half of the radio's rate limit is left.
     pub(crate) fn radio_half_full(&self) -> bool {
         self.radio.is_half_full()
     }

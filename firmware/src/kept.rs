@@ -30,10 +30,10 @@ static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 enum End {
-    /// There was none before.
+    /// No run before this one: the memory was not kept.
     #[default]
     None = 0,
-    /// It runs; found at a start, it ended without a word.
+    /// The firmware runs. Found at a start: the run before was cut off without a record.
     Runs = 0x464c_4b22,
     /// By a panic or a fault.
     Crashed = 0x464c_4b21,

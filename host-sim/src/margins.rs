@@ -16,7 +16,7 @@
 
 use companion::margins::TRACKING_M;
 use planner_core::coverage::footprint::{Footprint, Spacing};
-use sim_autopilot::{Estimator, Personality};
+use sim_autopilot::{AutopilotKind, Estimator};
 
 use crate::scenario::{Simulation, Vehicle};
 
@@ -31,11 +31,11 @@ pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
 pub const STRAY_PER_GUST_S: f32 = 0.05;
 
 /// How far an estimate may be from the truth, beyond what tracking covers, metres.
-pub fn estimate_m(estimator: Estimator, autopilot: Personality) -> f32 {
+pub fn estimate_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.0,
-        (Estimator::Recorded, Personality::Px4) => 0.65,
-        (Estimator::Recorded, Personality::Ardupilot) => 0.12,
+        (Estimator::Recorded, AutopilotKind::Px4) => 0.65,
+        (Estimator::Recorded, AutopilotKind::Ardupilot) => 0.12,
     }
 }
 
@@ -74,19 +74,19 @@ pub fn pads_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
 
 /// How much further than it flies beside its path a vehicle touches down beside its pad, metres. A PX4 that comes over its
 /// pad fast, or is blown, has its integrator against it, which carries it on once the companion no longer holds it.
-fn touchdown_m(gust_mps: f32, autopilot: Personality) -> f32 {
+fn touchdown_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
-        Personality::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
-        Personality::Ardupilot => 0.0,
+        AutopilotKind::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
+        AutopilotKind::Ardupilot => 0.0,
     }
 }
 
 /// How much lower than it believes a vehicle may be, metres.
-pub fn lower_m(estimator: Estimator, autopilot: Personality) -> f32 {
+pub fn lower_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
-        (Estimator::Recorded, Personality::Px4) => 1.1,
-        (Estimator::Recorded, Personality::Ardupilot) => 0.3,
+        (Estimator::Recorded, AutopilotKind::Px4) => 1.1,
+        (Estimator::Recorded, AutopilotKind::Ardupilot) => 0.3,
     }
 }
 

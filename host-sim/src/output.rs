@@ -12,7 +12,7 @@ use crate::report::{
 use crate::result::{self, MissionResult, Timing};
 use crate::say;
 use crate::swarm::Flight;
-use crate::swarm::monitor::Sample;
+use crate::swarm::referee::Sample;
 
 /// The page without a flight: map, roadmap, paths.
 pub fn planned_page(

@@ -244,7 +244,7 @@ impl Client {
                     // Of one that was sent twice nobody knows which was answered.
                     if !piece.repeated {
                         let took = self.link.now().duration_since(piece.sent_at);
-                        self.pace.answered_after(took);
+                        self.pace.note_round_trip(took);
                     }
                     progress(arrived as u64);
                 }

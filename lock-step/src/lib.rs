@@ -59,9 +59,9 @@ pub enum ToBoard {
     },
     /// Call a function of C's convention, above every task.
     Call {
-        /// Where it lies.
+        /// Address of the function.
         address: u32,
-        /// What it is given.
+        /// Argument of the call.
         argument: u32,
     },
 }

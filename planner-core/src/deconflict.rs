@@ -62,7 +62,7 @@ pub struct Neighbour {
     pub progress_m: Option<f32>,
     /// Whether it stands on the ground, or lies there for all one knows.
     pub grounded: bool,
-    /// Whether it has left the plan for good: it keeps nobody waiting, it is an obstacle.
+    /// Whether it has left the plan for good: its gates are open, and it is an obstacle.
     pub out: bool,
     /// Whether it flies around something on a path of its own.
     pub detours: bool,

@@ -230,7 +230,7 @@ pub fn advance<const W: usize>(
     let ahead = Ahead { points, next, along_m: tracker.along_m, stop_m, direction: before, accel };
     let braking_sq = ahead.braking_sq(cfg);
     let speed_before = tracker.speed_mps;
-    // Such that braking within the leg's acceleration is enough from the next step on.
+    // No faster than the leg's acceleration can brake from, beginning with the next step.
     let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));
     let change = accel * dt_s;
     tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);

@@ -13,7 +13,7 @@ use super::noise::{self, Disturbance};
 use super::port::{Ack, Port, Sender};
 use super::vehicle::{Demand, Vehicle};
 use super::wire::Fields;
-use crate::Personality;
+use crate::AutopilotKind;
 
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
@@ -194,8 +194,8 @@ impl Body {
         self.do_camera(command);
         let soon_us = self.time_us + ANSWER_US;
         let answer_us = match self.config.personality {
-            Personality::Px4 => self.camera.looks_us().max(soon_us),
-            Personality::Ardupilot => soon_us,
+            AutopilotKind::Px4 => self.camera.looks_us().max(soon_us),
+            AutopilotKind::Ardupilot => soon_us,
         };
         let ack = Ack { command: command.id, result: ACCEPTED, to: from.id() };
         self.ports[from.port].later.push((answer_us, ack));

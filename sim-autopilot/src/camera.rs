@@ -15,11 +15,11 @@ use super::command::Command;
 use super::messages::scaled;
 use super::port::Port;
 use super::snapshot::Snapshot;
-use crate::Personality;
+use crate::AutopilotKind;
 
 const CAMERA_FEEDBACK: u32 = 180;
 const CAMERA_IMAGE_CAPTURED: u32 = 263;
-/// Time between two looks: PX4's, ArduPilot's.
+/// Period at which the trigger distance is checked, microseconds: PX4's, ArduPilot's.
 const LOOK_EVERY_US: [u64; 2] = [50_000, 20_000];
 /// Photos kept for a referee that does not ask.
 const KEPT: usize = 100_000;
@@ -87,11 +87,11 @@ impl Camera {
     /// One step: the message to announce, if a picture was taken. `estimate` is none without a position.
     pub(super) fn update(
         &mut self,
-        personality: Personality,
+        personality: AutopilotKind,
         truth: Photo,
         estimate: Option<Point>,
     ) -> Option<u32> {
-        let px4 = personality == Personality::Px4;
+        let px4 = personality == AutopilotKind::Px4;
         let looks = truth.time_us >= self.look_us;
         if looks {
             self.look_us += LOOK_EVERY_US[usize::from(!px4)];

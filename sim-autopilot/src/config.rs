@@ -5,9 +5,9 @@ use planner_core::frames::{Geodetic, Projection};
 
 use super::estimator::Errors;
 use super::vehicle::VehicleLimits;
-use crate::{Estimator, Personality};
+use crate::{AutopilotKind, Estimator};
 
-impl Personality {
+impl AutopilotKind {
     /// Share of the airframe's drag: that of ArduCopter's simulated quadrotor follows from its recorded flights.
     pub(super) fn drag_share(self) -> f32 {
         match self {
@@ -39,7 +39,7 @@ pub struct Config {
     /// MAVLink system id, 1 to 255.
     pub system_id: u8,
     /// Which autopilot it is.
-    pub personality: Personality,
+    pub personality: AutopilotKind,
     /// Origin of the mission frame.
     pub world_origin: Geodetic,
     /// Origin of the autopilot's own local frame.
@@ -83,7 +83,7 @@ impl Default for Config {
         let vehicle = VehicleLimits::default();
         Self {
             system_id: 1,
-            personality: Personality::Px4,
+            personality: AutopilotKind::Px4,
             world_origin: origin,
             ekf_origin: origin,
             home: None,

@@ -17,7 +17,7 @@
 use planner_core::Point;
 
 use super::noise::{Gaussian, SLOT_S};
-use crate::{Estimator, Personality};
+use crate::{AutopilotKind, Estimator};
 
 impl Estimator {
     /// What ESTIMATOR_STATUS reports, across and in height, metres: recorded PX4s reported 0.02 to 0.29 across
@@ -45,7 +45,7 @@ impl Axis {
 }
 
 /// Across, up, and the most that a height is wrong for good, below and above.
-fn model(estimator: Estimator, autopilot: Personality) -> (Axis, Axis, [f32; 2]) {
+fn model(estimator: Estimator, autopilot: AutopilotKind) -> (Axis, Axis, [f32; 2]) {
     match (estimator, autopilot) {
         (Estimator::Perfect, _) => (Axis::NONE, Axis::NONE, [0.0, 0.0]),
         (Estimator::Rtk, _) => (
@@ -53,12 +53,12 @@ fn model(estimator: Estimator, autopilot: Personality) -> (Axis, Axis, [f32; 2])
             Axis { sigma_mps: 0.03, tau_s: 3.0, pull_s: 1.5, most_m: 0.15 },
             [0.0, 0.0],
         ),
-        (Estimator::Recorded, Personality::Px4) => (
+        (Estimator::Recorded, AutopilotKind::Px4) => (
             Axis { sigma_mps: 0.23, tau_s: 3.5, pull_s: 0.75, most_m: 0.75 },
             Axis { sigma_mps: 0.13, tau_s: 4.0, pull_s: 2.0, most_m: 0.7 },
             [-0.43, 0.34],
         ),
-        (Estimator::Recorded, Personality::Ardupilot) => (
+        (Estimator::Recorded, AutopilotKind::Ardupilot) => (
             Axis { sigma_mps: 0.02, tau_s: 1.5, pull_s: 1.25, most_m: 0.11 },
             Axis { sigma_mps: 0.005, tau_s: 6.0, pull_s: 6.0, most_m: 0.08 },
             [0.0, 0.0],
@@ -83,7 +83,7 @@ pub struct Errors {
 
 impl Errors {
     /// Errors as they may be at any time, from the first sample on.
-    pub fn new(estimator: Estimator, autopilot: Personality, seed: u64) -> Self {
+    pub fn new(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Self {
         let mut random = Gaussian::new(seed ^ 0x0E57_1A7E);
         let (across, up, height_m) = model(estimator, autopilot);
         // The sum of uniform numbers that a Gaussian is made of has its bound at 3.46; half of that is beyond any likely one.
@@ -141,7 +141,7 @@ mod tests {
         velocity: [f32; 2],
     }
 
-    fn flight(estimator: Estimator, autopilot: Personality, seed: u64) -> Flight {
+    fn flight(estimator: Estimator, autopilot: AutopilotKind, seed: u64) -> Flight {
         let mut errors = Errors::new(estimator, autopilot, seed);
         let (mut positions, mut across_v, mut up_v) = (Vec::new(), 0.0, 0.0);
         for _ in 0..3000 {
@@ -180,13 +180,13 @@ mod tests {
     fn the_model_s_errors_lie_in_the_ranges_of_the_recorded_flights() {
         let ranges = [
             (
-                Personality::Px4,
+                AutopilotKind::Px4,
                 [[0.13, 0.27], [0.26, 0.72], [0.20, 0.41], [0.38, 1.03]],
                 [[0.11, 0.51], [0.27, 1.09], [0.11, 0.57], [0.21, 1.42]],
                 [[0.14, 0.26], [0.10, 0.20]],
             ),
             (
-                Personality::Ardupilot,
+                AutopilotKind::Ardupilot,
                 [[0.02, 0.04], [0.03, 0.11], [0.01, 0.04], [0.03, 0.11]],
                 [[0.01, 0.03], [0.02, 0.08], [0.01, 0.04], [0.02, 0.08]],
                 [[0.015, 0.025], [0.0, 0.005]],
@@ -215,7 +215,7 @@ mod tests {
     #[test]
     fn rtk_stays_within_what_it_promises() {
         for seed in 0..200 {
-            for autopilot in [Personality::Px4, Personality::Ardupilot] {
+            for autopilot in [AutopilotKind::Px4, AutopilotKind::Ardupilot] {
                 let f = flight(Estimator::Rtk, autopilot, seed);
                 assert!(f.across[1] <= 0.1 && f.up[1] <= 0.15 && f.across[1] > 0.01);
             }
@@ -224,9 +224,9 @@ mod tests {
 
     #[test]
     fn the_same_seed_errs_alike_and_a_perfect_estimate_never() {
-        let run = |seed| flight(Estimator::Recorded, Personality::Px4, seed).across;
+        let run = |seed| flight(Estimator::Recorded, AutopilotKind::Px4, seed).across;
         assert_eq!(run(3), run(3));
         assert_ne!(run(3), run(4));
-        assert_eq!(flight(Estimator::Perfect, Personality::Px4, 3).across, [0.0; 4]);
+        assert_eq!(flight(Estimator::Perfect, AutopilotKind::Px4, 3).across, [0.0; 4]);
     }
 }

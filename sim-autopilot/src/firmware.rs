@@ -11,7 +11,7 @@ use super::status::Status;
 use super::telemetry;
 use super::vehicle::Gains;
 use super::wire::Fields;
-use crate::Personality;
+use crate::AutopilotKind;
 
 /// The firmware of one vehicle.
 #[derive(Clone, Debug)]
@@ -25,8 +25,8 @@ pub enum Firmware {
 impl Firmware {
     pub(super) fn new(config: &Config) -> Self {
         match config.personality {
-            Personality::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
-            Personality::Ardupilot => Self::Copter(Box::new(Copter::new(
+            AutopilotKind::Px4 => Self::Px4(Box::new(Px4::new(config.system_id, &config.vehicle))),
+            AutopilotKind::Ardupilot => Self::Copter(Box::new(Copter::new(
                 config.system_id,
                 &config.vehicle,
                 config.estimator_ready_s,
@@ -35,10 +35,10 @@ impl Firmware {
     }
 
     /// Streams it starts with: message id and interval in µs, 0 off until asked for.
-    pub(super) fn streams(personality: Personality) -> &'static [(u32, u32)] {
+    pub(super) fn streams(personality: AutopilotKind) -> &'static [(u32, u32)] {
         match personality {
-            Personality::Px4 => &telemetry::STREAMS,
-            Personality::Ardupilot => &ardupilot::STREAMS,
+            AutopilotKind::Px4 => &telemetry::STREAMS,
+            AutopilotKind::Ardupilot => &ardupilot::STREAMS,
         }
     }
 

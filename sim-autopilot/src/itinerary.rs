@@ -13,7 +13,7 @@ use super::body::{Body, Sense};
 use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
 use super::mission::{Item, Progress};
 use super::vehicle::wrap_pi;
-use crate::Personality;
+use crate::AutopilotKind;
 
 const NAV_WAYPOINT: u16 = 16;
 const NAV_RETURN_TO_LAUNCH: u16 = 20;
@@ -83,7 +83,7 @@ fn command_of(item: &Item) -> u16 {
 impl Body {
     /// The first item that is flown.
     fn first_item(&self) -> u16 {
-        u16::from(self.config.personality == Personality::Ardupilot)
+        u16::from(self.config.personality == AutopilotKind::Ardupilot)
     }
 
     /// Whether a mission is stored that can be flown.
@@ -204,7 +204,8 @@ impl Body {
                 let off = at - sense.position;
                 // NaN is no heading to wait for.
                 let turned = wrap_pi(heading - sense.heading).abs() < YAW_ERROR;
-                let turned = turned || heading.is_nan() || self.config.personality == Personality::Ardupilot;
+                let turned =
+                    turned || heading.is_nan() || self.config.personality == AutopilotKind::Ardupilot;
                 if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_UP_M && turned {
                     progress.inside_us.get_or_insert(sense.now_us);
                 }

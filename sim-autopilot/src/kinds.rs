@@ -2,7 +2,7 @@
 
 /// Which autopilot is simulated.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Personality {
+pub enum AutopilotKind {
     /// PX4 1.17, Offboard.
     #[default]
     Px4,

@@ -63,7 +63,7 @@ use self::body::{Body, Integral};
 pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
-pub use self::kinds::{Estimator, Personality};
+pub use self::kinds::{AutopilotKind, Estimator};
 use self::port::Port;
 pub use self::px4::Mode;
 use self::snapshot::Snapshot;
@@ -108,8 +108,8 @@ impl Autopilot {
     /// Whether it lands where it is, by itself.
     pub fn lands(&self) -> bool {
         let land = match self.body.config.personality {
-            Personality::Px4 => Mode::Land.custom_mode(),
-            Personality::Ardupilot => ardupilot::Mode::Land.number(),
+            AutopilotKind::Px4 => Mode::Land.custom_mode(),
+            AutopilotKind::Ardupilot => ardupilot::Mode::Land.number(),
         };
         self.custom_mode() == land
     }
@@ -333,16 +333,16 @@ impl Autopilot {
     /// The pilot takes over: PX4's Position, ArduCopter's BRAKE, which hold where it is.
     pub fn pilot_takes_over(&mut self) {
         self.set_pilot_mode(match self.body.config.personality {
-            Personality::Px4 => Mode::Position.custom_mode(),
-            Personality::Ardupilot => ardupilot::Mode::Brake.number(),
+            AutopilotKind::Px4 => Mode::Position.custom_mode(),
+            AutopilotKind::Ardupilot => ardupilot::Mode::Brake.number(),
         });
     }
 
     /// The pilot gives it back to Offboard or Guided.
     pub fn pilot_returns(&mut self) {
         self.set_pilot_mode(match self.body.config.personality {
-            Personality::Px4 => Mode::Offboard.custom_mode(),
-            Personality::Ardupilot => ardupilot::Mode::Guided.number(),
+            AutopilotKind::Px4 => Mode::Offboard.custom_mode(),
+            AutopilotKind::Ardupilot => ardupilot::Mode::Guided.number(),
         });
     }
 
@@ -384,7 +384,7 @@ impl Autopilot {
     /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights under a ceiling: its default
     /// is to climb and return. ArduCopter has no such parameter and brakes.
     pub fn land_on_stream_loss(&mut self) {
-        if self.body.config.personality == Personality::Px4 {
+        if self.body.config.personality == AutopilotKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
     }

@@ -45,7 +45,7 @@ pub struct Ack {
     pub command: u16,
     /// MAV_RESULT.
     pub result: u8,
-    /// Whom it answers: system, component.
+    /// System and component id of the sender that it answers.
     pub to: (u8, u8),
 }
 

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
 
 use super::status::Status;
-use crate::Personality;
+use crate::AutopilotKind;
 
 /// Everything telemetry is made of, at one instant.
 #[derive(Clone, Debug)]
@@ -89,7 +89,7 @@ impl Snapshot {
     }
 
     pub(super) fn is_px4(&self) -> bool {
-        self.status.personality == Personality::Px4
+        self.status.personality == AutopilotKind::Px4
     }
 
     pub(super) fn boot_ms(&self) -> u32 {

@@ -1,12 +1,12 @@
 //! What a firmware reports of its state.
 
-use crate::Personality;
+use crate::AutopilotKind;
 
 /// What telemetry reports of the firmware's state.
 #[derive(Clone, Copy, Debug)]
 pub struct Status {
     /// Which firmware it is.
-    pub personality: Personality,
+    pub personality: AutopilotKind,
     /// `custom_mode` of HEARTBEAT.
     pub custom_mode: u32,
     /// The mode that was asked for, whatever a failsafe flies.

@@ -10,7 +10,7 @@ use host_sim::boards::{self, Emulated, Piece};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
 use host_sim::scenario;
-use host_sim::swarm::board::told_state;
+use host_sim::swarm::board::reported_state;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, HEARTBEAT_DATA, MavCmd, SET_POSITION_TARGET_LOCAL_NED_DATA, STATUSTEXT_DATA,
@@ -305,7 +305,7 @@ impl Heard {
         }
         let by_radio = line == Port::Swarm as usize;
         match frame.message_id {
-            HEARTBEAT_DATA::ID if by_radio => self.state = told_state(frame).unwrap_or(self.state),
+            HEARTBEAT_DATA::ID if by_radio => self.state = reported_state(frame).unwrap_or(self.state),
             STATUSTEXT_DATA::ID if by_radio => {
                 let text = frame.decode::<STATUSTEXT_DATA>().map(|data| data.text);
                 self.texts.extend(text.iter().map(|text| text.to_str().unwrap_or_default().to_owned()));

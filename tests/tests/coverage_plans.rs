@@ -9,7 +9,7 @@ use host_sim::coverage::flight::{Act, Stop};
 use host_sim::scenario;
 use host_sim::scenario::coverage::Method;
 use planner_core::Point;
-use sim_autopilot::{Autopilot, Config, Personality, Photo};
+use sim_autopilot::{Autopilot, AutopilotKind, Config, Photo};
 
 /// A waypoint is passed within 2 m across, and by what is flown in a step.
 const PASSED_M: f32 = 2.2;
@@ -109,7 +109,7 @@ impl Client {
 }
 
 /// Flies one vehicle's plan and returns its pictures.
-fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Personality) -> Vec<Photo> {
+fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: AutopilotKind) -> Vec<Photo> {
     let origin = planned.wanted.origin;
     let start = stops[0].position;
     let config = Config {
@@ -126,11 +126,11 @@ fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Perso
     client.run(3.0);
     // The delay before it leaves is the swarm's; ArduPilot's item 0 is home.
     let mut items: Vec<Item> = items.iter().filter(|item| item.command != 93).cloned().collect();
-    if personality == Personality::Ardupilot {
+    if personality == AutopilotKind::Ardupilot {
         items.insert(0, Item { command: 16, frame: 0, params: [Some(0.0); 4], place: [0.0; 3] });
     }
     client.upload(&items);
-    if personality == Personality::Ardupilot {
+    if personality == AutopilotKind::Ardupilot {
         client.command(176, 1.0, 4.0);
         client.command(400, 1.0, 0.0);
     }
@@ -149,7 +149,7 @@ fn fly(planned: &Planned<'_>, stops: &[Stop], items: &[Item], personality: Perso
     client.run(0.1);
     let off = (client.autopilot.truth().position - stops[stops.len() - 1].position).xy().norm();
     assert!(off < 1.0, "{personality:?} came home {off} m off");
-    let all: Vec<u16> = (u16::from(personality == Personality::Ardupilot)..items.len() as u16).collect();
+    let all: Vec<u16> = (u16::from(personality == AutopilotKind::Ardupilot)..items.len() as u16).collect();
     assert_eq!(client.reached, all, "each item is reported once");
     let photos = client.autopilot.take_photos();
     assert_eq!(client.announced, photos.len(), "each picture is announced");
@@ -162,7 +162,7 @@ fn off_by(photo: &Photo, place: &Point) -> (f32, f32) {
 }
 
 /// Flies the plans of a scenario, and judges their pictures.
-fn judge(text: &str, personality: Personality, trigger: &str) {
+fn judge(text: &str, personality: AutopilotKind, trigger: &str) {
     let scenario = scenario::parse(text, "plans").expect("a scenario");
     let planned = Planned::new(&scenario, Method::Binpat).expect("a plan");
     let flights = planned.flights();
@@ -198,7 +198,7 @@ fn judge(text: &str, personality: Personality, trigger: &str) {
             }
             _ => assert_eq!(photos.len(), 0, "{label}"),
         }
-        if personality == Personality::Px4 && trigger == "waypoint" {
+        if personality == AutopilotKind::Px4 && trigger == "waypoint" {
             // The heading of a sweep: one for all, within what PX4 waits for.
             let turned = photos.iter().map(|photo| (photo.heading_rad - photos[0].heading_rad).abs());
             assert!(turned.fold(0.0, f32::max) < 0.43, "{label}");
@@ -206,7 +206,8 @@ fn judge(text: &str, personality: Personality, trigger: &str) {
     }
 }
 
-const ALL: [(&str, Personality); 2] = [("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)];
+const ALL: [(&str, AutopilotKind); 2] =
+    [("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)];
 
 #[test]
 fn each_plan_is_flown_and_photographs_what_was_planned() {

@@ -1,7 +1,7 @@
 //! Simulated autopilots fly what the recorded ones flew: `cargo xtask bench --only fidelity` prints the whole table.
 
 use flockmate_tests::fidelity::{Correction, Estimator, RUNS, Recording, allowed_m, recordings};
-use sim_autopilot::Personality;
+use sim_autopilot::AutopilotKind;
 
 /// The recorded flights that nobody interrupted.
 fn plain() -> impl Iterator<Item = (Recording, f64)> {
@@ -17,7 +17,7 @@ fn plain_flights_are_flown_again_as_they_were_recorded() {
         assert!(c.whole.rms <= allowed_m.min(0.2), "{name}");
         // NaN where the flight has no such part.
         assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
-        let in_follow_m = if recording.autopilot == Personality::Ardupilot { 0.08 } else { 0.12 };
+        let in_follow_m = if recording.autopilot == AutopilotKind::Ardupilot { 0.08 } else { 0.12 };
         assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
     }
 }
@@ -27,7 +27,7 @@ fn plain_flights_do_not_need_the_recorded_errors_to_come_near() {
     for (recording, allowed_m) in plain() {
         let c = recording.compare(Estimator::Perfect, Correction::Simulated);
         // Two recorded flights of one mission differ by 0.24 to 0.51 m with PX4.
-        let px4 = recording.autopilot == Personality::Px4;
+        let px4 = recording.autopilot == AutopilotKind::Px4;
         let name = format!("{} {}: {c:.2?}", recording.run, recording.vehicle);
         println!("{name}");
         assert!(c.whole.rms <= if px4 { 0.45 } else { allowed_m }, "{name}");
@@ -43,7 +43,7 @@ fn setpoints_as_they_were_sent_are_flown_as_recorded_under_the_recorded_errors()
         println!("{name}");
         assert!(c.whole.rms <= allowed_m.min(0.25), "{name}");
         assert!(!(c.lift_off.rms > 0.3 || c.landing.rms > 0.3), "{name}");
-        let in_follow_m = if recording.autopilot == Personality::Ardupilot { 0.08 } else { 0.2 };
+        let in_follow_m = if recording.autopilot == AutopilotKind::Ardupilot { 0.08 } else { 0.2 };
         assert!(c.follow.rms.is_nan() || c.follow.rms <= in_follow_m, "{name}");
     }
 }

@@ -18,7 +18,7 @@ use planner_core::frames::Geodetic;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
-use sim_autopilot::{Autopilot, Personality};
+use sim_autopilot::{Autopilot, AutopilotKind};
 
 /// Where PX4's recording was flown.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 47.397_741_4, lon_deg: 8.545_596_2, alt_m: 489.8 };
@@ -126,7 +126,7 @@ impl Victims {
         Self {
             now: Instant::ZERO,
             companion: Companion::new(Config::new(1, START, ORIGIN)).unwrap(),
-            autopilots: [Personality::Px4, Personality::Ardupilot].map(autopilot),
+            autopilots: [AutopilotKind::Px4, AutopilotKind::Ardupilot].map(autopilot),
             heard: [const { Framer::new() }; 4],
             said: 0,
         }

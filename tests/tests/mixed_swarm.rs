@@ -2,7 +2,7 @@
 
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
-use host_sim::scenario::{self, Personality};
+use host_sim::scenario::{self, AutopilotKind};
 use host_sim::swarm;
 
 const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
@@ -11,7 +11,7 @@ const DEMO: &str = include_str!("../../host-sim/scenarios/demo.toml");
 fn half_the_demo_by_ardupilot_is_complete_and_clean() {
     let mut scenario = scenario::parse(DEMO, "demo.toml").unwrap();
     for vehicle in scenario.vehicles.iter_mut().filter(|vehicle| vehicle.id % 2 == 0) {
-        vehicle.personality = Personality::Ardupilot;
+        vehicle.personality = AutopilotKind::Ardupilot;
     }
     let mut mission = Mission::prepare(scenario, &Progress::hidden()).unwrap();
     let plan = mission.plan().unwrap();

@@ -11,7 +11,7 @@ use flockmate_tests::{logs, shared_data};
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, GPS_GLOBAL_ORIGIN_DATA};
 use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
-use sim_autopilot::{Autopilot, Config, Personality};
+use sim_autopilot::{Autopilot, AutopilotKind, Config};
 
 const COMMAND_ACK: u32 = 77;
 const HEARTBEAT: u32 = 0;
@@ -120,7 +120,7 @@ fn the_simulated_arducopter_answers_as_the_recorded_one_did() {
     let Some(path) = shared_data("mavlink/arducopter-4.6-guided.tlog") else { return };
     let origin = Geodetic { lat_deg: -35.363_262, lon_deg: 149.165_237, alt_m: 584.09 };
     let config = Config {
-        personality: Personality::Ardupilot,
+        personality: AutopilotKind::Ardupilot,
         world_origin: origin,
         ekf_origin: origin,
         estimator_ready_s: 41.6,

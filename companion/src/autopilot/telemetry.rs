@@ -42,7 +42,8 @@ const GAP_MOST_S: f32 = 60.0;
 /// After a jump, or so long without one, the position is not used for this long; another one starts it again. What comes first
 /// after a silence may have waited on the way.
 pub const SETTLE: Duration = Duration::from_millis(1000);
-/// Another EKF origin is believed after this long without the known one: the autopilot is asked several times meanwhile.
+/// A different EKF origin is accepted once the known one was not reported for this long; the origin is requested several times
+/// meanwhile.
 const DOUBT: Duration = Duration::from_millis(800);
 /// After this long without a frame the sequence starts afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);

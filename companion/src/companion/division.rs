@@ -18,7 +18,7 @@ const THERE_M: f32 = 0.2;
 const MISSED: Duration = Duration::from_secs(3);
 /// With its pilot for so long it has left.
 const WITH_PILOT: Duration = Duration::from_secs(20);
-/// What stands for the CRC of a plan where what is left cannot be divided.
+/// Reported in place of a plan CRC where the rest of the area cannot be divided.
 const UNDIVIDED: u32 = u32::MAX;
 /// A shell that has not answered for so long is asked again.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
@@ -164,7 +164,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         dm(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
 
-    /// Where it is to hold, metres along its path: for a division under way, or for one that counts until its part of that comes.
+    /// Where this vehicle is to hold for a division, metres along its path: while the division is under way, and until the new
+    /// path of this vehicle has come.
     fn holds_at_m(&self) -> Option<f32> {
         // What it was ordered since the last step the fleet does not know yet.
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !self.lands_elsewhere())?;

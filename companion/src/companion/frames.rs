@@ -17,7 +17,7 @@ use crate::link::frame::Frame;
 use crate::link::intent::Intent;
 use crate::link::outbox::Outgoing;
 use crate::link::roster::Roster;
-use crate::link::{Fresh, budget};
+use crate::link::{Fresh, rate_limit};
 use crate::services::Heard;
 use crate::swarm::neighbours::relay::Relay;
 use crate::timers::Timer;
@@ -203,7 +203,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return DENIED;
         }
         if link == Link::Swarm {
-            self.links.spend(budget::POSITION);
+            self.links.spend(rate_limit::POSITION);
         }
         ACCEPTED
     }

@@ -137,7 +137,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             path_done: follow && (self.guidance.path_done(scene) || (self.guidance.descends() && on_ground)),
             at_goal: self.guidance.at_goal(scene) && !self.detours.home.is_on(),
             near_path: match (beneath, self.mission.state()) {
-                // Those refer to no place on the path.
+                // These interrupted states do not depend on a place on the path.
                 (State::TakeOff | State::Land, State::PilotReturned | State::PositionLost) => true,
                 (_, State::PilotReturned) => self.guidance.near_path(scene, REJOIN_WINDOW_M),
                 (_, State::PositionLost) => self.guidance.near_path(scene, LOST_WINDOW_M),

@@ -233,7 +233,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(
                 intent::DETOURS,
-                self.detours.is_flying() || self.detours.has_left() || self.guidance.retreating,
+                self.detours.is_flying() || self.detours.has_left() || self.guidance.evading,
             );
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());

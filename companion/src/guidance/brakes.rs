@@ -4,7 +4,7 @@ use planner_core::deconflict::Advice;
 use planner_core::flight::Path;
 
 use super::{Guidance, Phase};
-use crate::guidance::retreat::{self, Shelter};
+use crate::guidance::evade::{self, EvadeTarget};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
@@ -19,13 +19,13 @@ const ALONE_BESIDE_M: f32 = 0.5;
 impl Guidance {
     /// Stops the setpoint where it is: the state that follows does not go.
     pub fn brake(&mut self) {
-        self.shelter.reset();
+        self.evade_search.reset();
     }
 
     /// Looks for a step back from below a vehicle that comes down, where it stands or would wait; a place ahead is flown on to. One that is
     /// alone steps back from above one that lies below, to land beside it, but not beyond where others last heard it to be:
     /// they look for it from there on.
-    pub(super) fn retreat<const V: usize, const W: usize>(
+    pub(super) fn evade<const V: usize, const W: usize>(
         &mut self,
         state: State,
         path: &Path<W>,
@@ -46,10 +46,10 @@ impl Guidance {
         ) && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
-        let beside_m = safety_m + retreat::BESIDE_M;
+        let beside_m = safety_m + evade::BESIDE_M;
         let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
         if waits_there {
-            self.shelter.go_on(path, wait_m, neighbours.len(), |i, tell| {
+            self.evade_search.go_on(path, wait_m, neighbours.len(), |i, tell| {
                 if alone {
                     neighbours.above(i, safety_m + ALONE_BESIDE_M, tell);
                 } else {
@@ -57,16 +57,16 @@ impl Guidance {
                 }
             });
         } else {
-            self.shelter.reset();
+            self.evade_search.reset();
         }
-        let (to_m, nowhere) = match self.shelter.found {
-            Shelter::Here => (None, false),
-            Shelter::Back(to_m) => (Some(to_m.min(wait_m)), false),
-            Shelter::Nowhere => (None, !alone),
+        let (to_m, nowhere) = match self.evade_search.found {
+            EvadeTarget::Here => (None, false),
+            EvadeTarget::Back(to_m) => (Some(to_m.min(wait_m)), false),
+            EvadeTarget::Nowhere => (None, !alone),
         };
         let linked_m = self.linked_m;
         let to_m = to_m.filter(|to_m| !alone || *to_m >= linked_m);
-        self.retreating = to_m.is_some();
+        self.evading = to_m.is_some();
         if let Some(to_m) = to_m {
             advice.stop_within_m = (to_m - along_m).max(0.0);
         }

@@ -20,7 +20,7 @@ const CLEAR: Duration = Duration::from_millis(300);
 /// The ground between pad and goal may be this much lower than below both, metres: less than a storey.
 const LOWER_M: f32 = 2.0;
 /// For a vehicle that the roster does not name this one stands still no longer than this; then it goes on slowly.
-const STRANGER: Duration = Duration::from_secs(10);
+const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
 /// It then goes on at this share of its speed.
 const SLOW_SHARE: f32 = 0.15;
 /// A setpoint slower than this may turn, m/s.
@@ -190,7 +190,7 @@ impl Filter {
     }
 
     fn passes_stranger(&self, now: Instant) -> bool {
-        self.stranger && self.stopped_for(now) >= STRANGER
+        self.stranger && self.stopped_for(now) >= MAX_STOP_FOR_STRANGER
     }
 
     /// Whether the vehicle, stopped in its descent, is to climb back up its column.

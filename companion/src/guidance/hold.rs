@@ -40,7 +40,7 @@ impl Hold {
         core::mem::replace(&mut self.on, on) != on
     }
 
-    /// Whether it says so.
+    /// Whether the vehicle's intents report the hold.
     pub(crate) fn is_on(&self) -> bool {
         self.on
     }

@@ -14,7 +14,7 @@ impl Guidance {
     /// Goes on where the flight was interrupted.
     pub fn run(&mut self, now: Instant) {
         self.on_path = true;
-        self.shelter.reset();
+        self.evade_search.reset();
         self.linked_m = f32::INFINITY;
         self.progress_m = self.tracker.along_m;
         self.progress_at = now;
@@ -130,7 +130,7 @@ impl Guidance {
         }
     }
 
-    /// The raw point is where the setpoint stands: going on begins with a way from there.
+    /// Forgets the leg that was flown: the raw point is where the setpoint stands, and the next leg begins there.
     pub(super) fn settle(&mut self) {
         self.settled = true;
         self.leg = None;

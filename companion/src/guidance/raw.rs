@@ -8,7 +8,7 @@ use planner_core::track::{self, Reference, Tracker};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
-use crate::guidance::retreat;
+use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
@@ -104,7 +104,7 @@ impl Guidance {
             let free = self.filter.looks_back() && !self.filter.is_stopped();
             if !free {
                 advice.stop_within_m = 0.0;
-            } else if let Some(place) = retreat::step(path, &mut self.tracker, to_m, near, safety_m, TICK_S) {
+            } else if let Some(place) = evade::step(path, &mut self.tracker, to_m, near, safety_m, TICK_S) {
                 return Some(place);
             } else {
                 *blocked = true;

@@ -65,7 +65,7 @@ const fn rate(every_ms: u64, burst: u64) -> Rate {
 }
 
 /// For each sender, in the order of [`Sender`], each kind in the order of [`Kind`]. What others can request by radio is at most
-/// 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the radio budget leaves in the air. A list of all parameters is one burst.
+/// 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the radio rate limit leaves in the air. A list of all parameters is one burst.
 /// PX4 sends TIMESYNC at 10 Hz, and needs no answer to fly.
 const RATES: [[Rate; KINDS]; SENDERS] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],

@@ -50,7 +50,7 @@ pub struct DoneReport {
     pub flies: bool,
     /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of that.
     pub plan: bool,
-    /// What is photographed.
+    /// Waypoints that are photographed, as ranges of their numbers.
     pub ranges: Vec<Range, RANGES>,
 }
 

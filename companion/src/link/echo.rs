@@ -11,7 +11,7 @@ const SENT: usize = 16;
 const TICK: Duration = Duration::from_millis(10);
 /// No message counts as later than this, seconds: nobody can make another vehicle useless by echoes that are wrong.
 const LATEST_S: f32 = 1.0;
-/// Until the first echo a message counts as this late, seconds.
+/// Delay of the radio that is assumed before the first echo, seconds.
 const UNKNOWN_S: f32 = 0.2;
 /// A shorter delay counts by this share at each echo, a longer one at once.
 const FORGETS: f32 = 0.125;

@@ -148,7 +148,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (now - self.started_at).secs_f32() >= depart_s
     }
 
-    /// For how long the estimate has been worse than the margin leaves.
+    /// For how long the bound of the position estimate has exceeded what the margin leaves for it.
     pub(crate) fn vague_for(&self, now: Instant) -> Duration {
         self.vague_since.map_or(Duration::default(), |since| now - since)
     }

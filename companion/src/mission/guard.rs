@@ -358,7 +358,7 @@ pub struct Inputs {
     pub room_below: bool,
     /// Outside the geofence.
     pub outside: bool,
-    /// The path is blocked.
+    /// An obstacle or a vehicle out of the plan is on the path ahead.
     pub blocked: bool,
     /// All others stand, and it is this vehicle's turn to fly around.
     pub our_turn: bool,
@@ -381,7 +381,7 @@ impl Inputs {
         self.over_field && self.sought_home.is_none()
     }
 
-    /// Whether the column has not been free for `limit`, or a vehicle rests in it.
+    /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
     fn no_room_for(&self, limit: Duration) -> bool {
         self.column_blocked >= limit || self.column_barred >= BARRED
     }

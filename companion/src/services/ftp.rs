@@ -22,7 +22,7 @@ pub use self::packet::DATA;
 #[cfg(test)]
 pub(crate) use self::packet::TEXTS;
 use self::packet::{
-    ACK, EFBIG, EIO, HEAD, NAK, No, REMOVED, Request, Text, chunk, decimal, is_open, op, told,
+    ACK, EFBIG, EIO, HEAD, NAK, NakError, REMOVED, Request, Text, chunk, decimal, is_open, op, upload_text,
 };
 use self::stream::{Stream, due};
 use crate::link::frame::Frame;
@@ -103,7 +103,7 @@ impl Default for Ftp {
 }
 
 impl Ftp {
-    /// Takes a request in; a full queue drops it, and so it drops one that waits already.
+    /// Queues a request. One that is queued already, or finds the queue full, is dropped: the client repeats it.
     pub fn handle(&mut self, link: usize, now: Instant, frame: &Frame) {
         self.now = now;
         let request = Request::read(link, frame);
@@ -165,7 +165,7 @@ impl Ftp {
             }
             (Doing::Read(request, true) | Doing::Sum(request, true), _) => {
                 let due = due(&request, self.stream.take().as_ref());
-                self.nak(&due, No::Errno(EIO));
+                self.nak(&due, NakError::Errno(EIO));
             }
             (other, _) => self.doing = other,
         }
@@ -183,7 +183,7 @@ impl Ftp {
                     *asked = store.read(file, due.offset, chunk(&due));
                 } else {
                     (self.doing, self.stream) = (Doing::Nothing, None);
-                    self.nak(&due, No::EndOfFile);
+                    self.nak(&due, NakError::EndOfFile);
                 }
             }
             Doing::Sum(request, asked) => match request.file().filter(|file| store.size(*file).is_some()) {
@@ -191,7 +191,7 @@ impl Ftp {
                 None => {
                     let request = *request;
                     self.doing = Doing::Nothing;
-                    self.nak(&request, No::NotFound);
+                    self.nak(&request, NakError::NotFound);
                 }
             },
             Doing::Open(request) => {
@@ -221,9 +221,9 @@ impl Ftp {
     fn end_upload(&mut self, request: &Request, result: Result<(), UploadError>) {
         self.doing = Doing::Nothing;
         if let Some(session) = self.session.take() {
-            self.text = Some(told(session.file, result));
+            self.text = Some(upload_text(session.file, result));
         }
-        self.finish(request, result.map_err(No::from));
+        self.finish(request, result.map_err(NakError::from));
     }
 
     fn begin(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
@@ -269,7 +269,7 @@ impl Ftp {
             }
             op::LIST => self.list(request, store),
             op::OPEN_READ => match request.file().and_then(|file| Some((file, store.size(file)?))) {
-                None => self.nak(request, No::NotFound),
+                None => self.nak(request, NakError::NotFound),
                 Some((file, size)) => {
                     if self.take_session(request, file, false, store) {
                         self.memory.note(request, Ok(()), self.now);
@@ -278,12 +278,12 @@ impl Ftp {
                 }
             },
             op::READ | op::BURST_READ => match self.session_of(request) {
-                Ok(Session { writes: true, .. }) => self.nak(request, No::InvalidSession),
+                Ok(Session { writes: true, .. }) => self.nak(request, NakError::InvalidSession),
                 Ok(_) => {
                     self.stream = (request.opcode == op::BURST_READ).then(|| Stream::new(request));
                     self.doing = Doing::Read(*request, false);
                 }
-                Err(no) => self.nak(request, no),
+                Err(error) => self.nak(request, error),
             },
             op::CREATE | op::OPEN_WRITE => self.open(request, store, erasing),
             op::WRITE => self.write(request, store),
@@ -293,22 +293,22 @@ impl Ftp {
                     self.text = Some(REMOVED);
                     self.finish(request, Ok(()));
                 }
-                None => self.nak(request, No::NotFound),
+                None => self.nak(request, NakError::NotFound),
             },
             op::CRC32 => self.doing = Doing::Sum(*request, false),
             op::TRUNCATE | op::RENAME if request.file().is_none_or(|file| store.size(file).is_none()) => {
-                self.nak(request, No::NotFound);
+                self.nak(request, NakError::NotFound);
             }
             op::MAKE_DIRECTORY | op::REMOVE_DIRECTORY | op::TRUNCATE | op::RENAME => {
-                self.nak(request, No::Protected);
+                self.nak(request, NakError::Protected);
             }
-            _ => self.nak(request, No::Unknown),
+            _ => self.nak(request, NakError::Unknown),
         }
     }
 
     fn list(&mut self, request: &Request, store: &Store) {
         if !request.path().is_empty() {
-            return self.nak(request, No::NotFound);
+            return self.nak(request, NakError::NotFound);
         }
         let mut entries = heapless::Vec::<u8, DATA>::new();
         let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.size(*file)?)));
@@ -322,14 +322,14 @@ impl Ftp {
             let _ = entries.push(0);
         }
         if entries.is_empty() {
-            self.nak(request, No::EndOfFile);
+            self.nak(request, NakError::EndOfFile);
         } else {
             self.ack(request, &entries);
         }
     }
 
     fn open(&mut self, request: &Request, store: &mut Store, erasing: Erasing) {
-        let Some(file) = request.file() else { return self.nak(request, No::Protected) };
+        let Some(file) = request.file() else { return self.nak(request, NakError::Protected) };
         let same = |session: &&mut Session| {
             (session.client, session.id, session.file) == (request.client, request.session, file)
                 && session.fresh
@@ -345,7 +345,7 @@ impl Ftp {
             Ok(()) => self.doing = Doing::Open(*request),
             Err(why) => {
                 self.session = None;
-                self.text = Some(told(file, Err(why)));
+                self.text = Some(upload_text(file, Err(why)));
                 self.nak(request, why.into());
             }
         }
@@ -354,11 +354,11 @@ impl Ftp {
     fn write(&mut self, request: &Request, store: &mut Store) {
         match self.session_of(request) {
             Ok(Session { writes: true, .. }) => {}
-            Ok(_) => return self.nak(request, No::Protected),
+            Ok(_) => return self.nak(request, NakError::Protected),
             Err(no) => return self.nak(request, no),
         }
         if usize::from(request.size) > DATA || request.size == 0 {
-            return self.nak(request, No::InvalidSize);
+            return self.nak(request, NakError::InvalidSize);
         }
         if let Some(UploadState::Ended(Err(why))) = store.upload() {
             return self.nak(request, why.into());
@@ -368,7 +368,7 @@ impl Ftp {
                 self.session = self.session.map(|session| Session { fresh: false, ..session });
                 self.ack(request, &[]);
             }
-            Taken::TooLarge => self.nak(request, No::Errno(EFBIG)),
+            Taken::TooLarge => self.nak(request, NakError::Errno(EFBIG)),
             Taken::Later => {}
         }
     }
@@ -382,17 +382,17 @@ impl Ftp {
     }
 
     /// The session a request belongs to; a request from before it was opened belongs to none.
-    fn session_of(&mut self, request: &Request) -> Result<Session, No> {
+    fn session_of(&mut self, request: &Request) -> Result<Session, NakError> {
         let now = self.now;
         match &mut self.session {
             Some(session) if session.client == request.client && session.id == request.session => {
                 if (request.sequence.wrapping_sub(session.opened_by.sequence) as i16) < 0 {
-                    return Err(No::InvalidSession);
+                    return Err(NakError::InvalidSession);
                 }
                 session.used = now;
                 Ok(*session)
             }
-            _ => Err(No::InvalidSession),
+            _ => Err(NakError::InvalidSession),
         }
     }
 
@@ -404,7 +404,7 @@ impl Ftp {
     fn take_session(&mut self, request: &Request, file: File, writes: bool, store: &mut Store) -> bool {
         let held = |session: &Session| session.client != request.client && !self.is_idle(session);
         if self.session.as_ref().is_some_and(held) {
-            self.nak(request, No::Sessions);
+            self.nak(request, NakError::Sessions);
             return false;
         }
         self.drop_session(store);
@@ -429,15 +429,15 @@ impl Ftp {
     }
 
     /// Answers, and remembers the answer.
-    fn finish(&mut self, request: &Request, result: Result<(), No>) {
+    fn finish(&mut self, request: &Request, result: Result<(), NakError>) {
         self.memory.note(request, result, self.now);
         self.respond(request, result);
     }
 
-    fn respond(&mut self, request: &Request, result: Result<(), No>) {
+    fn respond(&mut self, request: &Request, result: Result<(), NakError>) {
         match result {
             Ok(()) => self.ack(request, &[]),
-            Err(no) => self.nak(request, no),
+            Err(error) => self.nak(request, error),
         }
     }
 
@@ -445,16 +445,16 @@ impl Ftp {
         self.put(request, ACK, 0, data);
     }
 
-    fn nak(&mut self, request: &Request, no: No) {
-        let code = match no {
-            No::Errno(errno) => return self.put(request, NAK, 0, &[2, errno]),
-            No::InvalidSize => 3,
-            No::InvalidSession => 4,
-            No::Sessions => 5,
-            No::EndOfFile => 6,
-            No::Unknown => 7,
-            No::Protected => 9,
-            No::NotFound => 10,
+    fn nak(&mut self, request: &Request, error: NakError) {
+        let code = match error {
+            NakError::Errno(errno) => return self.put(request, NAK, 0, &[2, errno]),
+            NakError::InvalidSize => 3,
+            NakError::InvalidSession => 4,
+            NakError::Sessions => 5,
+            NakError::EndOfFile => 6,
+            NakError::Unknown => 7,
+            NakError::Protected => 9,
+            NakError::NotFound => 10,
         };
         self.put(request, NAK, 0, &[code]);
     }

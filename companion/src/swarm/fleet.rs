@@ -142,7 +142,7 @@ impl<const V: usize> Fleet<V> {
         self.lease_at = now;
     }
 
-    /// Comes back as a vehicle that nothing is known of.
+    /// Forgets the fleet's state and takes part again under this incarnation number.
     fn renew(&mut self, incarnation: u8) {
         *self = Self { lease_at: self.lease_at, ..Self::new(self.own, self.members.len(), self.limits) };
         self.members[self.own].entry.incarnation = incarnation;
@@ -228,7 +228,7 @@ impl<const V: usize> Fleet<V> {
             self.lots.clear();
             return;
         }
-        // Who had no part in the division before has none in this one.
+        // A vehicle without a part in the division before has none in this one.
         let lot = |m: &Member| if m.in_roster { Lot::of(&m.entry) } else { Lot::default() };
         if !self.members.iter().map(lot).eq(self.lots.iter().copied()) {
             self.withdraw();
@@ -450,7 +450,7 @@ impl<const V: usize> Fleet<V> {
         self.divisions.len()
     }
 
-    /// The hash of the last of them.
+    /// The hash of the last division that counts.
     pub fn counted(&self) -> u32 {
         self.counted
     }

@@ -84,7 +84,7 @@ fn end(text: &str) -> ! {
     chosen::reset()
 }
 
-/// Keeps where it was and restarts. What runs above it does not go on in a program that is wrong.
+/// Records where the panic was, and restarts the board: no task or interrupt of higher priority runs on after a panic.
 pub fn panicked(info: &PanicInfo<'_>) -> ! {
     cortex_m::interrupt::disable();
     let mut text = String::<200>::new();

@@ -62,7 +62,7 @@ const ZONES: [[[f32; 2]; 4]; 2] = [
     [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
 ];
 
-/// Makes all of them; the sum of the answers.
+/// Counts all coverage plans and divisions; returns a checksum of the results.
 #[inline(never)]
 pub fn run(meter: &mut impl Meter, lent: &mut scratch::Scratch, out: &mut Flights) -> u32 {
     whole(meter, lent.area(), out) ^ parts(meter, lent.coverage(), out)

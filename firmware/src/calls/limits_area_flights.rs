@@ -161,7 +161,7 @@ fn plans(
     fields(&mut plan, good, routes);
 }
 
-/// Routes that are not of these lanes, or of these vehicles.
+/// Plans routes whose lanes or vehicles are not those of the request: each must be refused.
 fn wrong_routes(
     plan: &mut impl FnMut(&Work<'_, LANES, CORNERS>, &Plan<VEHICLES>, &Swarm<'_>) -> Result<(), PlanError>,
     good: &Work<'_, LANES, CORNERS>,

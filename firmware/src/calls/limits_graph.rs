@@ -32,7 +32,7 @@ pub(super) const PLACES: [Point; 6] = [
     Point::new(6.0, 5.0, 2.0),
 ];
 
-/// Over the ground at 0 m; below the last node there is none.
+/// Height of each node over the ground, metres; the last has no ground below it.
 const HEIGHTS_M: [f32; 6] = [2.0, 2.0, 2.0, 2.0, 2.0, f32::INFINITY];
 
 fn edges() -> Vec<Edge, 9> {

@@ -22,7 +22,7 @@ pub enum Overlap {
     NothingLeft(usize),
 }
 
-/// What is wrong with rings that do not cross.
+/// Rings that overlap although no edges cross, or holes outside every outer ring.
 pub fn find(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
     let (outers, holes) = (wide(outers), wide(holes));
     if let Some((i, j)) = sharing(&outers) {

@@ -57,10 +57,10 @@ impl Emulated {
         self.finish_within(patience)
     }
 
-    /// Puts what a bank of flash holds into the board's.
+    /// Writes `bank` into the board's flash.
     ///
     /// # Errors
-    /// The board is gone, or the bank is none of its flash.
+    /// The board is gone, or its flash has no such bank.
     pub fn load(&mut self, bank: &[u8]) -> anyhow::Result<()> {
         ensure!(bank.len() == LAYOUT.len() as usize, "a bank has {} bytes", LAYOUT.len());
         let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };

@@ -12,7 +12,7 @@ use clap::Args;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
-use sim_autopilot::{Autopilot, Config, Personality};
+use sim_autopilot::{Autopilot, AutopilotKind, Config};
 
 use crate::link::{Link, LinkUrl};
 use crate::progress::printed;
@@ -32,7 +32,7 @@ pub struct AutopilotArgs {
     pub listen: Vec<LinkUrl>,
     /// Which autopilot to be
     #[arg(long, value_name = "NAME", default_value = "px4", value_parser = personality())]
-    pub personality: Personality,
+    pub personality: AutopilotKind,
     /// MAVLink system id
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
     pub sysid: u8,
@@ -52,9 +52,9 @@ pub struct AutopilotArgs {
     pub origin: Option<Place>,
 }
 
-fn personality() -> impl TypedValueParser<Value = Personality> {
+fn personality() -> impl TypedValueParser<Value = AutopilotKind> {
     let names = PossibleValuesParser::new(["px4", "ardupilot"]);
-    names.map(|name| if name == "px4" { Personality::Px4 } else { Personality::Ardupilot })
+    names.map(|name| if name == "px4" { AutopilotKind::Px4 } else { AutopilotKind::Ardupilot })
 }
 
 fn seconds(text: &str) -> Result<f32, String> {

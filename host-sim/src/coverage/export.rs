@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::flight::{Act, Stop, heading_deg};
 use super::sorties::Sortie;
 use super::{Flight, Planned};
-use crate::scenario::Personality;
+use crate::scenario::AutopilotKind;
 use crate::scenario::coverage::{Heading, Trigger};
 
 const NAV_WAYPOINT: u16 = 16;
@@ -169,8 +169,8 @@ pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
         value
     };
     let firmware = match vehicle.personality {
-        Personality::Px4 => 12,
-        Personality::Ardupilot => 3,
+        AutopilotKind::Px4 => 12,
+        AutopilotKind::Ardupilot => 3,
     };
     let speed = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     json!({

@@ -52,7 +52,7 @@ impl<'a> Planned<'a> {
         Self::searched(scenario, method, LOOKS)
     }
 
-    /// The same as companions plan it, who look for a shorter order of the lanes no longer than a board can.
+    /// The same as companions plan it: they compare no more orders of the lanes than a board can.
     ///
     /// # Errors
     /// As [`Self::new`].

@@ -5,7 +5,7 @@
 //! | `tcp:HOST:PORT` | a TCP client |
 //! | `tcp-listen:HOST:PORT` | a TCP server of one client at a time; a new client replaces the old |
 //! | `udp:HOST:PORT` | sends to that peer and hears it, as PX4's SITL does |
-//! | `udp-listen:HOST:PORT` | hears everybody and sends to all who spoke in the last minute |
+//! | `udp-listen:HOST:PORT` | receives from all peers and sends to those heard in the last minute |
 //! | `serial:PATH:BAUD` | a serial port, for itself alone |
 //!
 //! A TCP client and a serial port that are lost are opened again, tried once a second.

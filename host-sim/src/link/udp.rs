@@ -60,7 +60,7 @@ impl Link for Peer {
     }
 }
 
-/// A bound socket and everybody who spoke to it.
+/// A bound socket and the peers that sent to it.
 pub struct Hub {
     socket: UdpSocket,
     clients: Vec<(SocketAddr, Instant)>,

@@ -47,7 +47,7 @@ pub struct ReportData {
 /// A closed border on the ground.
 #[derive(Clone, Debug, Serialize)]
 pub struct Outline {
-    /// What it encloses.
+    /// Area, hole or no-fly zone.
     pub kind: OutlineKind,
     /// Its corners, metres.
     #[serde(serialize_with = "pack::points")]

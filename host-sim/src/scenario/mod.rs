@@ -20,7 +20,7 @@ use crate::quote::quoted_path;
 pub use error::{Place, ScenarioError};
 pub use planner_core::deconflict::Method;
 pub use planner_core::prm::Sampling;
-pub use sim_autopilot::{Estimator, Personality};
+pub use sim_autopilot::{AutopilotKind, Estimator};
 pub use types::{
     Companion, Deconfliction, FAULT_KINDS, FAULT_OBSTACLE, Fault, Geofence, Map, Mission, Mode, Objective,
     Roadmap, Scenario, Simulation, Terminals, Unbuilt, Vehicle,

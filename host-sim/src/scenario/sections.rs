@@ -13,7 +13,7 @@ use planner_core::Point;
 use planner_core::frames::{Geodetic, geodetic_to_enu};
 use planner_core::prm::Sampling;
 use planner_core::roadmap::{MAX_COORDINATE_M, MAX_EDGE_M};
-use sim_autopilot::Personality;
+use sim_autopilot::AutopilotKind;
 use toml::de::DeTable;
 
 use self::checks::{VehicleSpans, check_apart, check_goals, check_goals_apart, check_inside, check_margins};
@@ -448,8 +448,8 @@ fn vehicle(
     let goal = table.get("goal");
     let personality = table.word(
         "personality",
-        Personality::Px4,
-        &[("px4", Personality::Px4), ("ardupilot", Personality::Ardupilot)],
+        AutopilotKind::Px4,
+        &[("px4", AutopilotKind::Px4), ("ardupilot", AutopilotKind::Ardupilot)],
     )?;
     let companion = match table.get("companion") {
         None => Companion::InProcess { flash: None },

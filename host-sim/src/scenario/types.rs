@@ -7,7 +7,7 @@ use planner_core::Point;
 use planner_core::deconflict::Method;
 use planner_core::frames::Geodetic;
 use planner_core::prm::Sampling;
-use sim_autopilot::{Estimator, Personality};
+use sim_autopilot::{AutopilotKind, Estimator};
 
 use super::coverage::Area;
 use super::error::ScenarioError;
@@ -179,7 +179,7 @@ pub struct Vehicle {
     /// What it can carry.
     pub payload_kg: Option<f32>,
     /// What autopilot it has.
-    pub personality: Personality,
+    pub personality: AutopilotKind,
     /// Its home, if not its start.
     pub home: Option<Geodetic>,
     /// Its EKF origin, if not its home.

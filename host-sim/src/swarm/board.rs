@@ -194,7 +194,7 @@ impl Board {
             return;
         }
         match frame.message_id {
-            HEARTBEAT_DATA::ID => self.state = told_state(frame).unwrap_or(self.state),
+            HEARTBEAT_DATA::ID => self.state = reported_state(frame).unwrap_or(self.state),
             TUNNEL_DATA::ID => {
                 let intent = Intent::decode(frame.padded(), frame.system);
                 self.progress_m = intent.map(|intent| intent.progress_m).or(self.progress_m);
@@ -239,7 +239,7 @@ impl LockStep {
 }
 
 /// The state that a companion's HEARTBEAT reports.
-pub fn told_state(frame: &Frame) -> Option<State> {
+pub fn reported_state(frame: &Frame) -> Option<State> {
     let reported = frame.decode::<HEARTBEAT_DATA>()?.custom_mode;
     State::ALL.iter().copied().find(|state| *state as u32 == reported)
 }

@@ -15,21 +15,21 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 /// A division that counts, as one vehicle flies it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Division {
-    /// When the vehicle first told that it flies it, seconds.
+    /// When the vehicle first reported that it flies it, seconds.
     pub t_s: f32,
     /// Its MAVLink system id.
     pub vehicle: u8,
     /// Divisions that count, this one among them.
     pub number: u8,
-    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody told them.
+    /// The lots that this one follows from, by the rank of the vehicles' ids; empty where nobody reported them.
     pub lots: Vec<Lot>,
     /// The CRC of the plan that the vehicle flies.
     pub plan_crc: u32,
 }
 
-/// What one vehicle told last.
+/// What one vehicle reported last.
 #[derive(Clone, Copy, Debug, Default)]
-struct Told {
+struct Reported {
     plan_crc: u32,
     number: u8,
     counted: u32,
@@ -41,10 +41,10 @@ struct Told {
 /// What was heard.
 #[derive(Debug, Default)]
 pub struct Divisions {
-    vehicles: HashMap<u8, Told>,
+    vehicles: HashMap<u8, Reported>,
     /// By the hash under which they were reported.
     lots: HashMap<u32, Vec<Lot>>,
-    told: Vec<Division>,
+    reported: Vec<Division>,
 }
 
 impl Divisions {
@@ -63,10 +63,10 @@ impl Divisions {
     }
 
     fn take_roster(&mut self, t_s: f32, roster: &Roster) {
-        let told = self.vehicles.entry(roster.system_id).or_default();
-        (told.number, told.counted) = (roster.divisions, roster.counted);
-        if told.number == told.flies {
-            told.flown_crc = told.plan_crc;
+        let reported = self.vehicles.entry(roster.system_id).or_default();
+        (reported.number, reported.counted) = (roster.divisions, roster.counted);
+        if reported.number == reported.flies {
+            reported.flown_crc = reported.plan_crc;
         }
         self.note(t_s, roster.system_id);
         if roster.hash == 0 {
@@ -91,17 +91,17 @@ impl Divisions {
 
     /// A division that counts is flown once the plan is another one.
     fn note(&mut self, t_s: f32, vehicle: u8) {
-        let told = self.vehicles.entry(vehicle).or_default();
-        if told.number > told.flies && told.plan_crc != told.flown_crc {
-            (told.flies, told.flown_crc) = (told.number, told.plan_crc);
-            let Told { number, counted, plan_crc, .. } = *told;
+        let reported = self.vehicles.entry(vehicle).or_default();
+        if reported.number > reported.flies && reported.plan_crc != reported.flown_crc {
+            (reported.flies, reported.flown_crc) = (reported.number, reported.plan_crc);
+            let Reported { number, counted, plan_crc, .. } = *reported;
             let lots = self.lots.get(&counted).cloned().unwrap_or_default();
-            self.told.push(Division { t_s, vehicle, number, lots, plan_crc });
+            self.reported.push(Division { t_s, vehicle, number, lots, plan_crc });
         }
     }
 
     /// The divisions that were flown, in order of time.
-    pub fn told(self) -> Vec<Division> {
-        self.told
+    pub fn into_divisions(self) -> Vec<Division> {
+        self.reported
     }
 }

@@ -7,8 +7,8 @@ use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
 
 use super::board::{Board, Lines};
-use super::monitor::{Observation, Phase};
 use super::radio::Radio;
+use super::referee::{Observation, Phase};
 use super::serial::{SerialConfig, SerialLink};
 use super::step::{STEP_S, STEP_US};
 use crate::boards::STACK_LEN;
@@ -297,7 +297,7 @@ impl Member {
             match happened {
                 Event::PlanRequested(wanted) => self.wants_plan = Some(wanted),
                 Event::RestartRequested => restarts = true,
-                // Its text says so.
+                // The companion also sends it as STATUSTEXT.
                 Event::WaitsForStart { .. } => {}
                 Event::StateChanged { from, to, text, warning } => {
                     self.note(from, to, text, warning);

@@ -2,7 +2,7 @@
 //!
 //! Fixed steps of 4 ms, one thread, every random number from the scenario's seed: the same scenario gives the same flight,
 //! bit for bit, in debug and release. Every byte between a companion and its autopilot passes a [`serial::SerialLink`],
-//! every byte between companions a [`radio::Radio`]; the [`monitor::Monitor`] sees the truth and gives it to nobody.
+//! every byte between companions a [`radio::Radio`]; the [`referee::Referee`] sees the truth and gives it to nobody.
 
 pub mod board;
 pub mod divisions;
@@ -10,8 +10,8 @@ pub mod faults;
 pub mod gateway;
 pub mod ground_station;
 pub mod member;
-pub mod monitor;
 pub mod radio;
+pub mod referee;
 pub mod serial;
 pub mod step;
 pub mod vehicles;
@@ -29,8 +29,8 @@ use self::faults::{Script, World};
 use self::gateway::Gateway;
 use self::ground_station::GroundStation;
 use self::member::{Member, Planner, is_finished};
-use self::monitor::{Monitor, Sample};
 use self::radio::{Radio, RadioConfig};
+use self::referee::{Referee, Sample};
 use self::step::STEP_US;
 use self::vehicles::members;
 use crate::coverage::check::Picture;
@@ -108,7 +108,7 @@ struct Run<'a> {
     plan: &'a SwarmPlan,
     members: Vec<Member>,
     radio: Radio,
-    monitor: Monitor<'a>,
+    referee: Referee<'a>,
     ground_station: GroundStation,
     gateway: Option<Gateway>,
     divisions: Divisions,
@@ -160,14 +160,14 @@ fn simulate(
     run.members.iter_mut().try_for_each(Member::say_stack)?;
     let result = run.result(command);
     run.log_losses(&result);
-    let tracks = (0..run.members.len()).map(|i| run.monitor.track(i).to_vec()).collect();
+    let tracks = (0..run.members.len()).map(|i| run.referee.track(i).to_vec()).collect();
     let pictures = run.members.iter_mut().flat_map(Member::take_pictures).collect();
-    let Run { monitor, log, done, divisions, t_s, .. } = run;
-    let divisions = divisions.told();
+    let Run { referee, log, done, divisions, t_s, .. } = run;
+    let divisions = divisions.into_divisions();
     Ok(Flight {
         result,
         tracks,
-        samples: monitor.samples,
+        samples: referee.samples,
         pictures,
         log,
         done,
@@ -199,16 +199,16 @@ impl<'a> Run<'a> {
         }
         let vehicles: Vec<(u8, f32)> = scenario.vehicles.iter().map(|v| (v.id, v.radius_m)).collect();
         let safety_distance_m = scenario.deconfliction.safety_distance_m;
-        let mut monitor =
-            Monitor::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &vehicles);
-        monitor.terrain = scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
+        let mut referee =
+            Referee::new(mission.map.grid(), mission.clearance_field(), safety_distance_m, &vehicles);
+        referee.terrain = scenario.area.as_ref().and_then(|area| area.terrain.as_ref()).map(|t| &*t.grid);
         // Lanes of two vehicles may lie side by side: one waits for as long as the other is on them.
-        monitor.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
+        referee.waits_end = !scenario.faults.is_empty() || scenario.area.is_some();
         Ok(Self {
             mission,
             plan,
             radio,
-            monitor,
+            referee,
             ground_station: GroundStation::new(scenario.mission.ground_stations[0]),
             gateway,
             divisions: Divisions::default(),
@@ -231,7 +231,7 @@ impl<'a> Run<'a> {
             members,
             radio,
             ground_station: &mut self.ground_station,
-            obstacles: &mut self.monitor.obstacles,
+            obstacles: &mut self.referee.obstacles,
         };
         self.script.step(now_us, &mut world, log)?;
         for (i, member) in members.iter_mut().enumerate() {
@@ -266,7 +266,7 @@ impl<'a> Run<'a> {
             gateway.step(now_us, members, radio, places, &overheard).context("link lost: --qgc")?;
         }
         let seen: Vec<_> = members.iter().map(Member::observation).collect();
-        self.monitor.observe(self.t_s, &seen);
+        self.referee.observe(self.t_s, &seen);
         Ok(())
     }
 
@@ -289,12 +289,12 @@ impl<'a> Run<'a> {
     }
 
     fn result(&self, command: &'static str) -> MissionResult {
-        let Self { mission, plan, members, monitor, .. } = self;
+        let Self { mission, plan, members, referee, .. } = self;
         let scenario = &mission.scenario;
         let vehicles: Vec<_> = (0..members.len()).map(|i| self.vehicle_result(i)).collect();
         let served = vehicles.iter().filter(|v| v.goal.is_some()).count();
         let all_served = served == mission.goals.len().min(members.len());
-        let clean = monitor.wall_contacts == 0 && monitor.violations == 0 && monitor.deadlocks == 0;
+        let clean = referee.wall_contacts == 0 && referee.violations == 0 && referee.deadlocks == 0;
         let finite = |m: f32| m.is_finite().then(|| rounded(m));
         let last_landing_s = members.iter().filter_map(|m| m.landed_s).fold(0.0, f64::max);
         MissionResult {
@@ -310,12 +310,12 @@ impl<'a> Run<'a> {
                 makespan_s: (last_landing_s - self.ground_station.started_s()).max(0.0),
             },
             safety: Safety {
-                wall_contacts: monitor.wall_contacts,
-                min_clearance_m: finite(monitor.min_clearance_m),
-                min_separation_m: finite(monitor.min_separation_m),
+                wall_contacts: referee.wall_contacts,
+                min_clearance_m: finite(referee.min_clearance_m),
+                min_separation_m: finite(referee.min_separation_m),
                 safety_distance_m: rounded(scenario.deconfliction.safety_distance_m),
-                violations: monitor.violations,
-                deadlocks: monitor.deadlocks,
+                violations: referee.violations,
+                deadlocks: referee.deadlocks,
             },
             roadmap: mission.roadmap_size(),
             left: Left { reasons: shortage::lines(mission, plan), ..mission.left(plan) },
@@ -328,7 +328,7 @@ impl<'a> Run<'a> {
         // As far as the estimate is wrong, the vehicle cannot know.
         let error_m = margins::estimate_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
         let nearest_goal_m = self.nearest_goal_m[i] - error_m;
-        let flown_m = self.monitor.flown_m(i);
+        let flown_m = self.referee.flown_m(i);
         vehicle_result(&self.members[i], &self.plan.flights[i], flown_m, nearest_goal_m, self.t_s)
     }
 
@@ -356,7 +356,7 @@ impl<'a> Run<'a> {
                 self.log.push(report::Event { t_s, vehicle: Some(vehicle.id), level, text });
             }
         }
-        self.log.extend(self.monitor.incidents.iter().map(|(t_s, i, text)| report::Event {
+        self.log.extend(self.referee.incidents.iter().map(|(t_s, i, text)| report::Event {
             t_s: *t_s as f32,
             vehicle: Some(scenario.vehicles[*i].id),
             level: Level::Error,

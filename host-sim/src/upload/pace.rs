@@ -55,8 +55,8 @@ impl Pace {
         over
     }
 
-    /// A piece that was sent once is answered.
-    pub fn answered_after(&mut self, time: Duration) {
+    /// Takes the round trip time of a packet that was sent only once.
+    pub fn note_round_trip(&mut self, time: Duration) {
         let time_s = time.as_secs_f32();
         let (smoothed_s, deviation_s) = match self.round_trip {
             None => (time_s, 0.5 * time_s),
@@ -113,7 +113,7 @@ mod tests {
                 let (_, sent_at, repeated) = under_way.remove(at);
                 answered += 1;
                 if !repeated {
-                    pace.answered_after(began + Duration::from_millis(ms) - sent_at);
+                    pace.note_round_trip(began + Duration::from_millis(ms) - sent_at);
                 }
             }
         }
@@ -152,7 +152,7 @@ mod tests {
             })
             .collect();
         assert_eq!(waits, [401, 801, 1601, 2001]);
-        pace.answered_after(Duration::from_millis(20));
+        pace.note_round_trip(Duration::from_millis(20));
         assert!(pace.is_over(sent_at, sent_at + Duration::from_millis(401)));
     }
 }

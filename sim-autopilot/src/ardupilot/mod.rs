@@ -36,7 +36,7 @@ use super::port::Sender;
 use super::status::Status;
 use super::vehicle::VehicleLimits;
 use super::wire::Fields;
-use crate::Personality;
+use crate::AutopilotKind;
 
 /// From arming until it lifts, where NAV_TAKEOFF comes at once: `MOT` arming delay 2 s, spool-up 0.5 s, and the throttle's
 /// slew to hover.
@@ -210,7 +210,7 @@ impl Copter {
         let known = self.position_known(now_us);
         let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
         Status {
-            personality: Personality::Ardupilot,
+            personality: AutopilotKind::Ardupilot,
             custom_mode: self.mode.number(),
             intended_mode: self.mode.number(),
             // Custom, stabilised, manual input; with the guided flag in every mode that has a position.

@@ -3,7 +3,7 @@
 use super::params::{self, Tuning};
 use super::setpoint;
 use super::{Commander, Mode};
-use crate::Personality;
+use crate::AutopilotKind;
 use crate::body::{Body, Order, Sense};
 use crate::command::{DO_SET_MODE, accept};
 use crate::itinerary::Leg;
@@ -31,7 +31,7 @@ pub struct Px4 {
     pub params: Params,
     /// Those of them that act.
     pub tuning: Tuning,
-    /// DO_SET_MODE understood and not yet decided: who asked, for which mode if it is one.
+    /// A pending DO_SET_MODE: sender, and the requested mode if it is valid.
     pub(super) asked: Option<(Sender, Option<Mode>)>,
 }
 
@@ -96,7 +96,7 @@ impl Px4 {
     pub fn status(&self, body: &Body, sense: &Sense) -> Status {
         let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
         Status {
-            personality: Personality::Px4,
+            personality: AutopilotKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
             intended_mode: self.commander.intention().custom_mode(),
             flags,

@@ -11,7 +11,7 @@ pub enum Mode {
     Position,
     /// AUTO.MISSION.
     Mission,
-    /// AUTO.LOITER.
+    /// AUTO.LOITER, "Hold" in QGroundControl.
     Hold,
     /// AUTO.RTL.
     Return,

@@ -13,7 +13,7 @@ const BRAKE: f32 = 17.0;
 const READY_S: f32 = 8.0;
 
 fn config() -> Config {
-    Config { personality: Personality::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
+    Config { personality: AutopilotKind::Ardupilot, estimator_ready_s: READY_S, ..Config::default() }
 }
 
 impl Bench {

@@ -28,7 +28,7 @@ impl Bench {
     fn upload(&mut self, plan: Plan<'_>) {
         let personality = self.autopilot.body.config.personality;
         let home = (16, 0, [0.0; 4], [0.0; 2], 488.0);
-        let home: Plan<'_> = if personality == Personality::Ardupilot { &[home] } else { &[] };
+        let home: Plan<'_> = if personality == AutopilotKind::Ardupilot { &[home] } else { &[] };
         let items: Vec<_> = home.iter().chain(plan).collect();
         let [low, high] = (items.len() as u16).to_le_bytes();
         self.send(44, &[low, high, 1, 1, 0]);
@@ -54,10 +54,10 @@ impl Bench {
     }
 
     /// Ready to fly a mission that is uploaded: armed where that is another command.
-    fn with_mission(personality: Personality, plan: Plan<'_>) -> Self {
+    fn with_mission(personality: AutopilotKind, plan: Plan<'_>) -> Self {
         let mut bench = match personality {
-            Personality::Px4 => Self::new(),
-            Personality::Ardupilot => Self::armed(),
+            AutopilotKind::Px4 => Self::new(),
+            AutopilotKind::Ardupilot => Self::armed(),
         };
         bench.upload(plan);
         bench
@@ -72,7 +72,7 @@ impl Bench {
     }
 }
 
-const BOTH: [Personality; 2] = [Personality::Px4, Personality::Ardupilot];
+const BOTH: [AutopilotKind; 2] = [AutopilotKind::Px4, AutopilotKind::Ardupilot];
 
 #[test]
 fn a_survey_is_flown_photographed_and_ends_at_home() {
@@ -80,7 +80,7 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
         let mut bench = Bench::with_mission(personality, SURVEY);
         assert_eq!(bench.start(), [0], "{personality:?}");
         let mode = bench.autopilot.custom_mode();
-        assert_eq!(mode, if personality == Personality::Px4 { 0x0404_0000 } else { 3 });
+        assert_eq!(mode, if personality == AutopilotKind::Px4 { 0x0404_0000 } else { 3 });
         bench.until(10.0, |a| !a.truth().landed);
         bench.until(120.0, |a| !a.truth().armed);
         let at = bench.autopilot.truth().position;
@@ -96,18 +96,18 @@ fn a_survey_is_flown_photographed_and_ends_at_home() {
             assert!((-2.1..2.3).contains(&along), "{personality:?}: {along}");
         }
         assert!((last.position - Point::new(43.0, 30.0, 10.3)).norm() < 2.2, "{personality:?} {last:?}");
-        if personality == Personality::Px4 {
+        if personality == AutopilotKind::Px4 {
             assert!(
                 photos.iter().all(|p| (p.heading_rad - 1.57).abs() < 0.22),
                 "PX4 looks as asked: {photos:?}"
             );
         }
-        let home = u16::from(personality == Personality::Ardupilot);
+        let home = u16::from(personality == AutopilotKind::Ardupilot);
         let all: Vec<u16> = (0..SURVEY.len() as u16).map(|k| k + home).collect();
         assert_eq!(bench.reached(), all, "{personality:?}");
         // The next flight begins with the first item.
         bench.autopilot.take_photos();
-        if personality == Personality::Ardupilot {
+        if personality == AutopilotKind::Ardupilot {
             assert_eq!((bench.mode(4.0), bench.arm()), (vec![0], vec![0]));
         }
         assert_eq!(bench.start(), [0]);
@@ -155,7 +155,7 @@ fn a_mission_that_is_left_goes_on_with_the_item_it_was_at() {
         bench.until(90.0, |a| a.truth().position.x > 15.0);
         let before = bench.reached();
         bench.autopilot.pilot_takes_over();
-        if personality == Personality::Px4 {
+        if personality == AutopilotKind::Px4 {
             bench.set_mode(4.0, 3.0);
         }
         bench.run(10.0);

@@ -42,7 +42,7 @@ fn ned_is_about_its_own_ekf_origin() {
     let b = *bench.of(32).last().unwrap().1.padded();
     let said = |at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
     let truth = frames::enu_to_geodetic(&world, &bench.autopilot.truth().position);
-    let expected = frames::geodetic_to_ned(Personality::Px4.projection(), &ekf, &truth);
+    let expected = frames::geodetic_to_ned(AutopilotKind::Px4.projection(), &ekf, &truth);
     for (k, at) in [4, 8, 12].into_iter().enumerate() {
         assert!((said(at) - expected[k]).abs() < 0.01, "axis {k}: {} for {}", said(at), expected[k]);
     }

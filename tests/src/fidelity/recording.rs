@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 use planner_core::frames::Geodetic;
-use sim_autopilot::Personality;
+use sim_autopilot::AutopilotKind;
 
 /// One recorded row that says where something was or shall be.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -41,7 +41,7 @@ pub struct Recording {
     /// System id.
     pub vehicle: u8,
     /// What flew it.
-    pub autopilot: Personality,
+    pub autopilot: AutopilotKind,
     /// Its EKF origin.
     pub origin: Geodetic,
     /// What it believed.

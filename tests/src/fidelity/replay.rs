@@ -6,7 +6,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 use nalgebra::Vector3;
 use planner_core::Point;
-use sim_autopilot::{Autopilot, Config, Personality};
+use sim_autopilot::{Autopilot, AutopilotKind, Config};
 
 use super::recording::{Message, Recording, Sample, Setpoint};
 use super::{Correction, Estimator};
@@ -92,7 +92,7 @@ impl Recording {
         let mut autopilot = Autopilot::new(&config).expect("a recorded place is one");
         autopilot.land_on_stream_loss();
         let ground_m = config.start.z - config.vehicle.radius_m;
-        let clock = if self.autopilot == Personality::Px4 { PX4_CLOCK } else { 1.0 };
+        let clock = if self.autopilot == AutopilotKind::Px4 { PX4_CLOCK } else { 1.0 };
         let (mut setpoints, mut messages) =
             (self.setpoints.iter().peekable(), self.messages.iter().peekable());
         let (mut sequence, mut buffer) = (0_u8, [0; 512]);

@@ -5,7 +5,7 @@ use planner_core::flight::{Path, VehiclePlan};
 use planner_core::safety::{self, Bounds, OwnSet, REACTION_S, Set};
 
 use super::super::{Guidance, Phase, Scene};
-use super::{Found, STRANGER};
+use super::{Found, MAX_STOP_FOR_STRANGER};
 use crate::autopilot::telemetry::Telemetry;
 use crate::mission::State;
 use crate::swarm::neighbours::{Met, Neighbours, Reach};
@@ -126,7 +126,7 @@ impl Guidance {
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.heard.grounded || met.lost || (deaf && silent);
             let rests = lies && last_place && held >= LANDS_LATE;
-            let lands_late = lands && (rests || (met.stranger && held >= STRANGER));
+            let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
                 2.0 * self.track.radius_m + HULLS_M
             } else if (met.heard.grounded || met.stands) && by_gates {

@@ -8,7 +8,7 @@ use planner_core::safety::{OwnSet, REACTION_S, Set};
 use super::super::limits::bounds;
 use super::super::motion::within;
 use super::super::{Guidance, Scene};
-use super::{CLEAR, Filter, LOWER_M, RESUME_M, STRANGER, TURNS_M, TURNS_MPS, WAITS_M, Way};
+use super::{CLEAR, Filter, LOWER_M, MAX_STOP_FOR_STRANGER, RESUME_M, TURNS_M, TURNS_MPS, WAITS_M, Way};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
@@ -116,7 +116,7 @@ impl Guidance {
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
                 // Past a stranger it goes on in the same stop, slowly.
-                let clear_for = if self.filter.passes_stranger(now) { STRANGER } else { CLEAR };
+                let clear_for = if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { CLEAR };
                 if now - since >= clear_for {
                     self.filter.reset_stop();
                 }

@@ -3,7 +3,7 @@
 //! A repeated request is known for [`MEMORY`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
 //! what closing a session came to is answered for [`CLOSED_MEMORY`] under any number, until its client opens the next.
 
-use super::packet::{No, Print, Request, op, print};
+use super::packet::{NakError, Print, Request, op, print};
 use crate::time::{Duration, Instant};
 
 /// A repeated request is known as one for this long.
@@ -13,7 +13,7 @@ const CLOSED_MEMORY: Duration = Duration::from_secs(10);
 /// Requests remembered.
 const REQUESTS: usize = 8;
 
-type Outcome = Result<(), No>;
+type Outcome = Result<(), NakError>;
 
 /// The memory.
 #[derive(Clone, Debug, Default)]

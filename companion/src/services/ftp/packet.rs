@@ -36,7 +36,7 @@ pub mod op {
 
 /// Why not, as NAK says it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum No {
+pub enum NakError {
     /// With an `errno`.
     Errno(u8),
     InvalidSize,
@@ -51,7 +51,7 @@ pub enum No {
 pub const EIO: u8 = 5;
 pub const EFBIG: u8 = 27;
 
-impl From<UploadError> for No {
+impl From<UploadError> for NakError {
     fn from(why: UploadError) -> Self {
         match why {
             UploadError::Armed | UploadError::Waiting => Self::Protected,
@@ -80,7 +80,7 @@ pub const TEXTS: [Text; 9] = [
 pub const REMOVED: Text = TEXTS[2];
 
 /// What is said when an upload has ended.
-pub fn told(file: File, result: Result<(), UploadError>) -> Text {
+pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
     TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,
         (File::Field, Ok(())) => 8,

@@ -50,7 +50,7 @@ pub struct CoverageHeader {
     pub unit: Unit,
     /// Which vehicles it may go to.
     pub parts: Parts,
-    /// Where vehicles look.
+    /// Heading of the vehicles along their lanes.
     pub heading: Heading,
     /// What takes the pictures.
     pub trigger: Trigger,

@@ -6,7 +6,7 @@ use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
 use super::beside::{self, MARGIN_M};
 use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
-use crate::guidance::retreat;
+use crate::guidance::evade;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
@@ -44,7 +44,7 @@ impl Detours {
             _ => view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell),
         }
         if self.aside {
-            view.neighbours.landing_columns(view.now, apart_m + retreat::BESIDE_M, &mut tell);
+            view.neighbours.landing_columns(view.now, apart_m + evade::BESIDE_M, &mut tell);
         }
         if self.lands {
             view.neighbours.lands_on(apart_m + MARGIN_M, tell);

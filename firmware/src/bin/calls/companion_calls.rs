@@ -57,7 +57,7 @@ pub fn run(meter: &mut impl Meter) {
         .run();
 }
 
-/// Bytes that are a frame's beginning again and again, each with a wrong end; and noise.
+/// Bytes that look like the start of a frame again and again, each with a wrong checksum; and noise.
 fn bytes(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
     let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
@@ -295,7 +295,7 @@ impl<M: Meter> Ground<'_, M> {
         self.pump()
     }
 
-    /// Takes all that the companion has to say, and does what it asks of its flash; whether it granted an FTP request.
+    /// Drains the companion's frames and events, and executes its flash operations; whether an FTP request was acknowledged.
     fn pump(&mut self) -> bool {
         let Self { companion, flash, meter, now, .. } = self;
         let now = *now;

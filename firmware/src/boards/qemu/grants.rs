@@ -31,8 +31,8 @@ const TIMER: usize = 0x4000_2000;
 const LOAD: usize = 0;
 const CONTROL: usize = 8;
 const INTCLR: usize = 12;
-/// Enabled, periodic, with interrupt, 32 bits, once.
-const ONCE: u32 = 0b1110_0011;
+/// Timer control: enabled, periodic, interrupt, 32 bits, one shot.
+const ONE_SHOT: u32 = 0b1110_0011;
 
 /// What joins the board to the desk.
 struct Desk {
@@ -62,7 +62,7 @@ pub fn start(take: fn(u8, &[u8])) {
         desk.say(FromBoard::Started, &[]);
         desk.flush();
         desk.read();
-        Register::new(TIMER, CONTROL).write(ONCE);
+        Register::new(TIMER, CONTROL).write(ONE_SHOT);
         interrupts::enable(Irq::DualTimer, interrupts::GRANTS);
         critical_section::with(|cs| DESK.borrow_ref_mut(cs).insert(desk).go_on(cs));
     }

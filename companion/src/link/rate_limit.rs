@@ -28,20 +28,20 @@ pub const fn state_bps(swarm_hz: u8) -> u32 {
 
 /// The account. In millionths of a byte, so that no time is too short to count.
 #[derive(Clone, Debug)]
-pub(crate) struct Budget {
+pub(crate) struct RateLimit {
     left: i64,
     at: Instant,
 }
 
 const BYTE: i64 = 1_000_000;
 
-impl Default for Budget {
+impl Default for RateLimit {
     fn default() -> Self {
         Self { left: i64::from(SAVED) * BYTE, at: Instant::ZERO }
     }
 }
 
-impl Budget {
+impl RateLimit {
     /// Whether another frame may go out by now. It may be longer than what is left; then it is owed.
     pub fn allows(&mut self, now: Instant, armed: bool) -> bool {
         let rate = i64::from(if armed { AIR_BPS } else { GROUND_BPS });

@@ -1,4 +1,4 @@
-//! The radio gets what the budget says, whatever is asked.
+//! The radio gets what the rate limit says, whatever is asked.
 
 extern crate std;
 use std::vec::Vec;
@@ -148,15 +148,15 @@ fn state_is_as_long_as_said() {
 
 #[test]
 fn what_is_owed_is_paid_back_by_time() {
-    let mut budget = Budget::default();
+    let mut rate_limit = RateLimit::default();
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
-    while budget.allows(at(0), true) {
-        budget.spend(MAX_SENT);
+    while rate_limit.allows(at(0), true) {
+        rate_limit.spend(MAX_SENT);
         sent += MAX_SENT as u32;
     }
     assert!((SAVED..=SAVED + MAX_SENT as u32).contains(&sent));
-    assert!(!budget.allows(at(10), true));
-    assert!(budget.allows(at(1100), true));
-    assert!(budget.allows(at(u64::from(u32::MAX)), true), "and never overflows");
+    assert!(!rate_limit.allows(at(10), true));
+    assert!(rate_limit.allows(at(1100), true));
+    assert!(rate_limit.allows(at(u64::from(u32::MAX)), true), "and never overflows");
 }

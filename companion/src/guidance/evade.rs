@@ -32,13 +32,13 @@ const FAST_MPS: f32 = 1.5;
 /// Fastest through its ends, m/s: a right angle is strayed from by 0.47 m then.
 const CORNER_MPS: f32 = 0.6;
 /// Acceleration, m/s².
-const RETREAT_MPS2: f32 = 1.0;
+const EVADE_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
 const BRAKES_MPS2: f32 = 1.5;
 
 /// Where to wait.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum Shelter {
+pub enum EvadeTarget {
     /// Where it would anyway.
     #[default]
     Here,
@@ -56,7 +56,7 @@ pub struct Search {
     from_m: Option<f32>,
     held: u16,
     /// What the last search found.
-    pub found: Shelter,
+    pub found: EvadeTarget,
 }
 
 impl Search {
@@ -79,13 +79,13 @@ impl Search {
         let found = loop {
             let along_m = from_m - f32::from(self.held) * PLACE_STEP_M;
             let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
-            let Some(place) = place.filter(|_| self.held <= STEPS) else { break Shelter::Nowhere };
+            let Some(place) = place.filter(|_| self.held <= STEPS) else { break EvadeTarget::Nowhere };
             budget = budget.saturating_sub(PLACE_COST);
             match self.sweep.go_on(neighbours, &mut budget, 1, &tell, |column| column.holds(&place)) {
                 None => return,
                 Some(true) => self.held += 1,
-                Some(false) if self.held == 0 => break Shelter::Here,
-                Some(false) => break Shelter::Back(along_m),
+                Some(false) if self.held == 0 => break EvadeTarget::Here,
+                Some(false) => break EvadeTarget::Back(along_m),
             }
         };
         (self.found, self.from_m) = (found, None);
@@ -93,7 +93,7 @@ impl Search {
 
     /// Forgets what was found.
     pub fn reset(&mut self) {
-        (self.found, self.from_m) = (Shelter::Here, None);
+        (self.found, self.from_m) = (EvadeTarget::Here, None);
     }
 }
 
@@ -122,10 +122,10 @@ pub fn step<const W: usize>(
         return None;
     }
     let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
-    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * RETREAT_MPS2 * left_m);
+    let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
     let ahead = allowed(CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // The tracker's speed is that of flying on; back is below zero.
-    let speed = ahead.min(FAST_MPS).min(RETREAT_MPS2 * dt_s - tracker.speed_mps.min(0.0));
+    let speed = ahead.min(FAST_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
     at(path, tracker)
@@ -172,14 +172,14 @@ mod tests {
     }
 
     /// What a search for a place to wait at 9 m finds, and the steps it takes.
-    fn search(columns: &[KeepOff]) -> (Shelter, usize) {
+    fn search(columns: &[KeepOff]) -> (EvadeTarget, usize) {
         let path = path();
-        let mut search = Search { found: Shelter::Back(99.0), ..Search::default() };
+        let mut search = Search { found: EvadeTarget::Back(99.0), ..Search::default() };
         for steps in 1.. {
             // A neighbour gives up to 16.
             let of = |i: usize| columns.chunks(16).nth(i).unwrap_or_default();
             search.go_on(&path, 9.0, 31, |i, tell| of(i).iter().for_each(|column| tell(*column)));
-            if search.found != Shelter::Back(99.0) {
+            if search.found != EvadeTarget::Back(99.0) {
                 return (search.found, steps);
             }
             assert!(steps < 100);
@@ -189,23 +189,23 @@ mod tests {
 
     #[test]
     fn a_place_below_one_that_comes_down_is_exchanged_for_one_before_it() {
-        let (Shelter::Back(to_m), 1) = search(&[column(6.0, 3.0, 2.1)]) else {
+        let (EvadeTarget::Back(to_m), 1) = search(&[column(6.0, 3.0, 2.1)]) else {
             panic!("one is looked at in a step")
         };
         assert!((5.0..7.0).contains(&to_m), "{to_m}");
-        assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (Shelter::Here, 1));
-        assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (Shelter::Nowhere, 2), "nowhere is better");
+        assert_eq!(search(&[column(0.0, 3.0, 2.1)]), (EvadeTarget::Here, 1));
+        assert_eq!(search(&[column(6.0, 3.0, 20.0)]), (EvadeTarget::Nowhere, 2), "nowhere is better");
     }
 
     #[test]
     fn a_search_among_all_columns_there_can_be_takes_a_dozen_steps() {
         let mut columns = std::vec![column(60.0, 0.0, 2.1); 31 * 16];
         let (found, steps) = search(&columns);
-        assert!(found == Shelter::Here && (5..8).contains(&steps), "{steps}");
+        assert!(found == EvadeTarget::Here && (5..8).contains(&steps), "{steps}");
         let last = columns.len() - 1;
         columns[last] = column(6.0, 3.0, 2.1);
         let (found, steps) = search(&columns);
-        assert!(matches!(found, Shelter::Back(_)) && steps < 20, "{found:?} after {steps}");
+        assert!(matches!(found, EvadeTarget::Back(_)) && steps < 20, "{found:?} after {steps}");
     }
 
     #[test]
