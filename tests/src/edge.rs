@@ -28,7 +28,7 @@ pub const SCRIPTS: [&str; 9] = [
     "kind = 'obstacle'\nradius_m = 0.4\nposition = AHEAD",
 ];
 
-/// A mission with a short radio range, its plan, and when who leaves the range of all others.
+/// A mission with a short radio range, its plan, and when each vehicle leaves the range of all others.
 pub struct Edge {
     /// How far the radio reaches, metres.
     pub range_m: f32,
@@ -107,7 +107,7 @@ impl Edge {
     }
 }
 
-/// When who leaves the range of all others, in the air.
+/// When each vehicle leaves the range of all others, in the air.
 fn leaves(flight: &Flight, range_m: f32) -> Vec<(f32, usize)> {
     let tracks = &flight.tracks;
     let mut leaves = Vec::new();

@@ -40,7 +40,7 @@ fn fault(kind: &str, at_s: f32, vehicle: u8) -> String {
     format!("{keys}at_s = {at_s:.2}\nvehicle = {vehicle}\n")
 }
 
-/// When somebody flies around something, and who.
+/// When a vehicle flies around an obstacle, and its index.
 fn flies_around(log: &str) -> Option<(f32, u8)> {
     let line = log.lines().find(|line| line.ends_with("Replanning → Follow: Flying around"))?;
     let mut words = line.split_whitespace();

@@ -137,7 +137,7 @@ fn the_papers_tracks_are_photographed_whole() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n").chars().take(4000).collect::<String>());
 }
 
-/// On the pad, while it starts, or in the air: who is paused and resumed photographs its part.
+/// On the pad, while it starts, or in the air: a vehicle that is paused and resumed photographs its part.
 #[test]
 fn a_vehicle_paused_at_any_time_goes_on_when_it_is_resumed() {
     let one = |seed: u64| {

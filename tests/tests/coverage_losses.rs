@@ -211,7 +211,7 @@ fn are_whole(draw: Draw) {
     let (wrong, short) = (all.iter().filter(wrong).count(), all.iter().filter(short).count());
     println!("{} flown, {short} not whole for a reason that is named, {wrong} wrong", all.len());
     assert_eq!(wrong, 0);
-    // Where the rule lands whom a rough radio cuts off, or who is alone, the area may be whole all the same.
+    // Where the rule lands a vehicle that a rough radio cuts off, or one that is alone, the area may be whole all the same.
     let incomplete = all.iter().filter(|o| o.covered < 1.0).count();
     println!("{incomplete} incomplete");
     let rare = if draw.radio == Radio::Rough || draw.struck > 1 { incomplete } else { short };
@@ -226,7 +226,7 @@ fn pictures(flight: &Flight<WAYPOINTS>, along_m: f32) -> Vec<Point> {
     places.filter(|at_m| *at_m <= along_m + 0.01).filter_map(|at_m| flight.path.point_at(at_m)).collect()
 }
 
-/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by who kept it, or by who has it now.
+/// Whatever is lost, and wherever the others hold, each waypoint is photographed once: by the vehicle that kept it, or by the one that has it now.
 #[test]
 fn divisions_leave_nothing_out_and_give_nothing_twice() {
     let one = |seed: u64| -> usize {

@@ -168,7 +168,7 @@ fn judge(seed: u64) -> Option<Seen> {
             return Some(Seen { refused: 1, ..seen });
         }
     };
-    assert_eq!(planned.plan, whole.plan, "seed {seed}: who flies what does not change");
+    assert_eq!(planned.plan, whole.plan, "seed {seed}: which vehicle flies what does not change");
     let findings = check_plan(&planned);
     assert!(findings.is_clean(), "seed {seed}: {:?}", Findings { over_time: Vec::new(), ..findings });
     for route in &planned.plan.routes {

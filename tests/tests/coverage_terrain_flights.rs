@@ -59,7 +59,7 @@ fn areas_above_random_hills_are_photographed_whole() {
     all_flown("hills", number("FLOCKMATE_HILLS_FROM", 0), number("FLOCKMATE_HILLS", 12), one);
 }
 
-/// What a lost vehicle leaves is photographed by the others, who follow the ground too; or a row of the table says why not.
+/// What a lost vehicle leaves is photographed by the others, which follow the ground too; or a row of the table says why not.
 #[test]
 fn losses_above_random_hills_touch_nothing() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -158,7 +158,7 @@ fn mission(
     let mut losses: Vec<[Lot; FEW], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
-            // Each in the air stands in the middle of its path; who fell out before is on the ground.
+            // Each in the air stands in the middle of its path; one that was lost before is on the ground.
             let lot = |k: usize| {
                 let flies = out.flights[k].task.flies();
                 let along_dm = if flies { (out.flights[k].path.length_m() * 5.0) as u16 } else { 0 };

@@ -265,7 +265,7 @@ impl FleetModel {
         vehicle
     }
 
-    /// Plants the error: who is silent does not count any more, as if it had left.
+    /// Plants the error: a silent vehicle does not count any more, as if it had left.
     fn forget_silent(&self, vehicle: &mut Vehicle) {
         let mut roster = vehicle.fleet.message(0);
         roster.hash = 0;
