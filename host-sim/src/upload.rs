@@ -1,9 +1,9 @@
 //! A MAVLink FTP client: uploads a file to a companion and compares CRCs.
 //!
 //! Source: MAVLink guide, "File Transfer Protocol". Several pieces are under way at once; what is not answered is sent again
-//! with the same sequence number, at the pace that this link bears ([`pace`]).
+//! with the same sequence number, as often as this link bears ([`retransmission`]).
 
-mod pace;
+mod retransmission;
 
 use std::collections::BTreeMap;
 use std::time::{Duration, Instant as Clock};
@@ -15,7 +15,7 @@ use companion::storage::store::File;
 use companion::{COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
-use self::pace::Pace;
+use self::retransmission::Retransmission;
 use crate::link::Link;
 
 /// System id of a ground station, unless another one is chosen.
@@ -44,7 +44,7 @@ pub struct Client {
     system: Option<u8>,
     sequence: u16,
     session: u8,
-    pace: Pace,
+    retransmission: Retransmission,
 }
 
 /// A piece that is not answered yet.
@@ -81,7 +81,7 @@ impl Client {
             system,
             sequence,
             session: 0,
-            pace: Pace::new(now),
+            retransmission: Retransmission::new(now),
         }
     }
 
@@ -191,7 +191,7 @@ impl Client {
         let mut asked_at = began;
         self.ask(&request)?;
         while self.link.now().duration_since(began) < PATIENCE {
-            if self.pace.is_over(asked_at, self.link.now()) {
+            if self.retransmission.is_over(asked_at, self.link.now()) {
                 self.ask(&request)?;
                 asked_at = self.link.now();
             }
@@ -215,12 +215,12 @@ impl Client {
         self.done(RESET, &[])?;
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
         // That it took long to erase its flash says nothing of the link.
-        self.pace = Pace::new(self.link.now());
+        self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(DATA).enumerate();
         let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
         let (mut arrived, mut heard_at) = (0, self.link.now());
         loop {
-            while under_way.len() < self.pace.window()
+            while under_way.len() < self.retransmission.window()
                 && let Some((i, piece)) = pieces.next()
             {
                 let request = self.request(WRITE, (i * DATA) as u32, piece);
@@ -244,7 +244,7 @@ impl Client {
                     // Of one that was sent twice nobody knows which was answered.
                     if !piece.repeated {
                         let took = self.link.now().duration_since(piece.sent_at);
-                        self.pace.note_round_trip(took);
+                        self.retransmission.note_round_trip(took);
                     }
                     progress(arrived as u64);
                 }
@@ -253,7 +253,7 @@ impl Client {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
             for piece in under_way.values_mut() {
-                if self.pace.is_over(piece.sent_at, self.link.now()) {
+                if self.retransmission.is_over(piece.sent_at, self.link.now()) {
                     self.ask(&piece.request)?;
                     (piece.sent_at, piece.repeated) = (self.link.now(), true);
                 }

@@ -1,10 +1,10 @@
 //! Which firmware runs: every call that depends on it goes through here.
 
 use super::ardupilot::{self, Copter};
-use super::body::{Body, Order, Sense};
 use super::command::Command;
 use super::config::Config;
 use super::params::Params;
+use super::platform::{Order, Platform, SensorReadings};
 use super::port::Sender;
 use super::px4::{self, Px4};
 use super::status::Status;
@@ -43,10 +43,10 @@ impl Firmware {
     }
 
     /// Sends what it says unasked when it has booted.
-    pub(super) fn boot(&mut self, body: &mut Body) {
+    pub(super) fn boot(&mut self, platform: &mut Platform) {
         match self {
-            Self::Px4(_) => body.announce_origin(),
-            Self::Copter(copter) => copter.boot(body),
+            Self::Px4(_) => platform.announce_origin(),
+            Self::Copter(copter) => copter.boot(platform),
         }
     }
 
@@ -78,53 +78,58 @@ impl Firmware {
         }
     }
 
-    pub(super) fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
+    pub(super) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> Order {
         match self {
-            Self::Px4(px4) => px4.update(body, sense),
-            Self::Copter(copter) => copter.update(body, sense, dt_s),
+            Self::Px4(px4) => px4.update(platform, sensors),
+            Self::Copter(copter) => copter.update(platform, sensors, dt_s),
         }
     }
 
-    pub(super) fn status(&self, body: &Body, sense: &Sense) -> Status {
+    pub(super) fn status(&self, platform: &Platform, sensors: &SensorReadings) -> Status {
         match self {
-            Self::Px4(px4) => px4.status(body, sense),
-            Self::Copter(copter) => copter.status(sense),
+            Self::Px4(px4) => px4.status(platform, sensors),
+            Self::Copter(copter) => copter.status(sensors),
         }
     }
 
-    pub(super) fn handle_command(&mut self, body: &mut Body, from: Sender, command: &Command) {
+    pub(super) fn handle_command(&mut self, platform: &mut Platform, from: Sender, command: &Command) {
         match self {
-            Self::Px4(px4) => px4.handle_command(body, from, command),
-            Self::Copter(copter) => copter.handle_command(body, from, command),
+            Self::Px4(px4) => px4.handle_command(platform, from, command),
+            Self::Copter(copter) => copter.handle_command(platform, from, command),
         }
     }
 
-    pub(super) fn handle_set_mode(&mut self, body: &mut Body, from: Sender, fields: &Fields<'_>) {
+    pub(super) fn handle_set_mode(&mut self, platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
         match self {
-            Self::Px4(px4) => px4.handle_set_mode(body, fields),
-            Self::Copter(copter) => copter.handle_set_mode(body, from, fields),
+            Self::Px4(px4) => px4.handle_set_mode(platform, fields),
+            Self::Copter(copter) => copter.handle_set_mode(platform, from, fields),
         }
     }
 
     /// SET_POSITION_TARGET_LOCAL_NED (84) or _GLOBAL_INT (86).
-    pub(super) fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+    pub(super) fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
         match self {
-            Self::Px4(px4) => px4.handle_setpoint(body, id, fields),
-            Self::Copter(copter) => copter.handle_setpoint(body, id, fields),
+            Self::Px4(px4) => px4.handle_setpoint(platform, id, fields),
+            Self::Copter(copter) => copter.handle_setpoint(platform, id, fields),
         }
     }
 
     /// REQUEST_DATA_STREAM, which PX4 ignores.
-    pub(super) fn handle_stream_request(&mut self, body: &mut Body, from: Sender, fields: &Fields<'_>) {
+    pub(super) fn handle_stream_request(
+        &mut self,
+        platform: &mut Platform,
+        from: Sender,
+        fields: &Fields<'_>,
+    ) {
         if let Self::Copter(_) = self {
-            ardupilot::handle_stream_request(body, from, fields);
+            ardupilot::handle_stream_request(platform, from, fields);
         }
     }
 
     /// HEARTBEAT of another system.
-    pub(super) fn handle_heartbeat(&mut self, body: &mut Body, from: Sender) {
+    pub(super) fn handle_heartbeat(&mut self, platform: &mut Platform, from: Sender) {
         if let Self::Copter(copter) = self {
-            copter.handle_heartbeat(body, from);
+            copter.handle_heartbeat(platform, from);
         }
     }
 
@@ -180,14 +185,14 @@ impl Firmware {
     }
 
     /// The pilot's switch, by `custom_mode`; false where there is no such mode.
-    pub(super) fn force_mode(&mut self, custom_mode: u32, sense: &Sense) -> bool {
+    pub(super) fn force_mode(&mut self, custom_mode: u32, sensors: &SensorReadings) -> bool {
         match self {
             Self::Px4(px4) => px4::Mode::from_custom_mode(custom_mode)
-                .map(|mode| px4.commander.force_mode(mode, sense))
+                .map(|mode| px4.commander.force_mode(mode, sensors))
                 .is_some(),
-            Self::Copter(copter) => {
-                ardupilot::Mode::from_number(custom_mode).map(|mode| copter.force_mode(mode, sense)).is_some()
-            }
+            Self::Copter(copter) => ardupilot::Mode::from_number(custom_mode)
+                .map(|mode| copter.force_mode(mode, sensors))
+                .is_some(),
         }
     }
 }

@@ -15,34 +15,37 @@ use super::{Autopilot, telemetry};
 impl Autopilot {
     pub(super) fn handle_frame(&mut self, port: usize, frame: &Frame) {
         let fields = Fields::new(frame);
-        let system_id = self.body.config.system_id;
+        let system_id = self.platform.config.system_id;
         let from = Sender { port, system: frame.system, component: frame.component };
         let for_us = |system: usize, component: usize| {
             let (system, component) = (fields.u8(system), fields.u8(component));
             (system == 0 || system == system_id) && (component == 0 || component == AUTOPILOT_COMPONENT)
         };
-        let (firmware, body) = (&mut self.firmware, &mut self.body);
+        let (firmware, platform) = (&mut self.firmware, &mut self.platform);
         match frame.message_id {
-            0 => firmware.handle_heartbeat(body, from),
+            0 => firmware.handle_heartbeat(platform, from),
             4 if fields.u8(12) == 0 && fields.u8(13) == 0 => {
                 let answer = telemetry::ping(fields.u64(0), fields.u32(8), from.system, from.component);
-                body.ports[port].send_raw(4, &answer);
+                platform.ports[port].send_raw(4, &answer);
             }
-            11 if fields.u8(4) == system_id => firmware.handle_set_mode(body, from, &fields),
+            11 if fields.u8(4) == system_id => firmware.handle_set_mode(platform, from, &fields),
             20 if for_us(2, 3) => self.handle_param_read(port, &fields),
-            21 if for_us(0, 1) => body.ports[port].param_cursor = Some(0),
+            21 if for_us(0, 1) => platform.ports[port].param_cursor = Some(0),
             23 if for_us(4, 5) => self.handle_param_set(port, &fields),
             // Everything of the mission protocol that names its target first.
-            43 | 45 if for_us(0, 1) => body.handle_mission(from, frame.message_id, &fields),
-            40 | 41 | 44 | 47 | 51 if for_us(2, 3) => body.handle_mission(from, frame.message_id, &fields),
-            39 | 73 if for_us(32, 33) => body.handle_mission(from, frame.message_id, &fields),
-            66 if for_us(2, 3) => firmware.handle_stream_request(body, from, &fields),
-            75 if for_us(30, 31) => firmware.handle_command(body, from, &Command::int(&fields)),
-            76 if for_us(30, 31) => firmware.handle_command(body, from, &Command::long(&fields)),
-            84 | 86 if for_us(50, 51) => firmware.handle_setpoint(body, frame.message_id, &fields),
+            43 | 45 if for_us(0, 1) => platform.handle_mission(from, frame.message_id, &fields),
+            40 | 41 | 44 | 47 | 51 if for_us(2, 3) => {
+                platform.handle_mission(from, frame.message_id, &fields);
+            }
+            39 | 73 if for_us(32, 33) => platform.handle_mission(from, frame.message_id, &fields),
+            66 if for_us(2, 3) => firmware.handle_stream_request(platform, from, &fields),
+            75 if for_us(30, 31) => firmware.handle_command(platform, from, &Command::int(&fields)),
+            76 if for_us(30, 31) => firmware.handle_command(platform, from, &Command::long(&fields)),
+            84 | 86 if for_us(50, 51) => firmware.handle_setpoint(platform, frame.message_id, &fields),
             111 if fields.i64(0) == 0 => {
-                let message = dialect::TIMESYNC_DATA { tc1: body.time_us as i64 * 1000, ts1: fields.i64(8) };
-                body.ports[port].send(&message);
+                let message =
+                    dialect::TIMESYNC_DATA { tc1: platform.time_us as i64 * 1000, ts1: fields.i64(8) };
+                platform.ports[port].send(&message);
             }
             _ => {}
         }
@@ -84,6 +87,6 @@ impl Autopilot {
         payload[6..8].copy_from_slice(&reported.to_le_bytes());
         payload[8..8 + name.len()].copy_from_slice(name.as_bytes());
         payload[24] = value.wire_type();
-        self.body.ports[port].send_raw(22, &payload);
+        self.platform.ports[port].send_raw(22, &payload);
     }
 }

@@ -9,9 +9,9 @@
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-use super::body::{Body, Sense};
 use super::command::{Command, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST};
 use super::mission::{Item, Progress};
+use super::platform::{Platform, SensorReadings};
 use super::vehicle::wrap_pi;
 use crate::AutopilotKind;
 
@@ -80,7 +80,7 @@ fn command_of(item: &Item) -> u16 {
     u16::from_le_bytes([item[30], item[31]])
 }
 
-impl Body {
+impl Platform {
     /// The first item that is flown.
     fn first_item(&self) -> u16 {
         u16::from(self.config.personality == AutopilotKind::Ardupilot)
@@ -100,7 +100,7 @@ impl Body {
 
     /// Does what is to be done at once and says what is to be flown; `None` once all is done. The next
     /// call begins with the first item again.
-    pub(super) fn fly_mission(&mut self, sense: &Sense, landed: bool) -> Option<Leg> {
+    pub(super) fn fly_mission(&mut self, sensors: &SensorReadings, landed: bool) -> Option<Leg> {
         let first = self.first_item();
         let progress = &mut self.missions.progress;
         progress.current = progress.current.max(first);
@@ -109,8 +109,8 @@ impl Body {
             match self.leg(&item) {
                 Some(leg) => {
                     let begun = self.missions.progress.since_us.is_some();
-                    self.missions.progress.since_us.get_or_insert(sense.now_us);
-                    if !(begun && self.is_done(&leg, sense, landed)) {
+                    self.missions.progress.since_us.get_or_insert(sensors.now_us);
+                    if !(begun && self.is_done(&leg, sensors, landed)) {
                         return Some(leg);
                     }
                 }
@@ -194,20 +194,21 @@ impl Body {
         }
     }
 
-    fn is_done(&mut self, leg: &Leg, sense: &Sense, landed: bool) -> bool {
+    fn is_done(&mut self, leg: &Leg, sensors: &SensorReadings, landed: bool) -> bool {
         let progress = &mut self.missions.progress;
-        let since = |us: Option<u64>| sense.now_us.saturating_sub(us.unwrap_or(sense.now_us)) as f32 * 1e-6;
+        let since =
+            |us: Option<u64>| sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6;
         match *leg {
             Leg::Wait(s) => since(progress.since_us) >= s,
-            Leg::TakeOff { up } => !landed && sense.position.z > up - REACHED_UP_M,
+            Leg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_UP_M,
             Leg::To { at, heading, stay_s, reached_m } => {
-                let off = at - sense.position;
+                let off = at - sensors.position;
                 // NaN is no heading to wait for.
-                let turned = wrap_pi(heading - sense.heading).abs() < YAW_ERROR;
+                let turned = wrap_pi(heading - sensors.heading).abs() < YAW_ERROR;
                 let turned =
                     turned || heading.is_nan() || self.config.personality == AutopilotKind::Ardupilot;
                 if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_UP_M && turned {
-                    progress.inside_us.get_or_insert(sense.now_us);
+                    progress.inside_us.get_or_insert(sensors.now_us);
                 }
                 let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;
                 !landed && (stayed || progress.inside_us.is_some() && stay_s.is_nan())

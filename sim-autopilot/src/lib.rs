@@ -28,7 +28,6 @@
 #![forbid(unsafe_code)]
 
 pub mod ardupilot;
-mod body;
 mod camera;
 mod command;
 mod config;
@@ -43,6 +42,7 @@ mod messages;
 mod mission;
 pub mod noise;
 pub mod params;
+mod platform;
 pub mod port;
 pub mod px4;
 mod routing;
@@ -59,11 +59,11 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic};
 
-use self::body::{Body, Integral};
 pub use self::camera::Photo;
 pub use self::config::{Config, ConfigError};
 use self::firmware::Firmware;
 pub use self::kinds::{AutopilotKind, Estimator};
+use self::platform::{Integral, Platform};
 use self::port::Port;
 pub use self::px4::Mode;
 use self::snapshot::Snapshot;
@@ -72,7 +72,7 @@ pub use self::vehicle::{State, VehicleLimits, cruise_load};
 /// One simulated vehicle with its autopilot.
 #[derive(Clone, Debug)]
 pub struct Autopilot {
-    body: Body,
+    platform: Platform,
     firmware: Firmware,
     due: Vec<u32>,
 }
@@ -84,30 +84,30 @@ impl Autopilot {
     /// Refuses what [`ConfigError`] names.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         config::check(config)?;
-        let mut body = Body::new(config, Firmware::streams(config.personality));
+        let mut platform = Platform::new(config, Firmware::streams(config.personality));
         let mut firmware = Firmware::new(config);
-        firmware.boot(&mut body);
-        Ok(Self { body, firmware, due: Vec::new() })
+        firmware.boot(&mut platform);
+        Ok(Self { platform, firmware, due: Vec::new() })
     }
 
     /// The truth about the vehicle.
     pub fn truth(&self) -> &State {
-        self.body.vehicle.state()
+        self.platform.vehicle.state()
     }
 
     /// Every picture taken since the last call, as it truly was taken: a camera fixed level to the body looks down from there.
     pub fn take_photos(&mut self) -> Vec<Photo> {
-        self.body.camera.take_photos()
+        self.platform.camera.take_photos()
     }
 
     /// The flight mode that flies, as HEARTBEAT's `custom_mode`.
     pub fn custom_mode(&self) -> u32 {
-        self.firmware.status(&self.body, &self.body.sense()).custom_mode
+        self.firmware.status(&self.platform, &self.platform.sensors()).custom_mode
     }
 
     /// Whether it lands where it is, by itself.
     pub fn lands(&self) -> bool {
-        let land = match self.body.config.personality {
+        let land = match self.platform.config.personality {
             AutopilotKind::Px4 => Mode::Land.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Land.number(),
         };
@@ -121,12 +121,12 @@ impl Autopilot {
 
     /// Microseconds since boot.
     pub fn time_us(&self) -> u64 {
-        self.body.time_us
+        self.platform.time_us
     }
 
     /// Wind at the vehicle now, ENU m/s.
     pub fn wind(&self) -> &Point {
-        &self.body.disturbance.wind
+        &self.platform.disturbance.wind
     }
 
     /// Takes bytes that arrived at port 0.
@@ -136,13 +136,13 @@ impl Autopilot {
 
     /// Takes bytes that arrived at a port; a port that is not there ignores them.
     pub fn handle_bytes_on(&mut self, port: usize, mut bytes: &[u8]) {
-        if port >= self.body.ports.len() {
+        if port >= self.platform.ports.len() {
             return;
         }
-        let now_us = self.body.time_us;
-        while let Some(frame) = self.body.ports[port].next_frame(now_us, &mut bytes) {
-            if self.body.config.routes {
-                routing::forward(&mut self.body.ports, port, self.body.config.system_id, &frame);
+        let now_us = self.platform.time_us;
+        while let Some(frame) = self.platform.ports[port].next_frame(now_us, &mut bytes) {
+            if self.platform.config.routes {
+                routing::forward(&mut self.platform.ports, port, self.platform.config.system_id, &frame);
             }
             self.handle_frame(port, &frame);
         }
@@ -155,87 +155,87 @@ impl Autopilot {
 
     /// As [`Autopilot::poll_transmit`], of any port.
     pub fn poll_transmit_from(&mut self, port: usize, out: &mut [u8]) -> usize {
-        self.body.ports.get_mut(port).map_or(0, |port| port.poll_transmit(out))
+        self.platform.ports.get_mut(port).map_or(0, |port| port.poll_transmit(out))
     }
 
     /// Adds the port for a ground station, which comes after the others and stays through a reboot.
     pub fn add_ground_port(&mut self) {
-        let config = &mut self.body.config;
+        let config = &mut self.platform.config;
         if !config.ground_port {
             config.ground_port = true;
             let streams = Firmware::streams(config.personality);
-            self.body.ports.push(Port::for_ground(config.system_id, streams));
+            self.platform.ports.push(Port::for_ground(config.system_id, streams));
         }
     }
 
     /// Takes bytes that arrived at the port for a ground station, if there is one.
     pub fn handle_ground_bytes(&mut self, bytes: &[u8]) {
-        if self.body.config.ground_port {
-            self.handle_bytes_on(self.body.ports.len() - 1, bytes);
+        if self.platform.config.ground_port {
+            self.handle_bytes_on(self.platform.ports.len() - 1, bytes);
         }
     }
 
     /// As [`Autopilot::poll_transmit`], of the port for a ground station.
     pub fn poll_ground_transmit(&mut self, out: &mut [u8]) -> usize {
-        let last = self.body.ports.len() - 1;
-        if self.body.config.ground_port { self.poll_transmit_from(last, out) } else { 0 }
+        let last = self.platform.ports.len() - 1;
+        if self.platform.config.ground_port { self.poll_transmit_from(last, out) } else { 0 }
     }
 
     /// Advances time by `dt_s` (0.004) over ground at `ground_up_m` below the vehicle, in the mission frame.
     pub fn step(&mut self, dt_s: f32, ground_up_m: f32) {
-        self.body.advance_time(dt_s, ground_up_m);
+        self.platform.advance_time(dt_s, ground_up_m);
         let was_armed = self.firmware.armed();
-        let sense = self.body.sense();
-        let order = self.firmware.update(&mut self.body, &sense, dt_s);
+        let sensors = self.platform.sensors();
+        let order = self.firmware.update(&mut self.platform, &sensors, dt_s);
         let (armed, landed) = (self.firmware.armed(), self.firmware.landed());
-        let body = &mut self.body;
-        body.vehicle.set_flags(armed, landed);
+        let platform = &mut self.platform;
+        platform.vehicle.set_flags(armed, landed);
         match order.integral {
             Integral::Keep => {}
-            Integral::Clear => body.vehicle.reset_integral(),
-            Integral::Match => body.vehicle.match_integral(),
+            Integral::Clear => platform.vehicle.reset_integral(),
+            Integral::Match => platform.vehicle.match_integral(),
         }
         if order.lift {
             let gains = self.firmware.gains();
-            let mut velocity = sense.velocity;
-            velocity.z += order.demand.height_rate_share * (sense.height_rate - velocity.z);
-            body.vehicle.control(&order.demand, gains, &sense.position, &velocity, dt_s);
+            let mut velocity = sensors.velocity;
+            velocity.z += order.demand.height_rate_share * (sensors.height_rate - velocity.z);
+            platform.vehicle.control(&order.demand, gains, &sensors.position, &velocity, dt_s);
         }
-        body.demand = armed.then_some(order.demand);
-        body.vehicle.advance(order.lift, &body.disturbance.wind, ground_up_m, dt_s);
-        body.frame.follow(body.vehicle.position());
+        platform.demand = armed.then_some(order.demand);
+        platform.vehicle.advance(order.lift, &platform.disturbance.wind, ground_up_m, dt_s);
+        platform.frame.follow(platform.vehicle.position());
         if was_armed && !armed {
-            body.vehicle.set_flags(false, landed);
+            platform.vehicle.set_flags(false, landed);
         }
-        body.update_camera();
+        platform.update_camera();
         self.transmit();
-        if self.body.reboot_us.is_some_and(|at_us| self.body.time_us >= at_us) {
+        if self.platform.reboot_us.is_some_and(|at_us| self.platform.time_us >= at_us) {
             self.reboot();
         }
     }
 
     fn transmit(&mut self) {
-        let now_us = self.body.time_us;
+        let now_us = self.platform.time_us;
         let mut snapshot = None;
-        for index in 0..self.body.ports.len() {
-            let once = core::mem::take(&mut self.body.ports[index].once);
+        for index in 0..self.platform.ports.len() {
+            let once = core::mem::take(&mut self.platform.ports[index].once);
             if !once.is_empty() {
                 let snapshot = snapshot.get_or_insert_with(|| self.snapshot());
                 once.iter().for_each(|&id| {
-                    snapshot.send(id, &mut self.body.ports[index]);
+                    snapshot.send(id, &mut self.platform.ports[index]);
                 });
             }
-            let port = &mut self.body.ports[index];
+            let port = &mut self.platform.ports[index];
             port.send_due_acks(now_us);
-            self.body.missions.ask_again(now_us, index, port);
+            self.platform.missions.ask_again(now_us, index, port);
             if let Some(next) = port.param_cursor
                 && !port.is_congested()
             {
                 self.send_param(index, next, next as u16);
                 let more = next + 1 < self.firmware.params().len();
-                self.body.ports[index].param_cursor = more.then_some(next + 1);
+                self.platform.ports[index].param_cursor = more.then_some(next + 1);
             }
-            let port = &mut self.body.ports[index];
+            let port = &mut self.platform.ports[index];
             if !port.is_due(now_us) {
                 continue;
             }
@@ -244,7 +244,7 @@ impl Autopilot {
             if !due.is_empty() {
                 let snapshot = snapshot.get_or_insert_with(|| self.snapshot());
                 for &id in &due {
-                    snapshot.send(id, &mut self.body.ports[index]);
+                    snapshot.send(id, &mut self.platform.ports[index]);
                 }
             }
             self.due = due;
@@ -252,51 +252,52 @@ impl Autopilot {
     }
 
     fn snapshot(&mut self) -> Snapshot {
-        let sense = self.body.sense();
-        let status = self.firmware.status(&self.body, &sense);
+        let sensors = self.platform.sensors();
+        let status = self.firmware.status(&self.platform, &sensors);
         let armed = self.firmware.armed();
-        let body = &mut self.body;
-        let error = body.position_error().cast::<f64>();
-        let position = *body.vehicle.position() + error;
-        let truth = body.vehicle.state();
-        let force = body.vehicle.specific_force();
+        let platform = &mut self.platform;
+        let error = platform.position_error().cast::<f64>();
+        let position = *platform.vehicle.position() + error;
+        let truth = platform.vehicle.state();
+        let force = platform.vehicle.specific_force();
         let force = if truth.touching { Point::new(0.0, 0.0, vehicle::GRAVITY) } else { force };
         let nan = Vector3::repeat(f64::NAN);
-        let target = match &body.demand {
+        let target = match &platform.demand {
             Some(demand) => [
-                body.frame.ned(&demand.position.cast::<f64>()),
-                body.frame.ned_rate(&body.vehicle.velocity_setpoint),
-                body.frame.ned_rate(&body.vehicle.acceleration_setpoint),
+                platform.frame.ned(&demand.position.cast::<f64>()),
+                platform.frame.ned_rate(&platform.vehicle.velocity_setpoint),
+                platform.frame.ned_rate(&platform.vehicle.acceleration_setpoint),
             ],
             None => [nan, nan, Vector3::new(0.0, 0.0, 100.0)],
         };
         let heading_rate = truth.heading_rate;
-        let noise = if body.config.position_noise_m > 0.0 { body.config.position_noise_m } else { 0.0 };
+        let noise =
+            if platform.config.position_noise_m > 0.0 { platform.config.position_noise_m } else { 0.0 };
         let gps = if noise > 0.0 {
-            (noise * body.disturbance.sensor(), noise * body.disturbance.sensor(), body.gps_ok)
+            (noise * platform.disturbance.sensor(), noise * platform.disturbance.sensor(), platform.gps_ok)
         } else {
-            (0.0, 0.0, body.gps_ok)
+            (0.0, 0.0, platform.gps_ok)
         };
         Snapshot {
-            time_us: body.time_us,
-            unix_us: body.config.boot_unix_us + body.time_us,
-            system_id: body.config.system_id,
+            time_us: platform.time_us,
+            unix_us: platform.config.boot_unix_us + platform.time_us,
+            system_id: platform.config.system_id,
             status,
             armed,
-            mission: (body.missions.progress.current, body.missions.items().len() as u16),
-            pictures: body.camera.taken(),
-            ned: body.frame.ned(&position),
-            velocity: body.frame.ned_rate(&sense.velocity),
-            geodetic: body.frame.geodetic(&position),
+            mission: (platform.missions.progress.current, platform.missions.items().len() as u16),
+            pictures: platform.camera.taken(),
+            ned: platform.frame.ned(&position),
+            velocity: platform.frame.ned_rate(&sensors.velocity),
+            geodetic: platform.frame.geodetic(&position),
             gps,
-            home: (body.home, body.frame.ned(&body.home_enu.cast::<f64>())),
-            ekf_origin: *body.frame.ekf_origin(),
+            home: (platform.home, platform.frame.ned(&platform.home_enu.cast::<f64>())),
+            ekf_origin: *platform.frame.ekf_origin(),
             specific_force: frames::swap_enu_ned(&force),
-            heading: (sense.heading, heading_rate),
+            heading: (sensors.heading, heading_rate),
             target,
-            height: body.height,
-            accuracy: body.config.estimator.accuracy_m(),
-            battery: sense.battery,
+            height: platform.height,
+            accuracy: platform.config.estimator.accuracy_m(),
+            battery: sensors.battery,
             attitude: OnceCell::new(),
         }
     }
@@ -304,17 +305,17 @@ impl Autopilot {
     /// Restarts: parameters, missions, charge and EKF origin stay, streams are forgotten, the motors stop. In the air it
     /// falls.
     pub fn reboot(&mut self) {
-        let body = &self.body;
-        let mut fresh = body.config.clone();
-        fresh.start = body.vehicle.state().position;
-        fresh.heading_rad = body.vehicle.state().heading_rad;
-        fresh.ekf_origin = *body.frame.ekf_origin();
-        fresh.seed = body.config.seed.wrapping_add(1);
-        let battery = body.vehicle.state().battery;
+        let platform = &self.platform;
+        let mut fresh = platform.config.clone();
+        fresh.start = platform.vehicle.state().position;
+        fresh.heading_rad = platform.vehicle.state().heading_rad;
+        fresh.ekf_origin = *platform.frame.ekf_origin();
+        fresh.seed = platform.config.seed.wrapping_add(1);
+        let battery = platform.vehicle.state().battery;
         if let Ok(mut booted) = Self::new(&fresh) {
-            booted.body.vehicle.set_battery(battery);
-            booted.body.missions = self.body.missions.clone();
-            booted.body.camera = self.body.camera.rebooted();
+            booted.platform.vehicle.set_battery(battery);
+            booted.platform.missions = self.platform.missions.clone();
+            booted.platform.camera = self.platform.camera.rebooted();
             booted.firmware.keep_params(&self.firmware);
             *self = booted;
         }
@@ -326,13 +327,13 @@ impl Autopilot {
     /// The pilot's switch, by HEARTBEAT's `custom_mode`: changes the mode without asking whether it can run. False where
     /// the firmware has no such mode.
     pub fn set_pilot_mode(&mut self, mode: impl Into<u32>) -> bool {
-        let sense = self.body.sense();
-        self.firmware.force_mode(mode.into(), &sense)
+        let sensors = self.platform.sensors();
+        self.firmware.force_mode(mode.into(), &sensors)
     }
 
     /// The pilot takes over: PX4's Position, ArduCopter's BRAKE, which hold where it is.
     pub fn pilot_takes_over(&mut self) {
-        self.set_pilot_mode(match self.body.config.personality {
+        self.set_pilot_mode(match self.platform.config.personality {
             AutopilotKind::Px4 => Mode::Position.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Brake.number(),
         });
@@ -340,7 +341,7 @@ impl Autopilot {
 
     /// The pilot gives it back to Offboard or Guided.
     pub fn pilot_returns(&mut self) {
-        self.set_pilot_mode(match self.body.config.personality {
+        self.set_pilot_mode(match self.platform.config.personality {
             AutopilotKind::Px4 => Mode::Offboard.custom_mode(),
             AutopilotKind::Ardupilot => ardupilot::Mode::Guided.number(),
         });
@@ -348,43 +349,43 @@ impl Autopilot {
 
     /// Sets the charge left, 0 to 1.
     pub fn set_battery(&mut self, charge: f32) {
-        self.body.vehicle.set_battery(charge);
+        self.platform.vehicle.set_battery(charge);
     }
 
     /// Shifts the position estimate by ENU metres from now on.
     pub fn jump_position(&mut self, offset: &Point) {
-        self.body.jump += offset;
+        self.platform.jump += offset;
     }
 
     /// Sets the errors of the estimate, estimated minus true, ENU metres and m/s, and how fast that of the height changes: a
     /// replay imposes those that were recorded.
     pub fn set_estimate_error(&mut self, position: &Point, velocity: &Point, height_rate: f32) {
-        (self.body.jump, self.body.velocity_bias) = (*position, *velocity);
-        self.body.height_error_rate = height_rate;
+        (self.platform.jump, self.platform.velocity_bias) = (*position, *velocity);
+        self.platform.height_error_rate = height_rate;
     }
 
     /// Where it believes to be and how fast it believes to move, ENU metres and m/s.
     pub fn estimate(&self) -> [Point; 2] {
-        let sense = self.body.sense();
-        [sense.position, sense.velocity]
+        let sensors = self.platform.sensors();
+        [sensors.position, sensors.velocity]
     }
 
     /// Moves the EKF origin and says so, as an estimator that resets does.
     pub fn set_ekf_origin(&mut self, origin: Geodetic) {
-        self.body.frame.set_ekf_origin(origin);
-        self.body.announce_origin();
+        self.platform.frame.set_ekf_origin(origin);
+        self.platform.announce_origin();
     }
 
     /// The same, by ENU metres.
     pub fn move_ekf_origin(&mut self, by: &Point) {
-        let origin = frames::enu_to_geodetic(self.body.frame.ekf_origin(), by);
+        let origin = frames::enu_to_geodetic(self.platform.frame.ekf_origin(), by);
         self.set_ekf_origin(origin);
     }
 
     /// Has PX4 land when setpoints stop (`COM_OBL_RC_ACT` 4), as an installer does for flights under a ceiling: its default
     /// is to climb and return. ArduCopter has no such parameter and brakes.
     pub fn land_on_stream_loss(&mut self) {
-        if self.body.config.personality == AutopilotKind::Px4 {
+        if self.platform.config.personality == AutopilotKind::Px4 {
             self.set_parameter("COM_OBL_RC_ACT", 4).expect("PX4 has this parameter");
         }
     }
@@ -399,7 +400,7 @@ impl Autopilot {
 
     /// Takes the GPS fix away or gives it back; without it no position control flies.
     pub fn set_gps_ok(&mut self, ok: bool) {
-        self.body.gps_ok = ok;
+        self.platform.gps_ok = ok;
         self.firmware.set_position_ok(ok);
     }
 }

@@ -111,7 +111,7 @@ impl Bench {
             payload[4 * k..4 * k + 4].copy_from_slice(&p.to_le_bytes());
         }
         payload[28..30].copy_from_slice(&id.to_le_bytes());
-        payload[30..32].copy_from_slice(&[self.autopilot.body.config.system_id, 1]);
+        payload[30..32].copy_from_slice(&[self.autopilot.platform.config.system_id, 1]);
         self.send(76, &payload);
         self.run(0.016);
         self.received[before..]
@@ -341,7 +341,7 @@ fn global_setpoints_fly_to_the_same_place() {
     let mut bench = Bench::hovering(5.0);
     bench.stream = None;
     let goal = Point::new(6.0, -4.0, 7.0);
-    let place = frames::enu_to_geodetic(&bench.autopilot.body.config.world_origin, &goal);
+    let place = frames::enu_to_geodetic(&bench.autopilot.platform.config.world_origin, &goal);
     let mut payload = setpoint(POSITION, 5, [0.0; 3], [0.0; 3], 0.0);
     payload[4..8].copy_from_slice(&((place.lat_deg * 1e7).round() as i32).to_le_bytes());
     payload[8..12].copy_from_slice(&((place.lon_deg * 1e7).round() as i32).to_le_bytes());
@@ -361,7 +361,7 @@ fn global_setpoints_fly_to_the_same_place() {
 fn takeoff_is_to_an_altitude_above_the_sea_and_ends_in_hold() {
     let mut bench = Bench::new();
     bench.run(0.5);
-    let up = bench.autopilot.body.config.world_origin.alt_m as f32 + 8.0;
+    let up = bench.autopilot.platform.config.world_origin.alt_m as f32 + 8.0;
     assert_eq!(bench.command(22, [0.0, 0.0, 0.0, f32::NAN, f32::NAN, f32::NAN, up]), [0]);
     bench.run(1.0);
     assert_eq!(bench.heartbeat().0, TAKEOFF);

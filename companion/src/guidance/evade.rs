@@ -22,8 +22,8 @@ pub const BESIDE_M: f32 = 0.6;
 const FOLLOWER_M: f32 = 0.6;
 /// Spacing of the places looked at, metres.
 const PLACE_STEP_M: f32 = 0.25;
-/// How many are looked at.
-const STEPS: u16 = 48;
+/// Places along the path that one search compares, at most.
+const MAX_PLACES: u16 = 48;
 /// What a search may cost in one step: neighbours, columns, and [`PLACE_COST`] for each place.
 const BUDGET: u16 = 96;
 const PLACE_COST: u16 = 4;
@@ -79,7 +79,7 @@ impl Search {
         let found = loop {
             let along_m = from_m - f32::from(self.held) * PLACE_STEP_M;
             let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
-            let Some(place) = place.filter(|_| self.held <= STEPS) else { break EvadeTarget::Nowhere };
+            let Some(place) = place.filter(|_| self.held <= MAX_PLACES) else { break EvadeTarget::Nowhere };
             budget = budget.saturating_sub(PLACE_COST);
             match self.sweep.go_on(neighbours, &mut budget, 1, &tell, |column| column.holds(&place)) {
                 None => return,

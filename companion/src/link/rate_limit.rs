@@ -33,11 +33,11 @@ pub(crate) struct RateLimit {
     at: Instant,
 }
 
-const BYTE: i64 = 1_000_000;
+const MICROBYTES_PER_BYTE: i64 = 1_000_000;
 
 impl Default for RateLimit {
     fn default() -> Self {
-        Self { left: i64::from(SAVED) * BYTE, at: Instant::ZERO }
+        Self { left: i64::from(SAVED) * MICROBYTES_PER_BYTE, at: Instant::ZERO }
     }
 }
 
@@ -48,18 +48,18 @@ impl RateLimit {
         // An hour fills it in any case.
         let passed_us = (now - self.at).micros().min(3_600_000_000) as i64;
         self.at = now;
-        self.left = (self.left + passed_us * rate).min(i64::from(SAVED) * BYTE);
+        self.left = (self.left + passed_us * rate).min(i64::from(SAVED) * MICROBYTES_PER_BYTE);
         self.left > 0
     }
 
     /// Whether half of what may be saved up is left, as of the last question whether a frame may go out.
     pub(crate) fn is_half_full(&self) -> bool {
-        self.left > i64::from(SAVED / 2) * BYTE
+        self.left > i64::from(SAVED / 2) * MICROBYTES_PER_BYTE
     }
 
     /// A frame went out.
     pub fn spend(&mut self, bytes: usize) {
-        self.left -= bytes.min(MAX_SENT) as i64 * BYTE;
+        self.left -= bytes.min(MAX_SENT) as i64 * MICROBYTES_PER_BYTE;
     }
 }
 

@@ -129,7 +129,7 @@ impl Photographed {
     pub(crate) fn handle(&mut self, report: &DoneReport, waits: bool, now: Instant) {
         if report.plan {
             if waits {
-                self.follow(report, now);
+                self.adopt_plan_of(report, now);
             }
             return;
         }
@@ -156,7 +156,7 @@ impl Photographed {
     }
 
     /// Plans as one that has started already.
-    fn follow(&mut self, report: &DoneReport, now: Instant) {
+    fn adopt_plan_of(&mut self, report: &DoneReport, now: Instant) {
         self.followed_at = Some(now);
         if self.before.ranges() != &report.ranges[..] {
             self.before.clear();

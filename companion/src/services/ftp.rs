@@ -232,7 +232,7 @@ impl Ftp {
                 self.respond(request, done);
             } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
                 // Its answer was lost; what was opened since then stays open otherwise.
-                self.opened(request, &session, store);
+                self.ack_open_again(request, &session, store);
             }
             return;
         }
@@ -374,7 +374,7 @@ impl Ftp {
     }
 
     /// Says once more what a session was opened with.
-    fn opened(&mut self, request: &Request, session: &Session, store: &Store) {
+    fn ack_open_again(&mut self, request: &Request, session: &Session, store: &Store) {
         match store.size(session.file) {
             Some(size) if !session.writes => self.ack(request, &size.to_le_bytes()),
             _ => self.ack(request, &[]),

@@ -12,7 +12,7 @@
 //!
 //! A datagram is one or more whole frames: a sender hands whole frames to [`Link::send`]. A stream may cut anywhere.
 
-mod lasting;
+mod reconnect;
 mod serial;
 mod tcp;
 mod transport;
@@ -120,8 +120,8 @@ impl LinkUrl {
         Ok(match self {
             Self::Tcp(_) | Self::Serial { .. } => {
                 let url = self.clone();
-                let open = move || url.open_once(lasting::RETRY / 4).ok();
-                Box::new(lasting::Lasting::new(self.to_string(), link, Box::new(open)))
+                let open = move || url.open_once(reconnect::RETRY / 4).ok();
+                Box::new(reconnect::ReconnectingLink::new(self.to_string(), link, Box::new(open)))
             }
             _ => link,
         })

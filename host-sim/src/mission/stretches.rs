@@ -11,7 +11,7 @@ use crate::capacity::WAYPOINTS;
 const FOR_LOSSES: usize = 3;
 
 /// When a flight asks for a division, seconds after the plan began by its labels; none where it is the whole route.
-fn asks_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
+fn division_requested_at_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.end_m(&flight.path).filter(|_| photographs.goes_on)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
@@ -41,7 +41,7 @@ fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
 
 /// What is agreed when the first vehicle of a plan asks for a division, by rank; none where no route goes on.
 pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
-    let hold_s = plan.flights.iter().filter_map(asks_s).min_by(f32::total_cmp)? + PROMISE_S;
+    let hold_s = plan.flights.iter().filter_map(division_requested_at_s).min_by(f32::total_cmp)? + PROMISE_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
     flights.sort_by_key(|flight| flight.id);
     Some(flights.into_iter().map(|flight| lot(flight, hold_s)).collect())

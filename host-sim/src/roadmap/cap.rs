@@ -30,7 +30,7 @@ const SOURCES: usize = 64;
 /// Rounds in which the far edges are chosen; a third one gains a tenth of what the second does.
 const ROUNDS: usize = 2;
 /// A way around an edge is looked for up to so many times its length; one that is longer counts as that.
-const AROUND: f32 = 1.5;
+const MAX_DETOUR_RATIO: f32 = 1.5;
 
 /// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
 pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
@@ -156,9 +156,9 @@ fn losses(rows: &[Vec<Out>], usages: &[Vec<u32>], kept: &[bool]) -> Vec<f32> {
                 };
                 let wanted: Vec<&Out> = rows[node].iter().filter(is_wanted).collect();
                 let Some(longest) = wanted.last() else { return Vec::new() };
-                let ways_m = ways_within(node, &kept_rows, class, AROUND * longest.length_m);
+                let ways_m = ways_within(node, &kept_rows, class, MAX_DETOUR_RATIO * longest.length_m);
                 let loss = |out: &&Out| {
-                    let around_m = ways_m[usize::from(out.to)].min(AROUND * out.length_m);
+                    let around_m = ways_m[usize::from(out.to)].min(MAX_DETOUR_RATIO * out.length_m);
                     // Rounding alone can make it less than nothing.
                     let longer_m = (around_m - out.length_m).max(0.0);
                     (out.edge, usage[out.edge as usize] as f32 / all * longer_m)

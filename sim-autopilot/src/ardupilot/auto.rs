@@ -9,8 +9,8 @@ use planner_core::Point;
 use super::auto_state::Auto;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, TakeOff};
-use crate::body::{Body, Sense};
 use crate::itinerary::{Leg, on_line};
+use crate::platform::{Platform, SensorReadings};
 
 /// A place is reached to land there within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
@@ -19,17 +19,17 @@ const LOOKS_M: f32 = 2.0;
 
 impl Copter {
     /// Whether AUTO can be entered; says why not.
-    pub(super) fn auto_runs(&self, body: &mut Body) -> bool {
-        if body.has_mission() && self.armed && self.landed && !body.mission_takes_off() {
-            body.say(2, "Auto: Missing Takeoff Cmd");
+    pub(super) fn auto_runs(&self, platform: &mut Platform) -> bool {
+        if platform.has_mission() && self.armed && self.landed && !platform.mission_takes_off() {
+            platform.say(2, "Auto: Missing Takeoff Cmd");
             return false;
         }
-        body.has_mission()
+        platform.has_mission()
     }
 
     /// MISSION_START.
-    pub(super) fn start_mission(&mut self, body: &mut Body) -> bool {
-        let starts = self.auto_runs(body) && self.set_mode(Mode::Auto, &body.sense());
+    pub(super) fn start_mission(&mut self, platform: &mut Platform) -> bool {
+        let starts = self.auto_runs(platform) && self.set_mode(Mode::Auto, &platform.sensors());
         self.auto.may_lift |= starts && self.armed;
         starts
     }
@@ -45,37 +45,37 @@ impl Copter {
     }
 
     /// Disarmed: what came down is done, and the mission is flown from its first item again.
-    pub(super) fn end_auto(&mut self, body: &mut Body) {
+    pub(super) fn end_auto(&mut self, platform: &mut Platform) {
         if self.lands_in_auto() {
-            body.pass_item();
+            platform.pass_item();
         }
         if self.auto.leg.is_some() {
-            body.rewind_mission();
+            platform.rewind_mission();
         }
         self.auto = Auto::default();
     }
 
     /// One step of the mission.
-    pub(super) fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
+    pub(super) fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if self.mode != Mode::Auto {
             if self.auto.leg.take().is_some() {
-                body.missions.progress.interrupt();
+                platform.missions.progress.interrupt();
             }
             return;
         }
         if self.landed && !self.auto.may_lift {
             return;
         }
-        let leg = body.fly_mission(sense, self.landed);
-        if let Some(speed) = body.missions.speed.take() {
+        let leg = platform.fly_mission(sensors, self.landed);
+        if let Some(speed) = platform.missions.speed.take() {
             self.speed = (speed > 0.0).then_some(speed);
         }
         if leg != self.auto.leg {
-            self.auto.from = Leg::end(self.auto.leg, &sense.position);
+            self.auto.from = Leg::end(self.auto.leg, &sensors.position);
             // At least a metre up from the ground.
             self.takeoff = match leg {
                 Some(Leg::TakeOff { up }) if self.landed => {
-                    Some(TakeOff { since_us: sense.now_us, up: up.max(sense.position.z + 1.0) })
+                    Some(TakeOff { since_us: sensors.now_us, up: up.max(sensors.position.z + 1.0) })
                 }
                 _ => None,
             };
@@ -87,14 +87,14 @@ impl Copter {
     }
 
     /// What the mission asks for now.
-    pub(super) fn auto_goal(&mut self, sense: &Sense) -> Goal {
+    pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> Goal {
         if self.takeoff.is_some() {
             return self.take_off_goal();
         }
         let at = self.reference.position;
         match self.auto.leg {
             Some(Leg::To { at, .. }) => {
-                let off = at - sense.position;
+                let off = at - sensors.position;
                 if libm::hypotf(off.x, off.y) > LOOKS_M {
                     self.auto.heading = Some(libm::atan2f(off.x, off.y));
                 }
@@ -110,14 +110,14 @@ impl Copter {
                 Goal::hold(Point::new(stay.x, stay.y, up))
             }
             Some(Leg::Land { at: Some([east, north]) })
-                if libm::hypotf(east - sense.position.x, north - sense.position.y) > ARRIVED_M
-                    && !sense.touching =>
+                if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M
+                    && !sensors.touching =>
             {
                 let up = self.auto.stay.map_or(at.z, |stay| stay.z);
                 Goal::hold(Point::new(east, north, up))
             }
-            Some(Leg::Land { .. }) => self.landing_goal(sense),
-            Some(Leg::Return) => self.return_goal(sense),
+            Some(Leg::Land { .. }) => self.landing_goal(sensors),
+            Some(Leg::Return) => self.return_goal(sensors),
             Some(Leg::Wait(_)) | None => self.auto.stay.map_or(Goal::STOP, Goal::hold),
         }
     }

@@ -2,11 +2,11 @@
 
 use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
-use crate::body::Body;
 use crate::command::{
     ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST,
     FAILED, FORCE, UNSUPPORTED, message_id,
 };
+use crate::platform::Platform;
 use crate::port::Sender;
 use crate::wire::Fields;
 
@@ -26,90 +26,90 @@ const DATA_STREAMS: [(u8, &[u32]); 8] = [
 
 impl Copter {
     /// Takes a command and acknowledges it.
-    pub(crate) fn handle_command(&mut self, body: &mut Body, from: Sender, command: &Command) {
-        let sense = body.sense();
+    pub(crate) fn handle_command(&mut self, platform: &mut Platform, from: Sender, command: &Command) {
+        let sensors = platform.sensors();
         let result = match command.id {
-            176 => self.change_mode(body, command.param[0] as u8, command.param[1] as u32),
-            400 if command.param[0] == 1.0 => done(self.arm(body, &sense, command.param[1] == FORCE)),
-            400 if command.param[0] == 0.0 => done(self.disarm(body, command.param[1] == FORCE)),
-            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return body.control_camera(from, command),
+            176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
+            400 if command.param[0] == 1.0 => done(self.arm(platform, &sensors, command.param[1] == FORCE)),
+            400 if command.param[0] == 0.0 => done(self.disarm(platform, command.param[1] == FORCE)),
+            DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return platform.control_camera(from, command),
             // The height counts from home.
-            22 => done(self.take_off(sense.home.z + command.z, &sense)),
-            21 => done(self.set_mode(Mode::Land, &sense)),
-            20 => done(self.set_mode(Mode::Rtl, &sense)),
-            17 => done(self.set_mode(Mode::Loiter, &sense)),
-            192 => self.reposition(body, command),
+            22 => done(self.take_off(sensors.home.z + command.z, &sensors)),
+            21 => done(self.set_mode(Mode::Land, &sensors)),
+            20 => done(self.set_mode(Mode::Rtl, &sensors)),
+            17 => done(self.set_mode(Mode::Loiter, &sensors)),
+            192 => self.reposition(platform, command),
             178 => {
                 self.speed = (command.param[1] > 0.0).then_some(command.param[1]);
                 ACCEPTED
             }
-            179 => done(body.set_home(command)),
+            179 => done(platform.set_home(command)),
             193 => FAILED,
-            300 => done(self.start_mission(body)),
+            300 => done(self.start_mission(platform)),
             245 => ACCEPTED,
             241 | 246 if self.armed => FAILED,
             241 => ACCEPTED,
             246 => {
                 if command.param[0] == 1.0 {
-                    body.reboot_soon();
+                    platform.reboot_soon();
                 }
                 ACCEPTED
             }
-            510 => body.report_interval(from, command.param[0], FAILED),
-            511 => body.set_interval(from, command, &STREAMS, DENIED),
+            510 => platform.report_interval(from, command.param[0], FAILED),
+            511 => platform.set_interval(from, command, &STREAMS, DENIED),
             512 => match message_id(command.param[0]) {
                 Some(id) if STREAMS.iter().any(|stream| stream.0 == id) => {
-                    body.ports[from.port].once.push(id);
+                    platform.ports[from.port].once.push(id);
                     ACCEPTED
                 }
                 _ => DENIED,
             },
             520 => {
-                body.ports[from.port].once.push(AUTOPILOT_VERSION);
+                platform.ports[from.port].once.push(AUTOPILOT_VERSION);
                 ACCEPTED
             }
             _ => UNSUPPORTED,
         };
-        body.acknowledge(from, command.id, result);
+        platform.acknowledge(from, command.id, result);
     }
 
     /// Takes the old SET_MODE, which ArduPilot acknowledges as if it were a command.
-    pub(crate) fn handle_set_mode(&mut self, body: &mut Body, from: Sender, fields: &Fields<'_>) {
-        let result = self.change_mode(body, fields.u8(5), fields.u32(0));
-        body.acknowledge(from, SET_MODE, result);
+    pub(crate) fn handle_set_mode(&mut self, platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
+        let result = self.change_mode(platform, fields.u8(5), fields.u32(0));
+        platform.acknowledge(from, SET_MODE, result);
     }
 
-    fn change_mode(&mut self, body: &mut Body, base: u8, number: u32) -> u8 {
+    fn change_mode(&mut self, platform: &mut Platform, base: u8, number: u32) -> u8 {
         if base & CUSTOM_MODE == 0 {
             return DENIED;
         }
-        let runs = |mode: &Mode| *mode != Mode::Auto || self.auto_runs(body);
+        let runs = |mode: &Mode| *mode != Mode::Auto || self.auto_runs(platform);
         let mode = Mode::from_number(number).filter(runs);
-        done(mode.is_some_and(|mode| self.set_mode(mode, &body.sense())))
+        done(mode.is_some_and(|mode| self.set_mode(mode, &platform.sensors())))
     }
 
     /// DO_REPOSITION: Guided, to a place.
-    fn reposition(&mut self, body: &Body, command: &Command) -> u8 {
-        let sense = body.sense();
-        let Some(to) = body.reposition_target(command) else { return DENIED };
+    fn reposition(&mut self, platform: &Platform, command: &Command) -> u8 {
+        let sensors = platform.sensors();
+        let Some(to) = platform.reposition_target(command) else { return DENIED };
         let changes_mode = command.param[1] as u32 & 1 != 0;
-        let guided = self.mode == Mode::Guided || changes_mode && self.set_mode(Mode::Guided, &sense);
+        let guided = self.mode == Mode::Guided || changes_mode && self.set_mode(Mode::Guided, &sensors);
         if !guided || !to.iter().all(|x| x.is_finite()) {
             return if guided { DENIED } else { FAILED };
         }
-        self.fly_to(Goal::hold(to), &sense);
+        self.fly_to(Goal::hold(to), &sensors);
         ACCEPTED
     }
 }
 
 /// Takes REQUEST_DATA_STREAM: the way ground stations asked before SET_MESSAGE_INTERVAL. It is not answered.
-pub(crate) fn handle_stream_request(body: &mut Body, from: Sender, fields: &Fields<'_>) {
+pub(crate) fn handle_stream_request(platform: &mut Platform, from: Sender, fields: &Fields<'_>) {
     let (rate_hz, stream, start) = (fields.u16(0), fields.u8(4), fields.u8(5) != 0);
     let interval_us = if start && rate_hz > 0 { 1_000_000 / u32::from(rate_hz.min(50)) } else { 0 };
-    let now_us = body.time_us;
+    let now_us = platform.time_us;
     for (_, ids) in DATA_STREAMS.iter().filter(|(id, _)| stream == 0 || *id == stream) {
         for &id in *ids {
-            body.ports[from.port].set_interval(id, interval_us, now_us);
+            platform.ports[from.port].set_interval(id, interval_us, now_us);
         }
     }
 }

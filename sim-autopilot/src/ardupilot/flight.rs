@@ -5,7 +5,7 @@ use planner_core::Point;
 use super::reference::Reference;
 use super::setpoint::Goal;
 use super::{Copter, Mode, ReturnLeg, micros};
-use crate::body::Sense;
+use crate::platform::SensorReadings;
 use crate::shaping::approach;
 use crate::vehicle::Demand;
 
@@ -22,13 +22,13 @@ const ARRIVED_M: f32 = 0.5;
 
 impl Copter {
     /// What the mode asks for now.
-    pub(super) fn demand(&mut self, sense: &Sense, dt: f32) -> Demand {
+    pub(super) fn demand(&mut self, sensors: &SensorReadings, dt: f32) -> Demand {
         let mut tuning = self.tuning;
         tuning.speed = self.speed.unwrap_or(tuning.speed);
         let goal = match self.mode {
-            Mode::Auto => self.auto_goal(sense),
+            Mode::Auto => self.auto_goal(sensors),
             Mode::Guided if self.takeoff.is_some() => self.take_off_goal(),
-            Mode::Guided => self.guided_goal(sense.now_us, dt),
+            Mode::Guided => self.guided_goal(sensors.now_us, dt),
             Mode::Brake => {
                 tuning.acceleration = BRAKE_MPS2;
                 Goal::STOP
@@ -37,20 +37,20 @@ impl Copter {
                 tuning.speed_down = tuning.stick_sink;
                 Goal { velocity: Point::new(0.0, 0.0, -tuning.stick_sink), ..Goal::STOP }
             }
-            Mode::Rtl => self.return_goal(sense),
-            Mode::Land => self.landing_goal(sense),
+            Mode::Rtl => self.return_goal(sensors),
+            Mode::Land => self.landing_goal(sensors),
         };
         self.reference.advance(&goal, &tuning, dt);
         // Without a position there is nothing to hold across.
-        let across = self.position_known(sense.now_us);
+        let across = self.position_known(sensors.now_us);
         let (p, v, a) = (self.reference.position, self.reference.velocity, self.reference.acceleration);
         let position =
             Point::new(if across { p.x } else { f32::NAN }, if across { p.y } else { f32::NAN }, p.z);
         // ArduPilot's derivative acts on the error, not on what is measured: what the reference shall do is added back.
         let d = 1.0 + tuning.gains.velocity_d[0];
-        if sense.touching && v.z < 0.0 {
+        if sensors.touching && v.z < 0.0 {
             // The reference does not run on below the ground.
-            self.reference.position.z = sense.position.z;
+            self.reference.position.z = sensors.position.z;
         }
         Demand {
             position,
@@ -58,7 +58,7 @@ impl Copter {
             acceleration: Point::new(a.x * d, a.y * d, a.z),
             heading: goal.heading,
             heading_rate: goal.heading_rate,
-            lift_off: self.lift_off(sense.now_us),
+            lift_off: self.lift_off(sensors.now_us),
             ..tuning.nothing()
         }
     }
@@ -95,46 +95,46 @@ impl Copter {
 
     /// Sinks towards `LAND_ALT_LOW` above home as if to stop there, at `LAND_SPEED` at least and `WPNAV_SPEED_DN` at most
     /// (`Mode::land_run_vertical_control`): without a rangefinder it knows no other ground.
-    pub(super) fn landing_goal(&self, sense: &Sense) -> Goal {
+    pub(super) fn landing_goal(&self, sensors: &SensorReadings) -> Goal {
         let tuning = &self.tuning;
-        let above_low = sense.position.z - sense.home.z - tuning.land_slow_below.max(1.0);
+        let above_low = sensors.position.z - sensors.home.z - tuning.land_slow_below.max(1.0);
         let rate = approach(above_low.max(0.0), tuning.gains.position[1], tuning.acceleration_z);
         let sink = rate.min(tuning.speed_down).max(tuning.land_speed);
         Goal { velocity: Point::new(0.0, 0.0, -sink), ..Goal::STOP }
     }
 
-    pub(super) fn return_goal(&mut self, sense: &Sense) -> Goal {
-        let home = sense.home;
+    pub(super) fn return_goal(&mut self, sensors: &SensorReadings) -> Goal {
+        let home = sensors.home;
         let at = self.reference.position;
-        let away = libm::hypotf(home.x - sense.position.x, home.y - sense.position.y);
+        let away = libm::hypotf(home.x - sensors.position.x, home.y - sensors.position.y);
         if let ReturnLeg::Climb { up } = &mut self.leg
             && up.is_nan()
         {
             // Near home the climb is cut by the cone `RTL_CONE_SLOPE`.
             let height = self.tuning.return_height.min(away * self.tuning.return_cone);
-            *up = (home.z + height).max(sense.position.z);
+            *up = (home.z + height).max(sensors.position.z);
         }
         match self.leg {
             ReturnLeg::Climb { up } => {
-                if up - sense.position.z < ARRIVED_M {
+                if up - sensors.position.z < ARRIVED_M {
                     self.leg = ReturnLeg::Cross { up };
                 }
                 Goal::hold(Point::new(at.x, at.y, up))
             }
             ReturnLeg::Cross { up } => {
                 if away < ARRIVED_M {
-                    self.leg = ReturnLeg::Wait { since_us: sense.now_us, up };
+                    self.leg = ReturnLeg::Wait { since_us: sensors.now_us, up };
                 }
                 Goal::hold(Point::new(home.x, home.y, up))
             }
             ReturnLeg::Wait { since_us, up } => {
-                if sense.now_us - since_us >= micros(self.tuning.return_loiter_s) {
+                if sensors.now_us - since_us >= micros(self.tuning.return_loiter_s) {
                     self.leg = ReturnLeg::Land;
                     self.reference = Reference::new(at, self.reference.velocity);
                 }
                 Goal::hold(Point::new(home.x, home.y, up))
             }
-            ReturnLeg::Land => self.landing_goal(sense),
+            ReturnLeg::Land => self.landing_goal(sensors),
         }
     }
 }

@@ -30,8 +30,8 @@ use self::auto_state::Auto;
 use self::params::Tuning;
 use self::reference::Reference;
 use self::setpoint::Goal;
-use super::body::{Body, Integral, Order, Sense};
 use super::params::Params;
+use super::platform::{Integral, Order, Platform, SensorReadings};
 use super::port::Sender;
 use super::status::Status;
 use super::vehicle::VehicleLimits;
@@ -205,8 +205,8 @@ impl Copter {
     }
 
     /// What telemetry reports.
-    pub fn status(&self, sense: &Sense) -> Status {
-        let now_us = sense.now_us;
+    pub fn status(&self, sensors: &SensorReadings) -> Status {
+        let now_us = sensors.now_us;
         let known = self.position_known(now_us);
         let sticks = matches!(self.mode, Mode::Stabilize | Mode::AltHold);
         Status {
@@ -221,7 +221,7 @@ impl Copter {
                 None if self.landed => 3,
                 None => 4,
             },
-            armable: self.armable(sense).is_ok(),
+            armable: self.armable(sensors).is_ok(),
             landed_state: match self.mode {
                 _ if self.landed => 1,
                 _ if self.takeoff.is_some() => 3,
@@ -248,76 +248,79 @@ impl Copter {
     }
 
     /// Takes a setpoint; outside Guided it is ignored.
-    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
         if self.mode != Mode::Guided {
             return;
         }
-        let goal =
-            if id == 84 { setpoint::local_ned(fields, body) } else { setpoint::global_int(fields, body) };
-        self.fly_to(goal, &body.sense());
+        let goal = if id == 84 {
+            setpoint::local_ned(fields, platform)
+        } else {
+            setpoint::global_int(fields, platform)
+        };
+        self.fly_to(goal, &platform.sensors());
     }
 
     /// A new goal in Guided: it ends a take-off.
-    fn fly_to(&mut self, goal: Goal, sense: &Sense) {
+    fn fly_to(&mut self, goal: Goal, sensors: &SensorReadings) {
         if self.takeoff.take().is_some() || goal.position.is_some() != self.goal.position.is_some() {
-            self.reference = Reference::new(sense.position, sense.velocity);
+            self.reference = Reference::new(sensors.position, sensors.velocity);
         }
-        (self.goal, self.goal_us) = (goal, sense.now_us);
+        (self.goal, self.goal_us) = (goal, sensors.now_us);
     }
 
     /// HEARTBEAT of another system: only the ground station's counts.
-    pub(super) fn handle_heartbeat(&mut self, body: &mut Body, from: Sender) {
+    pub(super) fn handle_heartbeat(&mut self, platform: &mut Platform, from: Sender) {
         if from.system != self.tuning.gcs_system {
             return;
         }
-        self.gcs_us = Some(body.time_us);
+        self.gcs_us = Some(platform.time_us);
         if self.failsafe == Some(Failsafe::GroundStation) {
             // It stays in the mode the failsafe chose.
             self.failsafe = None;
-            body.say(4, "GCS Failsafe Cleared");
+            platform.say(4, "GCS Failsafe Cleared");
         }
     }
 
     /// Whether the arming checks pass, or why not.
-    fn armable(&self, sense: &Sense) -> Result<(), &'static str> {
+    fn armable(&self, sensors: &SensorReadings) -> Result<(), &'static str> {
         if !self.mode.allows_arming() {
             Err("Arm: Mode not armable")
-        } else if self.tuning.checks && !self.position_known(sense.now_us) {
+        } else if self.tuning.checks && !self.position_known(sensors.now_us) {
             Err("Arm: Need Position Estimate")
-        } else if sense.battery < self.tuning.battery_to_arm {
+        } else if sensors.battery < self.tuning.battery_to_arm {
             Err("Arm: Battery 1 below minimum arming capacity")
         } else {
             Ok(())
         }
     }
 
-    fn arm(&mut self, body: &mut Body, sense: &Sense, force: bool) -> bool {
+    fn arm(&mut self, platform: &mut Platform, sensors: &SensorReadings, force: bool) -> bool {
         if self.armed {
             return true;
         }
-        if !force && let Err(why) = self.armable(sense) {
-            body.say(2, why);
+        if !force && let Err(why) = self.armable(sensors) {
+            platform.say(2, why);
             return false;
         }
         self.armed = true;
-        self.since.armed_us = sense.now_us;
-        self.since.idle_us = sense.now_us;
+        self.since.armed_us = sensors.now_us;
+        self.since.idle_us = sensors.now_us;
         self.goal = Goal::STOP;
-        body.announce_origin();
-        body.set_home_here();
-        body.say(6, "Arming motors");
+        platform.announce_origin();
+        platform.set_home_here();
+        platform.say(6, "Arming motors");
         true
     }
 
     /// Disarms; in the air only by force.
-    fn disarm(&mut self, body: &mut Body, force: bool) -> bool {
+    fn disarm(&mut self, platform: &mut Platform, force: bool) -> bool {
         if self.armed && !self.landed && !force {
             return false;
         }
         if self.armed {
-            body.say(6, "Disarming motors");
+            platform.say(6, "Disarming motors");
         }
-        self.end_auto(body);
+        self.end_auto(platform);
         self.armed = false;
         self.takeoff = None;
         self.failsafe = None;
@@ -326,24 +329,24 @@ impl Copter {
     }
 
     /// Changes the mode if it can run. Disarmed, Guided is accepted without a position.
-    fn set_mode(&mut self, mode: Mode, sense: &Sense) -> bool {
-        if self.armed && mode.needs_position() && !self.position_known(sense.now_us) {
+    fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings) -> bool {
+        if self.armed && mode.needs_position() && !self.position_known(sensors.now_us) {
             return false;
         }
-        self.force_mode(mode, sense);
+        self.force_mode(mode, sensors);
         true
     }
 
     /// Changes the mode as a pilot's switch does. The mode it is in is not entered again.
-    pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
+    pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         if mode == self.mode {
             return;
         }
         // Land goes on with the reference of a controller that was running, the others start theirs.
         let runs = self.mode.needs_position() && !self.landed;
         if mode != Mode::Land || !runs {
-            self.reference = Reference::new(sense.position, sense.velocity);
-            self.reference.acceleration = if self.landed { Point::zeros() } else { sense.acceleration };
+            self.reference = Reference::new(sensors.position, sensors.velocity);
+            self.reference.acceleration = if self.landed { Point::zeros() } else { sensors.acceleration };
             self.starts = !self.landed;
         }
         self.mode = mode;
@@ -353,10 +356,10 @@ impl Copter {
     }
 
     /// NAV_TAKEOFF to a height in the mission frame.
-    fn take_off(&mut self, up: f32, sense: &Sense) -> bool {
-        let possible = self.armed && self.landed && self.mode == Mode::Guided && up > sense.position.z;
+    fn take_off(&mut self, up: f32, sensors: &SensorReadings) -> bool {
+        let possible = self.armed && self.landed && self.mode == Mode::Guided && up > sensors.position.z;
         if possible {
-            let since_us = self.takeoff.map_or(sense.now_us, |takeoff| takeoff.since_us);
+            let since_us = self.takeoff.map_or(sensors.now_us, |takeoff| takeoff.since_us);
             self.takeoff = Some(TakeOff { since_us, up });
             self.auto.may_lift = true;
         }
@@ -364,17 +367,17 @@ impl Copter {
     }
 
     /// One step: timers, failsafes, phases, and what the mode asks for.
-    pub fn update(&mut self, body: &mut Body, sense: &Sense, dt_s: f32) -> Order {
-        let now_us = sense.now_us;
-        self.tell_progress(body, now_us);
+    pub fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> Order {
+        let now_us = sensors.now_us;
+        self.tell_progress(platform, now_us);
         if self.armed {
-            self.update_failsafe(body, sense);
-            self.update_timers(body, sense);
-            self.fly_mission(body, sense);
+            self.update_failsafe(platform, sensors);
+            self.update_timers(platform, sensors);
+            self.fly_mission(platform, sensors);
         }
         if !self.armed {
             // A vehicle disarmed in the air falls, and has landed when it lies still.
-            self.landed |= sense.touching;
+            self.landed |= sensors.touching;
             return self.rest();
         }
         if self.landed
@@ -385,14 +388,14 @@ impl Copter {
             self.landed = false;
             self.since.touching_us = None;
             self.since.lifted_us = now_us;
-            self.reference = Reference::new(sense.position, Point::zeros());
+            self.reference = Reference::new(sensors.position, Point::zeros());
         }
         if self.landed {
             return self.rest();
         }
-        let demand = self.demand(sense, dt_s);
+        let demand = self.demand(sensors, dt_s);
         let climbing = demand.velocity.z > 0.05;
-        self.detect_landing(sense, climbing);
+        self.detect_landing(sensors, climbing);
         let integral = if core::mem::take(&mut self.starts) { Integral::Match } else { Integral::Keep };
         Order { lift: true, integral, demand }
     }
@@ -403,8 +406,8 @@ impl Copter {
     }
 
     /// Origin and position, each once.
-    fn update_failsafe(&mut self, body: &mut Body, sense: &Sense) {
-        let now_us = sense.now_us;
+    fn update_failsafe(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
+        let now_us = sensors.now_us;
         let since = |start: u64| now_us.saturating_sub(start);
         if self.position_known(now_us) {
             self.lost_us = None;
@@ -416,8 +419,8 @@ impl Copter {
             && since(*self.lost_us.get_or_insert(now_us)) >= micros(ESTIMATOR_REACTION_S)
         {
             self.failsafe = Some(Failsafe::Estimator);
-            body.say(2, "EKF Failsafe: changed to LAND Mode");
-            self.force_mode(Mode::Land, sense);
+            platform.say(2, "EKF Failsafe: changed to LAND Mode");
+            self.force_mode(Mode::Land, sensors);
         }
         if self.failsafe.is_some() || self.landed {
             return;
@@ -425,43 +428,43 @@ impl Copter {
         let silent = |at: u64| since(at) >= micros(self.tuning.gcs_timeout_s + GCS_REACTION_S);
         if self.tuning.gcs_failsafe && self.gcs_us.is_some_and(silent) {
             self.failsafe = Some(Failsafe::GroundStation);
-            body.say(4, "GCS Failsafe");
-            self.force_mode(Mode::Rtl, sense);
-        } else if sense.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
+            platform.say(4, "GCS Failsafe");
+            self.force_mode(Mode::Rtl, sensors);
+        } else if sensors.battery < self.tuning.battery_low && self.tuning.battery_action > 0 {
             self.failsafe = Some(Failsafe::Battery);
-            body.say(4, "Battery 1 is low");
-            self.force_mode(if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl }, sense);
+            platform.say(4, "Battery 1 is low");
+            self.force_mode(if self.tuning.battery_action == 1 { Mode::Land } else { Mode::Rtl }, sensors);
         }
     }
 
-    fn update_timers(&mut self, body: &mut Body, sense: &Sense) {
-        let since = |start: u64| sense.now_us.saturating_sub(start);
+    fn update_timers(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
+        let since = |start: u64| sensors.now_us.saturating_sub(start);
         if !self.landed || self.takeoff.is_some() {
-            self.since.idle_us = sense.now_us;
+            self.since.idle_us = sensors.now_us;
         } else {
             let delay = self.tuning.disarm_delay_s - DISARM_EARLY_S;
             let landing = matches!(self.mode, Mode::Land | Mode::Rtl) || self.lands_in_auto();
             if landing && since(self.since.landed_us) >= micros(LAND_DISARM_S)
                 || delay > 0.0 && since(self.since.idle_us) >= micros(delay)
             {
-                self.disarm(body, false);
+                self.disarm(platform, false);
             }
         }
-        if sense.battery <= 0.0 {
-            self.disarm(body, true);
+        if sensors.battery <= 0.0 {
+            self.disarm(platform, true);
         }
     }
 
-    fn detect_landing(&mut self, sense: &Sense, climbing: bool) {
-        if !sense.touching || climbing {
+    fn detect_landing(&mut self, sensors: &SensorReadings, climbing: bool) {
+        if !sensors.touching || climbing {
             self.since.touching_us = None;
             return;
         }
-        let since = *self.since.touching_us.get_or_insert(sense.now_us);
-        if sense.now_us - since >= micros(LAND_DETECTOR_S) {
+        let since = *self.since.touching_us.get_or_insert(sensors.now_us);
+        if sensors.now_us - since >= micros(LAND_DETECTOR_S) {
             self.since.touching_us = None;
             self.landed = true;
-            self.since.landed_us = sense.now_us;
+            self.since.landed_us = sensors.now_us;
             self.takeoff = None;
             self.goal = Goal::STOP;
         }

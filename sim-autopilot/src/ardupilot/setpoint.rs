@@ -8,7 +8,7 @@ use nalgebra::Vector3;
 use planner_core::Point;
 use planner_core::frames::Geodetic;
 
-use crate::body::Body;
+use crate::platform::Platform;
 use crate::wire::Fields;
 
 const FRAME_LOCAL_NED: u8 = 1;
@@ -57,31 +57,31 @@ impl Goal {
 }
 
 /// Reads message 84.
-pub fn local_ned(fields: &Fields<'_>, body: &Body) -> Goal {
+pub fn local_ned(fields: &Fields<'_>, platform: &Platform) -> Goal {
     let frame = fields.u8(52);
     let in_body = matches!(frame, FRAME_BODY_NED | FRAME_BODY_OFFSET_NED);
     if frame != FRAME_LOCAL_NED && frame != FRAME_LOCAL_OFFSET_NED && !in_body {
         return Goal::STOP;
     }
-    let (sin, cos) = libm::sincos(f64::from(body.vehicle.state().heading_rad));
+    let (sin, cos) = libm::sincos(f64::from(platform.vehicle.state().heading_rad));
     let turned = |v: Vector3<f64>| match in_body {
         true => Vector3::new(cos * v.x - sin * v.y, sin * v.x + cos * v.y, v.z),
         false => v,
     };
     let mut ned = turned(vector(fields, 4));
     if frame != FRAME_LOCAL_NED {
-        ned += body.frame.ned(&body.sense().position.cast::<f64>());
+        ned += platform.frame.ned(&platform.sensors().position.cast::<f64>());
     }
-    let position = body.frame.enu(&ned).cast::<f32>();
-    let rate = |at| body.frame.enu_rate(&turned(vector(fields, at))).cast::<f32>();
+    let position = platform.frame.enu(&ned).cast::<f32>();
+    let rate = |at| platform.frame.enu_rate(&turned(vector(fields, at))).cast::<f32>();
     finish(fields, position, rate(16), rate(28))
 }
 
 /// Reads message 86.
-pub fn global_int(fields: &Fields<'_>, body: &Body) -> Goal {
+pub fn global_int(fields: &Fields<'_>, platform: &Platform) -> Goal {
     let base = match fields.u8(52) {
         0 | 5 => 0.0,
-        3 | 6 => body.home.alt_m,
+        3 | 6 => platform.home.alt_m,
         _ => return Goal::STOP,
     };
     let asked = Geodetic {
@@ -92,8 +92,8 @@ pub fn global_int(fields: &Fields<'_>, body: &Body) -> Goal {
     if !asked.is_valid() {
         return Goal::STOP;
     }
-    let rate = |at| body.frame.enu_rate(&vector(fields, at)).cast::<f32>();
-    finish(fields, body.frame.enu_of_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
+    let rate = |at| platform.frame.enu_rate(&vector(fields, at)).cast::<f32>();
+    finish(fields, platform.frame.enu_of_geodetic(&asked).cast::<f32>(), rate(16), rate(28))
 }
 
 fn vector(fields: &Fields<'_>, at: usize) -> Vector3<f64> {

@@ -1,7 +1,7 @@
 //! What ArduCopter says unasked beside its streams: texts, the origin when it is set, and stray parameters.
 
 use super::Copter;
-use crate::body::Body;
+use crate::platform::Platform;
 
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
@@ -12,37 +12,37 @@ const INT32: u8 = 6;
 
 impl Copter {
     /// What it says when it has booted.
-    pub fn boot(&mut self, body: &mut Body) {
-        body.say(6, "ArduPilot Ready");
-        body.announce(1);
+    pub fn boot(&mut self, platform: &mut Platform) {
+        platform.say(6, "ArduPilot Ready");
+        platform.announce(1);
     }
 
     /// Reports what has become so since the last step.
-    pub(super) fn tell_progress(&mut self, body: &mut Body, now_us: u64) {
+    pub(super) fn tell_progress(&mut self, platform: &mut Platform, now_us: u64) {
         if !self.said[0] && self.origin_known(now_us) {
             self.said[0] = true;
-            body.announce_origin();
-            body.announce(HOME_POSITION);
-            body.say(6, "EKF3 IMU0 origin set");
+            platform.announce_origin();
+            platform.announce(HOME_POSITION);
+            platform.say(6, "EKF3 IMU0 origin set");
         }
         if !self.said[1] && self.position_known(now_us) {
             self.said[1] = true;
-            body.say(6, "EKF3 IMU0 is using GPS");
+            platform.say(6, "EKF3 IMU0 is using GPS");
         }
         if now_us >= self.runtime_us + RUNTIME_EVERY_US {
             self.runtime_us = now_us;
-            self.tell_runtime(body, (now_us / 1_000_000) as f32);
+            self.tell_runtime(platform, (now_us / 1_000_000) as f32);
         }
     }
 
     /// PARAM_VALUE that nobody asked for.
-    fn tell_runtime(&self, body: &mut Body, seconds: f32) {
+    fn tell_runtime(&self, platform: &mut Platform, seconds: f32) {
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&seconds.to_le_bytes());
         payload[4..6].copy_from_slice(&(self.params.len() as u16).to_le_bytes());
         payload[6..8].copy_from_slice(&u16::MAX.to_le_bytes());
         payload[8..20].copy_from_slice(b"STAT_RUNTIME");
         payload[24] = INT32;
-        body.ports.iter_mut().for_each(|port| port.send_raw(PARAM_VALUE, &payload));
+        platform.ports.iter_mut().for_each(|port| port.send_raw(PARAM_VALUE, &payload));
     }
 }

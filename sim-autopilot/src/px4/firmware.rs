@@ -4,10 +4,10 @@ use super::params::{self, Tuning};
 use super::setpoint;
 use super::{Commander, Mode};
 use crate::AutopilotKind;
-use crate::body::{Body, Order, Sense};
 use crate::command::{DO_SET_MODE, accept};
 use crate::itinerary::Leg;
 use crate::params::Params;
+use crate::platform::{Order, Platform, SensorReadings};
 use crate::port::Sender;
 use crate::status::Status;
 use crate::vehicle::VehicleLimits;
@@ -43,80 +43,80 @@ impl Px4 {
     }
 
     /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
-    pub(crate) fn update(&mut self, body: &mut Body, sense: &Sense) -> Order {
-        self.commander.set_mission_ready(body.has_mission());
+    pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> Order {
+        self.commander.set_mission_ready(platform.has_mission());
         if let Some((from, mode)) = self.asked.take() {
-            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sense, &self.tuning));
-            body.acknowledge(from, DO_SET_MODE, accept(changed));
+            let changed = mode.is_some_and(|mode| self.commander.set_mode(mode, sensors, &self.tuning));
+            platform.acknowledge(from, DO_SET_MODE, accept(changed));
         }
-        self.fly_mission(body, sense);
+        self.fly_mission(platform, sensors);
         let failed = self.commander.in_failsafe();
-        let order = self.commander.update(sense, &self.tuning);
+        let order = self.commander.update(sensors, &self.tuning);
         if self.commander.in_failsafe() && !failed {
-            turn_gimbal(body);
+            turn_gimbal(platform);
         }
         order
     }
 
     /// What the mission asks for, while AUTO.MISSION flies it. Its return is AUTO.RTL.
-    fn fly_mission(&mut self, body: &mut Body, sense: &Sense) {
+    fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if !self.commander.armed() {
             if let Some(leg) = self.commander.mission.leg.take() {
                 if matches!(leg, Leg::Land { .. }) {
-                    body.pass_item();
+                    platform.pass_item();
                 }
-                body.rewind_mission();
+                platform.rewind_mission();
             }
             return;
         }
         if self.commander.mode() != Mode::Mission {
             if self.commander.mission.leg.take().is_some() {
-                body.missions.progress.interrupt();
+                platform.missions.progress.interrupt();
             }
             return;
         }
-        let leg = body.fly_mission(sense, self.commander.landed());
+        let leg = platform.fly_mission(sensors, self.commander.landed());
         let mission = &mut self.commander.mission;
         if leg != mission.leg {
-            mission.from = Leg::end(mission.leg, &sense.position);
+            mission.from = Leg::end(mission.leg, &sensors.position);
         }
         mission.leg = leg;
-        if let Some(speed) = body.missions.speed.take() {
+        if let Some(speed) = platform.missions.speed.take() {
             self.commander.set_cruise(speed);
         }
         if self.commander.mission.leg == Some(Leg::Return) {
             self.commander.mission.leg = None;
-            body.pass_item();
-            body.rewind_mission();
-            self.commander.force_mode(Mode::Return, sense);
+            platform.pass_item();
+            platform.rewind_mission();
+            self.commander.force_mode(Mode::Return, sensors);
         }
     }
 
     /// What telemetry reports.
-    pub fn status(&self, body: &Body, sense: &Sense) -> Status {
-        let (system_status, flags) = self.commander.heartbeat(body.time_us, &self.tuning);
+    pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> Status {
+        let (system_status, flags) = self.commander.heartbeat(platform.time_us, &self.tuning);
         Status {
             personality: AutopilotKind::Px4,
             custom_mode: self.commander.mode().custom_mode(),
             intended_mode: self.commander.intention().custom_mode(),
             flags,
             system_status,
-            armable: self.commander.armable(sense, &self.tuning),
+            armable: self.commander.armable(sensors, &self.tuning),
             landed_state: self.commander.landed_state(),
             guided: true,
             ekf_flags: 0,
             origin_known: true,
             // LOCAL_POSITION_NED comes only while the estimate is valid.
-            position_known: body.gps_ok,
+            position_known: platform.gps_ok,
         }
     }
 
     /// Takes a setpoint, if it counts.
-    pub fn handle_setpoint(&mut self, body: &Body, id: u32, fields: &Fields<'_>) {
+    pub fn handle_setpoint(&mut self, platform: &Platform, id: u32, fields: &Fields<'_>) {
         let context = setpoint::Context {
-            frame: &body.frame,
-            heading: body.vehicle.state().heading_rad,
-            home_alt_m: body.home.alt_m,
+            frame: &platform.frame,
+            heading: platform.vehicle.state().heading_rad,
+            home_alt_m: platform.home.alt_m,
         };
         let setpoint = if id == 84 {
             setpoint::local_ned(fields, &context)
@@ -124,19 +124,19 @@ impl Px4 {
             setpoint::global_int(fields, &context)
         };
         if let Some(setpoint) = setpoint {
-            self.commander.handle_setpoint(setpoint, body.time_us);
+            self.commander.handle_setpoint(setpoint, platform.time_us);
         }
     }
 }
 
-fn turn_gimbal(body: &mut Body) {
+fn turn_gimbal(platform: &mut Platform) {
     for (command, params) in GIMBAL {
         let mut payload = [0; 33];
         for (k, param) in params.iter().enumerate() {
             payload[4 * k..4 * k + 4].copy_from_slice(&param.to_le_bytes());
         }
         payload[28..30].copy_from_slice(&command.to_le_bytes());
-        payload[30] = body.config.system_id;
-        body.ports.iter_mut().for_each(|port| port.send_raw(COMMAND_LONG, &payload));
+        payload[30] = platform.config.system_id;
+        platform.ports.iter_mut().for_each(|port| port.send_raw(COMMAND_LONG, &payload));
     }
 }

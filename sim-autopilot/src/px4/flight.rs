@@ -4,7 +4,7 @@ use planner_core::Point;
 
 use super::glide::{self, Glide};
 use super::params::Tuning;
-use super::{Commander, Mode, ReturnLeg, Sense};
+use super::{Commander, Mode, ReturnLeg, SensorReadings};
 use crate::itinerary::{Leg, on_line};
 use crate::shaping::Ramp;
 use crate::vehicle::Demand;
@@ -27,24 +27,24 @@ const DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
     /// Fixes what the mode leans on: where it stops, which leg of the return is next.
-    pub(super) fn enter(&mut self, mode: Mode, sense: &Sense) {
-        self.hold = sense.position + glide::stop(&sense.velocity);
-        self.glide = Glide::new(sense.now_us, &sense.position, &sense.velocity);
-        self.hold_heading = sense.heading;
+    pub(super) fn enter(&mut self, mode: Mode, sensors: &SensorReadings) {
+        self.hold = sensors.position + glide::stop(&sensors.velocity);
+        self.glide = Glide::new(sensors.now_us, &sensors.position, &sensors.velocity);
+        self.hold_heading = sensors.heading;
         self.leg = ReturnLeg::Climb { up: f32::NAN };
         self.descent = None;
         if mode == Mode::Takeoff {
-            (self.hold.x, self.hold.y) = (sense.position.x, sense.position.y);
+            (self.hold.x, self.hold.y) = (sensors.position.x, sensors.position.y);
         }
     }
 
     /// Whether the demand lifts a vehicle off the ground. Hold, Return and Land never do.
-    pub(super) fn wants_up(&self, sense: &Sense, demand: &Demand) -> bool {
+    pub(super) fn wants_up(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
         match self.mode() {
             Mode::Takeoff => true,
-            Mode::Mission => demand.position.z - sense.position.z > CLIMB_M,
+            Mode::Mission => demand.position.z - sensors.position.z > CLIMB_M,
             Mode::Offboard => {
-                demand.position.z - sense.position.z > CLIMB_M
+                demand.position.z - sensors.position.z > CLIMB_M
                     || demand.velocity.z > CLIMB_MPS
                     || demand.acceleration.z > CLIMB_MPS
             }
@@ -53,7 +53,7 @@ impl Commander {
     }
 
     /// What the mode asks for now.
-    pub(super) fn demand(&mut self, sense: &Sense, tuning: &Tuning) -> Demand {
+    pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Demand {
         let held = Demand {
             position: self.hold,
             heading: self.hold_heading,
@@ -76,33 +76,33 @@ impl Commander {
             },
             Mode::Takeoff => {
                 let up = self.takeoff_up;
-                let up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
-                if !self.landed && sense.position.z > up - ARRIVED_M {
+                let up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
+                if !self.landed && sensors.position.z > up - ARRIVED_M {
                     // Reached: PX4 goes on in Hold at the height asked for.
                     self.intention = Mode::Hold;
                     self.after_disarm = Mode::Hold;
                     self.takeoff_up = f32::NAN;
                     self.hold.z = up;
-                    self.glide = Glide::new(sense.now_us, &self.hold, &Point::zeros());
+                    self.glide = Glide::new(sensors.now_us, &self.hold, &Point::zeros());
                 }
                 let position = Point::new(self.hold.x, self.hold.y, up);
                 Demand { position, climb_max: tuning.takeoff_speed.min(held.climb_max), ..held }
             }
-            Mode::Mission => self.mission_demand(sense, tuning, held),
+            Mode::Mission => self.mission_demand(sensors, tuning, held),
             Mode::Land => {
-                let across = self.glided(sense, tuning, &held);
-                let down = self.landing(sense, tuning, held);
+                let across = self.glided(sensors, tuning, &held);
+                let down = self.landing(sensors, tuning, held);
                 with_up(across, &down)
             }
-            Mode::Hold => self.glided(sense, tuning, &held),
-            Mode::Return => self.returning(sense, tuning, held),
+            Mode::Hold => self.glided(sensors, tuning, &held),
+            Mode::Return => self.returning(sensors, tuning, held),
             _ => held,
         }
     }
 
     /// What is held, approached as the automatic modes approach it across.
-    fn glided(&mut self, sense: &Sense, tuning: &Tuning, held: &Demand) -> Demand {
-        self.glide.advance(sense.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
+    fn glided(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: &Demand) -> Demand {
+        self.glide.advance(sensors.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
         let Glide { position, ramps: [east, north], .. } = self.glide;
         let up = f32::NAN;
         Demand {
@@ -114,7 +114,7 @@ impl Commander {
     }
 
     /// What an item of the mission asks for. Without a heading it looks where it flies (`MPC_YAW_MODE` 0).
-    fn mission_demand(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+    fn mission_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         match self.mission.leg {
             Some(Leg::TakeOff { up }) => {
                 self.hold.z = up;
@@ -122,25 +122,25 @@ impl Commander {
                 Demand { position: self.hold, climb_max, ..held }
             }
             Some(Leg::To { at, heading, .. }) => {
-                let off = at - sense.position;
+                let off = at - sensors.position;
                 if heading.is_finite() {
                     self.hold_heading = heading;
                 } else if libm::hypotf(off.x, off.y) > LOOKS_M {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
                 self.hold = at;
-                let (up, rate) = on_line(&self.mission.from, &at, &sense.position, &sense.velocity);
+                let (up, rate) = on_line(&self.mission.from, &at, &sensors.position, &sensors.velocity);
                 let (position, velocity) = (Point::new(at.x, at.y, up), Point::new(0.0, 0.0, rate));
                 Demand { position, velocity, heading: self.hold_heading, ..held }
             }
             Some(Leg::Land { at }) => {
                 if let Some([east, north]) = at {
                     (self.hold.x, self.hold.y) = (east, north);
-                    if libm::hypotf(east - sense.position.x, north - sense.position.y) > ARRIVED_M {
+                    if libm::hypotf(east - sensors.position.x, north - sensors.position.y) > ARRIVED_M {
                         return Demand { position: self.hold, ..held };
                     }
                 }
-                self.landing(sense, tuning, held)
+                self.landing(sensors, tuning, held)
             }
             Some(Leg::Wait(_) | Leg::Return) | None => held,
         }
@@ -149,23 +149,24 @@ impl Commander {
     /// Sinks at `MPC_Z_V_AUTO_DN` down to `MPC_LAND_ALT1`, slower from there to `MPC_LAND_ALT2`, then `MPC_LAND_SPEED`, these heights
     /// above home; and crawls (`MPC_LAND_CRWL`) once a distance sensor shows the ground nearer than `MPC_LAND_ALT3`. Each change of the
     /// rate is smooth (`MPC_JERK_AUTO`).
-    fn landing(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
+    fn landing(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         let [high, low] = tuning.land_slow_below;
-        let height = sense.position.z - sense.home.z;
+        let height = sensors.position.z - sensors.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
         let mut sink = LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
-        if sense.distance - sense.velocity.z * DISTANCE_LAG_S < tuning.land_crawl_below {
+        if sensors.distance - sensors.velocity.z * DISTANCE_LAG_S < tuning.land_crawl_below {
             sink = CRAWL_SHARE * tuning.land_crawl_speed;
         }
         let descent = match &mut self.descent {
             Some((at_us, ramp)) => {
-                let dt = sense.now_us.saturating_sub(core::mem::replace(at_us, sense.now_us)) as f32 * 1e-6;
+                let dt =
+                    sensors.now_us.saturating_sub(core::mem::replace(at_us, sensors.now_us)) as f32 * 1e-6;
                 ramp.advance(sink, tuning.auto_acceleration_down, tuning.auto_jerk, dt);
                 *ramp
             }
             begin => {
-                let ramp = Ramp { rate: -sense.velocity.z, change: 0.0 };
-                *begin = Some((sense.now_us, ramp));
+                let ramp = Ramp { rate: -sensors.velocity.z, change: 0.0 };
+                *begin = Some((sensors.now_us, ramp));
                 ramp
             }
         };
@@ -179,8 +180,8 @@ impl Commander {
         }
     }
 
-    fn returning(&mut self, sense: &Sense, tuning: &Tuning, held: Demand) -> Demand {
-        let away = libm::hypotf(sense.home.x - sense.position.x, sense.home.y - sense.position.y);
+    fn returning(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
+        let away = libm::hypotf(sensors.home.x - sensors.position.x, sensors.home.y - sensors.position.y);
         if let ReturnLeg::Climb { up } = &mut self.leg
             && up.is_nan()
         {
@@ -189,11 +190,11 @@ impl Commander {
                 // Near home the climb is cut by the cone `RTL_CONE_ANG`.
                 height = height.min(away / tuning.return_cone_tan.max(0.01));
             }
-            *up = (sense.home.z + height).max(sense.position.z);
+            *up = (sensors.home.z + height).max(sensors.position.z);
         }
         match self.leg {
             ReturnLeg::Climb { up } => {
-                if sense.position.z > up - ARRIVED_M {
+                if sensors.position.z > up - ARRIVED_M {
                     self.leg = ReturnLeg::Cross { up };
                 }
                 Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
@@ -201,18 +202,18 @@ impl Commander {
             ReturnLeg::Cross { up } => {
                 if away < ARRIVED_M {
                     self.leg = ReturnLeg::Descend;
-                    (self.hold.x, self.hold.y) = (sense.home.x, sense.home.y);
+                    (self.hold.x, self.hold.y) = (sensors.home.x, sensors.home.y);
                 }
-                Demand { position: Point::new(sense.home.x, sense.home.y, up), ..held }
+                Demand { position: Point::new(sensors.home.x, sensors.home.y, up), ..held }
             }
             ReturnLeg::Descend => {
-                let up = sense.home.z + tuning.return_descend_height;
-                if sense.position.z < up + ARRIVED_M {
+                let up = sensors.home.z + tuning.return_descend_height;
+                if sensors.position.z < up + ARRIVED_M {
                     self.leg = ReturnLeg::Land;
                 }
                 Demand { position: Point::new(self.hold.x, self.hold.y, up), ..held }
             }
-            ReturnLeg::Land => self.landing(sense, tuning, held),
+            ReturnLeg::Land => self.landing(sensors, tuning, held),
         }
     }
 }

@@ -27,8 +27,8 @@ use self::glide::Glide;
 pub use self::modes::Mode;
 use self::params::Tuning;
 use self::setpoint::Setpoint;
-use super::body::{Integral, Order, Sense};
 use super::itinerary::Leg;
+use super::platform::{Integral, Order, SensorReadings};
 use super::shaping::Ramp;
 use super::vehicle::Demand;
 
@@ -215,30 +215,30 @@ impl Commander {
     }
 
     /// Arms, if the mode can run; false is TEMPORARILY_REJECTED.
-    pub fn arm(&mut self, sense: &Sense, tuning: &Tuning, force: bool) -> bool {
+    pub fn arm(&mut self, sensors: &SensorReadings, tuning: &Tuning, force: bool) -> bool {
         if self.armed {
             return true;
         }
-        if !force && !self.armable(sense, tuning) {
+        if !force && !self.armable(sensors, tuning) {
             return false;
         }
         self.armed = true;
-        self.armed_us = sense.now_us;
+        self.armed_us = sensors.now_us;
         self.flown = !self.landed;
-        self.enter(self.intention, sense);
+        self.enter(self.intention, sensors);
         true
     }
 
     /// Whether the arming checks pass.
-    pub fn armable(&self, sense: &Sense, tuning: &Tuning) -> bool {
+    pub fn armable(&self, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match self.intention {
-            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Offboard => self.stream_fresh(sensors.now_us, tuning),
             Mode::Hold | Mode::Takeoff => true,
             Mode::Mission => self.mission.ready,
             Mode::Land | Mode::Return => false,
             Mode::Manual | Mode::Altitude | Mode::Position => false,
         };
-        runs && self.position_ok && sense.battery >= tuning.battery_low
+        runs && self.position_ok && sensors.battery >= tuning.battery_low
     }
 
     /// Disarms; in the air only by force.
@@ -257,21 +257,21 @@ impl Commander {
     }
 
     /// Changes the mode if it can run; the second ack of DO_SET_MODE says so.
-    pub fn set_mode(&mut self, mode: Mode, sense: &Sense, tuning: &Tuning) -> bool {
+    pub fn set_mode(&mut self, mode: Mode, sensors: &SensorReadings, tuning: &Tuning) -> bool {
         let runs = match mode {
-            Mode::Offboard => self.stream_fresh(sense.now_us, tuning),
+            Mode::Offboard => self.stream_fresh(sensors.now_us, tuning),
             Mode::Mission => self.mission.ready,
             mode => !mode.needs_sticks(),
         };
         if self.armed && !runs {
             return false;
         }
-        self.force_mode(mode, sense);
+        self.force_mode(mode, sensors);
         true
     }
 
     /// Changes the mode as a pilot's switch does, whom nobody asks whether it can run.
-    pub fn force_mode(&mut self, mode: Mode, sense: &Sense) {
+    pub fn force_mode(&mut self, mode: Mode, sensors: &SensorReadings) {
         self.intention = mode;
         if !mode.ends_with_flight() {
             self.after_disarm = mode;
@@ -280,21 +280,27 @@ impl Commander {
             self.takeoff_up = f32::NAN;
         }
         self.failsafe = None;
-        self.enter(mode, sense);
+        self.enter(mode, sensors);
     }
 
     /// Take-off to a height in the mission frame; NaN is `MIS_TAKEOFF_ALT` above home.
-    pub fn takeoff(&mut self, up: f32, sense: &Sense, tuning: &Tuning) -> bool {
-        let accepted = self.set_mode(Mode::Takeoff, sense, tuning);
+    pub fn takeoff(&mut self, up: f32, sensors: &SensorReadings, tuning: &Tuning) -> bool {
+        let accepted = self.set_mode(Mode::Takeoff, sensors, tuning);
         if accepted {
-            self.takeoff_up = if up.is_nan() { sense.home.z + tuning.takeoff_height } else { up };
+            self.takeoff_up = if up.is_nan() { sensors.home.z + tuning.takeoff_height } else { up };
         }
         accepted
     }
 
     /// Holds at a point instead of where it is (DO_REPOSITION); NaN keeps an axis.
-    pub fn reposition(&mut self, to: &Point, heading: f32, sense: &Sense, tuning: &Tuning) -> bool {
-        if !self.armed || !self.set_mode(Mode::Hold, sense, tuning) {
+    pub fn reposition(
+        &mut self,
+        to: &Point,
+        heading: f32,
+        sensors: &SensorReadings,
+        tuning: &Tuning,
+    ) -> bool {
+        if !self.armed || !self.set_mode(Mode::Hold, sensors, tuning) {
             return false;
         }
         for axis in 0..3 {
@@ -314,23 +320,23 @@ impl Commander {
     }
 
     /// One step: timers, failsafe, phases, and what the mode asks for.
-    pub fn update(&mut self, sense: &Sense, tuning: &Tuning) -> Order {
-        let now = sense.now_us;
+    pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Order {
+        let now = sensors.now_us;
         if self.armed {
-            self.update_failsafe(sense, tuning);
-            self.update_timers(sense, tuning);
+            self.update_failsafe(sensors, tuning);
+            self.update_timers(sensors, tuning);
         }
         if !self.armed {
             // A vehicle disarmed in the air falls, and has landed when it lies still.
-            if !self.landed && sense.touching {
+            if !self.landed && sensors.touching {
                 self.landed = true;
                 self.landed_us = now;
             }
             let demand = tuning.nothing();
             return Order { lift: false, integral: Integral::Clear, demand };
         }
-        let mut demand = self.demand(sense, tuning);
-        let wants_up = self.wants_up(sense, &demand);
+        let mut demand = self.demand(sensors, tuning);
+        let wants_up = self.wants_up(sensors, &demand);
         let mut integral = Integral::Keep;
         match self.phase {
             Phase::Ground => {
@@ -357,16 +363,16 @@ impl Commander {
                 }
             }
             Phase::Flying => {
-                let rate = descent(&demand, sense, tuning);
-                self.detect_landing(sense, rate > LAND_RATE_MPS, tuning);
+                let rate = descent(&demand, sensors, tuning);
+                self.detect_landing(sensors, rate > LAND_RATE_MPS, tuning);
             }
         }
         Order { lift: self.phase != Phase::Ground, integral, demand }
     }
 
-    fn update_failsafe(&mut self, sense: &Sense, tuning: &Tuning) {
-        let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sense.now_us, tuning);
-        let battery_out = sense.battery < tuning.battery_critical && !self.intention.ends_with_flight();
+    fn update_failsafe(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
+        let stream_lost = self.intention == Mode::Offboard && !self.stream_fresh(sensors.now_us, tuning);
+        let battery_out = sensors.battery < tuning.battery_critical && !self.intention.ends_with_flight();
         let action = if !self.position_ok {
             (self.intention != Mode::Land).then_some(Mode::Land)
         } else if stream_lost {
@@ -389,12 +395,12 @@ impl Commander {
         };
         if action != self.failsafe {
             self.failsafe = action;
-            self.enter(self.mode(), sense);
+            self.enter(self.mode(), sensors);
         }
     }
 
-    fn update_timers(&mut self, sense: &Sense, tuning: &Tuning) {
-        let since = |start: u64| sense.now_us.saturating_sub(start);
+    fn update_timers(&mut self, sensors: &SensorReadings, tuning: &Tuning) {
+        let since = |start: u64| sensors.now_us.saturating_sub(start);
         let idle = self.landed && self.phase == Phase::Ground;
         if idle && !self.flown && tuning.disarm_preflight_s > 0.0 {
             if since(self.armed_us) >= seconds(tuning.disarm_preflight_s) {
@@ -407,29 +413,29 @@ impl Commander {
         {
             self.disarm(false);
         }
-        if sense.battery <= 0.0 {
+        if sensors.battery <= 0.0 {
             self.disarm(true);
         }
     }
 
-    fn detect_landing(&mut self, sense: &Sense, wants_down: bool, tuning: &Tuning) {
-        if !sense.touching || !wants_down {
+    fn detect_landing(&mut self, sensors: &SensorReadings, wants_down: bool, tuning: &Tuning) {
+        if !sensors.touching || !wants_down {
             self.touching_us = None;
             return;
         }
-        let since = *self.touching_us.get_or_insert(sense.now_us);
-        if sense.now_us - since >= seconds(tuning.land_trigger_s + LAND_FILTER_S) {
+        let since = *self.touching_us.get_or_insert(sensors.now_us);
+        if sensors.now_us - since >= seconds(tuning.land_trigger_s + LAND_FILTER_S) {
             self.touching_us = None;
             self.landed = true;
-            self.landed_us = sense.now_us;
+            self.landed_us = sensors.now_us;
             self.phase = Phase::Ground;
         }
     }
 }
 
 /// Rate of sinking that a demand comes to, m/s.
-fn descent(demand: &Demand, sense: &Sense, tuning: &Tuning) -> f32 {
-    let error = (demand.position.z - sense.position.z) * tuning.gains.position[1];
+fn descent(demand: &Demand, sensors: &SensorReadings, tuning: &Tuning) -> f32 {
+    let error = (demand.position.z - sensors.position.z) * tuning.gains.position[1];
     let feed = demand.velocity.z;
     -(if error.is_nan() { 0.0 } else { error } + if feed.is_nan() { 0.0 } else { feed })
 }

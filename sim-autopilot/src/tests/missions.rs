@@ -26,7 +26,7 @@ const SURVEY: Plan<'static> = &[
 
 impl Bench {
     fn upload(&mut self, plan: Plan<'_>) {
-        let personality = self.autopilot.body.config.personality;
+        let personality = self.autopilot.platform.config.personality;
         let home = (16, 0, [0.0; 4], [0.0; 2], 488.0);
         let home: Plan<'_> = if personality == AutopilotKind::Ardupilot { &[home] } else { &[] };
         let items: Vec<_> = home.iter().chain(plan).collect();

@@ -13,7 +13,7 @@ pub(super) const RETRY: Duration = Duration::from_secs(1);
 type Open = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
 
 /// Nothing is heard while it is lost, and what is sent is dropped.
-pub struct Lasting {
+pub struct ReconnectingLink {
     /// Its URL.
     name: String,
     open: Open,
@@ -21,7 +21,7 @@ pub struct Lasting {
     retry_at: Instant,
 }
 
-impl Lasting {
+impl ReconnectingLink {
     /// Keeps an open link, and what opens it again.
     pub fn new(name: String, link: Box<dyn Link>, open: Open) -> Self {
         Self { name, open, link: Some(link), retry_at: Instant::now() }
@@ -45,7 +45,7 @@ impl Lasting {
     }
 }
 
-impl Link for Lasting {
+impl Link for ReconnectingLink {
     fn receive(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         match self.reopen().map_or(Ok(0), |link| link.receive(buffer)) {
             Err(why) => {

@@ -18,8 +18,8 @@ const DEVIATIONS: f32 = 4.0;
 /// Pieces under way at once, at most: the companion keeps six requests.
 const UNDER_WAY: usize = 4;
 
-/// The pace of one link.
-pub struct Pace {
+/// Retransmission timeout and window of one link.
+pub struct Retransmission {
     /// The smoothed round trip and its deviation, seconds.
     round_trip: Option<(f32, f32)>,
     wait: Duration,
@@ -28,7 +28,7 @@ pub struct Pace {
     window: usize,
 }
 
-impl Pace {
+impl Retransmission {
     /// That of a link on which nothing was answered yet.
     pub fn new(now: Clock) -> Self {
         Self {
@@ -83,7 +83,7 @@ mod tests {
     fn upload(every_ms: u64, loses: usize) -> (usize, f32) {
         const PIECES: usize = 200;
         let began = Clock::now();
-        let mut pace = Pace::new(began);
+        let mut retransmission = Retransmission::new(began);
         // Requests that wait for their answers.
         let mut line = VecDeque::new();
         let mut under_way: Vec<(usize, Clock, bool)> = Vec::new();
@@ -96,13 +96,13 @@ mod tests {
                     line.push_back(piece);
                 }
             };
-            while under_way.len() < pace.window() && next < PIECES {
+            while under_way.len() < retransmission.window() && next < PIECES {
                 under_way.push((next, now, false));
                 send(next);
                 next += 1;
             }
             for (piece, sent_at, repeated) in &mut under_way {
-                if pace.is_over(*sent_at, now) {
+                if retransmission.is_over(*sent_at, now) {
                     (*sent_at, *repeated) = (now, true);
                     send(*piece);
                 }
@@ -113,7 +113,7 @@ mod tests {
                 let (_, sent_at, repeated) = under_way.remove(at);
                 answered += 1;
                 if !repeated {
-                    pace.note_round_trip(began + Duration::from_millis(ms) - sent_at);
+                    retransmission.note_round_trip(began + Duration::from_millis(ms) - sent_at);
                 }
             }
         }
@@ -139,20 +139,20 @@ mod tests {
     #[test]
     fn silence_doubles_the_wait_up_to_its_bound_and_an_answer_ends_that() {
         let began = Clock::now();
-        let mut pace = Pace::new(began);
+        let mut retransmission = Retransmission::new(began);
         let mut sent_at = began;
         let waits: Vec<u128> = (0..4)
             .map(|_| {
                 let over = (1..)
                     .map(|ms| sent_at + Duration::from_millis(ms))
-                    .find(|now| pace.is_over(sent_at, *now));
+                    .find(|now| retransmission.is_over(sent_at, *now));
                 let wait = over.expect("some time") - sent_at;
                 sent_at += wait;
                 wait.as_millis()
             })
             .collect();
         assert_eq!(waits, [401, 801, 1601, 2001]);
-        pace.note_round_trip(Duration::from_millis(20));
-        assert!(pace.is_over(sent_at, sent_at + Duration::from_millis(401)));
+        retransmission.note_round_trip(Duration::from_millis(20));
+        assert!(retransmission.is_over(sent_at, sent_at + Duration::from_millis(401)));
     }
 }

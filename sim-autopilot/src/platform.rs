@@ -23,9 +23,9 @@ const ANSWER_US: u64 = 4_000;
 /// From the command to reboot until it does.
 const REBOOT_US: u64 = 200_000;
 
-/// What a state machine perceives in one step.
+/// What a firmware reads of its sensors and estimator in one step.
 #[derive(Clone, Copy, Debug)]
-pub struct Sense {
+pub struct SensorReadings {
     /// Microseconds since boot.
     pub now_us: u64,
     /// Estimated position, ENU metres.
@@ -72,7 +72,7 @@ pub enum Integral {
 
 /// Airframe, estimator, ports, home and stored missions.
 #[derive(Clone, Debug)]
-pub struct Body {
+pub struct Platform {
     pub(super) config: Config,
     pub(super) time_us: u64,
     slot_us: u64,
@@ -98,7 +98,7 @@ pub struct Body {
     pub(super) reboot_us: Option<u64>,
 }
 
-impl Body {
+impl Platform {
     pub(super) fn new(config: &Config, streams: &[(u32, u32)]) -> Self {
         let mut limits = config.vehicle;
         limits.drag_per_s *= config.personality.drag_share();
@@ -147,9 +147,9 @@ impl Body {
         self.height = self.vehicle.state().position.z - ground_up_m - self.config.vehicle.radius_m;
     }
 
-    pub(super) fn sense(&self) -> Sense {
+    pub(super) fn sensors(&self) -> SensorReadings {
         let state = self.vehicle.state();
-        Sense {
+        SensorReadings {
             now_us: self.time_us,
             position: state.position + self.position_error(),
             velocity: state.velocity
@@ -183,7 +183,7 @@ impl Body {
         if self.home_fixed {
             return;
         }
-        let position = self.sense().position;
+        let position = self.sensors().position;
         self.home_enu = position;
         self.home = self.frame.geodetic(&position.cast::<f64>());
         self.announce(HOME_POSITION);
