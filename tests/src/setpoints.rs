@@ -2,10 +2,10 @@
 //!
 //! Speed, acceleration and jerk are divided differences of the positions that were sent, in the autopilot's frame, so they
 //! hold whatever feed-forward goes along, and however the steps lie in time: a curve whose third derivative is bounded has
-//! third divided differences within that bound. A gap longer than [`GAP_S`] begins another stream, and so does a setpoint
+//! third divided differences within that bound. A gap longer than `GAP_S` begins another stream, and so does a setpoint
 //! that an autopilot in another mode did not follow: it has to be finite and inside the fence all the same. A setpoint that
 //! moves without a velocity of its own follows a vehicle that another flies, or is believed to: it moves no faster than
-//! [`FOLLOWS_MPS`].
+//! `FOLLOWS_MPS`.
 
 use mavlink::dialects::ardupilotmega::SET_POSITION_TARGET_LOCAL_NED_DATA;
 use nalgebra::Vector3;

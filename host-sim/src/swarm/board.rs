@@ -3,7 +3,7 @@
 //! What it does is known only by what it sends: its state from HEARTBEAT, its progress from TUNNEL, its words from STATUSTEXT, all
 //! heard on its radio's port. A board whose radio is not ours is heard on the port for the autopilot, which carries no TUNNEL.
 //!
-//! A board in QEMU is in lock step with the simulation ([`boards`](crate::boards)): it runs through a step while the desk computes
+//! A board in QEMU is in lock step with the simulation ([`crate::boards`]): it runs through a step while the desk computes
 //! the others', and its bytes are taken at the step's end.
 
 use std::path::Path;
