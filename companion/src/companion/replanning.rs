@@ -9,6 +9,7 @@ use crate::events::{Event, Wanted};
 use crate::guidance::Scene;
 use crate::mission::State;
 use crate::swarm::detour::Aim;
+use crate::swarm::detour::asking::Outlook;
 use crate::swarm::view::View;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -93,7 +94,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// There is none.
     pub(super) fn miss_detour(&mut self, failure: PlanFailure) {
         self.mission.fail(failure);
-        let for_good = failure != PlanFailure::Late && self.neighbours.all_down(self.now);
-        self.detours.miss(self.guidance.along_m(), for_good, self.now);
+        let outlook = if self.neighbours.any_comes_down_unheard(self.now) {
+            Outlook::Settles
+        } else if failure != PlanFailure::Late && self.neighbours.all_down(self.now) {
+            Outlook::Closed
+        } else {
+            Outlook::Open
+        };
+        self.detours.miss(self.guidance.along_m(), outlook, self.now);
     }
 }

@@ -18,7 +18,7 @@
 //!
 //! ENU metres.
 
-mod asking;
+pub(crate) mod asking;
 mod beside;
 mod homeward;
 

@@ -360,6 +360,12 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, self.down))
     }
 
+    /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
+    pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
+        let roster = &self.contacts[..self.roster];
+        roster.iter().any(|c| !c.tells(GROUNDED | OUT) && c.is_dead(now) && c.heard_within(now, self.down))
+    }
+
     /// Whether a vehicle of the roster has landed, or is out of the plan.
     pub(crate) fn rests(&self, id: u8, now: Instant) -> bool {
         self.in_roster(id).is_some_and(|at| self.contacts[at].tells(LANDED) || self.contacts[at].is_out(now))

@@ -5,13 +5,24 @@
 use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
 use super::beside::{self, MARGIN_M};
-use super::{Aim, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
+use super::{Aim, BLOCKED_WITHIN_M, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
 use crate::guidance::evade;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
 /// What is sought this near to where it was sought before is sought from the same place, metres.
 const HERE_M: f32 = 1.0;
+
+/// Whether a way around that was not found may be found later.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Outlook {
+    /// A silent vehicle may still come down, and leave more room once it lies.
+    Settles,
+    /// Somebody may still move.
+    Open,
+    /// Nothing can change.
+    Closed,
+}
 
 impl Detours {
     /// A way around, or just aside, is requested of the shell.
@@ -41,7 +52,11 @@ impl Detours {
         self.obstacles.known().iter().for_each(|obstacle| tell(*obstacle));
         match view.config.division {
             Some(_) if !self.aside => beside::others(view, &mut tell),
-            _ => view.neighbours.places(view.now, apart_m + MARGIN_M, &mut tell),
+            _ => {
+                // No nearer than blocks the way: a goal that is planned beside one that lies can be flown to.
+                let apart = [apart_m + MARGIN_M, apart_m + BLOCKED_WITHIN_M];
+                view.neighbours.places(view.now, apart, &mut tell);
+            }
         }
         if self.aside {
             view.neighbours.landing_columns(view.now, apart_m + evade::BESIDE_M, &mut tell);
@@ -95,8 +110,8 @@ impl Detours {
         *self = Self { aside, lands, left_at_m, fruitless, home, beside, ..flying };
     }
 
-    /// It has not; `along_m` is the place on the path, and `for_good` says whether nothing can change.
-    pub(crate) fn miss(&mut self, along_m: f32, for_good: bool, now: Instant) {
+    /// It has not; `along_m` is the place on the path.
+    pub(crate) fn miss(&mut self, along_m: f32, outlook: Outlook, now: Instant) {
         // It is sought again.
         if self.home.seeks() {
             self.home.miss(now);
@@ -110,6 +125,11 @@ impl Detours {
             self.no_way_aside_at = Some(now);
             return;
         }
+        if outlook == Outlook::Settles {
+            // It asks again later and later, and once more when that vehicle lies.
+            self.failed = self.failed.saturating_add(1).min(DETOURS_TRIED - 1);
+            return;
+        }
         if (along_m - self.failed_at_m).abs() > HERE_M {
             (self.failed_here, self.failed_at_m) = (0, along_m);
         }
@@ -120,6 +140,6 @@ impl Detours {
         self.failed_here = self.failed_here.saturating_add(1);
         let long = now - self.failed_since >= Duration::from_secs(GIVES_UP_S);
         let often = long && self.failed_here >= DETOURS_TRIED - 1;
-        self.hopeless = often || for_good;
+        self.hopeless = often || outlook == Outlook::Closed;
     }
 }

@@ -142,7 +142,7 @@ pub(super) fn others<const V: usize, const W: usize, const G: usize>(
     tell: &mut dyn FnMut(KeepOff),
 ) {
     let apart_m = view.config.safety_distance_m + MARGIN_M;
-    view.neighbours.places(view.now, apart_m, &mut *tell);
+    view.neighbours.places(view.now, [apart_m; 2], &mut *tell);
     let beside_m = apart_m + view.neighbours.stray_m();
     view.neighbours
         .landing_columns(view.now, beside_m, |column| tell(KeepOff { nature: Nature::Solid, ..column }));

@@ -1,6 +1,7 @@
 extern crate std;
 use std::vec::Vec;
 
+use super::asking::Outlook;
 use super::*;
 use crate::link::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
 use crate::swarm::obstacles::OBSTACLES;
@@ -9,6 +10,8 @@ use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
 use planner_core::detour::{KeepOff, Nature};
 use planner_core::flight::Gate;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
 fn exclude(bench: &mut Bench, command: &Command) -> u8 {
     bench.companion.detours.exclude(command, &ORIGIN, bench.companion.config.required_clearance_m)
@@ -117,7 +120,7 @@ fn who_died_may_have_been_flown_back_to_its_pad() {
     bench.neighbour = None;
     bench.run(60.0);
     let mut told = Vec::new();
-    bench.companion.neighbours.places(bench.now, 1.5, |place| told.push(place));
+    bench.companion.neighbours.places(bench.now, [1.5; 2], |place| told.push(place));
     assert!(told.iter().any(|place| (place.from - pad).norm() < 0.1 && place.radius_m == 1.5), "{told:?}");
 }
 
@@ -132,7 +135,7 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
     }
     bench.run(30.0);
     let mut told = Vec::new();
-    bench.companion.neighbours.places(bench.now, 1.5, |place| told.push(place));
+    bench.companion.neighbours.places(bench.now, [1.5; 2], |place| told.push(place));
     told
 }
 
@@ -242,4 +245,24 @@ fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
     exclude(&mut bench, &sphere(Point::new(15.9, 12.0, 1.5), 0.5));
     bench.run(1.0);
     assert_eq!(bench.state(), State::Blocked);
+}
+
+#[test]
+fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
+    let mut rng = Pcg32::seed_from_u64(5);
+    for _ in 0..500 {
+        let (mut detours, mut now) = (Detours::default(), Instant::from_millis(100_000));
+        let along_m = (rng.next_u32() % 20) as f32;
+        for _ in 0..rng.next_u32() % 9 {
+            now = now + Duration::from_millis(1_000 + u64::from(rng.next_u32() % 29_000));
+            detours.miss(along_m, Outlook::Settles, now);
+            assert!(!detours.gives_up(), "that vehicle may yet leave more room");
+        }
+        let (mut asked, outlook) = (0, if rng.next_u32() % 2 == 0 { Outlook::Open } else { Outlook::Closed });
+        while !detours.gives_up() {
+            detours.miss(along_m, outlook, now);
+            asked += 1;
+        }
+        assert!((1..=DETOURS_TRIED).contains(&asked), "{asked}");
+    }
 }

@@ -171,6 +171,11 @@ impl Contact {
         believed_m
     }
 
+    /// Whether it is on the ground: as it reports, or after so long a silence.
+    pub(super) fn lies(&self, now: Instant) -> bool {
+        self.tells(GROUNDED) || (!self.tells(OUT) && self.is_dead(now) && !self.heard_within(now, DOWN))
+    }
+
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
     pub(super) fn waits(&self, now: Instant) -> bool {
         self.is_out(now)

@@ -39,10 +39,14 @@ impl<const V: usize> Neighbours<V> {
         self.clear_at >= at
     }
 
-    /// Where the other vehicles of the roster are while they stand, those out of the plan among them.
-    pub fn places(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    /// Where the other vehicles of the roster are while they stand, those out of the plan among them: `apart_m` away from one in
+    /// the air is far enough, and `lying_m` from one that lies, and no longer strays.
+    pub fn places(&self, now: Instant, [apart_m, lying_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
-        placed.for_each(|c| c.obstacles(now, apart_m, self.field(), &mut tell));
+        placed.for_each(|c| {
+            let far_m = if c.lies(now) { lying_m } else { apart_m };
+            c.obstacles(now, far_m, self.field(), &mut tell);
+        });
     }
 
     /// Where vehicles that land without looking may come nearer than `apart_m`.

@@ -418,7 +418,7 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
             let here = table.contacts[1].state.position;
             let near = here + away * (0.99 * truly_m);
             let mut free = true;
-            table.places(Instant::from_millis(100), apart_m, |off| {
+            table.places(Instant::from_millis(100), [apart_m; 2], |off| {
                 let down_m = (off.from.z - near.z).clamp(0.0, off.from.z - off.to.z);
                 let nearest = off.from - Point::new(0.0, 0.0, down_m);
                 free &= (near - nearest).norm() >= off.radius_m;
@@ -451,4 +451,32 @@ fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes
         assert_eq!(kept, !over_area || silent_s < 600.0, "{silent_s} s, {here:?}, {below:?}");
         assert!(lies, "{silent_s} s: it lies there");
     }
+}
+
+#[test]
+fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
+    let mut rng = Pcg32::seed_from_u64(13);
+    let mut seen = [0; 3];
+    for _ in 0..2000 {
+        let flags = [0, OUT, GROUNDED, GROUNDED | OUT][(uniform(&mut rng, 0.0, 3.999)) as usize];
+        let mut table = joined(0);
+        table.contacts[0].flags = GROUNDED;
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
+        table.handle_intent(Instant::ZERO, 1, &intent(flags, 1, 2), 1, Some(2));
+        let silent_s = uniform(&mut rng, 1.0, 120.0);
+        let now = Instant::from_millis((1000.0 * silent_s) as u64);
+        let lying_m = uniform(&mut rng, 1.0, 2.0);
+        let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
+        let lies = flags & GROUNDED != 0 || (flags & OUT == 0 && silent_s >= 75.0);
+        let comes_down = flags & (GROUNDED | OUT) == 0 && (45.0..75.0).contains(&silent_s);
+        table.places(now, [apart_m, lying_m], |off| {
+            // Of a silent one the place is not known any better than that.
+            let most_m = lying_m + VAGUE_M;
+            let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
+            assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
+        });
+        assert_eq!(table.any_comes_down_unheard(now), comes_down, "{flags:#x}, {silent_s} s");
+        seen[if lies { 0 } else { 1 + usize::from(comes_down) }] += 1;
+    }
+    assert!(seen.iter().all(|count| *count > 100), "{seen:?}");
 }
