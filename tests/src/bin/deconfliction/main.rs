@@ -5,6 +5,7 @@
 //! can be flown again alone. A meeting is planned once a seed; every case of it and both methods fly that plan.
 
 mod cases;
+mod held;
 mod ideal;
 
 use std::path::Path;
@@ -21,6 +22,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use cases::Meeting;
+use held::{Cause, Struck};
 
 const METHODS: [&str; 2] = ["priority", "algorithm2"];
 /// A separation at which nobody is in anybody's way, metres.
@@ -40,6 +42,9 @@ struct Args {
     /// Only the cases whose name contains this.
     #[arg(long, value_name = "NAME", default_value = "")]
     only: String,
+    /// Only the methods whose name contains this.
+    #[arg(long, value_name = "NAME", default_value = "")]
+    method: String,
     /// Leave out meetings of more than twenty.
     #[arg(long)]
     small: bool,
@@ -66,6 +71,10 @@ struct Row {
     deadlocks: u32,
     /// Vehicles that no fault struck and that landed short of their goals, for want of a way.
     held_up: usize,
+    /// Why those were held up, by their causes in the order of [`Cause::ALL`].
+    held_up_by: [usize; Cause::ALL.len()],
+    /// How far silent vehicles lie at most: beside their path, and along it from where they were last heard, metres.
+    lies_m: [f32; 2],
     /// Smallest separation seen, metres.
     min_separation_m: f64,
     /// Mean share by which flights, from take-off to landing, take longer than alone.
@@ -111,29 +120,8 @@ fn main() -> Result<()> {
             continue;
         }
         let began = Instant::now();
-        for row in fly_all(&meeting, &args, dir)? {
-            println!(
-                "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7} {:>7.2} m {:>5.0} % {:>6.0} %",
-                row.name,
-                row.method,
-                row.complete,
-                row.seeds,
-                row.unplanned,
-                row.violations,
-                row.wall_contacts,
-                row.deadlocks,
-                row.held_up,
-                row.min_separation_m,
-                row.extra_flight * 100.0,
-                row.extra_makespan * 100.0,
-            );
-            if let (Some(planned), Some(ideal)) = (row.planned_makespan, row.ideal_makespan) {
-                let [planned, ideal] = [planned, ideal].map(|share| share * 100.0);
-                println!("    makespan by the schedule: {planned:.0} %, the ideal {ideal:.0} %");
-            }
-            if row.method == METHODS[0] {
-                row.incidents.iter().for_each(|incident| println!("    {incident}"));
-            }
+        for row in fly_all(&meeting, &args, dir)?.into_iter().filter(|row| row.seeds > 0) {
+            print(&row);
             rows.push(row);
         }
         println!("    {:.0} s", began.elapsed().as_secs_f64());
@@ -145,11 +133,46 @@ fn main() -> Result<()> {
     Ok(())
 }
 
+fn print(row: &Row) {
+    println!(
+        "{:30} {:10} {:>5}/{:<3} {:>9} {:>10} {:>8} {:>9} {:>7} {:>7.2} m {:>5.0} % {:>6.0} %",
+        row.name,
+        row.method,
+        row.complete,
+        row.seeds,
+        row.unplanned,
+        row.violations,
+        row.wall_contacts,
+        row.deadlocks,
+        row.held_up,
+        row.min_separation_m,
+        row.extra_flight * 100.0,
+        row.extra_makespan * 100.0,
+    );
+    if let (Some(planned), Some(ideal)) = (row.planned_makespan, row.ideal_makespan) {
+        let [planned, ideal] = [planned, ideal].map(|share| share * 100.0);
+        println!("    makespan by the schedule: {planned:.0} %, the ideal {ideal:.0} %");
+    }
+    if row.lies_m != [0.0; 2] {
+        let [beside_m, along_m] = row.lies_m;
+        println!(
+            "    silent, it lies up to {beside_m:.2} m beside its path, {along_m:.2} m further along it"
+        );
+    }
+    let causes = Cause::ALL.iter().zip(row.held_up_by).filter(|(_, count)| *count > 0);
+    causes.for_each(|(cause, count)| println!("    held up: {count} x {cause}"));
+    if row.method == METHODS[0] {
+        row.incidents.iter().for_each(|incident| println!("    {incident}"));
+    }
+}
+
 /// The rows of a meeting: its cases, each with both methods.
 fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
     let seeds: Vec<u64> = (args.first..args.first + args.seeds.min(meeting.seeds_most)).collect();
-    let flown: Vec<Vec<Row>> =
-        seeds.into_par_iter().map(|seed| fly_seed(meeting, seed, dir)).collect::<Result<_>>()?;
+    let flown: Vec<Vec<Row>> = seeds
+        .into_par_iter()
+        .map(|seed| fly_seed(meeting, seed, dir, &args.method))
+        .collect::<Result<_>>()?;
     let mut sums = rows(meeting);
     for (sum, row) in flown.into_iter().flat_map(|rows| rows.into_iter().enumerate()) {
         let sum = &mut sums[sum];
@@ -160,6 +183,8 @@ fn fly_all(meeting: &Meeting, args: &Args, dir: &Path) -> Result<Vec<Row>> {
         sum.wall_contacts += row.wall_contacts;
         sum.deadlocks += row.deadlocks;
         sum.held_up += row.held_up;
+        sum.lies_m.iter_mut().zip(row.lies_m).for_each(|(sum, m)| *sum = sum.max(m));
+        sum.held_up_by.iter_mut().zip(row.held_up_by).for_each(|(sum, count)| *sum += count);
         sum.min_separation_m = sum.min_separation_m.min(row.min_separation_m);
         sum.extra_flight += row.extra_flight;
         sum.extra_makespan += row.extra_makespan;
@@ -195,6 +220,8 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
         wall_contacts: 0,
         deadlocks: 0,
         held_up: 0,
+        held_up_by: [0; Cause::ALL.len()],
+        lies_m: [0.0; 2],
         min_separation_m: f64::INFINITY,
         extra_flight: 0.0,
         extra_makespan: 0.0,
@@ -207,9 +234,9 @@ fn rows(meeting: &Meeting) -> Vec<Row> {
 }
 
 /// All cases of a meeting with one seed.
-fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
+fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<Row>> {
     let mut rows = rows(meeting);
-    rows.iter_mut().for_each(|row| row.seeds = 1);
+    rows.iter_mut().filter(|row| row.method.contains(only)).for_each(|row| row.seeds = 1);
     let mut mission =
         Mission::prepare(parsed(meeting, "off", cases::GUSTS, seed, dir)?, &Progress::hidden())?;
     let plan = match mission.plan() {
@@ -234,13 +261,19 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
     }
     let (struck, at_s) = strike(meeting, &plan, &alone, seed);
     let cases = meeting.cases.iter().flat_map(|case| METHODS.map(|method| (case, method)));
-    for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases) {
+    for (row, (&(name, simulation), method)) in rows.iter_mut().zip(cases).filter(|(row, _)| row.seeds > 0) {
         let simulation = simulation.replace("AT_S", &at_s).replace("VEHICLE", &struck.to_string());
         mission.scenario = parsed(meeting, method, &simulation, seed, dir)?;
         let flight = fly(&mission, &plan)?;
         count(row, &flight.result, &alone);
-        let struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
-        row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !struck(v)).count();
+        let is_struck = |v: &VehicleResult| simulation.contains("[[faults]]") && v.id == struck;
+        row.held_up = flight.result.vehicles.iter().filter(|v| !v.reached && !is_struck(v)).count();
+        if simulation.contains("[[faults]]") && method == METHODS[0] {
+            // Whom nobody hears is where it was struck, or further along its path.
+            let silent = simulation.contains("radio-cut") && !simulation.contains("\"rx\"");
+            let struck = Struck { index: usize::from(struck) - 1, at_s: at_s.parse()?, silent };
+            explain(row, &mission, &plan, &flight, struck);
+        }
         if !flight.result.complete {
             let file = dir.join(format!("{name}, {method}, seed {seed}.toml"));
             std::fs::write(&file, meeting.scenario(method, &simulation, seed))
@@ -251,6 +284,20 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path) -> Result<Vec<Row>> {
             .extend(errors.map(|e| format!("seed {seed}, {:.1} s, {:?}: {}", e.t_s, e.vehicle, e.text)));
     }
     Ok(rows)
+}
+
+/// Notes what held up each vehicle that landed short of its goal, and where the one struck lies.
+fn explain(row: &mut Row, mission: &Mission, plan: &SwarmPlan, flight: &swarm::Flight, struck: Struck) {
+    if let Some([beside_m, along_m]) = held::lies(plan, flight, struck).filter(|_| struck.silent) {
+        row.lies_m = [row.lies_m[0].max(beside_m), row.lies_m[1].max(along_m)];
+    }
+    let held = |(i, v): &(usize, &VehicleResult)| !v.reached && *i != struck.index;
+    for (index, vehicle) in flight.result.vehicles.iter().enumerate().filter(held) {
+        let cause = held::cause(mission, plan, flight, struck, index);
+        row.held_up_by[cause as usize] += 1;
+        let (seed, by) = (flight.result.seed, flight.result.vehicles[struck.index].id);
+        row.incidents.push(format!("seed {seed}, vehicle {} held up by {by}: {cause}", vehicle.id));
+    }
 }
 
 /// The vehicle that faults strike, and when: what a scenario says of it.

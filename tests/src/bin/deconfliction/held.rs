@@ -1,0 +1,224 @@
+//! Why a vehicle that nothing struck landed short of its goal: by the truth, on the map, by a search of its own.
+//!
+//! Places of a lattice are joined where the map leaves the vehicle its clearance and everything that
+//! lies on the ground is further away than the safety distance. Neither the roadmap nor the companion is asked.
+
+use std::collections::VecDeque;
+use std::fmt;
+
+use host_sim::mission::{Mission, SwarmPlan};
+use host_sim::swarm::Flight;
+use planner_core::Point;
+use planner_core::segment::segment_is_clear;
+use serde::Serialize;
+
+/// From one place of the lattice to the next, metres.
+const LATTICE_M: f32 = 0.5;
+/// The ends of the way are joined to places so near, metres.
+const JOIN_M: f32 = 1.0;
+/// A vehicle this much above where it came to rest is still in the air, metres.
+const ALOFT_M: f32 = 1.0;
+/// A vehicle whose radio fails may come so far along its path unheard, metres.
+const STRETCH_M: f32 = 6.0;
+/// And lie so far beside it, metres.
+const BESIDE_M: f32 = 0.5;
+/// Spacing of the places that are compared with where it lies, metres.
+const FINE_M: f32 = 0.05;
+/// Spacing of the places where it may lie, metres.
+const STEP_M: f32 = 0.5;
+
+/// What held a vehicle up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub enum Cause {
+    /// The vehicle struck lies at its goal.
+    AtGoal,
+    /// The vehicle struck lies on the only route.
+    OnlyRoute,
+    /// It was silent, and for all that the others can know it lies at the goal.
+    MayBeAtGoal,
+    /// The same, on the only route.
+    MayBeOnRoute,
+    /// Others that lie or stand leave no way, the vehicle struck or not.
+    Others,
+    /// There was a way.
+    WayLeft,
+}
+
+impl Cause {
+    /// All of them.
+    pub const ALL: [Self; 6] =
+        [Self::AtGoal, Self::OnlyRoute, Self::MayBeAtGoal, Self::MayBeOnRoute, Self::Others, Self::WayLeft];
+}
+
+impl fmt::Display for Cause {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::AtGoal => "struck vehicle at the goal",
+            Self::OnlyRoute => "struck vehicle on the only route",
+            Self::MayBeAtGoal => "struck vehicle, silent, may lie at the goal",
+            Self::MayBeOnRoute => "struck vehicle, silent, may lie on the only route",
+            Self::Others => "others on the only route",
+            Self::WayLeft => "a way was left",
+        })
+    }
+}
+
+/// A vehicle that was struck: its index, when, and whether it fell silent.
+#[derive(Clone, Copy, Debug)]
+pub struct Struck {
+    /// Its index.
+    pub index: usize,
+    /// When, seconds of the simulation.
+    pub at_s: f32,
+    /// Whether nobody hears it from then on.
+    pub silent: bool,
+}
+
+/// What held up vehicle `held`.
+pub fn cause(mission: &Mission, plan: &SwarmPlan, flight: &Flight, struck: Struck, held: usize) -> Cause {
+    let apart_m = mission.scenario.deconfliction.safety_distance_m;
+    let Some((left_s, from)) = gave_up(&flight.tracks[held]) else { return Cause::WayLeft };
+    let path = &plan.flights[held].path;
+    let Some(over) = path.waypoints().last().map(|w| w.position) else { return Cause::WayLeft };
+    let ground = over - Point::new(0.0, 0.0, plan.flights[held].descent_m);
+    let others: Vec<Ball> = (0..flight.tracks.len())
+        .filter(|i| *i != held && *i != struck.index)
+        .filter_map(|i| place_at(&flight.tracks[i], left_s))
+        .map(|place| (place, apart_m))
+        .collect();
+    let lies = flight.tracks[struck.index].last().map(|(_, place)| (*place, apart_m));
+    let search = Search { mission, required_m: mission.tasks[held].required_clearance_m, from, over, ground };
+    if !search.finds(&others) {
+        return Cause::Others;
+    }
+    let known = [lies].into_iter().flatten().collect::<Vec<_>>();
+    let with = |more: &[Ball]| others.iter().chain(more).copied().collect::<Vec<_>>();
+    if search.goal_held(&known) {
+        return Cause::AtGoal;
+    }
+    if !search.finds(&with(&known)) {
+        return Cause::OnlyRoute;
+    }
+    let may = if struck.silent { may_lie(plan, flight, struck, apart_m + BESIDE_M) } else { Vec::new() };
+    if search.goal_held(&may) {
+        return Cause::MayBeAtGoal;
+    }
+    if search.finds(&with(&may)) { Cause::WayLeft } else { Cause::MayBeOnRoute }
+}
+
+/// A place, and how far to stay away from it, metres.
+type Ball = (Point, f32);
+
+/// When a vehicle that landed short began to descend, and where; one that never rose, where it is.
+fn gave_up(track: &[(f32, Point)]) -> Option<(f32, Point)> {
+    let (_, rest) = track.last()?;
+    track.iter().rev().find(|(_, place)| place.z > rest.z + ALOFT_M).or(track.last()).copied()
+}
+
+fn place_at(track: &[(f32, Point)], t_s: f32) -> Option<Point> {
+    let after = track.partition_point(|(at_s, _)| *at_s < t_s);
+    track.get(after).or(track.last()).map(|(_, place)| *place)
+}
+
+/// How far a silent vehicle lies beside its path, and how far along it from where it was last heard, metres.
+pub fn lies(plan: &SwarmPlan, flight: &Flight, struck: Struck) -> Option<[f32; 2]> {
+    let track = &flight.tracks[struck.index];
+    let path = &plan.flights[struck.index].path;
+    let (_, rest) = track.last()?;
+    let heard = place_at(track, struck.at_s)?;
+    let steps = (path.length_m() / FINE_M) as usize;
+    let nearest = |to: &Point| {
+        let away = |m: f32| Some((m, (path.point_at(m)? - to).xy().norm()));
+        let all = (0..=steps).filter_map(|i| away(i as f32 * FINE_M));
+        all.min_by(|a, b| a.1.total_cmp(&b.1))
+    };
+    let (rest, heard) = (nearest(rest)?, nearest(&heard)?);
+    Some([rest.1, rest.0 - heard.0])
+}
+
+/// On the ground below the path as far as it may come, unheard, from where it was last heard.
+fn may_lie(plan: &SwarmPlan, flight: &Flight, struck: Struck, radius_m: f32) -> Vec<Ball> {
+    let track = &flight.tracks[struck.index];
+    let path = &plan.flights[struck.index].path;
+    let (Some(heard), Some((_, rest))) = (place_at(track, struck.at_s), track.last()) else {
+        return Vec::new();
+    };
+    let steps = (path.length_m() / STEP_M) as usize;
+    let nearest = (0..=steps)
+        .map(|i| i as f32 * STEP_M)
+        .filter_map(|m| Some((m, (path.point_at(m)? - heard).norm())))
+        .min_by(|a, b| a.1.total_cmp(&b.1))
+        .map_or(0.0, |(m, _)| m);
+    (0..=(STRETCH_M / STEP_M) as usize)
+        .filter_map(|i| path.point_at(nearest + i as f32 * STEP_M))
+        .map(|place| (Point::new(place.x, place.y, rest.z), radius_m))
+        .collect()
+}
+
+/// A way from `from` over `over` down to `ground`.
+struct Search<'a> {
+    mission: &'a Mission,
+    required_m: f32,
+    from: Point,
+    over: Point,
+    ground: Point,
+}
+
+impl Search<'_> {
+    fn goal_held(&self, balls: &[Ball]) -> bool {
+        !apart(&self.over, &self.ground, balls)
+    }
+
+    fn finds(&self, balls: &[Ball]) -> bool {
+        if self.goal_held(balls) {
+            return false;
+        }
+        // What is too near already may be flown off from.
+        let here = |&(place, radius_m): &Ball| (place, radius_m.min((place - self.from).norm() - 1e-3));
+        let balls: Vec<Ball> = balls.iter().map(here).collect();
+        let grid = self.mission.map.grid();
+        let free =
+            |a: &Point, b: &Point| segment_is_clear(&grid, a, b, self.required_m) && apart(a, b, &balls);
+        let shape = self.mission.map.shape;
+        let extent = shape.max() - shape.min;
+        let sizes = [extent.x, extent.y, extent.z].map(|m| (m / LATTICE_M) as usize + 1);
+        let at = |[i, j, k]: [usize; 3]| shape.min + Point::new(i as f32, j as f32, k as f32) * LATTICE_M;
+        let index = |[i, j, k]: [usize; 3]| (k * sizes[1] + j) * sizes[0] + i;
+        let mut seen = vec![false; sizes.iter().product()];
+        let mut queue = VecDeque::new();
+        for i in 0..sizes[0] {
+            for j in 0..sizes[1] {
+                for k in 0..sizes[2] {
+                    let place = at([i, j, k]);
+                    if (place - self.from).norm() < JOIN_M && free(&self.from, &place) {
+                        seen[index([i, j, k])] = true;
+                        queue.push_back([i, j, k]);
+                    }
+                }
+            }
+        }
+        while let Some(cell) = queue.pop_front() {
+            let place = at(cell);
+            if (place - self.over).norm() < JOIN_M && free(&place, &self.over) {
+                return true;
+            }
+            for step in 0..27_usize {
+                let offsets = [step % 3, step / 3 % 3, step / 9];
+                let next: [usize; 3] = std::array::from_fn(|a| (cell[a] + offsets[a]).wrapping_sub(1));
+                if (0..3).all(|a| next[a] < sizes[a]) && !seen[index(next)] && free(&place, &at(next)) {
+                    seen[index(next)] = true;
+                    queue.push_back(next);
+                }
+            }
+        }
+        false
+    }
+}
+
+fn apart(a: &Point, b: &Point, balls: &[Ball]) -> bool {
+    let leg = b - a;
+    balls.iter().all(|(place, radius_m)| {
+        let share = ((place - a).dot(&leg) / leg.norm_squared().max(1e-9)).clamp(0.0, 1.0);
+        (a + leg * share - place).norm() >= *radius_m
+    })
+}
