@@ -173,33 +173,62 @@ pub enum Joint {
     Unknown,
     /// Further than [`OFF_M`] beside them.
     Beside,
-    /// On the leg that ends at the point of this number.
-    On(u8),
+    /// On them.
+    On {
+        /// Number of the point at which the leg ends on which it is at first.
+        leg: u8,
+        /// Points that turn back lead past it again: as far along them it may be already, metres.
+        more_m: f32,
+    },
 }
 
+/// A way that comes nearer again by less than this does not come back, metres.
+const BACK_M: f32 = 0.05;
+
 impl Joint {
-    /// Looks for the nearest place on the points.
+    /// Looks for the places on the points at which it may be: the first one, and how far from there the last one is.
     #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
-        let (mut least_sq, mut best) = (OFF_M * OFF_M, Self::Beside);
-        let Some(mut from) = points.first() else { return best };
+        let mut found = Self::Beside;
+        let Some(mut from) = points.first() else { return found };
+        let away_m = |place: &Point| sqrtf((position - place).norm_squared());
+        // How far the first place is away and, from there along the points, the leg; whether they have led away since.
+        let (mut least_m, mut along_m, mut left) = (OFF_M, 0.0, false);
+        let mut start_m = away_m(from);
         for (i, to) in points.iter().enumerate() {
-            let apart_sq = (position - nearest(position, from, to)).norm_squared();
-            if apart_sq < least_sq {
-                (least_sq, best) = (apart_sq, Self::On(i as u8));
+            let place = nearest(position, from, to);
+            let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
+            if !left && apart_m < least_m {
+                (found, least_m, along_m) = (Self::On { leg: i as u8, more_m: 0.0 }, apart_m, -upto_m);
+            } else if left
+                && apart_m < OFF_M
+                && apart_m + BACK_M < start_m
+                && let Self::On { more_m, .. } = &mut found
+            {
+                *more_m = along_m + upto_m;
             }
+            along_m += sqrtf((to - from).norm_squared());
+            start_m = away_m(to);
+            left |= found != Self::Beside && start_m > least_m + BACK_M;
             from = to;
         }
-        best
+        found
     }
 
-    /// That place, and the points from there on; none where it is beside them.
+    /// That place, and the points after it; none where it is beside them.
     fn ahead<'a>(&self, position: &Point, points: &'a [Point]) -> Option<(Point, &'a [Point])> {
-        let Self::On(leg) = *self else { return None };
-        let ahead = points.get(usize::from(leg)..)?;
-        let to = ahead.first()?;
-        let from = &points[usize::from(leg.saturating_sub(1))];
-        Some((nearest(position, from, to), ahead))
+        let Self::On { leg, .. } = *self else { return None };
+        let leg = usize::from(leg);
+        let to = points.get(leg)?;
+        // No leg ends at the first point: it is the place itself, and would take the room of another one.
+        let ahead = &points[leg.max(1).min(points.len())..];
+        Some((nearest(position, &points[leg.saturating_sub(1)], to), ahead))
+    }
+
+    /// How far along the points from that place it may be already, metres.
+    #[inline]
+    pub fn more_m(&self) -> f32 {
+        if let Self::On { more_m, .. } = *self { more_m } else { 0.0 }
     }
 }
 
@@ -250,11 +279,13 @@ impl Heard<'_> {
         let away = (first - self.position).abs();
         // No less than the distance, and no square root.
         let first_m = away.x + away.y + away.z;
+        // Where its place on them is yet to be looked for nothing is known but how far they lead.
+        let more_m = if self.joint == Joint::Unknown { 2.0 * self.extent_m } else { self.joint.more_m() };
         if first_m < OFF_M {
             // On its points, and no further than those lead.
-            return (along_m + OFF_M).min(first_m + self.extent_m);
+            return (along_m + more_m + OFF_M).min(first_m + self.extent_m);
         }
-        along_m + self.wider_m(bounds) + OFF_M
+        along_m + more_m + self.wider_m(bounds) + OFF_M
     }
 
     /// How old what it says is, seconds.
@@ -298,16 +329,23 @@ impl Heard<'_> {
         }
         if self.age_s > FRESH_S {
             set.grow_m = self.ball_m(bounds);
-        } else if let Some((nearest, ahead)) = self.joint().ahead(&self.position, self.points) {
+        } else {
+            self.add_motion(&mut set, bounds, ahead_s);
+        }
+        set.add_column(self.column_to_m);
+        set
+    }
+
+    fn add_motion(&self, set: &mut Set, bounds: &Bounds, ahead_s: f32) {
+        let joint = self.joint();
+        if let Some((nearest, ahead)) = joint.ahead(&self.position, self.points) {
             let ahead = core::iter::once(nearest).chain(ahead.iter().copied());
-            set.follow(ahead, self.along_m(bounds, ahead_s));
+            set.follow(ahead, joint.more_m() + self.along_m(bounds, ahead_s));
         } else {
             let share = if self.speed_mps > 0.0 { self.along_m(bounds, 0.0) / self.speed_mps } else { 0.0 };
             set.push(self.position + self.velocity * share);
             set.grow_m = self.wider_m(bounds);
         }
-        set.add_column(self.column_to_m);
-        set
     }
 
     #[inline]

@@ -100,7 +100,7 @@ impl Contact {
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
         if reach.lands || (dead && !lies) {
-            reaches(self.stretch_m() + OFF_M);
+            reaches(self.stretch_m() + self.joint.more_m() + OFF_M);
         }
         if reach.lands || self.climbs_to().is_some() {
             reaches(self.rests_m(reach));
