@@ -53,6 +53,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
         let room_below = !self.neighbours.any_below(&t.position, self.config.safety_distance_m + drift_m);
+        let (over_field, sought_home) =
+            (self.detours.home.can_turn(&view), self.detours.home.sought_for(now));
         Inputs {
             in_state: self.mission.in_state(now),
             heartbeat_age: t.heartbeat_age(now),
@@ -60,6 +62,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             jumped: t.is_settling(now),
             stalled: match self.mission.state() {
                 State::Follow => now - self.guidance.progress_at(),
+                // It may have stood for a gate long before. Where it can fly home it does not land for that.
+                State::Blocked if over_field && sought_home.is_none() => self.detours.blocked_for(now),
                 State::Blocked => (now - self.guidance.progress_at()).max(self.detours.blocked_for(now)),
                 _ => Duration::default(),
             },
@@ -100,13 +104,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && !self.guidance.returning
                 && !self.detours.home.is_on(),
             area: self.config.division.is_some(),
-            over_field: self.detours.home.can_turn(&view),
+            over_field,
             may_fly_beside: standing && self.is_undivided() && self.detours.may_fly_beside(&view),
             around_flown: follow && self.detours.beside.flies() && self.guidance.is_at_end(scene) && standing,
             own_plan_ready: self.detours.beside.is_back(),
             own_plan_lost: self.detours.beside.is_lost(),
             homeward: self.detours.home.is_on(),
-            sought_home: self.detours.home.sought_for(now),
+            sought_home,
             stands_to_return: standing && self.detours.home.may_ask(now),
             in_climb: matches!(beneath, State::TakeOff | State::Climb),
             armed: t.armed,
