@@ -74,11 +74,22 @@ fn forbid(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
 }
 
 /// The smallest take-off time ≥ `not_before_s` at which `flight`, labelled, keeps clear of every flight in `scheduled`,
-/// seconds.
+/// seconds. A place is free as soon as its vehicle has left it.
 pub fn earliest_departure<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
     not_before_s: f32,
+    scheduled: impl Iterator<Item = &'a Flight<W>>,
+    ws: &mut ScheduleWorkspace,
+) -> Result<f32, ScheduleError> {
+    departure_with_handover(cfg, flight, (not_before_s, 0.0), scheduled, ws)
+}
+
+/// The same where a place is free only `handover_s` after its vehicle has left it.
+pub(crate) fn departure_with_handover<'a, const W: usize>(
+    cfg: &ScheduleConfig,
+    flight: &Flight<W>,
+    (not_before_s, handover_s): (f32, f32),
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut ScheduleWorkspace,
 ) -> Result<f32, ScheduleError> {
@@ -100,8 +111,8 @@ pub fn earliest_departure<'a, const W: usize>(
                     // Held together iff p.from + d < q.to and q.from < p.to + d.
                     forbid(
                         &mut ws.forbidden,
-                        other.depart_s + q.from_s - p.to_s,
-                        other.depart_s + q.to_s - p.from_s,
+                        other.depart_s + q.from_s - handover_s - p.to_s,
+                        other.depart_s + q.to_s + handover_s - p.from_s,
                     );
                 }
             }
@@ -111,11 +122,12 @@ pub fn earliest_departure<'a, const W: usize>(
 }
 
 /// The differences of take-off times, of `a` after `b`, between which the two flights may meet: one interval, seconds; the
-/// first end is the greater one where they never meet.
+/// first end is the greater one where they never meet. A place is free `handover_s` after its vehicle has left it.
 pub(crate) fn forbidden_differences<const W: usize>(
     cfg: &ScheduleConfig,
     a: &Flight<W>,
     b: &Flight<W>,
+    handover_s: f32,
     ws: &mut ScheduleWorkspace,
 ) -> Result<(f32, f32), ScheduleError> {
     cut(cfg, a, &mut ws.own)?;
@@ -124,7 +136,7 @@ pub(crate) fn forbidden_differences<const W: usize>(
     for q in &ws.other {
         for p in &ws.own {
             // What widens nothing need not be looked at.
-            let (low, high) = (q.from_s - p.to_s, q.to_s - p.from_s);
+            let (low, high) = (q.from_s - handover_s - p.to_s, q.to_s + handover_s - p.from_s);
             if (low < from_s || high > to_s) && conflict(cfg, p, q) {
                 (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
             }

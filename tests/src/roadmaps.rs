@@ -119,7 +119,8 @@ impl Forger {
         if starts == 0 || goals == 0 {
             return;
         }
-        let route = Route { cfg: &SCHEDULE, from: 0, to: starts, not_before_s: 0.0, parked: &[] };
+        let route =
+            Route { cfg: &SCHEDULE, from: 0, to: starts, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
         let way = lengths_from(view, route.from, 0.0)[usize::from(route.to)];
         let mut flight = Flight::<NODES> {
             id: 1,

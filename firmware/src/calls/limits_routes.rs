@@ -215,6 +215,7 @@ fn schedules(
                     to: 2,
                     not_before_s: hard,
                     parked: &[Point::new(hard, 0.0, 0.0)],
+                    handover_s: hard,
                 };
                 let answer = to.call("sipp::route", || {
                     sipp::route(view, &route, any, flights[1..].iter(), &mut ws.sipp, &mut found)
@@ -225,7 +226,8 @@ fn schedules(
     }
     for i in 0..INDICES.len() * INDICES.len() {
         let (from, to_node) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
-        let route = Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[] };
+        let route =
+            Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
         let mut flight = plan.flights[0].clone();
         let answer =
             to.call("sipp::route", || sipp::route(view, &route, any, [].iter(), &mut ws.sipp, &mut flight));

@@ -68,9 +68,11 @@ impl Differences<'_> {
     }
 }
 
-/// Takes the vehicles in the order that ends the mission earliest, of those that are tried.
+/// Takes the vehicles in the order that ends the mission earliest, of those that are tried. A place is free `handover_s` after
+/// its vehicle has left it.
 pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: usize>(
     request: &PlanRequest<'_>,
+    handover_s: f32,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
@@ -92,7 +94,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     let ends = &mut ws.costs.as_flattened_mut()[..count * count];
     for (i, a) in out.flights.iter().enumerate() {
         for (j, b) in out.flights.iter().enumerate().skip(i + 1) {
-            let differences = schedule::forbidden_differences(cfg, a, b, &mut ws.schedule);
+            let differences = schedule::forbidden_differences(cfg, a, b, handover_s, &mut ws.schedule);
             let (from, to) = differences.map_err(|e| PlanError::Schedule(a.id, e))?;
             (ends[i * count + j], ends[j * count + i]) = (from, to);
         }
@@ -123,7 +125,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
         flights.iter().zip(&lasts_s).map(|(f, lasts_s)| f.depart_s + lasts_s).fold(0.0, fmaxf)
     };
     let before_s = makespan_s(&out.flights);
-    if depart_in(&order, request, ws, out).is_err() || makespan_s(&out.flights) >= before_s {
+    if depart_in(&order, request, handover_s, ws, out).is_err() || makespan_s(&out.flights) >= before_s {
         out.flights.iter_mut().zip(&found_s).for_each(|(flight, &depart_s)| flight.depart_s = depart_s);
     }
     Ok(())
@@ -136,6 +138,7 @@ const BOARD_VEHICLES: usize = 32;
 fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
     order: &[u16],
     request: &PlanRequest<'_>,
+    handover_s: f32,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), ScheduleError> {
@@ -146,8 +149,9 @@ fn depart_in<const N: usize, const V: usize, const W: usize, const P: usize>(
             .enumerate()
             .filter(|&(j, flight)| !flight.task.flies() || order[..place].contains(&(j as u16)));
         let (flight, scheduled) = (&out.flights[usize::from(i)], scheduled.map(|(_, flight)| flight));
+        let cfg = &request.schedule;
         let departure =
-            schedule::earliest_departure(&request.schedule, flight, 0.0, scheduled, &mut ws.schedule);
+            schedule::departure_with_handover(cfg, flight, (0.0, handover_s), scheduled, &mut ws.schedule);
         out.flights[usize::from(i)].depart_s = departure?;
     }
     Ok(())

@@ -17,10 +17,12 @@ use crate::schedule::{self, PIECE_M, PIECES, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
 
-/// Schedules the longest path first, and where that leads to no schedule the shortest.
+/// Schedules the longest path first, and where that leads to no schedule the shortest. A place is free `handover_s` after its
+/// vehicle has left it.
 pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
+    handover_s: f32,
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
@@ -50,7 +52,8 @@ pub(super) fn schedule_all<const N: usize, const V: usize, const W: usize, const
             let longer = if first == First::Longest { longer } else { longer.reverse() };
             goals[0].cmp(&goals[1]).then(longer).then(ids.0.cmp(&ids.1))
         });
-        failed = schedule_from(view, request, &mut order, ws, out);
+        let rush = Rush { count: 0, head_start_s: 0.0, handover_s };
+        failed = schedule_from(view, request, (&mut order, rush), ws, out);
         if failed.is_ok() {
             break;
         }
@@ -69,12 +72,11 @@ enum First {
 fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>(
     view: &RoadmapView<'_>,
     request: &PlanRequest<'_>,
-    order: &mut Vec<u16, V>,
+    (order, mut rush): (&mut Vec<u16, V>, Rush),
     ws: &mut PlanWorkspace<N, V, P>,
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut failed = Ok(());
-    let mut rush = Rush { count: 0, head_start_s: 0.0 };
     let reorderings = order.len().min(REORDERINGS);
     for round in 0..=reorderings + HEAD_STARTS {
         let Err((place, error)) = schedule_round(view, request, order, &rush, ws, out) else {
@@ -107,6 +109,8 @@ const HEAD_START_S: f32 = 3.0;
 struct Rush {
     count: usize,
     head_start_s: f32,
+    /// From when a vehicle has left a place until another one is to be there, seconds.
+    handover_s: f32,
 }
 
 /// One vehicle's turn among the others.
@@ -119,6 +123,8 @@ struct Turn<'a> {
     waiting: &'a [u16],
     /// It takes off no earlier, seconds.
     not_before_s: f32,
+    /// From when a vehicle has left a place until another one is to be there, seconds.
+    handover_s: f32,
 }
 
 fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize>(
@@ -136,7 +142,7 @@ fn schedule_round<const N: usize, const V: usize, const W: usize, const P: usize
         }
         let (before, waiting) = (&order[..place], &order[place + 1..]);
         let not_before_s = if place + rush.count < order.len() { rush.head_start_s } else { 0.0 };
-        let turn = Turn { index, before, waiting, not_before_s };
+        let turn = Turn { index, before, waiting, not_before_s, handover_s: rush.handover_s };
         let waits = wait_on_pad(view, request, &turn, ws, out);
         let flight = match waits.map_err(|error| (place, error))? {
             Some(flight) => flight,
@@ -156,7 +162,7 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Option<Flight<W>>, PlanError> {
-    let &Turn { index, before, waiting, not_before_s } = turn;
+    let &Turn { index, before, waiting, not_before_s, handover_s } = turn;
     let flight = &out.flights[index];
     let Some(goal) = flight.task.goal() else { return Ok(None) };
     let ends = Ends::new(request, index, goal);
@@ -172,7 +178,8 @@ fn wait_on_pad<const N: usize, const V: usize, const W: usize, const P: usize>(
         flight.fit_pieces();
         let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
         let cfg = &request.schedule;
-        match schedule::earliest_departure(cfg, &flight, not_before_s, scheduled, &mut ws.schedule) {
+        let from_s = (not_before_s, handover_s);
+        match schedule::departure_with_handover(cfg, &flight, from_s, scheduled, &mut ws.schedule) {
             Ok(depart_s) => return Ok(Some(Flight { depart_s, ..flight })),
             Err(ScheduleError::Blocked) => {}
             Err(error) => return Err(PlanError::Schedule(flight.id, error)),
@@ -190,14 +197,15 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     ws: &mut PlanWorkspace<N, V, P>,
     out: &SwarmPlan<V, W>,
 ) -> Result<Flight<W>, ScheduleError> {
-    let &Turn { index, before, waiting, not_before_s } = turn;
+    let &Turn { index, before, waiting, not_before_s, handover_s } = turn;
     let mut flight = out.flights[index].clone();
     let Some(goal) = flight.task.goal() else { return Ok(flight) };
     let Ends { from, to, vehicle } = Ends::new(request, index, goal);
     let passable = |_: u16, edge: &HalfEdge| view.clears(edge, vehicle.required_clearance_m);
     for avoid in [Avoid::WaitingPads, Avoid::Nothing] {
         let parked = Parked::<V>::new(view, avoid, &out.flights, waiting, index);
-        let mut route = Route { cfg: &request.schedule, from, to, not_before_s, parked: &parked.pads };
+        let cfg = &request.schedule;
+        let mut route = Route { cfg, from, to, not_before_s, parked: &parked.pads, handover_s };
         let mut best: Option<Flight<W>> = None;
         flight.piece_m = PIECE_M;
         for _ in 0..DEPARTURES {

@@ -54,6 +54,8 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     heap: Heap<N>,
     cut: Vec<Piece, PIECES>,
     forbidden: Forbidden,
+    /// Of the route that is sought.
+    handover_s: f32,
 }
 
 impl<const N: usize, const P: usize> SippWorkspace<N, P> {
@@ -68,6 +70,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             heap: Heap::new(),
             cut: Vec::new(),
             forbidden: Vec::new(),
+            handover_s: 0.0,
         }
     }
 }
@@ -91,6 +94,8 @@ pub struct Route<'a> {
     pub not_before_s: f32,
     /// Places where others stand all the time.
     pub parked: &'a [Point],
+    /// From when a vehicle has left a place until another one is to be there, seconds.
+    pub handover_s: f32,
 }
 
 /// The way from the pad up to the first node.
@@ -135,7 +140,7 @@ pub fn route<'a, const N: usize, const P: usize, const W: usize>(
 ) -> Result<(), ScheduleError> {
     let cfg = route.cfg;
     check::<N, W>(view, route, flight)?;
-    load(cfg, route.parked, scheduled, ws)?;
+    load(route, scheduled, ws)?;
     ws.first[..view.node_count()].fill(0);
     ws.heap.clear(N);
     ws.len = 0;
@@ -207,17 +212,19 @@ fn check<const N: usize, const W: usize>(
 
 /// Cuts all scheduled flights into pieces with absolute times.
 fn load<'a, const N: usize, const P: usize, const W: usize>(
-    cfg: &ScheduleConfig,
-    parked: &[Point],
+    route: &Route<'_>,
     scheduled: impl Iterator<Item = &'a Flight<W>>,
     ws: &mut SippWorkspace<N, P>,
 ) -> Result<(), ScheduleError> {
+    let &Route { cfg, parked, handover_s, .. } = route;
+    ws.handover_s = handover_s;
     const { assert!(P <= u16::MAX as usize, "cells count pieces in 16 bits") };
     ws.pieces.clear();
     for other in scheduled {
         cut(cfg, other, &mut ws.cut)?;
         for q in &ws.cut {
-            let absolute = Piece { from_s: q.from_s + other.depart_s, to_s: q.to_s + other.depart_s, ..*q };
+            let absolute =
+                Piece { from_s: q.from_s + other.depart_s, to_s: q.to_s + other.depart_s + handover_s, ..*q };
             ws.pieces.push(absolute).map_err(|_| ScheduleError::PiecesFull)?;
         }
     }
@@ -281,7 +288,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         // Held from −∞, so that it is no conflict with another pad.
         let on_pad = Piece { from_s: f32::NEG_INFINITY, ..standing(pad, true) };
         // The pad is held until the first part of the climb is behind the vehicle.
-        let off_pad_s = fmaxf(up.first_part(piece_m).1, OFF_PAD_S);
+        let off_pad_s = fmaxf(up.first_part(piece_m).1, OFF_PAD_S) + self.handover_s;
         let needed_s = self.near(cfg, &on_pad).map(|q| q.from_s).fold(f32::INFINITY, fminf);
         needed_s - off_pad_s
     }
@@ -329,14 +336,15 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
             parked: false,
         };
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
+        let held_s = self.handover_s;
         for q in self.cells.around(&self.pieces, &whole, apart_m) {
             // What ends before or begins after cannot even touch the times asked for.
-            if q.to_s < leave_s.0 || q.from_s - leg.to_s > leave_s.1 || !conflict(cfg, &whole, q) {
+            if q.to_s < leave_s.0 || q.from_s - held_s - leg.to_s > leave_s.1 || !conflict(cfg, &whole, q) {
                 continue;
             }
             for p in leg.pieces(0.0, leg.length_m, piece_m) {
                 if conflict(cfg, &p, q) {
-                    forbid(&mut self.forbidden, q.from_s - p.to_s, q.to_s - p.from_s);
+                    forbid(&mut self.forbidden, q.from_s - held_s - p.to_s, q.to_s - p.from_s);
                 }
             }
         }

@@ -183,7 +183,8 @@ fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.task.goal() else { continue };
         let (from, to) = (index as u16, view.header().starts + goal);
-        let route = Route { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[] };
+        let route =
+            Route { cfg: &cases::SCHEDULE, from, to, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
