@@ -79,8 +79,11 @@ const WINDOW_EDGE_M: f32 = 0.01;
 const PROGRESS_M: f32 = 0.25;
 /// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
 const FENCE_MARGIN_M: f32 = 0.05;
-/// However wide the margin, a descent leads so far down before the autopilot lands by itself, metres over the ground.
+/// However wide the margin, a descent leads so far down before it is slow, or before an autopilot that is not led to the ground
+/// lands by itself, metres over the ground.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;
+/// There it is led down no faster, m/s: what PX4 slows to near the ground as well.
+const TOUCHDOWN_MPS: f32 = 0.5;
 /// Shorter than this a leg need not be flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
@@ -155,7 +158,7 @@ pub struct Guidance {
     trapped_since: Option<Instant>,
     /// Whether its path leads aside only: it does not land at its end.
     pub aside: bool,
-    /// Height over the ground at which the autopilot lands by itself, metres.
+    /// Height over the ground from which a descent is slow, or an autopilot that is not led to the ground lands by itself, metres.
     low_m: f32,
     /// The lowest ground between pads, metres; infinite where those say how low.
     lowest_ground_m: f32,

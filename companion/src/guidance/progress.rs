@@ -136,7 +136,7 @@ impl Guidance {
             && !self.up
             && self.leg_done()
             && (scene.telemetry.position.z - low.position.z < DESCENDED_M
-                || self.guided_m(plan.descent_m) == 0.0)
+                || self.guided_m(scene, plan.descent_m) == 0.0)
     }
 
     /// Whether it stands at the end of the path and nobody keeps it from landing.

@@ -7,7 +7,10 @@ use planner_core::track::{self, Reference, Tracker};
 
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
-use super::{FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene};
+use super::{
+    FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene, TOUCHDOWN_MPS,
+};
+use crate::autopilot::Kind;
 use crate::guidance::evade;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -43,7 +46,8 @@ impl Guidance {
             Phase::Climb => path.point_at(0.0).map(|start| Point::new(raw.x, raw.y, start.z)),
             Phase::Join => path.point_at(self.tracker.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
-                Point::new(raw.x, raw.y, if self.up { end.z } else { end.z - self.guided_m(plan.descent_m) })
+                let down_m = if self.up { 0.0 } else { self.guided_m(scene, plan.descent_m) };
+                Point::new(raw.x, raw.y, end.z - down_m)
             }),
             Phase::Path if self.is_algorithm2() => {
                 return self.next_to_waypoint(path, &scene.telemetry.position, advice).unwrap_or(raw);
@@ -59,7 +63,7 @@ impl Guidance {
             (self.leg, self.leg_tracker) = (Some(leg), Tracker::default());
         }
         let Some(leg) = &self.leg else { return raw };
-        let advice = Advice::FREE;
+        let advice = Advice { speed_scale: self.descent_scale(plan, leg), ..Advice::FREE };
         let reference = track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
         self.lead_m = LEG_LEAD_M;
         if self.phase == Phase::Descent && self.leg_tracker.speed_mps > 0.0 {
@@ -180,9 +184,29 @@ impl Guidance {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }
 
-    /// How far down the setpoint leads, metres. At the end of the path and free to land it goes straight down, not lower than
-    /// the margin kept to obstacles: only from there the autopilot lands by itself, which the wind may carry off.
-    pub(super) fn guided_m(&self, descent_m: f32) -> f32 {
-        libm::fmaxf(descent_m - self.low_m, 0.0)
+    /// How far down the setpoint leads, metres. At the end of the path and free to land it goes straight down, to the ground where
+    /// the autopilot may be led there, else not lower than the margin kept to obstacles: once the autopilot lands by
+    /// itself the wind may carry it off.
+    pub(super) fn guided_m<const W: usize, const G: usize>(
+        &self,
+        scene: &Scene<'_, W, G>,
+        descent_m: f32,
+    ) -> f32 {
+        let low_m = if scene.telemetry.kind == Some(Kind::Px4) { 0.0 } else { self.low_m };
+        libm::fmaxf(descent_m - low_m, 0.0)
+    }
+
+    /// The share of the speed at which this leg is flown: below the margin kept to obstacles the ground may be, and is
+    /// touched slowly.
+    fn descent_scale<const W: usize, const G: usize>(&self, plan: &VehiclePlan<W, G>, leg: &Path<2>) -> f32 {
+        let (true, Some(top)) = (self.phase == Phase::Descent && !self.up, leg.waypoints().first()) else {
+            return 1.0;
+        };
+        let end_z = plan.path.point_at(plan.path.length_m()).map_or(top.position.z, |end| end.z);
+        let over_m = top.position.z - self.leg_tracker.along_m - (end_z - plan.descent_m + self.low_m);
+        let most_mps = libm::sqrtf(
+            TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
+        );
+        most_mps / self.leg_track.descend_mps
     }
 }
