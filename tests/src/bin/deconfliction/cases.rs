@@ -166,6 +166,17 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         nodes: 700,
         ..indoors()
     };
+    // As near each other as the hundred.
+    let forty = Meeting {
+        cases: vec![("circle, 40, 3 m apart", GUSTS)],
+        map: hall(dir, 30.0, "yard.bt")?,
+        vehicles: circle(40, 24.0, 30.0),
+        nodes: 700,
+        edge_max_m: 9.0,
+        sampling: "halton",
+        safety_distance_m: 3.0,
+        ..indoors()
+    };
     let hundred = Meeting {
         cases: vec![("circle, 100, 3 m apart", GUSTS)],
         map: hall(dir, 66.0, "field.bt")?,
@@ -212,7 +223,7 @@ pub fn all(dir: &Path) -> Result<Vec<Meeting>> {
         safety_margin_m: 0.3,
         ..indoors()
     };
-    Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, hundred])
+    Ok(vec![corridor, crossing, radios, doorway, stopped, twenty, forty, hundred])
 }
 
 /// Two in each arm, at 13 m and at 9.5 m from the middle, on the right of the arm's axis; goals are on the left.
