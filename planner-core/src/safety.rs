@@ -177,8 +177,9 @@ pub enum Joint {
     On {
         /// Number of the point at which the leg ends on which it is at first.
         leg: u8,
-        /// Points that turn back lead past it again: as far along them it may be already, metres.
-        more_m: f32,
+        /// Points that turn back lead past it again: as far along them it may be already, decimetres, rounded up. Two bytes,
+        /// since there is one for each contact.
+        more_dm: u16,
     },
 }
 
@@ -189,8 +190,8 @@ impl Joint {
     /// Looks for the places on the points at which it may be: the first one, and how far from there the last one is.
     #[inline(never)]
     pub fn find(position: &Point, points: &[Point]) -> Self {
-        let mut found = Self::Beside;
-        let Some(mut from) = points.first() else { return found };
+        let (mut found, mut more_m): (Option<u8>, f32) = (None, 0.0);
+        let Some(mut from) = points.first() else { return Self::Beside };
         let away_m = |place: &Point| sqrtf((position - place).norm_squared());
         // How far the first place is away and, from there along the points, the leg; whether they have led away since.
         let (mut least_m, mut along_m, mut left) = (OFF_M, 0.0, false);
@@ -199,20 +200,17 @@ impl Joint {
             let place = nearest(position, from, to);
             let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
             if !left && apart_m < least_m {
-                (found, least_m, along_m) = (Self::On { leg: i as u8, more_m: 0.0 }, apart_m, -upto_m);
-            } else if left
-                && apart_m < OFF_M
-                && apart_m + BACK_M < start_m
-                && let Self::On { more_m, .. } = &mut found
-            {
-                *more_m = along_m + upto_m;
+                (found, least_m, along_m) = (Some(i as u8), apart_m, -upto_m);
+            } else if left && apart_m < OFF_M && apart_m + BACK_M < start_m {
+                more_m = along_m + upto_m;
             }
             along_m += sqrtf((to - from).norm_squared());
             start_m = away_m(to);
-            left |= found != Self::Beside && start_m > least_m + BACK_M;
+            left |= found.is_some() && start_m > least_m + BACK_M;
             from = to;
         }
-        found
+        // The cast saturates.
+        found.map_or(Self::Beside, |leg| Self::On { leg, more_dm: libm::ceilf(10.0 * more_m) as u16 })
     }
 
     /// That place, and the points after it; none where it is beside them.
@@ -228,7 +226,7 @@ impl Joint {
     /// How far along the points from that place it may be already, metres.
     #[inline]
     pub fn more_m(&self) -> f32 {
-        if let Self::On { more_m, .. } = *self { more_m } else { 0.0 }
+        if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
     }
 }
 

@@ -479,6 +479,8 @@ fn sets(to: &mut Answers<'_, impl Listener>) {
             };
             let reach_m = to.call("safety::Heard::reach_m", || heard.reach_m(&bounds, hard));
             to.add(reach_m);
+            let more_m = to.call("safety::Joint::more_m", || heard.joint.more_m());
+            to.add(more_m);
             let other = to.call("safety::Heard::set", || heard.set(&bounds, hard));
             for own in &own {
                 let reach_m = to.call("safety::Set::reach_m", || own.reach_m());
