@@ -58,10 +58,9 @@ pub fn sample_nodes(
     let mut draws = Draws::new(config);
     let (min, size) = (grid.shape().min, grid.shape().max() - grid.shape().min);
     let is_free = |p: &Point| {
-        let never = never_sample.is_some_and(|never| never.is_blocked_at(p));
         grid.shape().cell_of(p).is_some_and(|cell| !grid.is_occupied(cell))
-            && !never
-            && keeps_clear(grid, config, p)
+            && !never_sample.is_some_and(|never| never.is_blocked_at(p))
+            && (config.clearance_m == 0.0 || segment_is_clear(grid, p, p, config.clearance_m))
     };
     for (found, node) in nodes[terminals.len()..total].iter_mut().enumerate() {
         let draw = |draws: &mut Draws| Some(min + draws.next().component_mul(&size)).filter(&is_free);
