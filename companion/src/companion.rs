@@ -31,22 +31,25 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// Setpoints at 20 Hz, twice what PX4 wants at least in practice.
+/// Period of setpoints: 20 Hz, twice the least rate that PX4 needs in practice.
 const SETPOINT_EVERY: Duration = Duration::from_millis(50);
-/// A setpoint that is held, or an EKF origin that is not used, is reported no more often.
+/// Least time between two reports of a setpoint that is held, or of an EKF origin that is not used.
 const REPORT_EVERY: Duration = Duration::from_secs(5);
-/// On the ground the table is looked at five times a second.
+/// Period of a step of the mission table on the ground.
 const IDLE_EVERY: Duration = Duration::from_millis(200);
-/// What all agree on in a coverage mission is reported so often.
+/// Period of the roster message of a coverage mission.
 const ROSTER_EVERY: Duration = Duration::from_millis(500);
-/// The same while a division is under way.
+/// Period of the roster message while a division is under way.
 const ROSTER_DIVIDING: Duration = Duration::from_millis(200);
+/// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
-/// After so long without setpoints Guided stops, seconds: between these, the time in which cruise speed flies the margin.
-/// ArduCopter's own 3 s would fly the last velocity on through walls while a link stalls; the shortest are four setpoints.
+/// Range of the time without setpoints after which Guided stops (`GUID_TIMEOUT`), seconds: within
+/// it, the time in which cruise speed flies the margin. ArduCopter's own 3 s would fly the last
+/// velocity on through walls while a link stalls; the shortest are four setpoints.
 const GUID_TIMEOUT_S: (f32, f32) = (0.2, 0.5);
-/// Rows taken at one instant; more would be a cycle in the table.
+/// Most rows of the mission table taken in one step; more would be a cycle in the table.
 const ROWS_AT_ONCE: usize = 4;
+/// Most events that wait for the shell.
 const EVENTS: usize = 16;
 
 /// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
@@ -75,7 +78,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         config.checked().map(Self::of)
     }
 
-    /// The same of settings that were checked, made where it stays: on a board there is no room for a copy on the stack.
+    /// As `new`, for settings that were checked, made where the companion stays: on a board there
+    /// is no room for a copy on the stack.
     #[inline(never)]
     pub fn make_in(place: &mut MaybeUninit<Self>, settings: Checked<V>) -> &mut Self {
         place.write(Self::of(settings))
@@ -106,7 +110,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// Where the mission is.
+    /// State of the mission.
     pub fn state(&self) -> State {
         self.mission.state()
     }
@@ -134,13 +138,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// How often the safety filter stopped the vehicle.
+    /// Number of times that the safety filter stopped the vehicle.
     pub fn filter_stops(&self) -> u32 {
         self.guidance.filter.activations()
     }
 
-    /// What the safety filter finds at this moment, as each step asks it: the vehicle that it stops for, 0 for none. Nothing
-    /// changes by it; its cost is counted so.
+    /// The vehicle that the safety filter stops for at this moment, as each step asks it; 0 for
+    /// none. Nothing changes by the call; the filter's cost is counted so.
     pub fn ask_filter(&mut self, now: Instant) -> u8 {
         let scene = Scene::new(
             self.mission.plan(),
@@ -158,17 +162,17 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Way made along the own path, metres.
     pub fn progress_m(&self) -> f32 {
-        // What is flown around comes on top of where the plan was left.
+        // The length of a detour comes on top of the place where the vehicle left the plan.
         let left_at_m = if self.detours.is_flying() { self.detours.left_at_m() } else { 0.0 };
         self.guidance.progress_m(self.mission.state(), &self.scene()) + left_at_m.max(0.0)
     }
 
-    /// What the setpoints came to since the start.
+    /// Greatest values of the setpoints since the start.
     pub fn setpoint_stats(&self) -> Stats {
         self.guidance.smoother.stats
     }
 
-    /// What a link's framer counted.
+    /// Counters of a link's framer.
     pub fn counters(&self, link: Link) -> Counters {
         self.links.counters(link)
     }
@@ -258,7 +262,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         )
     }
 
-    /// What requests to the autopilot follow from.
+    /// The situation that requests to the autopilot follow from.
     fn situation(&self) -> Situation {
         let in_state = self.mission.in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;

@@ -55,15 +55,16 @@ pub struct Config<const V: usize> {
     pub method: Method,
     /// The least error of the position estimate that is reckoned with, by which the operator vouches for the receiver, metres.
     pub estimate_m: f32,
-    /// How far the swarm's radio reaches for sure, metres: a vehicle that falls silent further away than most of that is out of range.
-    /// [`REACHES_ALL_M`]: it reaches everybody, so any silence is a failure.
+    /// Range of the swarm's radio for sure, metres: a vehicle that falls silent further away than
+    /// most of that is out of range. With [`REACHES_ALL_M`] the radio reaches every vehicle, so any
+    /// silence is a failure.
     pub radio_range_m: f32,
     /// A vehicle further than this from its start, horizontally, does not take off, metres.
     pub start_tolerance_m: f32,
     /// Battery charge below which it lands where no neighbour is below, and below half of which it lands anywhere,
     /// percent; 0 never.
     pub battery_low_percent: i8,
-    /// How often position and intent go to the swarm, each second.
+    /// Rate at which position and intent go to the swarm, Hz.
     pub swarm_hz: u8,
     /// Minimum and maximum corner of the volume it may be in, ENU metres.
     pub geofence: Option<(Point, Point)>,
@@ -78,7 +79,7 @@ pub struct Config<const V: usize> {
     pub ground_stations: [u8; GROUND_STATIONS],
 }
 
-/// A radio range that reaches everybody, metres.
+/// Radio range that reaches every vehicle, metres.
 pub const REACHES_ALL_M: f32 = 10_000.0;
 
 /// Settings that can be flown, and where the vehicle's own path starts.
@@ -156,7 +157,7 @@ impl<const V: usize> Config<V> {
 pub struct Ground {
     /// Pictures are taken at least so high above the field, metres.
     pub height_m: f32,
-    /// And at most so much higher, metres.
+    /// Greatest height of the estimate above that, metres.
     pub tolerance_m: f32,
     /// The lowest ground, metres up in the mission frame.
     pub low_m: f32,
@@ -235,7 +236,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the box, a vehicle that starts outside it is named, the first of the roster.
+        /// A vehicle that starts outside the geofence is named, whatever the box, the first of the
+        /// roster.
         #[test]
         fn who_starts_outside_the_geofence_is_named(
             low in proptest::array::uniform3(-2.0f32..12.0),

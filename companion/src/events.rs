@@ -11,7 +11,7 @@ pub enum Link {
     Swarm,
 }
 
-/// What the shell is to plan.
+/// The plan that the shell is to compute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wanted {
     /// The mission's plan.
@@ -22,7 +22,7 @@ pub enum Wanted {
     Division,
 }
 
-/// What the shell should know.
+/// An event for the shell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
     /// Plan this, and answer with [`crate::Companion::handle_plan`].
@@ -42,7 +42,7 @@ pub enum Event {
     },
     /// The mission waits for a vehicle that has not started.
     WaitsForStart {
-        /// Its MAVLink system id.
+        /// The command's MAVLink system id.
         id: u8,
     },
 }

@@ -49,57 +49,62 @@ pub use self::scene::Scene;
 pub use self::setpoint::Setpoint;
 pub use self::smoother::Stats;
 
-/// This near the end of the climb or of the path counts as there, metres.
+/// The end of a climb or of a path is reached within this distance, metres.
 const ARRIVED_M: f32 = 0.35;
-/// So near its reference a vehicle reports no less than this short of it, metres: 0.05 m less than what gates allow
-/// (`PROGRESS_ERROR_M`), since it stops short of a gate by a little.
+/// A vehicle near its reference reports its progress at most this far short of the reference,
+/// metres: 0.05 m less than gates allow (`PROGRESS_ERROR_M`), since a vehicle stops a little short
+/// of a gate.
 const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
-/// Slower than this counts as standing at the end of the path, m/s.
+/// A vehicle slower than this stands at the end of the path, m/s.
 const RESTS_MPS: f32 = 0.5;
 /// A setpoint slower than this stands, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
-/// This near its top the climb is done, metres.
+/// A climb is done within this distance of its top, metres.
 const CLIMBED_M: f32 = 0.12;
-/// This near the lower end of the guided descent it is done, metres.
+/// A guided descent is done within this distance of its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
-/// In a climb, a descent or a join the setpoint is at most this far ahead of the vehicle, metres.
+/// Greatest lead of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
-/// Before the take-off the setpoint follows the estimate of a vehicle that stands no faster than this, m/s.
+/// Greatest speed of the estimate of a vehicle on its pad, m/s: up to it the setpoint follows the
+/// estimate before the take-off.
 const DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
-/// The same after the position was lost, metres: the vehicle stopped within its braking distance of the reference, so a
-/// position further along is not to be believed.
+/// Stretch of the path searched after the position was lost, metres to either side: the vehicle
+/// stopped within its braking distance of the reference, so a position further along is not to be
+/// believed.
 pub const LOST_WINDOW_M: f32 = 2.5;
-/// The same once the setpoint stands, metres: the raw point may be as far ahead as a second is flown.
+/// Stretch of the path searched once the setpoint stands, metres to either side: the raw point may
+/// be a second of flight ahead.
 const SETTLE_WINDOW_M: f32 = 3.0;
-/// A nearest point so near the window's end lies beyond it, metres.
+/// A nearest point this near the end of the searched stretch lies beyond the stretch, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
-/// Less than this is no progress, metres.
+/// Least movement along the path that counts as progress, metres.
 const PROGRESS_M: f32 = 0.25;
-/// Before the geofence the raw point stops this short of it: the setpoint may stray so far from the path, metres.
+/// Distance that the raw point keeps from the geofence, metres: the setpoint may stray by this much
+/// from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
-/// However wide the margin, a descent leads so far down before it is slow, or before an autopilot that is not led to the ground
-/// lands by itself, metres over the ground.
+/// Greatest height over the ground, however wide the margin, at which a guided descent becomes
+/// slow, or at which an autopilot that is not led to the ground takes over the landing, metres.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;
-/// There it is led down no faster, m/s: what PX4 slows to near the ground as well.
+/// Fastest guided descent near the ground, m/s: PX4 slows to this speed as well.
 const TOUCHDOWN_MPS: f32 = 0.5;
-/// Shorter than this a leg need not be flown, metres.
+/// Shortest leg that is flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;
 
-/// Before the neighbours were asked: wait.
+/// Advice before the neighbours were looked at: wait.
 const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// The raw point's course, and the smoother that makes setpoints of it.
 #[derive(Clone, Debug)]
 pub struct Guidance {
     track: TrackConfig,
-    /// The same for climb, join and descent.
+    /// Limits of the reference in climb, join and descent.
     leg_track: TrackConfig,
     deconflict: DeconflictConfig,
     /// Share of the speed that the estimate allows: 0 stops.
     pub pace: f32,
-    /// What makes setpoints of raw points.
+    /// The smoother, which makes setpoints of raw points.
     pub smoother: Smoother,
     phase: Phase,
     tracker: Tracker,
@@ -118,13 +123,14 @@ pub struct Guidance {
     unsent_s: f32,
     /// Last advice of the neighbours.
     pub advice: Advice,
-    /// So many gates, from the first on, are open for good.
+    /// Number of gates, from the first on, that are open for good.
     opened: usize,
     on_path: bool,
     lead_m: f32,
-    /// Where along the path the setpoint is, metres.
+    /// Place of the setpoint along the path, metres.
     pub(crate) setpoint_m: f32,
-    /// Where along the path it will stop for now, whatever the safety filter does, metres.
+    /// Place along the path where the vehicle will stop for now, whatever the safety filter does,
+    /// metres.
     pub(crate) stops_at_m: f32,
     /// The safety filter.
     pub(crate) filter: Filter,
@@ -134,23 +140,24 @@ pub struct Guidance {
     pub(crate) turned: bool,
     /// Whether a descent goes back up its column.
     up: bool,
-    /// Its path leads out of the geofence from here.
+    /// The path leads out of the geofence from here.
     fenced: bool,
     progress_m: f32,
     progress_at: Instant,
     reported_m: f32,
     /// Whether it flies back the way it came.
     pub returning: bool,
-    /// Where others at least heard it to be, metres along the path; ∞ where nobody has.
+    /// Place along the path that others at least heard of, metres; ∞ where no vehicle has heard of
+    /// any.
     linked_m: f32,
     evade_search: Search,
     /// Whether it keeps out from under a vehicle that comes down.
     pub evading: bool,
-    /// How far ahead it waits, for the neighbours' sake, metres.
+    /// Distance ahead at which the vehicle waits for neighbours, metres.
     waits_m: f32,
-    /// It flies no further along its path for now, metres.
+    /// Place along the path beyond which the vehicle does not fly for now, metres.
     halt_m: f32,
-    /// Where it goes back to.
+    /// Place along the path to which the vehicle flies back.
     back_to_m: Option<f32>,
     /// No place along its path is better.
     nowhere: bool,
@@ -239,7 +246,7 @@ impl Guidance {
 
     /// Holds from now on: where the setpoint comes to a stop, or at `point` where no place was sent.
     pub fn hold_at(&mut self, point: Point) {
-        // Where places are sent again it brakes from the last one.
+        // A vehicle whose position is known again brakes from its last place.
         let lost = core::mem::take(&mut self.lost) && self.unsent_s > 0.0;
         if lost || !self.smoother.is_live() {
             self.smoother.resume_at(point, self.unsent_s);
@@ -262,7 +269,7 @@ impl Guidance {
         }
     }
 
-    /// Where on the path the reference is; −∞ before it runs.
+    /// Place of the reference on the path, metres; −∞ before the reference runs.
     pub fn along_m(&self) -> f32 {
         if self.on_path { self.tracker.along_m } else { f32::NEG_INFINITY }
     }
@@ -277,8 +284,8 @@ impl Guidance {
         self.fenced && self.stands()
     }
 
-    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one asked for; if not, the smoother held
-    /// the last one.
+    /// One step of `dt_s`: new advice, new setpoint. Returns whether the setpoint is the one that
+    /// the raw point requires; if not, the smoother held the last setpoint.
     pub fn step<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -309,7 +316,7 @@ impl Guidance {
             self.setpoint_m = plan.path.project(&place, along_m, SETTLE_WINDOW_M).min(along_m);
             let along_m = if self.on_path { along_m } else { -plan.climb_m };
             self.stops_at_m = match state {
-                // What stopped it is looked at on.
+                // The safety filter goes on checking the neighbour that stopped the vehicle.
                 State::Follow | State::Blocked | State::Replanning => {
                     along_m + self.advice.stop_within_m.max(0.0)
                 }
@@ -389,7 +396,8 @@ impl Guidance {
         };
         let mut blocked = false;
         let dt_s = if self.smoother.resumes() { self.unsent_s } else { dt_s };
-        // Where it stops stays where it is, however many raw points this step takes.
+        // The place where the vehicle stops stays the same, however many raw points this step
+        // takes.
         let stops_at_m = advised_at_m + advice.stop_within_m;
         self.fenced &= !moves;
         for _ in 0..self.smoother.begin(Pace { share, urgent }, dt_s) {
@@ -440,7 +448,8 @@ impl Guidance {
         }
     }
 
-    /// What the safety filter finds at this moment: the vehicle that it stops for, 0 for none. Nothing changes by it.
+    /// The vehicle that the safety filter stops for at this moment; 0 for none. Nothing changes by
+    /// the call.
     pub fn ask_filter<const V: usize, const W: usize, const G: usize>(
         &mut self,
         state: State,
@@ -468,7 +477,7 @@ impl Guidance {
         self.trapped_since
     }
 
-    /// That counts from now on.
+    /// The time in a trap counts from now on.
     pub(crate) fn forget_trap(&mut self) {
         self.trapped_since = None;
     }

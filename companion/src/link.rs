@@ -19,13 +19,16 @@ use self::rate_limit::RateLimit;
 use crate::events::Link;
 use crate::time::Instant;
 
-/// Entries of a link's queue that no answer takes: they are left for texts, acks of the own requests, and commands.
+/// Entries of a link's queue that answers leave free for texts, for acks of the own requests, and
+/// for commands.
 const KEPT_FREE: usize = 8;
-/// And entries that are left for answers to a ground station: a list of all parameters, and two more.
+/// Further entries that are left free for answers to a ground station: a list of all parameters,
+/// and two more.
 const KEPT_FOR_GROUND: usize = 12;
 const BOTH: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
-/// What is made from the newest state when its link is polled, instead of waiting in a queue.
+/// A message that is made from the newest state when its link is polled, instead of waiting in a
+/// queue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Fresh {
     /// A setpoint.
@@ -38,13 +41,13 @@ pub(crate) enum Fresh {
     Position,
     /// The intent.
     Intent,
-    /// What others do not hear of each other, passed on.
+    /// Reports of vehicles that others do not hear, passed on.
     Relay,
-    /// What all agree on in a coverage mission.
+    /// The roster: the state of all vehicles that a coverage mission agrees on.
     Roster,
-    /// What of the area is photographed.
+    /// The photographed waypoints of the area.
     Done,
-    /// The same as a number to be plotted.
+    /// The number of photographed waypoints, to be plotted.
     DoneCount,
 }
 
@@ -67,7 +70,7 @@ impl Links {
         self.framers[link as usize].next(now, input)
     }
 
-    /// What a link's framer counted.
+    /// Counters of a link's framer.
     pub(crate) fn counters(&self, link: Link) -> Counters {
         self.framers[link as usize].counters()
     }
@@ -77,7 +80,7 @@ impl Links {
         self.outboxes[link as usize].dropped()
     }
 
-    /// Something is to be made at the next poll, or not.
+    /// Sets whether the message `what` is to be made at the next poll.
     pub(crate) fn set_due(&mut self, link: Link, what: Fresh, due: bool) {
         let bit = 1 << what as u8;
         let bits = &mut self.due[link as usize];
@@ -101,7 +104,7 @@ impl Links {
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Text { warning, text }));
     }
 
-    /// The same with numbers: each `#` of the text stands for one.
+    /// As `say`, with numbers: each `#` of the text stands for one.
     pub(crate) fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
         let numbers = [numbers[0], numbers[1], 0];
         self.outboxes.iter_mut().for_each(|outbox| outbox.push(Outgoing::Count { warning, text, numbers }));
@@ -147,7 +150,8 @@ impl Links {
         self.log_sender(now, sender, command.log_text(), command.from);
     }
 
-    /// What this very command frame was answered lately, `Some(None)` if nothing; `None` for a frame not seen.
+    /// The answer that this very command frame got lately, `Some(None)` if none yet; `None` for a
+    /// frame not seen.
     pub(crate) fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
         self.repeats.answered(frame, now)
     }
@@ -189,7 +193,7 @@ impl Links {
         self.sent.count()
     }
 
-    /// What a message takes one way, seconds, by an echo of an own intent.
+    /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
         self.sent.delay_s(echo, now)
     }

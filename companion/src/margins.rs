@@ -21,24 +21,27 @@
 
 use crate::time::Duration;
 
-/// How far beside its path a vehicle flies at cruise speed, by its own estimate, metres.
+/// Lateral tracking error at cruise speed, by the vehicle's own estimate, metres.
 pub const TRACKING_M: f32 = 0.25;
-/// The same at a crawl, metres.
+/// Lateral tracking error at a crawl, metres.
 pub const CRAWL_M: f32 = 0.1;
-/// The least bound of an estimate, unless `FLK_EST_M` says otherwise: a receiver with fixed RTK, metres.
+/// Least bound of the position estimate's error, unless `FLK_EST_M` says otherwise: a receiver with
+/// fixed RTK, metres.
 pub const ESTIMATE_M: f32 = 0.1;
-/// The reported accuracy is one standard deviation; the bound is three.
+/// Bound of the estimate's error over the reported accuracy, which is one standard deviation.
 pub const ACCURACY_FACTOR: f32 = 3.0;
-/// A reported accuracy older than this is not known any more.
+/// Age from which a reported accuracy counts as unknown.
 pub const ACCURACY_AGE: Duration = Duration::from_secs(3);
 
-/// By how much two vehicles over an area may be nearer than they believe, metres: what the clearance leaves each for its
-/// estimate. Both are kept apart by that beside the safety distance, where no gates do it.
+/// Distance by which two vehicles over an area may be nearer than they believe, metres: the part of
+/// the clearance left to each for its estimate. Both are kept apart by this beside the safety
+/// distance, where no gates separate them.
 pub(crate) fn stray_m(clearance_m: f32, radius_m: f32) -> f32 {
     2.0 * libm::fmaxf(room_m(clearance_m, radius_m, TRACKING_M), 0.0)
 }
 
-/// What clearance, hull and tracking leave for the estimate and for gusts, metres; negative if nothing.
+/// The part of the clearance that hull and tracking leave for the estimate and for gusts, metres;
+/// negative if nothing.
 pub fn room_m(clearance_m: f32, radius_m: f32, tracking_m: f32) -> f32 {
     clearance_m - radius_m - tracking_m
 }
@@ -64,7 +67,7 @@ pub fn pace(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
     ((crawl_m - bound_m) / (crawl_m - cruise_m)).clamp(SLOWEST, 1.0)
 }
 
-/// Least share of the cruise speed that still moves.
+/// Least share of the cruise speed that still moves the vehicle.
 const SLOWEST: f32 = 0.1;
 
 #[cfg(test)]
@@ -84,7 +87,7 @@ mod tests {
             let (good, bad) = (a.min(b), a.max(b));
             let [fast, slow] = [good, bad].map(|bound_m| pace(bound_m, clearance_m, radius_m));
             proptest::prop_assert!(fast >= slow && (0.0..=1.0).contains(&fast));
-            // Whatever moves keeps its hull inside the clearance.
+            // A moving vehicle keeps its hull inside the clearance.
             let tracking_m = |pace: f32| if pace == 1.0 { TRACKING_M } else { CRAWL_M };
             for (pace, bound_m) in [(fast, good), (slow, bad)] {
                 proptest::prop_assert!(pace == 0.0 || radius_m + tracking_m(pace) + bound_m <= clearance_m + 1e-3);

@@ -56,7 +56,7 @@ impl From<PlanError> for PlanFailure {
     }
 }
 
-/// What an error of the planner is to a companion.
+/// The companion's failure for an error of the planner.
 fn failure(error: &PlanError) -> PlanFailure {
     match error {
         PlanError::Terminals | PlanError::BadGoal(_) | PlanError::SameId(_) => PlanFailure::NoRoadmap,

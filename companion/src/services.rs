@@ -52,7 +52,7 @@ impl Heard<'_> {
 #[derive(Clone, Debug)]
 pub(crate) struct Services {
     store: Option<Store>,
-    /// Those in use where there is no flash.
+    /// Parameters in use where there is no flash.
     parameters: Parameters,
     ftp: Ftp,
     /// Cruise, climb and descent of the mission, m/s, which parameters may limit.
@@ -74,7 +74,7 @@ impl Services {
         self.store = Some(store);
     }
 
-    /// What the flash has of an area that is photographed.
+    /// Photographed waypoints of an area that the flash has.
     pub(crate) fn photographed(&self) -> &[u8] {
         self.store.as_ref().map_or(&[], Store::photographed)
     }
@@ -98,7 +98,7 @@ impl Services {
         self.parameters().apply(config);
     }
 
-    /// What the flash is to do next.
+    /// The next request to the flash.
     pub(crate) fn poll_flash(
         &mut self,
         now: Instant,
@@ -134,7 +134,7 @@ impl Services {
         let for_us = |at: usize| p[at] == own.0 && (p[at + 1] == own.1 || p[at + 1] == 0);
         match heard.frame.message_id {
             ftp::MESSAGE if (p[1], p[2]) == own => {
-                // From others not even answered: sessions are scarce.
+                // A request of another sender is not even answered: sessions are scarce.
                 if self.store.is_some() && heard.sender == Sender::GroundStation {
                     if ftp::changes_files(p) {
                         links.log_sender(heard.now, heard.sender, "File request from #/#", heard.from());

@@ -61,7 +61,7 @@ impl Duration {
         self.0
     }
 
-    /// What it is longer than `other`; nothing where it is shorter.
+    /// Time by which this duration is longer than `other`; zero where it is shorter.
     pub const fn beyond(self, other: Self) -> Self {
         Self(self.0.saturating_sub(other.0))
     }

@@ -5,7 +5,7 @@
 
 use crate::time::{Duration, Instant};
 
-/// What can be due.
+/// Actions that can be due.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Timer {
     /// A step of the control loop.
@@ -14,11 +14,11 @@ pub(crate) enum Timer {
     Heartbeat,
     /// Position and intent to the swarm.
     Swarm,
-    /// What all agree on in a coverage mission, to the swarm.
+    /// Roster message of a coverage mission, to the swarm.
     Roster,
-    /// What of the area is photographed: noted, kept, reported.
+    /// Photographed waypoints of the area: noted, kept, reported.
     Done,
-    /// The same to the swarm.
+    /// Photographed waypoints of the area, to the swarm.
     DoneReport,
     /// The request that the state repeats: mode, take-off, landing, disarming.
     Request,
@@ -35,7 +35,7 @@ pub(crate) enum Timer {
 }
 
 const TIMERS: usize = 12;
-/// Those that wake the shell.
+/// Timers that wake the shell.
 const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 
 /// When each is due; at the start all are.

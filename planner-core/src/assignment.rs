@@ -23,7 +23,7 @@ pub use self::costs::AssignmentError;
 use self::costs::Costs;
 use self::state::{NONE, Paths, State};
 
-/// What an assignment amounts to.
+/// Result of an assignment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Assignment {
     /// Number of pairs: the most there can be.

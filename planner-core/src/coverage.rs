@@ -50,11 +50,11 @@ pub use self::flat::Flat;
 pub enum CoverageError {
     /// The area is not one: see [`area::AreaError`].
     Area(area::AreaError),
-    /// This setting is not what it may be.
+    /// The setting of this name is outside its range.
     Setting(&'static str),
     /// Lanes further apart than a footprint is wide, or waypoints further than it is long, leave gaps.
     Gaps,
-    /// There are more lanes, or more pieces of one lane, than the memory holds.
+    /// The path has more lanes, or more pieces of one lane, than the memory holds.
     LanesFull,
     /// The no-fly zones have more corners than the memory holds.
     NoFlyFull,
@@ -64,7 +64,7 @@ pub enum CoverageError {
     InsideNoFly(u8),
     /// No way leads to a lane: no-fly zones close it in.
     Unreachable,
-    /// There are no vehicles, or more than the memory holds.
+    /// The fleet has no vehicles, or more than the memory holds.
     Vehicles,
     /// The memory lent is too small.
     WorkspaceTooSmall,

@@ -77,13 +77,13 @@ pub struct Own<'a, const W: usize> {
     pub position: Point,
     /// Arc length of its reference, metres (minus the climb before take-off).
     pub along_m: f32,
-    /// Its path.
+    /// Path of the own vehicle.
     pub path: &'a Path<W>,
     /// Whether that is one of its own, not the plan's.
     pub detours: bool,
 }
 
-/// What the neighbours leave.
+/// Advice to the own vehicle, with which it stays clear of the neighbours.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Advice {
     /// Share of the nominal speed, 0…1.
@@ -95,28 +95,30 @@ pub struct Advice {
 }
 
 impl Advice {
-    /// Nobody near.
+    /// Advice where no neighbour is near.
     pub const FREE: Self = Self { speed_scale: 1.0, stop_within_m: f32::INFINITY, waiting_for: 0 };
 }
 
-/// A neighbour without a known plan is looked for this often along the own path: four seconds of flight at the nominal
-/// speed.
+/// Most samples of the own path that are compared with a neighbour without a known plan: four
+/// seconds of flight at the nominal speed.
 const LOOKS: usize = 16;
-/// Time of flight from one look to the next, seconds.
+/// Time of flight from one sample of the path to the next, seconds.
 const LOOK_EVERY_S: f32 = 0.25;
 
-/// Distances so much less are the same, metres.
+/// Two distances that differ by less than this are the same, metres.
 const ROUNDING_M: f32 = 0.05;
-/// A reference this little beyond a gate still stands at it: what overruns a stop is not to carry it through, metres.
+/// A reference this little beyond a gate still stands at the gate, metres: a small overshoot of the
+/// stop must not carry the vehicle through.
 const AT_GATE_M: f32 = 0.1;
-/// A vehicle that brakes comes to stand beyond its reference, by so much of the speed that it is faster than the second: 0.5 m were
-/// seen from 5.8 m/s.
+/// Overshoot of a braking vehicle beyond its reference, as seconds of flight at the cruise speed
+/// above [`LEADS_ABOVE_MPS`]: 0.5 m were seen from 5.8 m/s.
 const LEADS_S: f32 = 0.2;
-/// Below this cruise speed, m/s, it adds nothing.
+/// At a cruise speed up to this a braking vehicle does not overshoot its reference, m/s.
 const LEADS_ABOVE_MPS: f32 = 3.0;
 
-/// What the neighbours leave `own`; `gates` are sorted along the path. Work: the gates, a look through the neighbours for
-/// each gate within reach, and for each neighbour without a plan 16 points (`LOOKS`) of the own path.
+/// The advice to `own`; `gates` are sorted along the path. Work: the gates, a search through the
+/// neighbours for each gate within reach, and for each neighbour without a plan 16 points
+/// (`LOOKS`) of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &Own<'_, W>,
@@ -232,7 +234,7 @@ impl Ahead {
                 return Some(i as f32 * self.step_m);
             }
             last = (i + 1, to);
-            // Not below zero, and 0 where it is no number.
+            // The number is not below zero, and 0 where it is NaN.
             i = i.saturating_add(1).saturating_add((room_m * looks_a_metre) as usize);
         }
         None

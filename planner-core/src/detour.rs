@@ -20,28 +20,29 @@ use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::{ConfigError, Point};
 
-/// Coming nearer by less than this is none: a hovering vehicle sways, metres.
+/// Sway of a hovering vehicle, metres: an approach by less than this is not counted as one.
 const HOVER_SWAY_M: f32 = 0.05;
-/// The same of a way that is planned: rounding. The safety filter allows no more.
+/// Rounding of a planned path, metres: an approach by less than this is not counted as one. The
+/// safety filter allows no more.
 const WAY_NEARER_M: f32 = 0.002;
 
 /// A stretch to stay away from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct KeepOff {
-    /// One end.
+    /// One end of the zone's axis.
     pub from: Point,
     /// The other end.
     pub to: Point,
     /// Distance to keep, metres.
     pub radius_m: f32,
-    /// What is there.
+    /// Kind of the zone.
     pub nature: Nature,
 }
 
-/// What is to be kept off.
+/// Kind of a keep-out zone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Nature {
-    /// Something, all along the stretch for all one knows.
+    /// A zone that may be occupied all along its axis.
     Solid,
     /// A vehicle at `from` that descends to `to`: not to be rested below, nor flown up to.
     Landing,
@@ -57,7 +58,8 @@ impl KeepOff {
         not_negative("radius_m", self.radius_m)
     }
 
-    /// The same, with no more distance than `here` has: a vehicle that is too near already may fly off.
+    /// The zone with no more distance than `here` has: a vehicle that is too near already may fly
+    /// off.
     fn seen_from(&self, here: &Point, nearer_m: f32) -> Self {
         let now_sq = segments_distance_sq((here, here), (&self.from, &self.to));
         let far_m = self.radius_m + nearer_m;
@@ -68,7 +70,8 @@ impl KeepOff {
         Self { radius_m: fminf(self.radius_m, fmaxf(now_m - nearer_m, 0.0)), ..*self }
     }
 
-    /// The same, no deeper than the ground below it: nothing falls through a floor. What lies is on the ground.
+    /// The zone no deeper than the ground below it: a vehicle does not fall through a floor. A
+    /// vehicle that lies is on the ground.
     fn settled(&self, view: &RoadmapView<'_>) -> Self {
         let falls = self.to.z < self.from.z;
         let Some((low_m, high_m)) = view.ground_around(&self.from).filter(|_| falls) else { return *self };
@@ -80,8 +83,8 @@ impl KeepOff {
         Self { from, to, ..*self }
     }
 
-    /// What of it is not to be flown through. A vehicle that descends may be met half way by one that climbs as fast: of its column
-    /// the lower third of what is above `here` is left to cross.
+    /// The part of the zone that may not be flown through. A vehicle that descends may be met half
+    /// way by one that climbs as fast: of its column the lower third above `here` is left to cross.
     pub(crate) fn solid(&self, here: &Point) -> Self {
         if self.nature != Nature::Landing {
             return *self;
@@ -187,7 +190,7 @@ pub fn is_blocked<const W: usize>(
     false
 }
 
-/// How many stretches [`is_blocked`] looks at: the legs ahead, the climb, the descent.
+/// Number of stretches that [`is_blocked`] checks: the legs ahead, the climb, the descent.
 pub fn stretches_ahead<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().len() - legs_begun(path, along_m) + 2
 }
@@ -197,10 +200,10 @@ fn legs_begun<const W: usize>(path: &Path<W>, along_m: f32) -> usize {
     path.waypoints().partition_point(|w| w.along_m <= along_m)
 }
 
-/// Where a way around leads.
+/// Target of a detour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Goal {
-    /// To this goal of the roadmap, by its index.
+    /// A goal of the roadmap, by its index.
     Node(u16),
     /// Over a field, without a roadmap: to this place over the vehicle's pad.
     Home {
@@ -211,18 +214,18 @@ pub enum Goal {
     },
 }
 
-/// What to plan.
+/// The detour to plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DetourRequest {
     /// Whether it is not the goal that is sought but the nearest node to rest at, away from all there is to keep off.
     pub aside: bool,
-    /// Where the vehicle hovers, on a leg whose ends follow.
+    /// Place where the vehicle hovers, on a leg whose ends follow.
     pub here: Point,
     /// The ends of that leg; nodes of the roadmap, but that one may be where an earlier detour began.
     pub leg: [Point; 2],
-    /// Its clearance, metres.
+    /// Clearance of that leg, metres.
     pub leg_clearance_m: f32,
-    /// Where to.
+    /// Target of the detour.
     pub goal: Goal,
     /// Height of the goal over its ground, metres.
     pub descent_m: f32,
@@ -274,7 +277,7 @@ pub enum DetourError {
     GoalBlocked,
 }
 
-/// The way aside is no longer than this, nor its end further away, metres.
+/// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
 const ASIDE_M: f32 = 20.0;
 
 /// The shortest path to the goal, or aside, that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer
@@ -343,7 +346,7 @@ pub fn plan<const N: usize, const W: usize>(
     failed
 }
 
-/// Of what is nearer already than it should be, no more distance than there is.
+/// A zone that is nearer already than it should be keeps no more distance than there is.
 pub(crate) fn shorten(obstacles: &mut [KeepOff], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
         *obstacle = obstacle.seen_from(here, WAY_NEARER_M);

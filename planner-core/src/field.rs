@@ -13,24 +13,24 @@ use libm::{floorf, fmaxf, fminf};
 use crate::coverage::Flat;
 use crate::file::{CRC32, FileError};
 
-/// What the bytes begin with.
+/// First eight bytes of a height field's file.
 pub const MAGIC: [u8; 8] = *b"FLKFIELD";
-/// The version written and read.
+/// Version of the file format that is written and read.
 pub const VERSION: u16 = 1;
 /// Bytes before the first node.
 pub const HEADER_LEN: usize = 28;
 /// Most nodes: their bytes fit where a roadmap does.
 pub const MAX_NODES: usize = 1 << 16;
-/// Nodes are in these, metres.
+/// Unit in which a node's height is stored, metres.
 pub const STEP_M: f32 = 0.1;
 const CRC_LEN: usize = 4;
 
-/// Where nodes are.
+/// Places of the nodes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldShape {
     /// The south-western node.
     pub low: Flat,
-    /// From one node to the next, metres.
+    /// Distance from one node to the next, metres.
     pub cell_m: f32,
     /// Nodes from west to east, at least 2.
     pub columns: u16,
@@ -97,7 +97,7 @@ impl<'a> FieldView<'a> {
         Ok(Self { shape, nodes, highest_dm, crc })
     }
 
-    /// Where its nodes are.
+    /// Places of the nodes.
     pub fn shape(&self) -> &FieldShape {
         &self.shape
     }

@@ -4,8 +4,8 @@ use core::fmt;
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
-/// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final xor 0xFFFFFFFF. One set of
-/// tables for all that is summed.
+/// CRC-32 as in zip and PNG (ISO-HDLC): polynomial 0x04C11DB7 reflected, initial value and final
+/// xor 0xFFFFFFFF. One set of tables serves every file and record.
 pub static CRC32: Crc<u32, Tables> = Crc::<u32, Tables>::new(&CRC_32_ISO_HDLC);
 
 /// 1 kB of tables on a board; a desk takes sixteen bytes at once by 16 kB.

@@ -23,18 +23,20 @@ pub struct Waypoint {
     pub along_m: f32,
     /// Label of the swarm's schedule: arrival, seconds after take-off at nominal speed. Only its order matters in flight.
     pub at_s: f32,
-    /// The same of the departure: later than `at_s` where the schedule lets somebody pass.
+    /// Time of the departure, seconds: later than `at_s` where the schedule lets another vehicle
+    /// pass.
     pub leave_s: f32,
 }
 
 /// Why a path was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum PathError {
-    /// More than `W` waypoints.
+    /// The path has more than `W` waypoints.
     PathFull,
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
-    /// Longer than vehicles can tell each other of: [`crate::coverage::flights::FURTHEST_M`].
+    /// The path is longer than vehicles can report to each other:
+    /// [`crate::coverage::flights::FURTHEST_M`].
     TooLong,
 }
 
@@ -176,22 +178,22 @@ impl<const W: usize> Path<W> {
     }
 }
 
-/// A vehicle that stands reports its progress at most this wrong, metres.
+/// Greatest error of the progress that a standing vehicle reports, metres.
 pub const PROGRESS_ERROR_M: f32 = 0.25;
 
-/// What a vehicle does on its flight.
+/// Task of a vehicle on its flight.
 ///
 /// Every task's flight is one path: what differs is what happens along it, which the task says by arc length.
 // A tag of its own, so that one that stays is all zeros and a static of plans costs .bss alone.
 #[repr(u8)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Task {
-    /// It stays on its pad.
+    /// The vehicle stays on its pad.
     #[default]
     Stay,
-    /// It flies to the goal with this index and lands below it.
+    /// The vehicle flies to the goal with this index and lands below it.
     Goto(u16),
-    /// It photographs along lanes and lands at the end of its path.
+    /// The vehicle photographs along lanes and lands at the end of its path.
     Photograph(Photographs),
 }
 
@@ -211,18 +213,18 @@ impl Task {
 }
 
 impl From<Option<u16>> for Task {
-    /// To the goal; without one it stays.
+    /// The task of flying to the goal; without a goal the vehicle stays.
     fn from(goal: Option<u16>) -> Self {
         goal.map_or(Self::Stay, Self::Goto)
     }
 }
 
-/// One vehicle's way from its pad to the ground below its goal.
+/// One vehicle's flight from its pad to the ground below its goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Flight<const W: usize> {
     /// Id of the vehicle, unique in the swarm.
     pub id: u8,
-    /// What it does.
+    /// Task of the vehicle.
     pub task: Task,
     /// Air part, start to goal, labelled with seconds after take-off.
     pub path: Path<W>,
@@ -247,7 +249,7 @@ pub struct Flight<const W: usize> {
 /// A vehicle that waits where it is sent reports enough to open every gate that waits for what lies behind it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gate {
-    /// Where to wait, metres along the own path; −climb is the pad.
+    /// Place of the gate, metres along the own path; −climb is the pad.
     pub at_m: f32,
     /// Which vehicle to wait for: its id.
     pub id: u8,
@@ -255,10 +257,10 @@ pub struct Gate {
     pub until_m: f32,
 }
 
-/// What one companion needs of the swarm's plan.
+/// The part of the swarm's plan that one companion needs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct VehiclePlan<const W: usize, const G: usize> {
-    /// What the vehicle does.
+    /// Task of the vehicle.
     pub task: Task,
     /// Air part, start to goal.
     pub path: Path<W>,
@@ -268,14 +270,14 @@ pub struct VehiclePlan<const W: usize, const G: usize> {
     pub descent_m: f32,
     /// Scheduled take-off, seconds after the start. Not needed to keep apart: it waits on the pad instead of in the air.
     pub depart_s: f32,
-    /// Where to wait, and for which vehicle.
+    /// Places to wait at, and for which vehicle.
     pub gates: Vec<Gate, G>,
     /// CRC-32 over the whole swarm's plan: vehicles that agree on it agree on the order at every gate.
     pub plan_crc: u32,
 }
 
 impl<const W: usize, const G: usize> VehiclePlan<W, G> {
-    /// One that stays on its pad. All zeros, so a static costs .bss alone.
+    /// The plan of a vehicle that stays on its pad. All zeros, so a static costs .bss alone.
     pub const fn new() -> Self {
         Self {
             task: Task::Stay,

@@ -159,7 +159,8 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
 /// second, and one that has to stop brakes before. Without it each vehicle is later than the one before, and those that
 /// leave their pads in time wait in the air. Gates know nothing of it.
 const HANDOVER_S: f32 = 2.0;
-/// So few vehicles are planned without: none waits for many that wait themselves, and all land earlier.
+/// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: no vehicle of theirs
+/// waits for many that wait themselves, and all land earlier.
 const FEW: usize = 12;
 
 /// The paths, their order, and whether each vehicle has room for its gates. A place is free `handover_s` after its vehicle has left it.
@@ -180,7 +181,7 @@ fn in_order<const N: usize, const V: usize, const W: usize, const P: usize>(
     Ok(())
 }
 
-/// What the companion of flight `index` needs of the swarm's plan.
+/// The part of the swarm's plan that the companion of flight `index` needs.
 pub fn vehicle_plan<const V: usize, const W: usize, const G: usize>(
     plan: &SwarmPlan<V, W>,
     index: usize,

@@ -30,9 +30,9 @@ pub use write::{Edge, encoded_len, write, write_with_landmarks};
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
-/// Version of a file that says how high each node is over the ground.
+/// Version of a roadmap file that says how high each node is over the ground.
 pub const VERSION: u16 = 2;
-/// Version of one that does not; written and read too.
+/// Version of a roadmap file without heights; this version is written and read as well.
 const WITHOUT_HEIGHTS: u16 = 1;
 /// Bytes before the first node.
 pub const HEADER_LEN: usize = 72;
@@ -42,12 +42,13 @@ pub const MAX_NODES: usize = u16::MAX as usize;
 pub const MAX_COORDINATE_M: f32 = 16_384.0;
 /// Longest edge a roadmap may have, metres. The schedule looks at each metre of an edge, so this bounds its work.
 pub const MAX_EDGE_M: f32 = 100.0;
-/// Longest way to a landmark, metres: up to there a sum of edges is right to 4 mm an edge.
+/// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
+/// mm an edge.
 pub const MAX_WAY_M: f32 = 4.0 * MAX_COORDINATE_M;
 /// Largest clearance a half-edge can carry, metres.
 pub const MAX_CLEARANCE_M: f32 = 65.535;
 
-/// Landmarks of a roadmap that has any.
+/// Number of landmarks of a roadmap that has landmarks.
 pub const LANDMARKS: usize = 2;
 
 const NODE_LEN: usize = 12;
@@ -60,7 +61,7 @@ const WORD_LEN: usize = 4;
 pub enum RoadmapError {
     /// The bytes are no whole file.
     File(FileError),
-    /// This node is NaN, infinite or beyond [`MAX_COORDINATE_M`].
+    /// The node of this index is NaN, infinite or beyond [`MAX_COORDINATE_M`].
     Node(u16),
     /// The row of this node is out of order or beyond the half-edges.
     Offset(u16),
@@ -80,7 +81,7 @@ pub enum RoadmapError {
     Height(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
-    /// More than [`MAX_NODES`] nodes.
+    /// The roadmap has more than [`MAX_NODES`] nodes.
     TooManyNodes,
     /// The output buffer is smaller than the roadmap; `needed` bytes would do.
     RoadmapFull {
@@ -93,7 +94,7 @@ pub enum RoadmapError {
     SelfLoop(usize),
     /// The edge at this index has a clearance that is NaN, infinite or negative.
     Clearance(usize),
-    /// The same two nodes are joined twice.
+    /// These two nodes are joined twice.
     Duplicate(u16, u16),
 }
 
@@ -103,7 +104,7 @@ impl From<FileError> for RoadmapError {
     }
 }
 
-/// What a roadmap says about itself.
+/// Header of a roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoadmapHeader {
     /// The mission origin: zero of the nodes' frame.
@@ -115,7 +116,8 @@ pub struct RoadmapHeader {
     /// Clearance every edge was tested to exceed, metres: no vehicle that needs more than this may skip
     /// [`HalfEdge::clearance_m`].
     pub tested_clearance_m: f32,
-    /// Where stored clearances saturate, metres: an edge with this value has at least that much.
+    /// Value at which stored clearances saturate, metres: an edge with this value has at least that
+    /// much.
     pub max_clearance_m: f32,
     /// Start nodes; they are nodes `0..starts`.
     pub starts: u16,
@@ -162,7 +164,8 @@ impl RoadmapHeader {
     }
 }
 
-/// In f64, where the product is exact, so that rounding can only go down. The cast saturates.
+/// Computed in f64, where the product is exact, so that rounding can only go down. The cast
+/// saturates.
 fn millimetres_down(metres: f32) -> u16 {
     (f64::from(metres) * 1000.0) as u16
 }
@@ -210,9 +213,9 @@ pub struct RoadmapView<'a> {
     nodes: &'a [[u8; NODE_LEN]],
     offsets: &'a [[u8; WORD_LEN]],
     half_edges: &'a [[u8; WORD_LEN]],
-    /// One entry a node, or none.
+    /// An entry for each node, or none at all.
     landmarks: &'a [[u8; LANDMARKS_LEN]],
-    /// One entry a node, or none.
+    /// An entry for each node, or none at all.
     heights: &'a [[u8; HEIGHT_LEN]],
 }
 

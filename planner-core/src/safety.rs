@@ -22,14 +22,16 @@ use crate::{ConfigError, Point, all_positive};
 
 /// Time from a decision to the first motion that follows it, seconds: two setpoints.
 pub const REACTION_S: f32 = 0.1;
-/// A vehicle goes on to the reference that it lags: at most this time of flight behind it, seconds.
+/// Greatest lag of a vehicle behind its reference, as seconds of flight: the vehicle flies on that
+/// far.
 pub const LAG_S: f32 = 0.25;
-/// Heard within this time counts as heard, seconds.
+/// A neighbour heard within this time counts as heard, seconds.
 pub const FRESH_S: f32 = 1.0;
-/// Further than this from the points that it reports a vehicle does not fly along them, metres: real vehicles lag by
-/// up to 0.5 m and stray by 0.4 m.
+/// A vehicle further than this from the path points that it reports does not fly along them,
+/// metres: real vehicles lag by up to 0.5 m and stray by 0.4 m.
 pub const OFF_M: f32 = 0.9;
-/// Most points of a set: a vehicle's place and the eight points that it reports.
+/// Most points of the set that a vehicle may occupy: its place and the eight path points that it
+/// reports.
 const POINTS: usize = 9;
 
 /// How a vehicle stops.
@@ -37,12 +39,12 @@ const POINTS: usize = 9;
 pub struct Braking {
     /// Braking that is counted on, m/s².
     pub accel_mps2: f32,
-    /// Its change, m/s³.
+    /// Jerk with which braking begins, m/s³.
     pub jerk_mps3: f32,
 }
 
 impl Braking {
-    /// How far a vehicle flies on that begins to brake at this speed, metres.
+    /// Distance that a vehicle flies on that begins to brake at this speed, metres.
     #[inline]
     pub fn stop_m(&self, speed_mps: f32) -> f32 {
         let ramp_s = self.accel_mps2 / self.jerk_mps3;
@@ -50,19 +52,19 @@ impl Braking {
     }
 }
 
-/// Where a vehicle can be: a polyline, perhaps a vertical column below its first point, and how much wider than a line
-/// both are.
+/// Places where a vehicle can be: a polyline, perhaps a vertical column below its first point, and
+/// how much wider than a line both are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Set {
     points: Vec<Point, POINTS>,
     /// Lower end of the column.
     foot: Option<Point>,
-    /// How far beside the line it can be, metres.
+    /// Distance beside the line up to which the vehicle can be, metres.
     pub grow_m: f32,
 }
 
 impl Set {
-    /// One place.
+    /// A set of one place.
     #[inline]
     pub fn at(place: Point) -> Self {
         let mut points = Vec::new();
@@ -76,7 +78,8 @@ impl Set {
         self.points.push(to).is_ok()
     }
 
-    /// From `place` along the points `ahead`, for `length_m` from the first of them. Where they end the set ends.
+    /// The set from `place` along the points `ahead`, for `length_m` from the first of them. The
+    /// set ends where the points end.
     pub fn along(place: Point, ahead: impl Iterator<Item = Point>, length_m: f32) -> Self {
         let mut set = Self::at(place);
         set.follow(ahead, length_m);
@@ -105,14 +108,14 @@ impl Set {
         }
     }
 
-    /// From `place` straight up or down to the height `to_m`.
+    /// The set from `place` straight up or down to the height `to_m`.
     pub fn vertical(place: Point, to_m: f32) -> Self {
         let mut set = Self::at(place);
         set.push(Point::new(place.x, place.y, to_m));
         set
     }
 
-    /// How far from its first point it reaches at most, metres.
+    /// Greatest distance of the set from its first point, metres.
     pub fn reach_m(&self) -> f32 {
         let here = self.points[0];
         let most_sq = self.points.iter().fold(0.0_f32, |most, p| most.max((p - here).norm_squared()));
@@ -125,26 +128,26 @@ impl Set {
         self.foot = to_m.filter(|z| *z < first.z).map(|z| Point::new(first.x, first.y, z));
     }
 
-    /// Its first point and its last.
+    /// First and last point of the set.
     fn ends(&self) -> (&Point, &Point) {
         (&self.points[0], &self.points[self.points.len() - 1])
     }
 
-    /// Its legs, at least one, and the column.
+    /// Legs of the set, at least one, and the column.
     fn segments(&self) -> impl Iterator<Item = (&Point, &Point)> {
         let next = if self.points.len() > 1 { &self.points[1..] } else { &self.points[..] };
         self.points.iter().zip(next).chain(self.foot.as_ref().map(|foot| (&self.points[0], foot)))
     }
 }
 
-/// What a neighbour's set follows from.
+/// Inputs of a neighbour's set.
 #[derive(Clone, Copy, Debug)]
 pub struct Heard<'a> {
     /// Place, ENU metres.
     pub position: Point,
     /// ENU m/s.
     pub velocity: Point,
-    /// Its length.
+    /// Speed, m/s: the length of the velocity.
     pub speed_mps: f32,
     /// Seconds since both were heard.
     pub age_s: f32,
@@ -152,12 +155,12 @@ pub struct Heard<'a> {
     pub delay_s: f32,
     /// Points that it flies along next; empty if somebody else flies it.
     pub points: &'a [Point],
-    /// Where it is on them.
+    /// Place of the neighbour on its points.
     pub joint: Joint,
-    /// How far from the first of them they lead at most, metres.
+    /// Greatest distance to which the points lead from the first of them, metres.
     pub extent_m: f32,
-    /// How far along its points it may have stopped since, unheard for long, metres; 0 for one that is
-    /// heard.
+    /// Distance along its points up to which the neighbour may have stopped since, unheard for
+    /// long, metres; 0 for one that is heard.
     pub rests_within_m: f32,
     /// Whether it stands on the ground.
     pub grounded: bool,
@@ -165,13 +168,13 @@ pub struct Heard<'a> {
     pub column_to_m: Option<f32>,
 }
 
-/// Where a vehicle is on the points that it reports: the same as long as neither is heard again.
+/// Place of a vehicle on the points that it reports: the same as long as neither is heard again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Joint {
-    /// To be looked for.
+    /// The place was not sought yet.
     #[default]
     Unknown,
-    /// Further than [`OFF_M`] beside them.
+    /// The vehicle is further than [`OFF_M`] beside its points.
     Beside,
     /// On them.
     On {
@@ -183,7 +186,7 @@ pub enum Joint {
     },
 }
 
-/// A way that comes nearer again by less than this does not come back, metres.
+/// A path that comes nearer again by less than this does not come back, metres.
 const BACK_M: f32 = 0.05;
 
 impl Joint {
@@ -193,7 +196,8 @@ impl Joint {
         let (mut found, mut more_m): (Option<u8>, f32) = (None, 0.0);
         let Some(mut from) = points.first() else { return Self::Beside };
         let away_m = |place: &Point| sqrtf((position - place).norm_squared());
-        // How far the first place is away and, from there along the points, the leg; whether they have led away since.
+        // Distance of the first place and, from there along the points, of the leg; whether the
+        // points have led away since.
         let (mut least_m, mut along_m, mut left) = (OFF_M, 0.0, false);
         let mut start_m = away_m(from);
         for (i, to) in points.iter().enumerate() {
@@ -213,7 +217,7 @@ impl Joint {
         found.map_or(Self::Beside, |leg| Self::On { leg, more_dm: libm::ceilf(10.0 * more_m) as u16 })
     }
 
-    /// That place, and the points after it; none where it is beside them.
+    /// The place on the points, and the points after it; none where the vehicle is beside them.
     fn ahead<'a>(&self, position: &Point, points: &'a [Point]) -> Option<(Point, &'a [Point])> {
         let Self::On { leg, .. } = *self else { return None };
         let leg = usize::from(leg);
@@ -223,7 +227,7 @@ impl Joint {
         Some((nearest(position, &points[leg.saturating_sub(1)], to), ahead))
     }
 
-    /// How far along the points from that place it may be already, metres.
+    /// Distance along the points from that place that the vehicle may have flown already, metres.
     #[inline]
     pub fn more_m(&self) -> f32 {
         if let Self::On { more_dm, .. } = *self { 0.1 * f32::from(more_dm) } else { 0.0 }
@@ -239,7 +243,7 @@ fn nearest(position: &Point, from: &Point, to: &Point) -> Point {
     from + leg * share.clamp(0.0, 1.0)
 }
 
-/// What a neighbour can do at most.
+/// Bounds of a neighbour's motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bounds {
     /// How it stops.
@@ -263,7 +267,8 @@ impl Bounds {
 }
 
 impl Heard<'_> {
-    /// How far from its place it can be in any direction, `ahead_s` of flight included, metres.
+    /// Distance from its place that the neighbour can reach in any direction, `ahead_s` of flight
+    /// included, metres.
     #[inline]
     pub fn reach_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
         if self.grounded {
@@ -277,7 +282,7 @@ impl Heard<'_> {
         let away = (first - self.position).abs();
         // No less than the distance, and no square root.
         let first_m = away.x + away.y + away.z;
-        // Where its place on them is yet to be looked for nothing is known but how far they lead.
+        // Where the place on the points was not sought yet only their extent is known.
         let more_m = if self.joint == Joint::Unknown { 2.0 * self.extent_m } else { self.joint.more_m() };
         if first_m < OFF_M {
             // On its points, and no further than those lead.
@@ -294,17 +299,17 @@ impl Heard<'_> {
 
     #[inline]
     fn ball_m(&self, bounds: &Bounds) -> f32 {
-        // It hears that nobody hears it by messages that are as late as its own.
+        // The neighbour learns that no vehicle hears it by messages that are as late as its own.
         bounds.speed_max_mps * self.old_s().min(bounds.silent_s + 2.0 * self.delay_s)
     }
 
-    /// How far it flies until it has stopped.
+    /// Distance that the neighbour flies until it has stopped.
     #[inline]
     fn along_m(&self, bounds: &Bounds, ahead_s: f32) -> f32 {
         if self.rests_within_m > 0.0 {
             return self.rests_within_m;
         }
-        // It may have begun to speed up since it was heard.
+        // The neighbour may have begun to speed up since it was heard.
         let gained_mps = bounds.braking.accel_mps2 * (self.old_s() + REACTION_S);
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);
         let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
@@ -317,7 +322,8 @@ impl Heard<'_> {
         0.5 * bounds.braking.accel_mps2 * self.old_s() * self.old_s()
     }
 
-    /// Where it can be; with `ahead_s` also where its points lead it in so much time.
+    /// Set of places where the neighbour can be; with `ahead_s` also where its points lead it in so
+    /// much time.
     pub fn set(&self, bounds: &Bounds, ahead_s: f32) -> Set {
         let mut set = Set::at(self.position);
         if self.grounded {

@@ -32,9 +32,10 @@ use self::pieces::{Piece, conflict, cut};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
-/// Most forbidden intervals kept apart while a delay is sought; more are merged, which only forbids more.
+/// Most forbidden intervals kept apart while a delay is sought; more of them are merged, which only
+/// forbids more.
 const INTERVALS: usize = 128;
-/// This far above its pad a vehicle has left it at the least, metres.
+/// Least height above its pad at which a vehicle has left the pad, metres.
 const OFF_PAD_M: f32 = 0.02;
 
 /// Scratch of [`earliest_departure`] and [`gates`].
@@ -42,7 +43,7 @@ const OFF_PAD_M: f32 = 0.02;
 pub struct ScheduleWorkspace {
     own: Vec<Piece, PIECES>,
     other: Vec<Piece, PIECES>,
-    /// Those of `own`.
+    /// Blocks of `own`.
     blocks: Blocks,
     forbidden: Forbidden,
 }
@@ -85,7 +86,7 @@ pub fn earliest_departure<'a, const W: usize>(
     departure_with_handover(cfg, flight, (not_before_s, 0.0), scheduled, ws)
 }
 
-/// The same where a place is free only `handover_s` after its vehicle has left it.
+/// As `departure`, but a place is free only `handover_s` after its vehicle has left it.
 pub(crate) fn departure_with_handover<'a, const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
@@ -135,7 +136,7 @@ pub(crate) fn forbidden_differences<const W: usize>(
     let (mut from_s, mut to_s) = (f32::INFINITY, f32::NEG_INFINITY);
     for q in &ws.other {
         for p in &ws.own {
-            // What widens nothing need not be looked at.
+            // A segment that widens no interval need not be compared.
             let (low, high) = (q.from_s - handover_s - p.to_s, q.to_s + handover_s - p.from_s);
             if (low < from_s || high > to_s) && conflict(cfg, p, q) {
                 (from_s, to_s) = (fminf(from_s, low), fmaxf(to_s, high));
@@ -204,7 +205,7 @@ pub fn gates<const W: usize, const G: usize>(
     if full { Err(ScheduleError::GatesFull) } else { Ok(()) }
 }
 
-/// How far gates of flight `index` have to be merged for no more than `most`, metres.
+/// Distance within which gates of flight `index` have to be merged for no more than `most`, metres.
 pub(crate) fn merged_m<const W: usize>(
     cfg: &ScheduleConfig,
     flights: &[Flight<W>],
@@ -224,10 +225,12 @@ pub(crate) fn merged_m<const W: usize>(
     Err(ScheduleError::GatesFull)
 }
 
-/// How far along the path gates for one vehicle are merged, metres; the first that leaves few enough.
+/// Distances along the path within which gates for one vehicle are merged, metres: the first
+/// distance that leaves few enough gates is taken.
 const MERGED_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 
-/// For each block of `ws.own` those of `ws.other` that may come too near; `None` where none does.
+/// For each block of `ws.own` the blocks of `ws.other` that may come too near; `None` where none
+/// does.
 #[inline(never)]
 fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; BLOCKS]> {
     let mut near = [0; BLOCKS];

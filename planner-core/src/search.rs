@@ -17,12 +17,12 @@ use crate::roadmap::{HalfEdge, RoadmapView, target_of};
 pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
-/// Half-edges looked at together; a row is seldom longer.
+/// Half-edges compared together; a node seldom has more.
 const CHUNK: usize = 64;
 /// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
 type Gains = [u8; 256];
 
-/// Up to so many targets the search is drawn to each in turn: a board's 32 vehicles.
+/// Most targets for which the search is guided (A*) to each target in turn: a board's 32 vehicles.
 const FEW_TARGETS: usize = 32;
 
 /// Why a search gave no answer.
@@ -136,6 +136,7 @@ impl Graph for RoadmapView<'_> {
     ) -> usize {
         // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
         // is eight times the rounding of the three products.
+        /// Factor by which rounding may raise a lower bound of the distance to the target.
         const SLACK: f32 = 1.0 + 1e-6;
         let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
@@ -323,8 +324,8 @@ fn spread(view: &RoadmapView<'_>, nodes: &[u16]) -> (Point, f32) {
     ((low + high) / 2.0, libm::sqrtf((high - low).norm_squared()))
 }
 
-/// Where the values of a half-edge's target lie. No target of a checked roadmap is beyond `N`; where `N` is a power of two
-/// the compiler sees it too and leaves out the check.
+/// Index of the values of a half-edge's target. No target of a checked roadmap is beyond `N`; where
+/// `N` is a power of two the compiler sees it too and leaves out the check.
 #[inline(always)]
 fn target_index<const N: usize>(half_edge: &[u8; 4]) -> usize {
     let target = u32::from_le_bytes(*half_edge) as usize & 0xffff;

@@ -20,11 +20,11 @@ pub struct TrackConfig {
     pub cruise_mps: f32,
     /// Greatest speed upwards on a slanted leg, m/s.
     pub climb_mps: f32,
-    /// The same downwards, m/s.
+    /// Nominal speed downwards, m/s.
     pub descend_mps: f32,
     /// Acceleration and braking across, m/s².
     pub accel_mps2: f32,
-    /// The same upwards and downwards, m/s².
+    /// Acceleration upwards and downwards, m/s².
     pub accel_z_mps2: f32,
     /// Time in which the autopilot answers to a change of velocity in a corner, seconds. PX4's velocity loop takes 0.55 s
     /// (`MPC_XY_VEL_P_ACC` = 1.8 1/s) for a sudden one; sent smoothly, with its acceleration, it leaves less to make up for.
@@ -82,7 +82,7 @@ impl Default for TrackConfig {
     }
 }
 
-/// Where the reference is. All zero before the first waypoint.
+/// Place of the reference. All zero before the first waypoint.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Tracker {
     /// Arc length of the reference, metres.
@@ -104,14 +104,15 @@ pub struct Reference {
     pub finished: bool,
 }
 
-/// The reference may always be this far ahead: what an autopilot lags at walking speed, metres.
+/// Least lead of the reference ahead of the vehicle, metres: the distance by which an autopilot
+/// lags at walking speed.
 const LEAD_LEAST_M: f32 = 0.4;
-/// In the open, faster than it walks, it lags so much further: what is sent, answered and reported late, seconds, and twice
-/// that before the reference slows.
+/// Further lead in the open for speed above [`WALKS_MPS`], as seconds of flight: the time by which
+/// setpoint, response and report are late, and twice that before the reference slows.
 const LEAD_S: f32 = 0.8;
-/// A walk, m/s.
+/// Walking speed, m/s: at this speed [`LEAD_LEAST_M`] covers an autopilot's lag.
 const WALKS_MPS: f32 = 2.0;
-/// This near its end the path is flown, metres.
+/// A path is flown once the reference is this near its end, metres.
 const END_M: f32 = 0.01;
 
 /// Half of the clearance a leg leaves beyond the body, within the configured bounds.
@@ -151,7 +152,7 @@ fn braking_speed(accel: f32, room: f32, later_s: f32) -> f32 {
     sqrtf(lost * lost + fmaxf(room, 0.0)) - lost
 }
 
-/// What lies ahead of the reference.
+/// The path ahead of the reference.
 struct Ahead<'a> {
     points: &'a [Waypoint],
     /// Index of the next waypoint.
@@ -159,9 +160,9 @@ struct Ahead<'a> {
     along_m: f32,
     /// Distance within which to stop, metres.
     stop_m: f32,
-    /// Of the leg at hand.
+    /// Direction of the leg at hand.
     direction: Point,
-    /// Of the leg at hand, m/s².
+    /// Acceleration of the leg at hand, m/s².
     accel: f32,
 }
 
@@ -180,7 +181,7 @@ impl Ahead<'_> {
             }
             room += 2.0 * leg_accel * (waypoint.along_m - from_m);
             if room >= enough {
-                // From here on there is room to stop before any corner.
+                // Beyond this there is room to stop before any corner.
                 break;
             }
             let corner_sq = match self.points.get(i + 1) {
@@ -250,7 +251,8 @@ pub fn advance<const W: usize>(
     })
 }
 
-/// How far behind the vehicle may be on a leg of this clearance at this speed of the reference, metres.
+/// Greatest lead of the reference over the vehicle on a leg of this clearance at this speed of the
+/// reference, metres.
 fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     let deviation_m = deviation(cfg, clearance_m);
     let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, LEAD_LEAST_M));
@@ -259,7 +261,7 @@ fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKS_MPS, 0.0) } else { lead_m }
 }
 
-/// Slower than this the reference is about to stop, m/s.
+/// A reference slower than this is about to stop, m/s.
 const CRAWLS_MPS: f32 = 0.05;
 
 fn fmaxi(a: usize, b: usize) -> usize {

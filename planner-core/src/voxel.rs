@@ -83,7 +83,7 @@ impl GridShape {
 
     /// Whether no bit beyond the cells is set: it would be an obstacle that no cell has.
     fn padding_is_clear(&self, words: &[u64]) -> bool {
-        /// The first cell, the first two and the first three of a brick along each axis.
+        /// Masks of a brick's first cell layer, first two and first three, along each axis.
         const LAYERS: [[u64; 3]; 3] = [
             [0x1111_1111_1111_1111, 0x3333_3333_3333_3333, 0x7777_7777_7777_7777],
             [0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff],
@@ -115,7 +115,7 @@ impl GridShape {
     }
 }
 
-/// What lies beyond the grid's faces.
+/// Content of the space beyond the grid's faces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outside {
     /// Space beyond the grid is an obstacle: the faces count for clearance.
@@ -151,7 +151,7 @@ impl<'a> VoxelGrid<'a> {
         &self.shape
     }
 
-    /// What lies beyond the faces.
+    /// Content of the space beyond the faces.
     #[inline]
     pub fn outside(&self) -> Outside {
         self.outside

@@ -15,8 +15,9 @@ pub const BRAKE: u32 = 17;
 /// Position, with velocity as feed-forward. Acceleration is left out: 0xC00 was not seen to fly.
 pub const MASK_POSITION_VELOCITY: u16 = 0xDC0;
 
-/// How far ahead the velocity of a setpoint looks, seconds: Guided closes an error of velocity with `WPNAV_ACCEL` /
-/// `PSC_JERK_XY`, and the recording's circle is flown 0.6 s behind. Acceleration for so long replaces the one left out.
+/// Lead of a setpoint's velocity, seconds: Guided closes an error of velocity with `WPNAV_ACCEL` /
+/// `PSC_JERK_XY`, and the recording's circle is flown 0.6 s behind. Acceleration over this time
+/// replaces the acceleration that is left out.
 pub const VELOCITY_LEAD_S: f32 = 0.5;
 
 /// Parameters that limit what it flies, with 4.6's defaults; centimetres but for the jerk.
@@ -49,8 +50,8 @@ pub fn estimator_ready(flags: u16) -> bool {
     flags & POSITION_KNOWN == POSITION_KNOWN && flags & UNINITIALISED == 0
 }
 
-/// From this variance ratio on an estimate counts as unsound: EKF_STATUS_REPORT gives innovations as a share of what the filter
-/// takes in, and `FS_EKF_THRESH` is 0.8.
+/// Variance ratio from which an estimate counts as unsound: EKF_STATUS_REPORT gives innovations as
+/// a share of the largest that the filter accepts, and `FS_EKF_THRESH` is 0.8.
 const RATIO_MOST: f32 = 0.8;
 
 /// Whether a variance ratio is sound; NaN is not.

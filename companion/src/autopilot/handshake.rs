@@ -4,13 +4,13 @@ use crate::autopilot::telemetry::{Ack, Telemetry};
 use crate::mission::State;
 use crate::time::{Duration, Instant};
 
-/// A denied arming is requested again after this long.
+/// Time after which a denied arming is requested again.
 const RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Longest time from the ack of arming to the first HEARTBEAT (1 Hz) with the armed bit.
 const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
-/// Arming requests that may stay without an answer; then arming has failed.
+/// Arming requests that may stay without an answer; after them arming has failed.
 const ARMING_TRIES: u8 = 2;
-/// Different refusals reported in one state.
+/// Most different refusals reported in one state.
 const REFUSALS: usize = 4;
 
 const NAV_TAKEOFF: u16 = 22;
@@ -21,7 +21,7 @@ const ACCEPTED: u8 = 0;
 /// `MAV_RESULT` IN_PROGRESS.
 const IN_PROGRESS: u8 = 5;
 
-/// How far the requests of this state have come.
+/// State of the requests of this mission state.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Handshake {
     /// When arming was last requested.

@@ -16,7 +16,8 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// From `MAV_AUTOPILOT`; `None` for one the companion cannot fly, and for what is no flight controller (8).
+    /// The kind by `MAV_AUTOPILOT`; `None` for one the companion cannot fly, and for a component
+    /// that is no flight controller (8).
     pub fn from_heartbeat(autopilot: u8) -> Option<Self> {
         match autopilot {
             12 => Some(Self::Px4),
@@ -65,7 +66,7 @@ impl Kind {
         }
     }
 
-    /// By how many seconds of acceleration the velocity of a setpoint is ahead.
+    /// Lead of a setpoint's velocity, as seconds of its acceleration.
     pub fn velocity_lead_s(self) -> f32 {
         match self {
             Self::Px4 => 0.0,
@@ -81,7 +82,7 @@ impl Kind {
         }
     }
 
-    /// Its parameters that limit what it flies.
+    /// The autopilot's parameters that limit what it flies.
     pub fn limits(self) -> &'static [LimitParameter] {
         match self {
             Self::Px4 => &px4::LIMITS,

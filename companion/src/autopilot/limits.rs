@@ -3,7 +3,7 @@
 //! They are read on connecting. A value that did not come, or that no vehicle has, counts as the default of its kind. Source: PX4
 //! 1.17 `mc_pos_control` parameters, ArduCopter 4.6 `WPNAV_*` and `PSC_*`.
 
-/// What an autopilot's parameter limits.
+/// The quantity that an autopilot's parameter limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Limit {
     /// Speed across, m/s.
@@ -24,11 +24,12 @@ pub enum Limit {
     JerkZ,
 }
 
-/// Kinds of limits.
+/// Number of kinds of limits.
 const LIMITS: usize = 8;
 
 impl Limit {
-    /// What a vehicle may have: a value outside is no limit but a switch (0, −1) or a mistake.
+    /// The values that a vehicle may have, least and greatest: a value outside is no limit but a
+    /// switch (0, −1) or a mistake.
     fn range(self) -> (f32, f32) {
         match self {
             Self::Speed | Self::Climb | Self::Descend => (0.1, 50.0),
@@ -41,17 +42,17 @@ impl Limit {
 /// A parameter of an autopilot that limits what it flies.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LimitParameter {
-    /// Its name, at most 16 bytes.
+    /// Name of the parameter, at most 16 bytes.
     pub name: &'static str,
-    /// What it limits.
+    /// The quantity that the parameter limits.
     pub limit: Limit,
-    /// Its unit, in metres and seconds.
+    /// Unit of the parameter, in metres and seconds.
     pub unit: f32,
-    /// Its default, in its own unit.
+    /// Default of the parameter, in its own unit.
     pub default: f32,
 }
 
-/// What the autopilot's parameters allow.
+/// The limits that the autopilot's parameters set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutopilotLimits {
     values: [f32; LIMITS],

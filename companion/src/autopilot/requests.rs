@@ -15,35 +15,40 @@ use crate::mission::State;
 use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
-/// While another EKF origin is in doubt the autopilot is asked this often.
+/// Time between two requests for the EKF origin while another origin is in doubt.
 pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
-/// Disarming is requested this long after the state was entered, and again.
+/// Time from entering the state to the request to disarm, and between two such requests.
 pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
-/// Before a landing is requested the safety filter has looked down: two steps.
+/// Time for which the safety filter watches the column below before a landing is requested: two
+/// steps.
 const LOOKS_DOWN: Duration = Duration::from_millis(100);
 const RETRY_EVERY: Duration = Duration::from_millis(1000);
-/// Longer than ArduCopter takes to spin up and lift off (2.3 s).
+/// Time after which the take-off is requested again: longer than ArduCopter takes to spin up and
+/// lift off (2.3 s).
 const TAKE_OFF_AFTER: Duration = Duration::from_millis(4000);
-/// Positions missing this long while HEARTBEAT is heard: it has rebooted, and forgotten the streams.
+/// Gap in the positions, while HEARTBEAT is heard, after which the autopilot has rebooted and
+/// forgotten its streams.
 const STREAMS_LOST: Duration = Duration::from_millis(1500);
-/// Streams are asked for again no sooner than this.
+/// Least time between two requests for all streams.
 const STREAMS_EVERY: Duration = Duration::from_millis(2000);
-/// HEARTBEAT comes at 1 Hz: one late is not yet silence.
+/// Age up to which HEARTBEAT counts as heard: HEARTBEAT comes at 1 Hz, and one late is not yet
+/// silence.
 const HEARD: Duration = Duration::from_millis(1500);
-/// Streams asked for at each step while connecting.
+/// Streams that are requested in each step while connecting.
 const SETUP_BURST: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
-/// Requests for limits, all together, and the time from one to the next.
+/// Most requests for the autopilot's limit parameters, all together.
 const LIMIT_TRIES: u8 = 80;
+/// Time between two requests for limit parameters.
 const LIMIT_EVERY: Duration = Duration::from_millis(150);
 /// `MAV_PARAM_TYPE_REAL32`.
 const REAL32: u8 = 9;
-/// A stream that is this old is requested again: SYS_STATUS comes each second.
+/// Age after which a stream is requested again: SYS_STATUS comes each second.
 const STREAM_LOST: Duration = Duration::from_millis(4000);
-/// No vehicle takes off with a charge that is older.
+/// Greatest age of the reported charge with which a vehicle takes off.
 const BATTERY_LOST: Duration = Duration::from_millis(5000);
 
-/// What requests follow from.
+/// The situation that requests follow from.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Situation {
     pub(crate) now: Instant,
@@ -58,11 +63,11 @@ pub(crate) struct Situation {
     pub(crate) may_land: bool,
 }
 
-/// How far the requests have come.
+/// State of the requests.
 #[derive(Clone, Debug)]
 pub(crate) struct Requests {
     handshake: Handshake,
-    /// What the autopilot's parameters allow.
+    /// The limits that the autopilot's parameters set.
     limits: AutopilotLimits,
     /// Which of them were read, by bits, and how often they may still be requested.
     read: u16,
@@ -79,12 +84,12 @@ impl Default for Requests {
 }
 
 impl Requests {
-    /// How far arming has come.
+    /// State of the arming.
     pub(crate) fn handshake(&self) -> &Handshake {
         &self.handshake
     }
 
-    /// What the autopilot's parameters allow, as far as they were read.
+    /// The limits that the autopilot's parameters set, as far as they were read.
     pub(crate) fn limits(&self) -> &AutopilotLimits {
         &self.limits
     }
@@ -129,7 +134,7 @@ impl Requests {
         }
         let all = kind.limits();
         let from = usize::from(self.tries);
-        // In turn, so that one that does not exist holds back none.
+        // Parameters are requested in turn, so that one that does not exist holds back none.
         let missing = (from..from + all.len()).map(|i| i % all.len()).find(|i| self.read & 1 << i == 0);
         let Some(limit) = missing.and_then(|i| all.get(i)) else {
             self.tries = 0;

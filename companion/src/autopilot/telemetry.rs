@@ -30,22 +30,24 @@ const EXTENDED_SYS_STATE: u32 = 245;
 const ARMED: u8 = 0x80;
 const CRITICAL: u8 = 5;
 const ON_GROUND: u8 = 1;
-/// Further than this plus [`JUMP_MPS`] × time from where the last position and velocity lead is a jump, metres.
+/// Least jump, metres: the distance of a position from the one that the last position and velocity
+/// lead to, beyond [`JUMP_MPS`] × time.
 const JUMP_M: f32 = 1.0;
-/// More than any vehicle flown so changes its velocity between two positions, m/s.
+/// Change of velocity between two positions that no vehicle flown so far exceeded, m/s.
 const JUMP_MPS: f32 = 5.0;
-/// An EKF origin further from the mission's is not used, metres: the autopilot's frame is f32, and rounds a setpoint by up to
-/// 1.4 mm at this distance, by metres on the other side of the earth.
+/// Greatest distance of the EKF origin from the mission's origin, metres: the autopilot's frame is
+/// f32, and rounds a setpoint by up to 1.4 mm at this distance, by metres on the other side of the
+/// earth.
 const ORIGIN_MOST_M: f32 = 30_000.0;
-/// No gap is longer than the mission waits for its autopilot, seconds.
+/// Longest gap between two positions, seconds: the mission waits for its autopilot no longer.
 const GAP_MOST_S: f32 = 60.0;
-/// After a jump, or so long without one, the position is not used for this long; another one starts it again. What comes first
-/// after a silence may have waited on the way.
+/// Time for which the position is not used after a jump, or after an equally long gap; another jump
+/// starts the time again. The first messages after a silence may have waited on the way.
 pub const SETTLE: Duration = Duration::from_millis(1000);
-/// A different EKF origin is accepted once the known one was not reported for this long; the origin is requested several times
-/// meanwhile.
+/// Time without a report of the known EKF origin after which a different one is accepted; the
+/// origin is requested several times meanwhile.
 const DOUBT: Duration = Duration::from_millis(800);
-/// After this long without a frame the sequence starts afresh.
+/// Gap after which the frames' sequence numbers start afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
 /// Streams whose age is kept: more than any autopilot is asked for.
@@ -82,12 +84,12 @@ pub(crate) struct Ack {
     pub(crate) to: (u8, u8),
 }
 
-/// What changed by a frame.
+/// The effect of a frame on the telemetry.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing, or not for us.
+    /// No change, or a frame for another component.
     None,
-    /// Something is newer.
+    /// Some value is newer.
     Updated,
     /// The EKF origin is no longer known: ask for it.
     OriginLost,
@@ -127,7 +129,8 @@ pub struct Telemetry {
     doubted_at: Option<Instant>,
     /// The EKF origin moved while armed.
     pub(crate) origin_moved: bool,
-    /// What the estimator last reported of its error, metres, and when; infinite for one that is not sound.
+    /// Error that the estimator last reported, metres, and when; infinite for an estimate that is
+    /// not sound.
     accuracy: Option<(f32, Instant)>,
     /// When the position below was heard; `None` while it is unknown.
     pub position_at: Option<Instant>,
@@ -140,7 +143,7 @@ pub struct Telemetry {
     /// When each stream of [`Kind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
     streams: [Instant; STREAMS],
     boot_ms: u32,
-    /// By the autopilot's clock, of the last position used, milliseconds.
+    /// Time of the last position used, by the autopilot's clock, milliseconds.
     read_boot_ms: u32,
     /// When a position was last read, used or not.
     read_at: Option<Instant>,
@@ -151,8 +154,8 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Nothing heard.
-    /// A board without a mission takes an EKF origin anywhere.
+    /// Telemetry before any frame. With `anywhere` (a board without a mission) an EKF origin is
+    /// accepted anywhere.
     pub fn new(anywhere: bool) -> Self {
         Self { battery_percent: -1, anywhere, ..Self::default() }
     }
@@ -182,8 +185,8 @@ impl Telemetry {
         age(self.position_at, now)
     }
 
-    /// How far the estimate may be off, metres, by what the autopilot reports and by what the operator vouches for
-    /// (`FLK_EST_M`); infinite while that is not known.
+    /// Bound of the estimate's error, metres, by what the autopilot reports and by what the
+    /// operator vouches for (`FLK_EST_M`); infinite while the error is not known.
     pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
         match self.accuracy {
             Some((accuracy_m, at)) if now - at <= margins::ACCURACY_AGE => {
@@ -212,14 +215,15 @@ impl Telemetry {
         }
         self.note_stream(frame.message_id, now);
         match frame.message_id {
-            // By field: a command newer than the crate's may be answered.
+            // Decoded field by field: a command newer than the crate's may be answered.
             COMMAND_ACK_DATA::ID => {
                 let p = frame.padded();
                 let command = u16::from_le_bytes([p[0], p[1]]);
                 self.ack = Some(Ack { command, result: p[2], to: (p[8], p[9]) });
                 Change::Updated
             }
-            // By field: a vehicle type newer than the crate must not make the autopilot silent.
+            // Decoded field by field: a vehicle type newer than the crate must not make the
+            // autopilot silent.
             HEARTBEAT => {
                 let p = frame.padded();
                 let Some(kind) = Kind::from_heartbeat(p[5]) else { return Change::None };
@@ -255,7 +259,7 @@ impl Telemetry {
                 None => Change::None,
             },
             EKF_STATUS_REPORT_DATA::ID => {
-                // By field: flags newer than the crate's must not hide the others.
+                // Decoded field by field: flags newer than the crate's must not hide the others.
                 let p = frame.padded();
                 self.estimator_ready = ardupilot::estimator_ready(u16::from_le_bytes([p[20], p[21]]));
                 let ratio = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
@@ -269,7 +273,7 @@ impl Telemetry {
                 Change::Updated
             }
             ESTIMATOR_STATUS_DATA::ID if self.kind == Some(Kind::Px4) => {
-                // By field: flags newer than the crate's must not hide the accuracy.
+                // Decoded field by field: flags newer than the crate's must not hide the accuracy.
                 let p = frame.padded();
                 let metres = |at: usize| f32::from_le_bytes([p[at], p[at + 1], p[at + 2], p[at + 3]]);
                 let (across_m, height_m) = (metres(32), metres(36));
@@ -300,7 +304,7 @@ impl Telemetry {
         age(heard.filter(|at| *at > Instant::ZERO), now)
     }
 
-    /// Its index among the streams that are on.
+    /// Index of the message among the streams that are on.
     fn stream(&self, message_id: u32) -> Option<usize> {
         let kept = self.kind.unwrap_or_default().streams();
         let mut on = kept.iter().filter(|(_, interval_us)| *interval_us > 0.0);
@@ -394,7 +398,8 @@ impl Telemetry {
         let geodetic = frames::ned_to_geodetic(kind.projection(), &ekf_origin, &ned);
         let position = frames::geodetic_to_enu(mission_origin, &geodetic);
         if let Some(at) = self.read_at {
-            // By the autopilot's clock, since the last one that was used: what waited on the way comes all at once.
+            // Time by the autopilot's clock since the last position that was used: positions that
+            // waited on the way come all at once.
             let passed_s = d.time_boot_ms.wrapping_sub(self.read_boot_ms) as f32 * 1e-3;
             let dt_s = passed_s.min(GAP_MOST_S);
             if now - at > SETTLE {

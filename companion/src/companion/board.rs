@@ -7,7 +7,7 @@ use crate::mission::State;
 use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
-/// Without an autopilot this long after the start, there is none that could be armed.
+/// Time after the start at which a board that has heard no autopilot has none that could be armed.
 const ALONE_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {

@@ -10,17 +10,18 @@ use crate::mission::State;
 use crate::swarm::fleet::{Fleet, Lot, Own, PROMISE_S};
 use crate::time::Duration;
 
-/// So much further than it needs to stop, metres.
+/// Margin added to the stopping distance when a vehicle commits itself to a hold, metres.
 const SPARE_M: f32 = 0.3;
-/// This near where it promised to hold it is there, metres.
+/// A vehicle within this distance of the place where it promised to hold has reached it, metres.
 const THERE_M: f32 = 0.2;
-/// Above its pad it waits while another vehicle has been silent for so long: that one's part may yet be given to it.
+/// Silence of another vehicle after which a vehicle waits above its own pad: the silent vehicle's
+/// share may yet be given to it.
 const MISSED: Duration = Duration::from_secs(3);
-/// With its pilot for so long it has left.
+/// Time under a pilot's control after which a vehicle has left the mission.
 const WITH_PILOT: Duration = Duration::from_secs(20);
 /// Reported in place of a plan CRC where the rest of the area cannot be divided.
 const UNDIVIDED: u32 = u32::MAX;
-/// A shell that has not answered for so long is asked again.
+/// Time after which a shell that has not answered is asked again.
 const ASK_AGAIN: Duration = Duration::from_secs(30);
 
 fn dm(along_m: f32) -> Option<u16> {
@@ -45,7 +46,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.step_fleet(&own, now);
         let Some(fleet) = self.neighbours.fleet() else { return };
         let home_m = self.home_m();
-        // One that has left is on its way to the ground.
+        // A vehicle that has left the mission is on its way to the ground.
         let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.misses_one(now, MISSED));
         let halt_m = match self.holds_at_m() {
             Some(holds_at_m) => holds_at_m,
@@ -63,7 +64,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// What this vehicle says of itself.
+    /// State of this vehicle as it reports it to the fleet.
     fn own_in_fleet(&self) -> Own {
         use State::*;
         let state = self.mission.state();
@@ -81,7 +82,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let along_m = self.guidance.progress_m(state, &self.scene());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
-        // One that holds, or waits, may have come a little further than where its descent begins.
+        // A vehicle that holds, or waits, may have come a little further than where its descent
+        // begins.
         let descends = self.guidance.along_m() > self.home_m() + THERE_M;
         let nearly_down = flies && descends && self.holds_at_m().is_none();
         let standing = match ends || nearly_down {
@@ -136,14 +138,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         (excluded && !self.lands_elsewhere()) || self.resumes_too_late()
     }
 
-    /// Where its last descent begins, metres along its path: above its pad.
+    /// Place where this vehicle's last descent begins, metres along its path: above its pad.
     fn home_m(&self) -> f32 {
         let waypoints = self.mission.plan().map_or(&[][..], |plan| plan.path.waypoints());
         waypoints.iter().nth_back(1).map_or(f32::NEG_INFINITY, |home| home.along_m)
     }
 
-    /// Where it would hold if it promised that now: at the last picture that it takes soon, no further than its gates are open
-    /// and no nearer than it can stop.
+    /// Place where this vehicle would hold if it committed itself now: at the last picture that it
+    /// takes soon, no further than its gates are open and no nearer than it can stop.
     fn promise_dm(&self) -> Option<u16> {
         use State::*;
         let fleet = self.neighbours.fleet()?;
@@ -154,7 +156,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let plan = self.mission.plan()?;
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
-        // One whose path is blocked comes no further.
+        // A vehicle whose path is blocked comes no further.
         let promise_s = if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { PROMISE_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let clear_m = self.guidance.clear_m(&self.scene());
@@ -164,10 +166,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         dm(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
 
-    /// Where this vehicle is to hold for a division, metres along its path: while the division is under way, and until the new
-    /// path of this vehicle has come.
+    /// Place where this vehicle is to hold for a division, metres along its path: while the
+    /// division is under way, and until the new path of this vehicle has come.
     fn holds_at_m(&self) -> Option<f32> {
-        // What it was ordered since the last step the fleet does not know yet.
+        // The fleet does not know yet what this vehicle was commanded since the last step.
         let fleet = self.neighbours.fleet().filter(|fleet| fleet.takes_part() && !self.lands_elsewhere())?;
         let behind = fleet.division() > self.mission.division();
         let held_dm = behind.then(|| fleet.held_at_dm());
@@ -239,7 +241,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 if self.mission.take_division(plan, &place, division, in_air) {
                     self.neighbours.forget_plan();
                     self.detours.forget_plan();
-                    // From now on places are those along this path.
+                    // From now on places are those along the new path.
                     match in_air {
                         true => self.guidance.begin_path(self.now),
                         false => self.guidance.reset(),

@@ -81,8 +81,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 if change == Change::OriginLost {
                     self.timers.set(Timer::Origin, self.now);
-                    // It may have been restarted and know nothing of the streams we asked for. Positions that jump
-                    // again and again are no reason to flood it.
+                    // The autopilot may have been restarted and have lost the streams that were
+                    // requested. Positions that jump again and again are no reason to flood the
+                    // link.
                     if self.timers.is_due(Timer::Streams, self.now) {
                         self.connect();
                     }
@@ -102,7 +103,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
             return;
         }
-        // Its sequence number counts only if the frame decodes.
+        // The frame's sequence number counts only if the frame decodes.
         if frame.message_id == TUNNEL_DATA::ID {
             if let Some(relay) = Relay::decode(frame.padded(), id) {
                 let ours = self.mission.plan().is_some_and(|plan| plan.plan_crc == relay.plan_crc);
@@ -175,7 +176,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             {
                 self.restart(command)
             }
-            // To all components: another one's.
+            // A command to all components is for another one.
             None if !command.to_component => return None,
             None => UNSUPPORTED,
         };

@@ -10,18 +10,19 @@ use crate::mission::{FRESH, Inputs, State};
 use crate::swarm::neighbours::STANDING_MPS;
 use crate::time::Duration;
 
-/// How far a landing ends from where it was commanded: the way to stop from cruise, metres.
+/// Distance of a landing from where it was commanded: the stopping distance from cruise, metres.
 const LANDING_DRIFT_M: f32 = 1.0;
-/// The same of a vehicle that stood still.
+/// Distance of a landing from where it was commanded for a vehicle that stood still, metres.
 const STANDING_DRIFT_M: f32 = 0.3;
-/// A vehicle whose estimate is higher or lower than its pad by more than this does not take off, metres: real estimates on
-/// the ground were seen up to 1.1 m off.
+/// Greatest height difference between estimate and pad with which a vehicle takes off, metres: real
+/// estimates on the ground were seen up to 1.1 m off.
 const START_HEIGHT_M: f32 = 1.5;
-/// The row `NeighboursSilent` stops a vehicle a second after this: when its lease has run out.
+/// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
+/// after this.
 const LEASE_ENDS: Duration = Duration::from_secs(19);
-/// A gate this little ahead is no way to fly on, metres.
+/// A gate nearer ahead than this leaves no path to fly on, metres.
 const FLIES_ON_M: f32 = 0.2;
-/// A vehicle on the ground moves up or down more slowly, m/s.
+/// Greatest vertical speed of a vehicle that rests on the ground, m/s.
 const RESTING_MPS: f32 = 0.5;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -62,7 +63,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             jumped: t.is_settling(now),
             stalled: match self.mission.state() {
                 State::Follow => now - self.guidance.progress_at(),
-                // It may have stood for a gate long before. Where it can fly home it does not land for that.
+                // The vehicle may have stood for a gate long before. Where it can fly home it does
+                // not land for that.
                 State::Blocked if over_field && sought_home.is_none() => self.detours.blocked_for(now),
                 State::Blocked => (now - self.guidance.progress_at()).max(self.detours.blocked_for(now)),
                 _ => Duration::default(),
@@ -209,8 +211,9 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && (clear_m > self.guidance.along_m() + FLIES_ON_M || clear_m >= length_m)
     }
 
-    /// How far it flies on its plan unheard, metres along its path, and after how many seconds all gates up to there are open
-    /// for sure; −1e6 where it does not.
+    /// Distance that this vehicle flies on its plan while it is unheard, metres along its path, and
+    /// the seconds after which all gates up to there are open for sure; −1e6 where it flies no such
+    /// distance.
     pub(super) fn clears_m(&self) -> (f32, u8) {
         match self.follows_plan() {
             true => self.guidance.clears_m(&self.view().scene, &self.neighbours, self.now),

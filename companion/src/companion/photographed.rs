@@ -11,9 +11,10 @@ use crate::mission::State;
 use crate::time::Duration;
 use crate::timers::Timer;
 
-/// Noted, and sent as a number, so often.
+/// Period at which photographed waypoints are noted and their number is sent.
 const NOTED_EVERY: Duration = Duration::from_millis(1000);
-/// Others on the ground say what they know each second, and lose half of it.
+/// Time within which others on the ground report what they know: they report each second, and half
+/// of the messages are lost.
 const OTHERS_SAY: Duration = Duration::from_secs(5);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -60,7 +61,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// What others are to know.
+    /// The report of photographed waypoints to other vehicles.
     pub(super) fn done_report(&mut self) -> DoneReport {
         let (waits, flies) = (self.plans_with_others(), self.may_photograph());
         let report = self.mission.photographed_mut().report(waits, flies);
@@ -77,7 +78,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// The same as a number to be plotted: waypoints of the area that it knows to be photographed.
+    /// The number of waypoints that this vehicle knows to be photographed, as a value to be
+    /// plotted.
     pub(super) fn done_count(&self) -> NAMED_VALUE_FLOAT_DATA {
         NAMED_VALUE_FLOAT_DATA {
             time_boot_ms: self.now.boot_ms(),

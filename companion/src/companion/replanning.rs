@@ -13,7 +13,7 @@ use crate::swarm::detour::asking::Outlook;
 use crate::swarm::view::View;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// What decisions about ways around follow from.
+    /// The view that decisions about detours follow from.
     pub(crate) fn view(&self) -> View<'_, V, W, G> {
         View {
             now: self.now,
@@ -66,8 +66,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
     }
 
-    /// What the shell is asked for by [`Wanted::Detour`]; `None` if nothing is, or no way around can be planned.
-    /// `tell` is given all that is to be kept off.
+    /// The detour that [`Wanted::Detour`] requests of the shell; `None` if none is requested, or
+    /// none can be planned. `tell` is given all keep-out zones.
     pub fn detour(&self, tell: impl FnMut(KeepOff)) -> Option<DetourRequest> {
         let replans = matches!(self.mission.state(), State::Replanning | State::PadReplanning);
         if replans { self.detours.requested(&self.view(), tell) } else { None }
@@ -77,7 +77,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn take_detour(&mut self, detour: &VehiclePlan<W, G>) {
         let along_m = self.guidance.along_m();
         let here = self.mission.plan().and_then(|plan| plan.path.point_at(along_m));
-        // What it promised meanwhile is along its own path.
+        // A promise made meanwhile is along the vehicle's own path.
         let beside = self.detours.beside;
         let bound = beside.back_m().is_some() && !beside.flies() && !self.is_undivided();
         if bound || !here.is_some_and(|here| self.mission.begins_at(detour, &here)) {
@@ -91,7 +91,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.neighbours.avoid(self.now);
     }
 
-    /// There is none.
+    /// The requested detour does not exist.
     pub(super) fn miss_detour(&mut self, failure: PlanFailure) {
         self.mission.fail(failure);
         let outlook = if self.neighbours.any_comes_down_unheard(self.now) {

@@ -14,7 +14,7 @@ use crate::swarm::detour::Aim;
 use crate::timers::Timer;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// One step of the control loop: reference, table, and what is asked for again.
+    /// One step of the control loop: reference, mission table, and requests to the autopilot.
     pub(super) fn step(&mut self) {
         let now = self.now;
         if self.services.is_untuned() && self.erasing() == Erasing::Allowed {
@@ -59,7 +59,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.step_photographed(off_plan);
         let along = Along {
             progress_m: self.guidance.progress_m(state, &self.scene()),
-            // Where it brakes along its path it takes the pictures that it passes.
+            // A vehicle that brakes along its path takes the pictures that it passes.
             place: match state.holds_place() {
                 true if self.detours.beside.flies() && !self.guidance.returning => Place::Beside,
                 true if !off_plan => Place::OnPath,

@@ -18,11 +18,11 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
-/// Bit of a setpoint's mask: it says nothing of the heading.
+/// Bit of a setpoint's type mask: its heading is ignored.
 const YAW_IGNORED: u16 = 0x400;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_FRAME_LEN`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
         if out.len() < frame::MAX_SENT {
             return 0;
@@ -81,7 +81,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         length
     }
 
-    /// What neighbours do not hear from others, while the account has enough for answers too.
+    /// Relays vehicles that neighbours do not hear, while the rate limit has enough for answers
+    /// too.
     fn pass_on(&mut self, out: &mut [u8]) -> usize {
         if !self.links.radio_half_full() || !self.links.take_due(Link::Swarm, Fresh::Relay) {
             return 0;
@@ -98,7 +99,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
     }
 
-    /// What was asked for, and what waits to be sent.
+    /// Writes an answer that was requested, or a message that waits to be sent.
     fn answer(&mut self, link: Link, out: &mut [u8]) -> usize {
         let system = self.config.system_id;
         if self.links.take_due(link, Fresh::Version) {
@@ -119,7 +120,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         self.links.say(warning, text);
     }
 
-    /// The same with numbers: each `#` of the text stands for one.
+    /// As `say`, with numbers: each `#` of the text stands for one.
     pub fn say_count(&mut self, warning: bool, text: &'static str, numbers: [u32; 2]) {
         self.links.say_count(warning, text, numbers);
     }

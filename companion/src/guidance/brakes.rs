@@ -9,11 +9,12 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
-/// A stop further ahead is no place to wait at yet, metres.
+/// Distance ahead within which a stop is a place to wait at, metres.
 const WAITS_WITHIN_M: f32 = 8.0;
-/// A vehicle that was heard to hear us within this time is linked.
+/// Age within which a report that a vehicle hears us shows that it is linked.
 const LINKED: Duration = Duration::from_millis(800);
-/// What gusts carry a vehicle off that its autopilot lands from a standstill, and some room, metres.
+/// Drift in gusts of a vehicle that its autopilot lands from a standstill, with some reserve,
+/// metres.
 const ALONE_BESIDE_M: f32 = 0.5;
 
 impl Guidance {

@@ -16,30 +16,31 @@ use planner_core::track::Tracker;
 
 use crate::swarm::sweep::Sweep;
 
-/// What the one that comes down may drift, and the one below sways, metres.
+/// Drift of the vehicle that descends and sway of the one below, together, metres.
 pub const BESIDE_M: f32 = 0.6;
-/// What two may stray together, metres.
+/// Stray of two vehicles from their paths, together, metres.
 const FOLLOWER_M: f32 = 0.6;
-/// Spacing of the places looked at, metres.
+/// Spacing of the places along the path that are compared, metres.
 const PLACE_STEP_M: f32 = 0.25;
-/// Places along the path that one search compares, at most.
+/// Most places along the path that one search compares.
 const MAX_PLACES: u16 = 48;
-/// What a search may cost in one step: neighbours, columns, and [`PLACE_COST`] for each place.
+/// Greatest cost of a search in one step: neighbours, columns, and [`PLACE_COST`] for each place.
 const BUDGET: u16 = 96;
 const PLACE_COST: u16 = 4;
 /// Fastest on a straight leg, m/s.
 const FAST_MPS: f32 = 1.5;
-/// Fastest through its ends, m/s: a right angle is strayed from by 0.47 m then.
+/// Fastest through the ends of a leg, m/s: at this speed the vehicle strays from a right angle by
+/// 0.47 m.
 const CORNER_MPS: f32 = 0.6;
-/// Acceleration, m/s².
+/// Acceleration of a vehicle that evades, m/s².
 const EVADE_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
 const BRAKES_MPS2: f32 = 1.5;
 
-/// Where to wait.
+/// Place to wait at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum EvadeTarget {
-    /// Where it would anyway.
+    /// The place where the vehicle waits in any case.
     #[default]
     Here,
     /// Metres along the path.
@@ -52,10 +53,11 @@ pub enum EvadeTarget {
 #[derive(Clone, Debug, Default)]
 pub struct Search {
     sweep: Sweep,
-    /// Where it began, metres along the path, and how many places from there back are held.
+    /// Place along the path where the evading began, metres, and the number of places from there
+    /// back that are held.
     from_m: Option<f32>,
     held: u16,
-    /// What the last search found.
+    /// Result of the last search.
     pub found: EvadeTarget,
 }
 
@@ -97,7 +99,7 @@ impl Search {
     }
 }
 
-/// One step of `dt_s` back towards `to_m`; `None` if somebody is behind.
+/// One step of `dt_s` back towards `to_m`; `None` if another vehicle is behind.
 pub fn step<const W: usize>(
     path: &Path<W>,
     tracker: &mut Tracker,
@@ -109,7 +111,7 @@ pub fn step<const W: usize>(
     let here = path.point_at(tracker.along_m)?;
     let back = path.point_at(tracker.along_m - PLACE_STEP_M)?;
     if tracker.speed_mps > 0.0 {
-        // It flies on, and brakes first.
+        // The vehicle flies on, and brakes first.
         tracker.speed_mps = (tracker.speed_mps - BRAKES_MPS2 * dt_s).max(0.0);
         tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
         return at(path, tracker);
@@ -171,7 +173,7 @@ mod tests {
         KeepOff { from, to, radius_m, nature: Nature::Landing }
     }
 
-    /// What a search for a place to wait at 9 m finds, and the steps it takes.
+    /// Result of a search for a place to wait at 9 m, and the steps that it takes.
     fn search(columns: &[KeepOff]) -> (EvadeTarget, usize) {
         let path = path();
         let mut search = Search { found: EvadeTarget::Back(99.0), ..Search::default() };

@@ -14,15 +14,18 @@ use planner_core::Point;
 use super::limits::Limits;
 use super::motion::{Motion, shortened};
 
-/// A setpoint keeps so far inside, metres: the autopilot's frame rounds it by up to 1.4 mm, 30 km from its origin.
+/// Distance that a setpoint keeps inside the fence, metres: the autopilot's frame rounds the
+/// setpoint by up to 1.4 mm, 30 km from its origin.
 const FRAME_ROUNDING_M: f32 = 2e-3;
-/// The follower turns so far before the fence, metres: steps of finite length overshoot by millimetres.
+/// Distance before the fence at which the follower turns, metres: steps of finite length overshoot
+/// by millimetres.
 const TURNS_BEFORE_M: f32 = 0.02;
 /// Part of the jerk that an axis may take to brake, and that its stops are planned with.
 const JERK_SHARES: [f32; 2] = [0.577, 0.48];
-/// The same of the acceleration across, and upwards.
+/// Part of the acceleration that an axis may take to brake, and that its stops are planned with,
+/// across and upwards.
 const ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
-/// Halvings between a step that is safe and one that is not.
+/// Halvings of the interval between a step that is safe and one that is not.
 const HALVINGS: usize = 8;
 
 /// A box that setpoints do not leave.
@@ -122,7 +125,8 @@ impl Fence {
         jerk
     }
 
-    /// What bounds an axis of a motion that is at a place: what is behind a wall's last centimetres moves no nearer to it.
+    /// Bounds of an axis of a motion that is at `place`: a motion behind a wall's last centimetres
+    /// moves no nearer to the wall.
     fn walls(&self, axis: usize, place: f32, brake: Brake) -> Walls {
         let (low, high) = (self.low[axis], self.high[axis]);
         let before_m = fminf(TURNS_BEFORE_M, 0.25 * (high - low));
@@ -130,7 +134,7 @@ impl Fence {
     }
 }
 
-/// Where a motion along an axis may stop.
+/// Places where a motion along an axis may stop.
 struct Walls {
     low: f32,
     high: f32,
@@ -147,7 +151,7 @@ impl Walls {
     }
 }
 
-/// What an axis plans its stops with.
+/// Braking that an axis plans its stops with.
 fn brake(limits: &Limits, axis: usize) -> Brake {
     Brake {
         accel_mps2: ACCEL_SHARES[axis / 2][1] * limits.most_mps2[axis / 2],
@@ -191,7 +195,7 @@ fn share_what_is_left(
         let room = sqrtf(fmaxf(across * across - taken * taken, 0.0));
         let next = accel[beside] + others[beside] * dt_s;
         let next = fmaxf(fminf(next, room), -room);
-        // That comes before what is wanted upwards.
+        // Braking comes before the wanted acceleration upwards.
         let most = left(&braking);
         others[beside] = fmaxf(fminf((next - accel[beside]) / dt_s, most), -most);
         let most = sqrtf(fmaxf(most * most - others[beside] * others[beside], 0.0));
@@ -235,7 +239,7 @@ mod tests {
             let (mut v, mut a, mut s, mut furthest) = (speed, accel, 0.0f32, 0.0f32);
             let dt = 5e-4;
             for _ in 0..20_000 {
-                // As late as it may be, it takes the acceleration back.
+                // As late as it may be, the motion takes the acceleration back.
                 let ends = v + a * fabsf(a) / (2.0 * brake.jerk_mps3) <= 0.0;
                 let next = if ends {
                     fminf(a + brake.jerk_mps3 * dt, fmaxf(a, 0.0))

@@ -13,27 +13,29 @@ mod look;
 
 use crate::time::{Duration, Instant};
 
-/// Length of the way ahead that has to be free before a stopped vehicle goes on, metres.
+/// Length of the path ahead that has to be free before a stopped vehicle goes on, metres.
 const RESUME_M: f32 = 1.0;
-/// The way has to be free for so long before the vehicle goes on.
+/// Time for which the path ahead has to be free before a stopped vehicle goes on.
 const CLEAR: Duration = Duration::from_millis(300);
-/// The ground between pad and goal may be this much lower than below both, metres: less than a storey.
+/// Depth of the ground between pad and goal below the lower of both, metres: less than a storey.
 const LOWER_M: f32 = 2.0;
-/// For a vehicle that the roster does not name this one stands still no longer than this; then it goes on slowly.
+/// Longest standstill for a vehicle that the roster does not name; after it this vehicle goes on
+/// slowly.
 const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
-/// It then goes on at this share of its speed.
+/// Share of its speed at which a vehicle goes on after [`MAX_STOP_FOR_STRANGER`].
 const SLOW_SHARE: f32 = 0.15;
-/// A setpoint slower than this may turn, m/s.
+/// Fastest setpoint that may reverse along the path, m/s.
 const TURNS_MPS: f32 = 0.05;
-/// A setpoint no further than this from the reference may turn, metres.
+/// Greatest distance between setpoint and reference at which the setpoint may reverse, metres.
 const TURNS_M: f32 = 0.03;
-/// A stop this near is a standstill, metres: a little more than the way that advice looks ahead.
+/// A stop ahead nearer than this is a standstill, metres: a little more than the distance that
+/// advice looks ahead.
 const WAITS_M: f32 = 0.6;
-/// What kept the vehicle from going on within this time still does.
+/// Time for which whatever kept the vehicle from going on still does.
 const LATELY: Duration = Duration::from_millis(500);
-/// A vehicle that flew on for so long was not kept from going on.
+/// Time of unhindered flight after which a vehicle was not kept from going on.
 const FREE: Duration = Duration::from_secs(5);
-/// A vehicle that yields in its descent climbs back up its column after it was stopped for so long.
+/// Standstill after which a vehicle that yields in its descent climbs back up its column.
 const CLIMB_BACK_AFTER: Duration = Duration::from_secs(1);
 
 /// A neighbour whose set meets that of the vehicle.
@@ -44,7 +46,7 @@ struct Found {
     rests: bool,
 }
 
-/// What the filter found.
+/// Result of the filter's check.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Filter {
     /// Since when it keeps the vehicle stopped.
@@ -75,7 +77,7 @@ pub(crate) struct Filter {
     hindered_at: Instant,
     /// Whether it was to yield then.
     hindered_yields: bool,
-    /// How often it stopped the vehicle.
+    /// Number of times that the filter stopped the vehicle.
     activations: u32,
 }
 
@@ -94,7 +96,7 @@ enum Way {
 }
 
 impl Filter {
-    /// For how long it has kept the vehicle stopped.
+    /// Time for which the filter has kept the vehicle stopped.
     pub(crate) fn stopped_for(&self, now: Instant) -> Duration {
         self.stopped_since.map_or(Duration::default(), |at| now - at)
     }
@@ -103,18 +105,20 @@ impl Filter {
         self.stopped_since.is_some()
     }
 
-    /// For how long it has kept the vehicle from going on although it goes first; zero once it has not for `free`.
+    /// Time for which the filter has kept the vehicle from going on although the vehicle goes
+    /// first; zero once the filter has not for `free`.
     pub(crate) fn blocked_for(&self, now: Instant, free: Duration) -> Duration {
         let since = self.hindered_since.filter(|_| !self.hindered_yields && now - self.hindered_at < free);
         since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long it has kept the vehicle from going on because of a vehicle that stands for good.
+    /// Time for which the filter has kept the vehicle from going on because of a vehicle that
+    /// stands for good.
     pub(crate) fn barred_for(&self, now: Instant) -> Duration {
         if self.rests { self.hindered_for(now) } else { Duration::default() }
     }
 
-    /// For how long it has made the vehicle yield.
+    /// Time for which the filter has made the vehicle yield.
     pub(crate) fn yielded_for(&self, now: Instant) -> Duration {
         if self.hindered_yields { self.hindered_for(now) } else { Duration::default() }
     }
@@ -129,7 +133,7 @@ impl Filter {
         self.yields
     }
 
-    /// For which vehicle it stops; 0 for none.
+    /// The vehicle that the filter stops for; 0 for none.
     pub(crate) fn blocker(&self) -> u8 {
         if self.is_stopped() { self.blocker } else { 0 }
     }
@@ -139,32 +143,33 @@ impl Filter {
         self.blocker
     }
 
-    /// How often it stopped the vehicle.
+    /// Number of times that the filter stopped the vehicle.
     pub(crate) fn activations(&self) -> u32 {
         self.activations
     }
 
-    /// For how long the column has not been free.
+    /// Time for which the column has not been free.
     pub(crate) fn column_blocked_for(&self, now: Instant) -> Duration {
         self.column_since.filter(|_| !self.column_clear).map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long a vehicle that rests, or is lost, has been in the column.
+    /// Time for which a vehicle that rests, or is lost, has been in the column.
     pub(crate) fn column_barred_for(&self, now: Instant) -> Duration {
         self.barred_since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long the column has been free.
+    /// Time for which the column has been free.
     pub(crate) fn column_clear_for(&self, now: Instant) -> Duration {
         self.column_since.filter(|_| self.column_clear).map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long a landing has been waiting, now and then.
+    /// Time for which a landing has been waiting, now and then.
     fn held_for(&self, now: Instant) -> Duration {
         self.held_since.map_or(Duration::default(), |at| now - at)
     }
 
-    /// For how long it has kept the vehicle from going on, stops and short flights between them together.
+    /// Time for which the filter has kept the vehicle from going on, stops and short flights
+    /// between them together.
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
         let since = self.hindered_since.filter(|_| now - self.hindered_at < LATELY);
         since.map_or(Duration::default(), |at| now - at)

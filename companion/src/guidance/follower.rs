@@ -18,7 +18,8 @@ use super::fence::Fence;
 use super::limits::Limits;
 use super::motion::{Motion, shortened};
 
-/// Rate of the loop, as a share of jerk over acceleration: twice the rate is how fast a change of velocity dies away.
+/// Rate of the follower's loop, as a share of jerk over acceleration: a change of velocity dies
+/// away at twice this rate.
 const RATE_SHARE: f32 = 0.45;
 
 impl Motion {
@@ -32,7 +33,7 @@ impl Motion {
         dt_s: f32,
     ) {
         let (velocity, before) = (self.velocity, self.acceleration);
-        // Where it comes to if it takes on the curve's acceleration.
+        // Place that the follower reaches if it takes on the curve's acceleration.
         let place = self.position + velocity * dt_s + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
         let speed = velocity + (before + to.acceleration) * (0.5 * dt_s);
         let rate = RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);

@@ -10,11 +10,12 @@
 
 use crate::time::{Duration, Instant};
 
-/// Longer than a report counts, and than three of them in a row are lost.
+/// Time for which a reported hold counts: longer than three reports in a row are lost.
 const SPAN: Duration = Duration::from_millis(1000);
-/// A vehicle that yields stands for so long before it says that it holds.
+/// Standstill after which a vehicle that yields reports that it holds.
 const SOON: Duration = Duration::from_millis(300);
-/// A vehicle that goes first gives the others this long to stand.
+/// Standstill after which a vehicle that goes first reports that it holds: the others have this
+/// long to stand.
 const PATIENCE: Duration = Duration::from_secs(4);
 
 /// Whether a vehicle holds its place.
@@ -28,8 +29,8 @@ pub(crate) struct Hold {
 }
 
 impl Hold {
-    /// One step of a vehicle that stands and is not to move, or does not; `yields` if another one goes first. Messages are
-    /// `late_s` late. Returns whether it begins or ends to hold.
+    /// One step; `stands` for a vehicle that stands and is not to move, `yields` if another one
+    /// goes first. Messages are `late_s` late. Returns whether the vehicle begins or ends to hold.
     pub(super) fn step(&mut self, stands: bool, yields: bool, late_s: f32, now: Instant) -> bool {
         if stands {
             self.late = Duration::from_micros((late_s * 1e6) as u64);
@@ -45,7 +46,7 @@ impl Hold {
         self.on
     }
 
-    /// It was said.
+    /// Notes that the hold was reported.
     pub(crate) fn note(&mut self, now: Instant) {
         self.told_at = Some(now);
     }

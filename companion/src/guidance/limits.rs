@@ -9,16 +9,18 @@ use planner_core::{ConfigError, Point};
 use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
 
-/// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get that.
+/// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get their own limit.
 pub const JERK_MPS3: f32 = 4.0;
-/// The same while the safety filter stops a vehicle, m/s³.
+/// Greatest jerk of a setpoint while the safety filter stops a vehicle, m/s³.
 pub const URGENT_JERK_MPS3: f32 = 8.0;
 /// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
 const CORNER_SHARE: f32 = 1.5;
 
-/// The smoother smooths over this time at most: lower limits of jerk lower the acceleration, seconds.
+/// Longest time over which the smoother smooths, seconds: lower limits of jerk lower the
+/// acceleration.
 pub(crate) const SMOOTH_MOST_S: f32 = 1.2;
-/// An unheard vehicle has stopped by then, seconds: it notices after 1.8 s and brakes.
+/// Time within which an unheard vehicle has stopped, seconds: the vehicle notices after 1.8 s and
+/// brakes.
 const SILENT_S: f32 = 3.0;
 /// Speed of the join to the path, m/s.
 pub(crate) const JOIN_MPS: f32 = 1.0;
@@ -36,9 +38,10 @@ pub struct Limits {
     pub accel_mps2: f32,
     /// Upwards and downwards, m/s².
     pub accel_z_mps2: f32,
-    /// Of a setpoint, across and vertically, m/s²: a corner adds to what is braked and gained before and behind it.
+    /// Greatest acceleration of a setpoint, across and vertically, m/s²: a corner adds to the
+    /// braking before it and the acceleration behind it.
     pub most_mps2: [f32; 2],
-    /// Of a setpoint, m/s³.
+    /// Greatest jerk of a setpoint, m/s³.
     pub jerk_mps3: f32,
 }
 
@@ -47,7 +50,7 @@ impl Limits {
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
         let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
-        // What the smoother's longest average smooths to that jerk.
+        // Acceleration that the smoother's longest average smooths to that jerk.
         let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =
@@ -90,19 +93,19 @@ impl Limits {
     }
 }
 
-/// What guidance gives to planner-core's calls.
+/// Settings that guidance gives to planner-core's calls.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Settings {
     /// Along the path.
     pub(crate) track: TrackConfig,
     /// Along the way to it, and in climb and descent.
     pub(crate) leg_track: TrackConfig,
-    /// Of advice.
+    /// Settings of advice.
     pub(crate) deconflict: DeconflictConfig,
 }
 
 impl Settings {
-    /// Those of a vehicle with these limits.
+    /// Limits of a vehicle with these settings.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let limits = Limits::new(config, autopilot);
         let track = TrackConfig {
@@ -138,7 +141,7 @@ impl Settings {
     }
 }
 
-/// What is expected of vehicles that fly as this one does.
+/// Bounds expected of vehicles that fly as this one does.
 pub(crate) fn bounds(track: &TrackConfig) -> Bounds {
     let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: URGENT_JERK_MPS3 };
     Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: SILENT_S }
@@ -169,7 +172,7 @@ mod tests {
     }
 
     proptest::proptest! {
-        /// Whatever is read, limits stay between those of a slow vehicle and those of the mission.
+        /// Limits stay between those of a slow vehicle and those of the mission, whatever is read.
         #[test]
         fn no_value_makes_a_limit_senseless(
             read in proptest::collection::vec((0usize..8, proptest::prelude::any::<u32>(), -5.0f32..600.0), 0..40),

@@ -3,7 +3,7 @@
 use planner_core::Point;
 use planner_core::flight::Path;
 
-/// A setpoint that stands this near the end of the path has flown it, metres.
+/// A setpoint that stands this near the end of the path has flown the path, metres.
 const AT_END_M: f32 = 0.02;
 
 /// Arc length of the nearest point of the path; its end, if that is as near as counts as there.

@@ -29,19 +29,19 @@ impl Guidance {
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
         self.opened = 0;
-        // Whatever kept it from going on did so on the other path.
+        // A hindrance on the other path does not count on this one.
         self.filter.reset();
         self.run(now);
     }
 
-    /// The same, from `along_m` metres along it on.
+    /// As `begin_path`, from `along_m` metres along the path on.
     pub(crate) fn begin_path_at(&mut self, along_m: f32, now: Instant) {
         self.begin_path(now);
         self.tracker.along_m = along_m;
         self.progress_m = along_m;
     }
 
-    /// It flies no further along its path than this for now, metres; ∞ for all of it.
+    /// The vehicle flies no further along its path than this for now, metres; ∞ for the whole path.
     pub(crate) fn halt_at(&mut self, along_m: f32) {
         self.halt_m = along_m;
     }
@@ -56,7 +56,7 @@ impl Guidance {
         self.smoother.velocity().norm_squared() < STANDING_SETPOINT_MPS * STANDING_SETPOINT_MPS
     }
 
-    /// Where along its path it could stop now, metres.
+    /// Place along the path where the vehicle could stop now, metres.
     pub(crate) fn stops_by_m(&self) -> f32 {
         let braking_m = self.smoother.braking_m(false);
         self.tracker.along_m.max(self.setpoint_m + braking_m)

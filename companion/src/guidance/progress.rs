@@ -10,12 +10,13 @@ use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// A gate that opens within this time is waited for unheard, seconds: less than the row `Alone` waits.
+/// Longest time until a gate opens for which an unheard vehicle waits, seconds: less than the row
+/// `Alone` waits.
 const OPENS_IN_S: f32 = 14.0;
 
 impl Guidance {
-    /// How far along the plan's path every gate is open, or will be within [`OPENS_IN_S`], metres, and
-    /// after how many seconds that is for sure.
+    /// Place along the plan's path up to which every gate is open, or will be within
+    /// [`OPENS_IN_S`], metres, and the seconds after which that is sure.
     pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &Scene<'_, W, G>,
@@ -35,7 +36,8 @@ impl Guidance {
         (closed.map_or(length_m, |gate| gate.at_m.min(length_m)), libm::ceilf(in_s) as u8)
     }
 
-    /// How far along the plan's path every gate is open, metres; −∞ where it does not follow that.
+    /// Place along the plan's path up to which every gate is open, metres; −∞ where the vehicle
+    /// does not follow that path.
     pub(crate) fn clear_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
         let Some(plan) = scene.plan.filter(|_| !self.returning && !scene.detours) else {
             return f32::NEG_INFINITY;

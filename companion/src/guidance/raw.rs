@@ -115,7 +115,7 @@ impl Guidance {
                 advice.stop_within_m = 0.0;
             }
         }
-        // Where the path leaves the geofence, it stops before it.
+        // Where the path leaves the geofence, the raw point stops before the fence.
         let speed = self.tracker.speed_mps.max(0.0);
         let accel = self.track.accel_mps2.min(self.track.accel_z_mps2);
         let braking_m = speed * speed / (2.0 * accel) + 2.0 * speed * TICK_S + FENCE_MARGIN_M;
@@ -151,7 +151,7 @@ impl Guidance {
                     [from, to] => (to.position - from.position) / (to.along_m - from.along_m),
                     _ => Point::zeros(),
                 };
-                // Of its speed it keeps what leads to the new waypoint.
+                // The leg keeps the part of its speed that leads to the new waypoint.
                 let kept = self.leg.as_ref().map_or(0.0, |old| course(old).dot(&course(&leg)).max(0.0));
                 let speed_mps = self.leg_tracker.speed_mps * kept;
                 (self.leg, self.leg_tracker) = (Some(leg), Tracker { along_m: 0.0, speed_mps });
@@ -184,9 +184,10 @@ impl Guidance {
         self.leg.as_ref().is_some_and(|leg| self.leg_tracker.along_m >= leg.length_m())
     }
 
-    /// How far down the setpoint leads, metres. At the end of the path and free to land it goes straight down, to the ground where
-    /// the autopilot may be led there, else not lower than the margin kept to obstacles: once the autopilot lands by
-    /// itself the wind may carry it off.
+    /// Depth to which the setpoint leads in a descent, metres. At the end of the path and free to
+    /// land it leads straight down, to the ground where the autopilot may be led there, else not
+    /// lower than the margin kept to obstacles: once the autopilot lands by itself the wind may
+    /// carry the vehicle off.
     pub(super) fn guided_m<const W: usize, const G: usize>(
         &self,
         scene: &Scene<'_, W, G>,

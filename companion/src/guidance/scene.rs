@@ -4,7 +4,7 @@ use planner_core::flight::VehiclePlan;
 
 use crate::autopilot::telemetry::Telemetry;
 
-/// What guidance reads beside its own state.
+/// Inputs of guidance beside its own state.
 pub struct Scene<'a, const W: usize, const G: usize> {
     /// The plan, if there is one with a path.
     pub plan: Option<&'a VehiclePlan<W, G>>,
@@ -19,7 +19,7 @@ pub struct Scene<'a, const W: usize, const G: usize> {
 }
 
 impl<'a, const W: usize, const G: usize> Scene<'a, W, G> {
-    /// What is known of a vehicle of this rank and id; a plan without a path is none.
+    /// The scene of a vehicle of this rank and id; a plan without a path is none.
     pub fn new(
         plan: Option<&'a VehiclePlan<W, G>>,
         telemetry: &'a Telemetry,

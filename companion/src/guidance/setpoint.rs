@@ -4,18 +4,20 @@ use planner_core::Point;
 
 use crate::autopilot::telemetry::Telemetry;
 
-/// Acceleration for each metre off the reference, 1/s²: with what PX4's cascade asks for by itself (`MPC_XY_P` 0.95 ·
-/// `MPC_XY_VEL_P_ACC` 1.8) it makes the loop 2.8 times as stiff, and a gust carries the vehicle less than half as far.
+/// Acceleration for each metre off the reference, 1/s²: PX4's cascade alone commands `MPC_XY_P`
+/// 0.95 · `MPC_XY_VEL_P_ACC` 1.8; this makes the loop 2.8 times as stiff, and a gust carries the
+/// vehicle less than half as far.
 const HOLD_PER_S2: f32 = 3.0;
 /// Acceleration for each m/s beside the reference's velocity, 1/s: keeps the stiffer loop damped (ratio 0.76).
 const DAMP_PER_S: f32 = 1.5;
-/// Bound on both together, m/s²: a position that jumps must not throw the vehicle about.
+/// Bound on the sum of both accelerations, m/s²: a position that jumps must not throw the vehicle
+/// about.
 const HOLD_MOST_MPS2: f32 = 1.5;
 
-/// What the autopilot is sent.
+/// Setpoint for the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Setpoint {
-    /// Nothing: the state streams no setpoints.
+    /// No setpoint: the state streams none.
     None,
     /// Be there, with this velocity and acceleration: ENU metres, m/s, m/s². And look there, radians from east to the left,
     /// where the task says so.

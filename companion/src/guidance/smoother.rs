@@ -25,43 +25,50 @@ use super::fence::Fence;
 use super::limits::{Limits, SMOOTH_MOST_S};
 use super::motion::{Motion, shortened, within};
 
-/// Time between two raw points, seconds: the rate of the setpoints.
+/// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
-/// Raw points taken in one call at most: a step that is later moves the setpoint no further.
+/// Most raw points taken in one call: a later step moves the setpoint no further.
 pub const TICKS: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
 const MAX_WINDOW_TICKS: usize = (SMOOTH_MOST_S / TICK_S + 0.5) as usize;
 /// Shortest window of each moving average, in ticks.
 const MIN_WINDOW_TICKS: usize = 8;
-/// The averages leave so much of the jerk to corners and to the clock.
+/// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
 const JERK_ROOM: f32 = 1.12;
 /// Raw velocities that count for one value of both averages.
 const LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
-/// The clock takes this share of the jerk that the curve leaves: its own steps are 50 ms long.
+/// Share of the jerk left by the curve that the clock takes: the clock's own steps are 50 ms long.
 const CLOCK_SHARE: f32 = 0.7;
-/// The clock leaves the rest of the jerk to what it cannot foresee: the next raw point.
+/// Share of the jerk that the clock plans with: the rest is for the next raw point, which it cannot
+/// foresee.
 const JERK_USED: f32 = 0.9;
-/// The end of a change of speed is planned with this share of the jerk: the curve may need the rest.
+/// Share of the jerk with which the end of a change of speed is planned: the curve may need the
+/// rest.
 const END_SHARE: f32 = 0.4;
-/// The share of the jerk with which a speeding up ends: nothing depends on how soon the clock runs at 1 again.
+/// Share of the jerk with which an acceleration ends: nothing depends on how soon the clock runs at
+/// 1 again.
 const RISE_SHARE: f32 = 0.15;
-/// Below this speed of the curve the clock's acceleration is that of this speed, m/s.
+/// Least speed of the curve from which the clock's acceleration is computed, m/s.
 const SLOW_MPS: f32 = 0.2;
-/// Slower than this stands, m/s.
+/// A setpoint slower than this stands, m/s.
 const STANDS_MPS: f32 = 0.01;
-/// The end of a stop: speed falls by this share of itself each second.
+/// Rate of decay at the end of a stop, 1/s: speed falls by this share of itself each second.
 const TAIL_PER_S: f32 = 4.0;
-/// A vehicle that another flies is followed no faster, m/s: a place that moves faster is an estimate that jumps.
+/// Fastest that the setpoint follows a vehicle under other control, m/s: a place that moves faster
+/// is an estimate that jumps.
 const FOLLOWS_MPS: f32 = 15.0;
-/// After so short a time without setpoints the vehicle still does what the last one said, seconds.
+/// Longest gap in the setpoints during which the vehicle still does what the last setpoint said,
+/// seconds.
 const GAP_S: f32 = 0.3;
-/// Share of the newest step in the velocity at which a vehicle was followed: it is reported in steps of its own.
+/// Weight of the newest step in the velocity of a followed vehicle: the position is reported in
+/// steps of its own.
 const FOLLOWED_SHARE: f32 = 0.25;
-/// A vehicle goes on at most so many times faster than it was followed.
+/// Greatest speed after following, over the speed at which the vehicle was followed.
 const FOLLOWED_MOST: f32 = 1.5;
-/// A raw point this little outside the fence is put inside without a word, metres.
+/// Distance outside the fence up to which a raw point is moved inside without a report, metres.
 const FENCE_SLACK_M: f32 = 0.01;
-/// A step may exceed the speed limit by this much, metres: rounding at a kilometre from the origin.
+/// Distance by which a step may exceed the speed limit, metres: rounding at a kilometre from the
+/// origin.
 const STEP_SLACK_M: f32 = 2e-3;
 
 /// How fast the clock is to run.
@@ -73,7 +80,8 @@ pub struct Pace {
     pub urgent: bool,
 }
 
-/// What setpoints came to since the start: greatest values, and how often the smoother had to hold.
+/// Statistics of the setpoints since the start: greatest values, and the number of times that the
+/// smoother had to hold.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Stats {
     /// Setpoints made.
@@ -117,7 +125,8 @@ pub struct Smoother {
     resumes: bool,
     /// Velocity at which setpoints followed a vehicle that another flies.
     followed: Point,
-    /// Of the step that is being made: its length, whether the safety filter stops, whether its raw points are sound.
+    /// Settings of the step that is being made: its length, whether the safety filter stops,
+    /// whether its raw points are sound.
     dt_s: f32,
     stopping: bool,
     sound: bool,
@@ -177,17 +186,17 @@ impl Smoother {
         self.motion.position
     }
 
-    /// Its velocity.
+    /// Velocity of the setpoint.
     pub(crate) fn velocity(&self) -> Point {
         self.motion.velocity
     }
 
-    /// Its acceleration.
+    /// Acceleration of the setpoint.
     pub(crate) fn acceleration(&self) -> Point {
         self.motion.acceleration
     }
 
-    /// Where the raw point is: ahead of the setpoint by what the averages hold.
+    /// The raw point: ahead of the setpoint by the content of the averages.
     pub(crate) fn raw(&self) -> Point {
         self.raw
     }
@@ -207,7 +216,7 @@ impl Smoother {
         self.live && self.stopping
     }
 
-    /// How far the setpoint is from its curve, metres.
+    /// Distance of the setpoint from its curve, metres.
     #[cfg(test)]
     pub(crate) fn off_curve_m(&self) -> f32 {
         (self.curve().0 - self.motion.position).norm()
@@ -401,7 +410,8 @@ impl Smoother {
         let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), TAIL_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
-        // It speeds up only by what the curve itself leaves of the acceleration, which may change while it does.
+        // The clock speeds up only by the part of the acceleration that the curve leaves, which may
+        // change meanwhile.
         let [least, most] = [fminf(-accel - own, 0.0), fmaxf(accel - 2.0 * fabsf(own), 0.0)];
         let wanted = within(wanted, least, most) / speed;
         // The rates σ̇ at which the acceleration, bend · σ² + slope · σ̇, changes by no more than the jerk allows; where the

@@ -8,8 +8,8 @@
 use planner_core::Point;
 use planner_core::flight::Path;
 
-/// Within this distance a waypoint is reached, metres: nearer than what the referee counts as reached, by the greatest
-/// error of an RTK estimate.
+/// A waypoint is reached within this distance, metres: nearer than the referee requires, by the
+/// greatest error of an RTK estimate.
 const WP_RADIUS_M: f32 = 0.4;
 
 /// The paper's `nWaypoint`, and whether the path is completed.
@@ -20,7 +20,8 @@ pub(super) struct Waypoints {
 }
 
 impl Waypoints {
-    /// One turn of the loop for a vehicle at `position`: where it flies to; `None` once the path is completed.
+    /// One turn of the loop for a vehicle at `position`: the waypoint that the vehicle flies to;
+    /// `None` once the path is completed.
     pub(super) fn next<const W: usize>(&mut self, path: &Path<W>, position: &Point) -> Option<Point> {
         let points = path.waypoints();
         let goal = points.get(self.next)?.position;

@@ -10,19 +10,19 @@
 use crate::events::Link;
 use crate::time::{Duration, Instant};
 
-/// Whose frame it is.
+/// The kind of sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Sender {
     /// Named by the mission file.
     GroundStation,
-    /// Of the own system, on the autopilot's link.
+    /// A component of the own system, on the autopilot's link.
     Autopilot,
     /// Any other.
     Other,
 }
 
 impl Sender {
-    /// By the system id of a frame, to the vehicle of system `own`.
+    /// The kind of sender by the system id of a frame, to the vehicle of system `own`.
     pub(crate) fn of(link: Link, system: u8, own: u8, ground_stations: &[u8]) -> Self {
         if system != 0 && ground_stations.contains(&system) {
             Self::GroundStation
@@ -43,7 +43,7 @@ pub(crate) enum Kind {
     Time,
     /// PARAM_VALUE and PARAM_ERROR.
     Parameter,
-    /// What a REQUEST_MESSAGE requests.
+    /// The message that a REQUEST_MESSAGE requests.
     Message,
     /// STATUSTEXT that names a sender.
     Text,
@@ -64,9 +64,10 @@ const fn rate(every_ms: u64, burst: u64) -> Rate {
     Rate { every_ms, burst }
 }
 
-/// For each sender, in the order of [`Sender`], each kind in the order of [`Kind`]. What others can request by radio is at most
-/// 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the radio rate limit leaves in the air. A list of all parameters is one burst.
-/// PX4 sends TIMESYNC at 10 Hz, and needs no answer to fly.
+/// Rate limits for each sender, in the order of [`Sender`], and each kind in the order of [`Kind`].
+/// Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the
+/// radio rate limit leaves in the air. A list of all parameters is one burst. PX4 sends TIMESYNC at
+/// 10 Hz, and needs no answer to fly.
 const RATES: [[Rate; KINDS]; SENDERS] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
     [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],

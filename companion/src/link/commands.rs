@@ -13,13 +13,13 @@ use crate::time::{Duration, Instant};
 const COMMAND_INT: u32 = 75;
 const COMMAND_LONG: u32 = 76;
 
-/// `MAV_RESULT`.
+/// `MAV_RESULT` of an accepted command.
 pub const ACCEPTED: u8 = 0;
-/// Not in this state.
+/// `MAV_RESULT` of a command that is not possible in this state.
 pub const TEMPORARILY_REJECTED: u8 = 1;
-/// Parameters make no sense.
+/// `MAV_RESULT` of a command whose parameters make no sense.
 pub const DENIED: u8 = 2;
-/// Unknown command.
+/// `MAV_RESULT` of an unknown command.
 pub const UNSUPPORTED: u8 = 3;
 
 /// NAV_RETURN_TO_LAUNCH.
@@ -42,7 +42,7 @@ const GLOBAL: u8 = 0;
 /// `MAV_FRAME_GLOBAL_INT`.
 const GLOBAL_INT: u8 = 5;
 
-/// The same frame within this time is a repetition, not a new command.
+/// Time within which the same frame is a repetition, not a new command.
 const REPEAT: Duration = Duration::from_secs(5);
 
 /// A command that concerns us.
@@ -72,7 +72,7 @@ impl Command {
         restarts || matches!(self.command, RETURN | LAND | PAUSE_CONTINUE | START | EXCLUDE)
     }
 
-    /// What is said once it took effect: the numbers are its sender.
+    /// The text reported once the command took effect: its numbers name the sender.
     pub(crate) fn log_text(&self) -> &'static str {
         match self.command {
             START => "Start from #/#",
@@ -116,7 +116,8 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
     })
 }
 
-/// Bytes of a command that are compared: parameters, command, addressee, and what follows them.
+/// Bytes of a command that are compared: parameters, command, addressee, and the frame's further
+/// fields.
 const COMPARED: usize = 35;
 
 /// A command frame and its answer.
@@ -139,7 +140,8 @@ pub struct Repeats {
 }
 
 impl Repeats {
-    /// What this very frame was answered lately, `Some(None)` if nothing; `None` for a frame not seen.
+    /// The answer that this very frame got lately, `Some(None)` if none yet; `None` for a frame not
+    /// seen.
     pub fn answered(&self, frame: &Frame, now: Instant) -> Option<Option<u8>> {
         let same = |seen: &&Answered| {
             seen.from == (frame.system, frame.component)
@@ -160,7 +162,7 @@ impl Repeats {
     }
 }
 
-/// What was commanded and is not done yet.
+/// Commands of the operator that are not done yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Pending {
     /// MISSION_START, until the mission ends.
@@ -207,7 +209,8 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
             pending.start = true;
             return Some(ACCEPTED);
         }
-        // What others left of an area is flown from the pad that it came back to.
+        // A vehicle flies the rest of an area, which others left, from the pad that it came back
+        // to.
         START if state == Done && inputs.area => {
             pending.start = true;
             return Some(ACCEPTED);

@@ -22,19 +22,19 @@ use crate::time::Duration;
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10F;
-/// Version of the layout.
+/// Version of the message's layout.
 pub const VERSION: u8 = 1;
 /// Most ranges of one message.
 pub const RANGES: usize = 19;
 /// Bytes of a range.
 pub(crate) const RANGE: usize = 6;
-/// On the ground it is sent so often.
+/// Period of the message on the ground.
 pub(crate) const EVERY: Duration = Duration::from_millis(1000);
-/// The same in flight.
+/// Period of the message in flight.
 pub(crate) const EVERY_IN_FLIGHT: Duration = Duration::from_millis(5000);
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 10;
-/// Longest TUNNEL payload.
+/// Longest TUNNEL payload, bytes.
 pub const LENGTH: usize = TUNNEL_HEAD + HEAD + RANGES * RANGE;
 
 /// The message.
@@ -44,7 +44,7 @@ pub struct DoneReport {
     pub system_id: u8,
     /// CRC-32 of the mission file.
     pub mission_crc: u32,
-    /// How often the area was begun again.
+    /// Number of times that the area was begun again.
     pub round: u8,
     /// Whether the sender flies.
     pub flies: bool,
@@ -61,7 +61,7 @@ pub(crate) fn range_bytes(range: &Range) -> [u8; RANGE] {
     if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE] }
 }
 
-/// The same read.
+/// The range of these bytes: the inverse of the encoding above.
 pub(crate) fn range_of(bytes: &[u8; RANGE]) -> Range {
     let [a, b, c, d, e, f] = *bytes;
     let first = u32::from_le_bytes([a, b, c, 0]);

@@ -7,16 +7,18 @@ use crate::time::{Duration, Instant};
 
 /// Intents remembered: three seconds of them.
 const SENT: usize = 16;
-/// Unit of the time held.
+/// Unit of the time for which a message was held before its echo.
 const TICK: Duration = Duration::from_millis(10);
-/// No message counts as later than this, seconds: nobody can make another vehicle useless by echoes that are wrong.
+/// Greatest delay that a message counts with, seconds: no vehicle can make another one useless by
+/// echoes that are wrong.
 const LATEST_S: f32 = 1.0;
 /// Delay of the radio that is assumed before the first echo, seconds.
 const UNKNOWN_S: f32 = 0.2;
-/// A shorter delay counts by this share at each echo, a longer one at once.
+/// Weight of a new delay that is shorter than the known one; a longer delay replaces the known one
+/// at once.
 const FORGETS: f32 = 0.125;
 
-/// What an intent says of another vehicle's last intent.
+/// The part of an intent that acknowledges another vehicle's last intent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Echo {
     /// Rank of that vehicle in the roster, below 255.
@@ -28,7 +30,7 @@ pub struct Echo {
 }
 
 impl Echo {
-    /// Of a frame that was heard so long ago; none if that is too long.
+    /// The echo of a frame that was heard `held` ago; `None` if that is too long.
     pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
         let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
         let held = u8::try_from(held.micros() / TICK.micros()).ok().filter(|held| *held < u8::MAX)?;
@@ -49,12 +51,12 @@ impl Sent {
         self.count = self.count.wrapping_add(1);
     }
 
-    /// How many were sent.
+    /// Number of intents that were sent.
     pub(crate) fn count(&self) -> usize {
         self.count
     }
 
-    /// What a message takes one way, seconds, by an echo of an own intent.
+    /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
         let (_, sent) = self.ring.iter().flatten().find(|(sequence, _)| *sequence == echo.sequence)?;
         let round_s = (now - *sent).secs_f32() - f32::from(echo.held) * TICK.secs_f32();

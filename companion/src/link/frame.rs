@@ -20,9 +20,9 @@ use mavlink::{MavlinkVersion, Message, MessageData};
 
 use crate::time::{Duration, Instant};
 
-/// A frame not complete this long after its first byte is given up.
+/// Time after its first byte at which an incomplete frame is dropped.
 pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
-/// The longest frame without its signature: 10 bytes of header, 255 of payload, 2 of CRC.
+/// Longest frame without its signature, bytes: 10 of header, 255 of payload, 2 of CRC.
 pub const MAX_SENT: usize = 267;
 
 const V1_START: u8 = 0xFE;
@@ -34,7 +34,7 @@ const SIGNATURE_LEN: usize = 13;
 /// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
 /// with the last of them.
 const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
-/// Steps that a lifetime touches, and one.
+/// Most arrival steps within [`PARTIAL_LIFETIME`], and one.
 const ARRIVALS: usize = 10;
 
 /// A frame whose CRC is right.
@@ -84,7 +84,7 @@ impl Frame {
     }
 }
 
-/// What passed through a [`Framer`].
+/// Counters of a [`Framer`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counters {
     /// Frames given out.
@@ -113,18 +113,18 @@ pub struct Framer {
     len: usize,
     /// When the bytes of the buffer were received, oldest first; the last one covers the whole buffer.
     arrivals: Vec<Arrival, ARRIVALS>,
-    /// How many of the next bytes belong to a frame of unknown id or to a signature.
+    /// Number of the next bytes that belong to a frame of unknown id or to a signature.
     uncounted: usize,
     counters: Counters,
 }
 
 const _: () = assert!(size_of::<Framer>() <= 480);
 
-/// What the bytes at the front of the buffer are.
+/// Kind of the bytes at the front of the buffer.
 enum Front {
     /// Too few bytes to decide; this many are needed in all.
     Needs(usize),
-    /// Not a frame.
+    /// Bytes that are not a frame.
     False,
     /// A checked frame of this many bytes, without its signature.
     Good(usize),
@@ -152,7 +152,7 @@ impl Framer {
         }
     }
 
-    /// What passed so far.
+    /// Counters of the frames so far.
     pub fn counters(&self) -> Counters {
         self.counters
     }
@@ -322,7 +322,7 @@ pub fn extra_crc(message_id: u32) -> Option<u8> {
     (extra != 0 || message_id == COMPONENT_INFORMATION).then_some(extra)
 }
 
-/// Who sends a frame.
+/// Sender of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Header {
     /// System id of the sender.

@@ -29,26 +29,28 @@ use crate::link::echo::Echo;
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points reported.
 pub const POINTS: usize = 8;
-/// Version of the layout.
+/// Version of the message's layout.
 pub const VERSION: u8 = 4;
 const HEAD: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
-/// Stands on the ground.
+/// Flag of a vehicle that stands on the ground.
 pub const GROUNDED: u8 = 1;
-/// Flies under its companion's setpoints.
+/// Flag of a vehicle that flies under its companion's setpoints.
 pub const FLYING: u8 = 2;
-/// Landed after its mission.
+/// Flag of a vehicle that landed after its mission.
 pub const LANDED: u8 = 4;
-/// Its progress counts on the shared plan.
+/// Flag of a vehicle whose progress counts on the shared plan.
 pub const ON_PLAN: u8 = 8;
-/// Has left the plan and rests where it is, or a pilot keeps it: it opens all gates and is an obstacle.
+/// Flag of a vehicle that has left the plan and rests where it is, or that a pilot keeps: this
+/// vehicle opens all gates and is an obstacle.
 pub const OUT: u8 = 16;
-/// Stands, and will until somebody else moves.
+/// Flag of a vehicle that stands, and will stand until another vehicle moves.
 pub const WAITING: u8 = 32;
-/// Its path is blocked; it waits for all to stand, and flies around.
+/// Flag of a vehicle whose path is blocked; it waits until all others stand, then flies a detour.
 pub const BLOCKED: u8 = 64;
-/// Flies a path of its own, or will; its progress is where it left the plan.
+/// Flag of a vehicle that flies a detour, or will; its reported progress is the place where it left
+/// the plan.
 pub const DETOURS: u8 = 128;
 
 /// One vehicle's intent.
@@ -64,7 +66,8 @@ pub struct Intent {
     pub plan_crc: u32,
     /// Progress along the own path, metres.
     pub progress_m: f32,
-    /// How far along the own path its gates are open, metres: so far it flies on though it hears nobody.
+    /// Place along the own path up to which the sender's gates are open, metres: the sender flies
+    /// on to there even when it hears no vehicle.
     pub clear_m: f32,
     /// Seconds until the last of those gates is open for sure, at most 127.
     pub clear_in_s: u8,
@@ -74,7 +77,7 @@ pub struct Intent {
     pub floor_m: f32,
     /// Whether it may come down from where it is: it climbs, descends or lands, or somebody else flies it.
     pub column: bool,
-    /// Whose intent it heard, and when: for the sender's measure of the delay.
+    /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
     pub echo: Option<Echo>,
     /// Points that it flies along next, as far as it will go for now; none while somebody else flies it.
     pub points: Vec<Point, POINTS>,

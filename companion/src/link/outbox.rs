@@ -12,7 +12,7 @@ use mavlink::dialects::ardupilotmega::{
 
 use crate::link::frame::{self, Header};
 
-/// Entries a link holds.
+/// Entries that a link's queue holds.
 pub const DEPTH: usize = 32;
 
 /// A message that waits.
@@ -41,13 +41,13 @@ pub enum Outgoing {
     },
     /// PARAM_VALUE of one of ours.
     ParameterValue {
-        /// Its index.
+        /// Index of the parameter.
         index: usize,
-        /// How many there are.
+        /// Number of parameters.
         count: u16,
-        /// Its name.
+        /// Name of the parameter.
         name: &'static str,
-        /// Its value.
+        /// Value of the parameter.
         value: f32,
     },
     /// PARAM_ERROR.
@@ -65,7 +65,7 @@ pub enum Outgoing {
     Arm(bool),
     /// DO_SET_CAM_TRIGG_DIST: pictures so far apart, metres, 0 for none; and whether one is taken at once.
     TriggerEvery {
-        /// From one to the next.
+        /// Distance from one picture to the next.
         step_m: f32,
         /// A picture now.
         at_once: bool,
@@ -94,7 +94,7 @@ pub enum Outgoing {
         warning: bool,
         /// At most 50 bytes with the numbers in it.
         text: &'static str,
-        /// What each `#` stands for, in order.
+        /// Numbers that replace the text's `#`, in order.
         numbers: [u32; 3],
     },
 }
@@ -192,7 +192,7 @@ impl Outbox {
                 return frame::encode(header, &told, out);
             }
             Outgoing::ParameterError { index, id, why, to } => {
-                // By field: the name may be anything.
+                // Encoded field by field: the name may be anything.
                 let mut payload = [0; PARAM_ERROR_DATA::ENCODED_LEN];
                 payload[..2].copy_from_slice(&index.to_le_bytes());
                 (payload[2], payload[3]) = to;
@@ -207,7 +207,7 @@ impl Outbox {
                 );
             }
             Outgoing::Timesync { tc1, ts1, to } => {
-                // By field: the crate's type lacks the addressee.
+                // Encoded field by field: the crate's type lacks the addressee.
                 let mut payload = [0; TIMESYNC_DATA::ENCODED_LEN + 2];
                 payload[..8].copy_from_slice(&tc1.to_le_bytes());
                 payload[8..16].copy_from_slice(&ts1.to_le_bytes());
@@ -218,7 +218,8 @@ impl Outbox {
                 command(MavCmd::MAV_CMD_COMPONENT_ARM_DISARM, f32::from(u8::from(arm)), 0.0, 0.0)
             }
             Outgoing::Ack { command, result, to } => {
-                // By field: the command may be unknown to the crate, and its type lacks the addressee.
+                // Encoded field by field: the command may be unknown to the crate, and its type
+                // lacks the addressee.
                 let [low, high] = command.to_le_bytes();
                 let payload = [low, high, result, 0, 0, 0, 0, 0, to.0, to.1];
                 return frame::encode_raw(

@@ -8,15 +8,17 @@
 use crate::link::frame::MAX_SENT;
 use crate::time::Instant;
 
-/// Bytes of a second beside the state while armed: 32 vehicles add a quarter to their state.
+/// Bytes a second beside the vehicle's state while it is armed: 32 vehicles add a quarter to their
+/// state.
 pub const AIR_BPS: u32 = 250;
-/// The same disarmed, when a person reads and writes files: with one vehicle's state it is a radio of 57 600 baud.
+/// Bytes a second beside the vehicle's state while it is disarmed, when a person reads and writes
+/// files: with one vehicle's state it is a radio of 57 600 baud.
 pub const GROUND_BPS: u32 = 4500;
-/// Most bytes that are saved up: a list of all parameters, or five texts.
+/// Most bytes that the token bucket saves up: a list of all parameters, or five texts.
 pub const SAVED: u32 = 1000;
-/// Bytes of a position with its frame; nothing else that is asked for and made fresh is longer.
+/// Bytes of a position with its frame; no other message that is requested and made fresh is longer.
 pub(crate) const POSITION: usize = 40;
-/// The same and the longest intent with its frame.
+/// Bytes of a position and of the longest intent, each with its frame.
 const STATE: u32 = POSITION as u32 + 145;
 /// Bytes of a heartbeat with its frame.
 const HEARTBEAT: u32 = 21;

@@ -21,28 +21,28 @@ use heapless::Vec;
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10E;
-/// Version of the layout.
+/// Version of the message's layout.
 pub const VERSION: u8 = 1;
 /// Most vehicles of one message.
 pub const ENTRIES: usize = 22;
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 18;
 const ENTRY: usize = 5;
-/// Longest TUNNEL payload.
+/// Longest TUNNEL payload, bytes.
 pub const LENGTH: usize = TUNNEL_HEAD + HEAD + ENTRIES * ENTRY;
 
 /// Whether a vehicle takes part. What comes later in this list outlasts what comes before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[repr(u8)]
 pub enum Standing {
-    /// It flies its part, or will.
+    /// The vehicle flies its share, or will.
     #[default]
     Alive,
     /// The others have not heard it for so long that its part is theirs.
     Lost,
-    /// By its own account it flies no further: what is left of its part is the others'.
+    /// The vehicle reports that it flies no further: the rest of its share is the others'.
     Left,
-    /// The same, and nothing of its part is left.
+    /// The vehicle reports that it flies no further, and nothing of its share is left.
     Finished,
 }
 
@@ -57,9 +57,10 @@ pub struct Entry {
     pub incarnation: u8,
     /// Whether it takes part.
     pub standing: Standing,
-    /// How far along its path it has come, decimetres.
+    /// Progress of the vehicle along its path, decimetres.
     pub done_dm: u16,
-    /// So far along its path it flies before it waits for a division, decimetres; 0 on its pad.
+    /// Place along its path up to which the vehicle flies before it waits for a division,
+    /// decimetres; 0 on its pad.
     pub promise_dm: Option<u16>,
     /// Whether it stands there.
     pub holds: bool,

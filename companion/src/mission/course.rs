@@ -14,7 +14,7 @@ use crate::mission::waits::Waits;
 use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
 use crate::time::{Duration, Instant};
 
-/// A path begins this near to where the vehicle is, metres.
+/// Greatest distance between the begin of a path and the vehicle, metres.
 const BEGINS_M: f32 = 0.1;
 
 /// One vehicle's mission: at most `W` waypoints and `G` gates.
@@ -35,7 +35,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
     left_with_all: Option<bool>,
-    /// Where the plan ends, the height in which it leads there, and its descent, metres.
+    /// Place where the plan ends, the height in which the plan leads there, and the descent,
+    /// metres.
     home: (Point, f32, f32),
     failure: Option<PlanFailure>,
     /// Since when the estimate is worse than the margin leaves at a crawl.
@@ -47,7 +48,7 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     division: usize,
     /// Whether the part that the last one gives has come and is not flown yet.
     fresh: bool,
-    /// What the shell was asked to divide, and when.
+    /// The division that the shell was requested to compute, and when.
     asked: Option<(u32, Instant)>,
 }
 
@@ -77,7 +78,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Where it is.
+    /// State of the mission.
     pub(crate) fn state(&self) -> State {
         self.state
     }
@@ -87,7 +88,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.entered_at
     }
 
-    /// For how long.
+    /// Time in this state.
     pub(crate) fn in_state(&self, now: Instant) -> Duration {
         now - self.entered_at
     }
@@ -97,7 +98,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.started_at
     }
 
-    /// For how long the pilot has the vehicle.
+    /// Time for which the pilot has had the vehicle.
     pub(crate) fn with_pilot(&self, now: Instant) -> Duration {
         now - self.pilot_since
     }
@@ -107,7 +108,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.interrupted.beneath(self.state)
     }
 
-    /// What was commanded and is not done yet.
+    /// Commands that are not done yet.
     pub(crate) fn pending(&self) -> &Pending {
         &self.pending
     }
@@ -148,7 +149,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (now - self.started_at).secs_f32() >= depart_s
     }
 
-    /// For how long the bound of the position estimate has exceeded what the margin leaves for it.
+    /// Time for which the bound of the position estimate has exceeded the part that the margin
+    /// leaves for it.
     pub(crate) fn vague_for(&self, now: Instant) -> Duration {
         self.vague_since.map_or(Duration::default(), |since| now - since)
     }
@@ -158,7 +160,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.vague_since = if usable { None } else { self.vague_since.or(Some(now)) };
     }
 
-    /// It waits for the vehicle `id`, which has not started, or for none (0). Returns whether that is to be named.
+    /// The vehicle waits for the vehicle `id`, which has not started, or for none (0). Returns
+    /// whether `id` is to be reported.
     pub(crate) fn names(&mut self, id: u8, now: Instant) -> bool {
         self.waits.watch(id, now)
     }
@@ -189,7 +192,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         (from, to)
     }
 
-    /// What a person reads on a change of state that interrupts another.
+    /// The text for a change of state that interrupts another.
     pub(crate) fn interruption(&self, from: State, to: State) -> Option<&'static str> {
         self.interrupted.text(from, to)
     }
@@ -222,7 +225,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Where its plan ends, as a goal that is reached without a roadmap, and how far it descends there, metres.
+    /// Place where the vehicle's plan ends, as a goal that is reached without a roadmap, and the
+    /// descent there, metres.
     pub(crate) fn home(&self) -> (Goal, f32) {
         let (over, layer_m, descent_m) = self.home;
         (Goal::Home { over, layer_m }, descent_m)
@@ -233,7 +237,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.fresh
     }
 
-    /// It is flown.
+    /// Begins to fly the division's path.
     pub(crate) fn fly_division(&mut self) {
         self.fresh = false;
     }
@@ -294,12 +298,12 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// What of an area is photographed.
+    /// The photographed waypoints of the area.
     pub(crate) fn photographed(&self) -> &Photographed {
         &self.photographed
     }
 
-    /// The same, to be changed.
+    /// The photographed waypoints of the area, to be changed.
     pub(crate) fn photographed_mut(&mut self) -> &mut Photographed {
         &mut self.photographed
     }
@@ -313,7 +317,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// It leaves its pad to fly its plan.
+    /// The vehicle leaves its pad to fly its plan.
     pub(crate) fn leave_pad(&mut self) {
         if let Some(VehiclePlan { task: Task::Photograph(photographs), .. }) = &self.plan {
             self.photographed.leave_pad(photographs);
@@ -325,7 +329,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         self.tasks.handle_ack(ack, links);
     }
 
-    /// What was requested did not come.
+    /// The requested plan did not come.
     pub(crate) fn fail(&mut self, failure: PlanFailure) {
         self.failure = Some(failure);
     }
@@ -341,7 +345,8 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         })
     }
 
-    /// It leaves its path `along_m` metres along it: from now on places are those of another one.
+    /// The vehicle leaves its path `along_m` metres along it: from now on places are those of
+    /// another path.
     fn leave_path(&mut self, along_m: f32) {
         if self.left_with_all.is_none() {
             self.note_photographed(along_m);

@@ -2,9 +2,9 @@
 
 use crate::time::Duration;
 
-pub(crate) const FRESH: Duration = Duration::from_millis(500);
+pub(crate) const FRESH: Duration = Duration::from_millis(500); // Age up to which a position is known.
 
-/// What must hold for a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
+/// Condition of a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Guard {
     /// HEARTBEAT was heard within the last second and a half.
@@ -21,9 +21,9 @@ pub enum Guard {
     FoundFlying,
     /// The plan has come.
     PlanReady,
-    /// There will be no plan.
+    /// No plan will come.
     PlanFailed,
-    /// There will be no plan, for want of the mission's roadmap.
+    /// No plan will come, for want of the mission's roadmap.
     RoadmapBad,
     /// MISSION_START was commanded, there is a goal, and the estimate's bound fits into the margin.
     StartCommanded,
@@ -73,7 +73,7 @@ pub enum Guard {
     StaysArmed,
     /// Motors off, the autopilot is heard, and the state has lasted as long as the limit.
     StaysDisarmed,
-    /// The same, and the start is only paused.
+    /// As [`Guard::StaysDisarmed`], and the start is only paused.
     StaysDisarmedPaused,
     /// Arming was accepted, but the armed bit did not come.
     ArmedUnseen,
@@ -81,7 +81,7 @@ pub enum Guard {
     ArmingUnanswered,
     /// Motors on, and off the ground or moving up or down.
     InAir,
-    /// The same, in Offboard or Guided that this companion entered, without setpoints.
+    /// In the air, in Offboard or Guided that this companion entered, without setpoints.
     Unattended,
     /// Disarming was refused, and no mode lands the vehicle.
     DisarmRefused,
@@ -119,31 +119,31 @@ pub enum Guard {
     ReturnOverField,
     /// In a coverage mission the path has been blocked for the limit, and the way home can be planned.
     BlockedOverField,
-    /// The same, and it may fly around what blocks it and back to its path.
+    /// As [`Guard::BlockedOverField`], and the vehicle may fly around what blocks it and back to its path.
     AroundOverField,
-    /// It stands where it comes back to its path.
+    /// The vehicle stands where its detour comes back to its path.
     AroundFlown,
-    /// It does, and its own plan has come.
+    /// The vehicle stands where its detour comes back to its path, and its own plan has come.
     OwnPlanReady,
-    /// It does, and there is none.
+    /// The vehicle stands where its detour comes back to its path, and no own plan will come.
     OwnPlanLost,
-    /// The same as [`Guard::BlockedOverField`] where the safety filter has made it yield for the limit.
+    /// As [`Guard::BlockedOverField`], but the safety filter has made the vehicle yield for the limit.
     YieldedOverField,
-    /// The same where the safety filter has kept it from going on for the limit.
+    /// As [`Guard::BlockedOverField`], but the safety filter has hindered the vehicle for the limit.
     HinderedOverField,
-    /// The same as [`Guard::Stalled`] where the way home can be planned.
+    /// As [`Guard::Stalled`] where the way home can be planned.
     StalledOverField,
-    /// It is to fly home, and stands.
+    /// The vehicle is to fly home, and stands.
     StandsToReturn,
     /// The way home has come.
     WayHomeReady,
-    /// For the limit there has been none, and it can fly back as it came.
+    /// No way home was found for the limit, and the vehicle can fly back as it came.
     NoWayHome,
     /// The safety filter finds another vehicle in the column to the ground.
     LandingBlocked,
-    /// It has found none for the limit.
+    /// No vehicle was in the column for the limit.
     LandingClear,
-    /// It has found one for the limit, or one that rests for 5 s, and the path leads back to the pad.
+    /// The column was occupied for the limit (5 s by a vehicle that rests), and the path leads to the pad.
     NoRoomToLand,
     /// Before the take-off: the column above has not been free for the limit.
     ColumnBlocked,
@@ -151,13 +151,13 @@ pub enum Guard {
     Yielded,
     /// The safety filter has kept this vehicle from going on for the limit, and it does not seek its way home.
     Hindered,
-    /// The same, and it does not: a place aside may yet be sought.
+    /// As [`Guard::NoRoomToLand`], but the path does not lead back: a place aside may yet be sought.
     NoRoomHere,
     /// The way back to its pad has been barred for the limit by a vehicle that rests, or the descent there by any.
     PadTaken,
-    /// There is no place aside to land at.
+    /// No place aside to land at exists.
     NoPlaceAside,
-    /// It stands at the place aside where it is to land.
+    /// The vehicle stands at the place aside where it is to land.
     AsideReached,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
@@ -165,9 +165,9 @@ pub enum Guard {
     BatteryLow,
     /// Outside the configured volume, and no neighbour below.
     OutsideGeofence,
-    /// Of the neighbours that fly, none was heard for the limit.
+    /// None of the neighbours that fly was heard for the limit.
     NeighboursSilent,
-    /// Its next gate is open, or none is left.
+    /// The vehicle's next gate is open, or none is left.
     WayFree,
     /// All others are out of radio range, and the state has lasted for the limit.
     OutOfRange,
@@ -177,29 +177,29 @@ pub enum Guard {
     OnGround,
     /// A vehicle that left the plan, or an obstacle, blocks the path, or this vehicle left the plan itself.
     PathBlocked,
-    /// Nothing blocks the path any more.
+    /// No keep-out zone blocks the path any more.
     PathClear,
     /// The path is blocked, all others stand, and it is this vehicle's turn.
     OurTurn,
     /// The way around has come.
     DetourReady,
-    /// There is no way around.
+    /// No detour exists.
     DetourFailed,
-    /// There was none several times, and no neighbour is below.
+    /// Several searches found no detour, and no neighbour is below.
     NoWayAround,
-    /// The same, but somebody lies below, and the path leads back to the pad.
+    /// Several searches found no detour, a neighbour lies below, and the path leads back to the pad.
     NoWayOn,
-    /// For the limit it waited where a vehicle lands without looking, and its own path led to no better place.
+    /// For the limit the vehicle waited below one that lands without looking, and its path led nowhere better.
     Underneath,
     /// Standing still.
     Standing,
-    /// Others have divided the part of this vehicle, or count it as lost.
+    /// Others have divided the share of this vehicle, or count it as lost.
     Excluded,
-    /// Others on the ground know of more that is photographed than its plan leaves out.
+    /// Others on the ground know of more photographed waypoints than the plan leaves out.
     MoreIsDone,
     /// A vehicle that follows another plan of this mission is heard.
     PlansDiffer,
-    /// It stands as far along its path as it promised to fly before the division.
+    /// The vehicle stands as far along its path as it promised to fly before the division.
     HoldsToDivide,
     /// The division counts, and its part of that has come.
     DivisionReady,
@@ -207,7 +207,7 @@ pub enum Guard {
     NothingToDivide,
 }
 
-/// What the guards look at: a snapshot of the vehicle, the commands and the plan.
+/// Inputs of the guards: a snapshot of the vehicle, the commands and the plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Inputs {
     /// Time in the state.
@@ -230,13 +230,13 @@ pub struct Inputs {
     pub out_of_range: bool,
     /// A neighbour was heard within the last second.
     pub neighbour_heard: bool,
-    /// Others have divided the part of this vehicle, or count it as lost.
+    /// Others have divided the share of this vehicle, or count it as lost.
     pub excluded: bool,
     /// More is photographed than its plan leaves out.
     pub more_is_done: bool,
     /// Another plan of this mission is heard.
     pub plans_differ: bool,
-    /// It stands where it promised to wait for a division.
+    /// The vehicle stands where it promised to wait for a division.
     pub holds_to_divide: bool,
     /// The part that the last division gives has come.
     pub division_ready: bool,
@@ -250,7 +250,7 @@ pub struct Inputs {
     pub roadmap_bad: bool,
     /// The plan has a goal.
     pub has_goal: bool,
-    /// In a coverage mission: all that are heard have its plan, and had the time to say otherwise.
+    /// In a coverage mission: all vehicles heard have this one's plan, and had time to report otherwise.
     pub plans_as_others: bool,
     /// Near the pad below the start point, in height too.
     pub at_start: bool,
@@ -270,23 +270,23 @@ pub struct Inputs {
     pub land: bool,
     /// NAV_RETURN_TO_LAUNCH holds.
     pub turn_back: bool,
-    /// It is a coverage mission.
+    /// The mission is a coverage mission.
     pub area: bool,
     /// In a coverage mission: the way home can be planned from here.
     pub over_field: bool,
-    /// It may fly around what blocks its path, and back to that.
+    /// The vehicle may fly around what blocks its path, and back to its path.
     pub may_fly_beside: bool,
-    /// It stands where it comes back to its path.
+    /// The vehicle stands where its detour comes back to its path.
     pub around_flown: bool,
-    /// Its own plan has come there.
+    /// The vehicle's own plan has come there.
     pub own_plan_ready: bool,
-    /// There is none.
+    /// The vehicle's own plan will not come there.
     pub own_plan_lost: bool,
-    /// It is to fly home, or does.
+    /// The vehicle is to fly home, or does.
     pub homeward: bool,
-    /// For how long it has sought its way home, if it does.
+    /// Time for which the vehicle has sought its way home, if it does.
     pub sought_home: Option<Duration>,
-    /// It stands, and may ask for its way home.
+    /// The vehicle stands, and may request its way home.
     pub stands_to_return: bool,
     /// The climb is not done: it goes on after the interruption.
     pub in_climb: bool,
@@ -342,9 +342,9 @@ pub struct Inputs {
     pub can_land_aside: bool,
     /// The way aside asked for, or flown, leads to where it is to land.
     pub lands_aside: bool,
-    /// It stands at the end of that.
+    /// The vehicle stands at the end of the path aside.
     pub aside_reached: bool,
-    /// It comes down in any case: the battery is nearly empty, or it does not know where it would hold.
+    /// The vehicle must land: the battery is nearly empty, or the place to hold at is unknown.
     pub must_land: bool,
     /// Time for which the safety filter has made it yield.
     pub yielded: Duration,
@@ -368,11 +368,11 @@ pub struct Inputs {
     pub no_way_around: bool,
     /// Time it waited under a vehicle that lands, unable to go elsewhere along its path.
     pub underneath: Duration,
-    /// Slower than a hovering vehicle sways.
+    /// The vehicle moves more slowly than a hovering vehicle sways.
     pub standing: bool,
 }
 
-/// A vehicle that rests makes no room: nobody waits longer above it.
+/// Longest wait above a vehicle that rests: a vehicle that rests makes no room.
 const BARRED: Duration = Duration::from_secs(5);
 
 impl Inputs {
@@ -387,7 +387,7 @@ impl Inputs {
     }
 }
 
-/// HEARTBEAT comes at 1 Hz: one late is not yet silence.
+/// Age up to which HEARTBEAT counts as heard: it comes at 1 Hz, and one late is not yet silence.
 pub(super) const HEARD: Duration = Duration::from_millis(1500);
 
 impl Guard {

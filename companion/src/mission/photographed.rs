@@ -11,26 +11,28 @@ use crate::link::done::{DoneReport, RANGE, RANGES, range_bytes, range_of};
 use crate::storage::store::{self, BLOCK};
 use crate::time::{Duration, Instant};
 
-/// Most ranges of waypoints that are known to be photographed; what is more is photographed again.
+/// Most ranges of waypoints that are known to be photographed; a waypoint outside them is
+/// photographed again.
 pub const DONE: usize = 40;
-/// What is done is kept in flash each time so many waypoints came to it.
+/// Newly photographed waypoints after which the ranges are stored in flash again.
 const KEEP_EVERY: u32 = 10;
-/// Reports of ones in flight come this often at least: so long their set counts, not what others on the ground know.
+/// Time for which the ranges reported by vehicles in flight count, instead of what vehicles on the
+/// ground know: reports in flight come at least this often.
 const FOLLOWS: Duration = Duration::from_secs(25);
-/// Mission CRC and round, before the ranges.
+/// Bytes before the ranges: mission CRC and round.
 const HEAD: usize = 5;
 const _: () = assert!(HEAD + DONE * RANGE <= BLOCK);
 
-/// What is photographed.
+/// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Photographed {
-    /// How often the area was begun again.
+    /// Number of times that the area was begun again.
     round: u8,
-    /// What the plan leaves out, or will.
+    /// Waypoints that the plan leaves out, or will.
     before: Done<DONE>,
     /// All that is known.
     known: Done<DONE>,
-    /// How many of those the flash has.
+    /// Number of waypoints that the flash has.
     kept: u32,
     /// Whether `before` has changed since a plan was requested.
     outdated: bool,
@@ -60,7 +62,7 @@ impl Photographed {
         self.before = self.known.clone();
     }
 
-    /// What the flash is to keep, if that is worth a record: at once where nothing more is to come.
+    /// The record for the flash, if it is worth one: at once where no further waypoint is to come.
     pub(crate) fn keep(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
         let count = self.known.count();
         let least = if at_once { self.kept + 1 } else { self.kept + KEEP_EVERY };
@@ -70,7 +72,7 @@ impl Photographed {
         }
         self.kept = count;
         let mut kept = store::Photographed::new();
-        // They fit: `HEAD` and `DONE` ranges are no more than a block.
+        // Both fit: `HEAD` and `DONE` ranges are no more than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
         self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&range_bytes(range)));
@@ -88,7 +90,7 @@ impl Photographed {
         (self.planned, self.flown, self.outdated) = (self.round, false, false);
     }
 
-    /// What the plan leaves out.
+    /// Waypoints that the plan leaves out.
     pub(crate) fn before(&self) -> &[Range] {
         self.before.ranges()
     }
@@ -98,7 +100,7 @@ impl Photographed {
         self.outdated
     }
 
-    /// How many waypoints are known to be done.
+    /// Number of waypoints that are known to be photographed.
     pub(crate) fn count(&self) -> u32 {
         self.known.count()
     }
@@ -113,7 +115,7 @@ impl Photographed {
         }
     }
 
-    /// Nothing of a round before counts any more.
+    /// Waypoints of an earlier round do not count any more.
     fn begin_again(&mut self) {
         self.round = self.round.wrapping_add(1);
         self.known.clear();
@@ -121,7 +123,7 @@ impl Photographed {
 
     /// Notes the first `count` pictures of the path.
     pub(crate) fn note<const W: usize>(&mut self, photographs: &Photographs, path: &Path<W>, count: u32) {
-        // What does not fit is photographed again.
+        // A waypoint that does not fit is photographed again.
         photographs.first(path, count).for_each(|range| _ = self.known.insert(range));
     }
 
@@ -165,7 +167,8 @@ impl Photographed {
         }
     }
 
-    /// What others are to know, a part after the other; in flight, in turn, what the plan leaves out, if one report holds that.
+    /// The report to other vehicles, one part after the other; in flight, in turn, the waypoints
+    /// that the plan leaves out, if one report holds them.
     pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
         let plan = flies && !self.reports_plan && self.before.ranges().len() <= RANGES;
         self.reports_plan = plan;

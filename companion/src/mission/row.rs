@@ -4,10 +4,10 @@ use super::guard::Guard;
 use super::state::{State, To};
 use crate::time::Duration;
 
-/// What a row does beside changing the state.
+/// Effect of a row beside the change of state.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Action {
-    /// Nothing.
+    /// No effect.
     None,
     /// Ask for the streams and the EKF origin.
     Connect,
@@ -66,15 +66,15 @@ pub enum Action {
 pub struct Row {
     /// States it applies to.
     pub from: &'static [State],
-    /// The same, a bit for each.
+    /// States of the row, a bit for each.
     pub(crate) states: u32,
-    /// What must hold.
+    /// Condition of the row.
     pub guard: Guard,
     /// How long it must have held; zero: at once.
     pub limit: Duration,
     /// The next state.
     pub to: To,
-    /// What is done.
+    /// Effect of the row.
     pub action: Action,
     /// STATUSTEXT for a person, at most 50 bytes; empty: none.
     pub text: &'static str,

@@ -1,6 +1,6 @@
 //! Where the mission is, and what was interrupted.
 
-/// Where the mission is.
+/// State of the mission.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum State {
     /// No HEARTBEAT of the autopilot yet.
@@ -50,7 +50,7 @@ pub enum State {
     Blocked,
     /// Hovers; the shell was asked for a way around.
     Replanning,
-    /// The same on the ground.
+    /// Replanning on the ground, before the take-off.
     PadReplanning,
     /// Brakes along the path, then lands.
     Stopping,
@@ -133,7 +133,7 @@ impl State {
     }
 }
 
-/// Where a row leads.
+/// Target of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum To {
     /// To this state.
@@ -142,8 +142,9 @@ pub enum To {
     Interrupted,
 }
 
-/// What was interrupted. The states that interrupt are [`State::Paused`] on the one hand, and on the other those in which
-/// autopilot, position or pilot take the vehicle: a pause may itself be interrupted.
+/// The states that were interrupted. The states that interrupt are [`State::Paused`] on the one
+/// hand, and on the other those in which autopilot, position or pilot take the vehicle: a pause may
+/// itself be interrupted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Interrupted {
     /// The state that the pause interrupted.
@@ -159,7 +160,7 @@ impl Default for Interrupted {
 }
 
 impl Interrupted {
-    /// Where [`To::Interrupted`] leads from `state`.
+    /// Target of [`To::Interrupted`] from `state`.
     pub fn target(&self, state: State) -> State {
         if state == State::Paused { self.by_pause } else { self.by_loss }
     }
@@ -180,7 +181,7 @@ impl Interrupted {
         }
     }
 
-    /// What a person reads on a change of state that interrupts another.
+    /// The text for a change of state that interrupts another.
     pub(crate) fn text(&self, from: State, to: State) -> Option<&'static str> {
         use State::*;
         let kept = match to {

@@ -42,20 +42,20 @@ pub(crate) const fn back(
     Row { from, states: bits(from), guard, limit, to: To::Interrupted, action, text, warning: false }
 }
 
-/// Longer than the armed bit lags behind the ack of arming, twice over.
+/// Twice the time by which the armed bit lags behind the ack of arming.
 const MS2500: Duration = Duration::from_millis(2500);
 
 use Action as A;
 use Guard as G;
 use State::*;
 
-/// On the ground before arming.
+/// States on the ground before arming.
 pub(crate) const WAITING: &[State] = &[WaitPosition, Planning, Ready, Scheduled, PadReplanning];
-/// Started, on the pad, arming not yet requested.
+/// States on the pad after the start command, before arming is requested.
 pub(crate) const STARTED: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging];
-/// Started, on the pad.
+/// States on the pad after the start command.
 pub(crate) const ON_PAD: &[State] = &[Scheduled, PadReplanning, Streaming, Engaging, Arming, CancelStart];
-/// In the air, or about to be, under our setpoints.
+/// States in the air, or about to be, under our setpoints.
 pub(crate) const FLYING: &[State] = &[
     TakeOff,
     Climb,
@@ -70,17 +70,18 @@ pub(crate) const FLYING: &[State] = &[
     AutopilotSilent,
     PositionLost,
 ];
-/// In the air, with links and position as they should be.
+/// States in the air in which links and position are as they should be.
 pub(crate) const SOUND: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping, LandingHeld];
-/// The same, on its path under way or stopped: it can stop along it.
+/// States of [`SOUND`] on the path, under way or stopped: the vehicle can stop along its
+/// path.
 pub(crate) const ON_PATH: &[State] = &[Follow, Paused, Alone, Blocked, Replanning, Dividing];
 
-/// The same, not yet landing.
+/// States of [`SOUND`] before the landing.
 pub(crate) const IN_ROUTE: &[State] =
     &[TakeOff, Climb, Follow, Paused, Alone, Blocked, Replanning, Dividing, Stopping];
 
-/// In the air, and the autopilot was heard.
+/// States in the air in which the autopilot was heard.
 pub(crate) const LINKED: &[State] = &[
     TakeOff,
     Climb,
@@ -95,7 +96,7 @@ pub(crate) const LINKED: &[State] = &[
     PositionLost,
 ];
 
-/// The mission.
+/// The transition table of the mission.
 #[rustfmt::skip]
 pub static TABLE: &[Row] = &[
     // The autopilot itself, the pilot and the failsafe: before everything else.
@@ -142,7 +143,7 @@ pub static TABLE: &[Row] = &[
     warn(&[TakeOff, Climb, PilotReturned], G::BatteryLow, NOW,    Land,            A::AskLand,     "Battery low: landing"),
     warn(IN_ROUTE,            G::EstimateVague,    s(30),  Land,            A::AskLand,     "Estimate worse than margin for 30 s: landing"),
     warn(IN_ROUTE,            G::OutsideGeofence,  NOW,    Land,            A::AskLand,     "Geofence reached: landing"),
-    // What others decided while it was not heard.
+    // The division that others decided while this vehicle was not heard.
     warn(&[TakeOff, Climb, PilotReturned], G::Excluded, NOW,   Land,            A::AskLand,     "Its part was given away: landing"),
     warn(ON_PATH,             G::Excluded,         NOW,    Stopping,        A::BrakeOnPath, "Its part was given away: landing"),
     info(&[Stopping],         G::Standing,         NOW,    Land,            A::AskLand,     ""),

@@ -14,7 +14,7 @@ use crate::autopilot::telemetry::Ack;
 use crate::link::Links;
 use crate::time::Instant;
 
-/// What the tasks remember.
+/// Memory of the tasks.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Tasks {
     camera: Camera,
@@ -47,7 +47,8 @@ impl Tasks {
     }
 }
 
-/// Where the vehicle is to look `along_m` metres along its path, radians from east to the left; anywhere where absent.
+/// Heading of the vehicle `along_m` metres along its path, radians from east to the left; any
+/// heading where absent.
 pub(crate) fn heading<const W: usize>(task: &Task, path: &Path<W>, along_m: f32) -> Option<f32> {
     match task {
         Task::Stay | Task::Goto(_) => None,

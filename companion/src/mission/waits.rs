@@ -4,10 +4,11 @@
 
 use crate::time::{Duration, Instant};
 
-/// So long a vehicle waits for one that has not started before it says so, and again.
+/// Time for which a vehicle waits for one that has not started before it reports that, and time
+/// between two reports.
 const NAMED_AFTER: Duration = Duration::from_secs(30);
 
-/// For which vehicle this one waits, and since when, or since it was named last.
+/// The vehicle that this one waits for, and since when, or since the wait was reported last.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Waits {
     id: u8,

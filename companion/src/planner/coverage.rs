@@ -23,11 +23,11 @@ use crate::storage::mission_file::coverage::{CoverageView, Heading, Parts};
 use crate::storage::mission_file::{MissionVehicle, MissionView};
 use crate::swarm::fleet::Lot;
 
-/// Changes of the lanes' order that companions look at: on a board a few million instructions.
+/// Changes of the lanes' order that companions try: on a board a few million instructions.
 pub const LOOKS: u32 = 2000;
 /// Most rings of an area.
 pub const RINGS: usize = 128;
-/// Clearance that every leg is taken to have, metres: over the fields there are no walls.
+/// Clearance that every leg over the fields is taken to have, metres: there are no walls.
 const OPEN_FIELD_M: f32 = 10.0;
 
 /// Memory for areas of at most `X` vertices, `L` lanes and `K` vehicles.
@@ -151,12 +151,12 @@ fn vehicle(
     }
 }
 
-/// What is planned.
+/// The mission to plan.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a, 'm> {
     /// The mission.
     pub mission: &'a MissionView<'m>,
-    /// Its area.
+    /// Area of the mission.
     pub view: &'a CoverageView<'m>,
     /// The heights to fly above, where there are any: used if they are the mission's.
     pub field: Option<FieldView<'m>>,
@@ -167,7 +167,7 @@ pub struct Request<'a, 'm> {
 }
 
 impl<'m> Request<'_, 'm> {
-    /// What lanes keep above the ground; none where it is level.
+    /// The surface that lanes follow above the ground; none where it is level.
     fn following(&self, vehicles: &[Vehicle]) -> Result<Option<Following<'m>>, Error> {
         let Some(ground) = &self.view.header().ground else { return Ok(None) };
         let crc = self.mission.header().roadmap_crc;

@@ -30,9 +30,9 @@ use crate::storage::store::window::Taken;
 use crate::storage::store::{Answer, Erasing, File, Store, UploadError, UploadState};
 use crate::time::{Duration, Instant};
 
-/// FILE_TRANSFER_PROTOCOL.
+/// Message id of FILE_TRANSFER_PROTOCOL.
 pub const MESSAGE: u32 = 110;
-/// Bytes of its payload: network, system, component, then the packet.
+/// Bytes of that message's payload: network, system, component, then the packet.
 pub const PAYLOAD_LEN: usize = 254;
 
 /// Whether a FILE_TRANSFER_PROTOCOL begins an upload or removes a file.
@@ -40,9 +40,9 @@ pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
     matches!(padded[6], op::CREATE | op::OPEN_WRITE | op::REMOVE)
 }
 
-/// Requests that wait; `mavftp` has five under way.
+/// Most requests that wait; `mavftp` has five under way.
 const QUEUE: usize = 6;
-/// A session whose client was silent this long may be taken by another.
+/// A session whose client was silent for this long may be taken over by another client.
 const IDLE: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
@@ -58,13 +58,13 @@ struct Session {
     client: (u8, u8),
     file: File,
     writes: bool,
-    /// Nothing was written to it yet.
+    /// No byte was written to the file yet.
     fresh: bool,
     opened_by: Request,
     used: Instant,
 }
 
-/// What the server is at.
+/// Work of the server.
 #[derive(Clone, Copy, Debug)]
 enum Doing {
     Nothing,
@@ -127,7 +127,7 @@ impl Ftp {
         Some(payload)
     }
 
-    /// What a person should read.
+    /// Text for a person.
     pub fn text(&mut self) -> Option<Text> {
         self.text.take()
     }
@@ -201,7 +201,8 @@ impl Ftp {
                     Some(UploadState::Ended(Err(why))) => self.end_upload(&request, Err(why)),
                     _ => {
                         self.doing = Doing::Nothing;
-                        // To erase for it may have taken longer than a client may be silent.
+                        // The erasing for this session may have taken longer than a client may be
+                        // silent.
                         self.session = self.session.map(|session| Session { used: self.now, ..session });
                         self.finish(&request, Ok(()));
                     }
@@ -231,7 +232,7 @@ impl Ftp {
             if !is_open(request) || done.is_err() {
                 self.respond(request, done);
             } else if let Some(session) = self.session.filter(|session| session.opened_by.is(request)) {
-                // Its answer was lost; what was opened since then stays open otherwise.
+                // The answer was lost; a file that was opened since then stays open.
                 self.ack_open_again(request, &session, store);
             }
             return;

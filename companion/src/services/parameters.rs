@@ -6,7 +6,7 @@
 
 use crate::config::{Config, REACHES_ALL_M};
 
-/// Longest name, bytes.
+/// Longest name of a parameter, bytes.
 pub const NAME_LEN: usize = 16;
 /// Bytes of a kept parameter.
 const ENTRY_LEN: usize = NAME_LEN + 4;
@@ -34,9 +34,9 @@ const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Param
     Parameter { name, least, most, default, whole: true }
 }
 
-/// How many there are.
+/// Number of parameters.
 pub const COUNT: usize = 10;
-/// Bytes they take in flash.
+/// Bytes that all parameters take in flash.
 pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
 
 /// All parameters, sorted by name; `companion/README.md` prints the same table.
@@ -130,7 +130,7 @@ impl Parameters {
         config.swarm_hz = self.values[SWARM_HZ] as u8;
     }
 
-    /// As they are kept: for each the name, padded with zeros, and the value.
+    /// The parameters as the flash keeps them: for each the name, padded with zeros, and the value.
     pub fn to_bytes(&self) -> [u8; STORED_LEN] {
         let mut bytes = [0; STORED_LEN];
         for (entry, (parameter, value)) in

@@ -29,24 +29,24 @@ pub use records::{GOAL_LEN, MissionGoal, MissionVehicle, NO_GOAL, VEHICLE_LEN};
 
 /// First eight bytes of the file.
 pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
-/// Version this code writes. It also reads version 2, which has goals alone, and version 1, which names no ground station
-/// and means 255.
+/// Version of the mission file that this code writes. It also reads version 2, which has goals
+/// alone, and version 1, which names no ground station and means 255.
 pub const VERSION: u16 = 3;
-/// The version before: no kind.
+/// Version 2, which does not state the kind of mission.
 const WITHOUT_KIND: u16 = 2;
-/// The first one.
+/// Version 1, which names no ground stations.
 const WITHOUT_GROUND_STATIONS: u16 = 1;
-/// Most bytes that a board keeps.
+/// Longest mission file that a board keeps, bytes.
 pub const MOST_BYTES: usize = 4096;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
 const CRC_LEN: usize = 4;
-/// Flag: the six numbers of the geofence count.
+/// Flag of a mission file whose six geofence numbers count.
 const FENCED: u8 = 1;
 /// Kinds of mission, in the byte after the flags.
 const GOALS: u8 = 0;
 const COVERAGE: u8 = 1;
-/// What all vehicles of a mission share.
+/// Settings that all vehicles of a mission share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionHeader {
     /// CRC-32 of the roadmap file it belongs to.
@@ -107,21 +107,21 @@ impl MissionHeader {
     }
 }
 
-/// What the vehicles of a mission do.
+/// Work of the vehicles of a mission.
 #[derive(Clone, Copy, Debug)]
 pub enum Kind<'a> {
-    /// They fly to goals, on a roadmap.
+    /// The vehicles fly to goals, on a roadmap.
     Goals,
-    /// They photograph an area.
+    /// The vehicles photograph an area.
     Coverage(CoverageView<'a>),
 }
 
-/// The same, as it is written.
+/// Work of the vehicles of a mission, as it is written.
 #[derive(Clone, Copy, Debug)]
 pub enum Block<'a> {
-    /// They fly to goals.
+    /// The vehicles fly to goals.
     Goals(&'a [MissionGoal]),
-    /// They photograph an area.
+    /// The vehicles photograph an area.
     Coverage(CoverageParts<'a>),
 }
 
@@ -338,7 +338,7 @@ impl<'a> MissionView<'a> {
         Ok(())
     }
 
-    /// What all vehicles share.
+    /// Settings that all vehicles share.
     pub fn header(&self) -> &MissionHeader {
         &self.header
     }
@@ -348,7 +348,7 @@ impl<'a> MissionView<'a> {
         self.crc
     }
 
-    /// What its vehicles do.
+    /// Work of the vehicles.
     pub fn kind(&self) -> &Kind<'a> {
         &self.kind
     }
@@ -391,7 +391,8 @@ impl<'a> MissionView<'a> {
         self.header.roadmap_crc == roadmap.crc() && terminals == (self.vehicles.len(), self.goals.len())
     }
 
-    /// What the whole swarm's planner is asked, over lists that the caller keeps, for vehicles with room for `gates_most`.
+    /// The request to the whole swarm's planner, over lists that the caller keeps, for vehicles
+    /// with room for `gates_most`.
     ///
     /// # Errors
     /// [`MissionError::RosterFull`] if there are more vehicles or goals than `V`.

@@ -36,7 +36,7 @@ pub use self::upload_state::{UploadError, UploadState};
 use self::window::Window;
 use crate::services::parameters::Parameters;
 
-/// What of an area is photographed, as the mission writes it.
+/// Photographed waypoints of an area, as the mission writes them.
 pub(crate) type Photographed = heapless::Vec<u8, BLOCK>;
 
 /// A companion's flash.
@@ -93,7 +93,8 @@ impl Store {
         store
     }
 
-    /// Where the roadmap or field that this start uses lies, in the storage bank. It is not written until the next start.
+    /// Place of the roadmap or field that this start uses, in the storage bank. The place is not
+    /// written until the next start.
     pub fn roadmap(&self) -> Option<Range<u32>> {
         let slot = self.in_use?;
         let at = Area::Slot(slot).data_at(&self.layout);
@@ -110,7 +111,8 @@ impl Store {
         self.in_use.is_some()
     }
 
-    /// Where the mission file lies, in the storage bank; to be copied from there, since the journal moves.
+    /// Place of the mission file, in the storage bank; the caller copies the file from there, since
+    /// the journal moves.
     pub fn mission(&self) -> Option<Range<u32>> {
         self.extent(File::Mission)
     }
@@ -140,7 +142,7 @@ impl Store {
         self.unsaved
     }
 
-    /// What was last kept of an area that is photographed.
+    /// Photographed waypoints of an area as last kept.
     pub(crate) fn photographed(&self) -> &[u8] {
         &self.photographed
     }
@@ -203,7 +205,7 @@ impl Store {
         (0..2).filter(|i| number(i).is_some_and(|n| n > self.forgotten)).max_by_key(number)
     }
 
-    /// The same, if it is this file.
+    /// The newest sealed area, if it holds this file.
     fn newest_of(&self, file: File) -> Option<(usize, Seal)> {
         let slot = self.newest()?;
         let seal = self.slots[slot].seal()?;

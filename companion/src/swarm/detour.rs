@@ -37,80 +37,85 @@ use crate::swarm::sweep::Sweep;
 use crate::swarm::view::{Reported, View};
 use crate::time::{Duration, Instant};
 
-/// Time from one look along the path to the next.
+/// Time between two checks whether the path is blocked.
 const LOOK_EVERY: Duration = Duration::from_millis(500);
-/// Stretches of the path that are looked at in one step, each against one thing; a step looks at the whole path at least once.
+/// Stretches of the path that are checked in one step, each against one keep-out zone; a step
+/// checks the whole path at least once.
 const STRETCHES: usize = 160;
-/// A thing to look at costs as much as so many stretches beside those.
+/// Cost of gathering one keep-out zone, as a number of those stretches.
 const THING_COST: usize = 12;
-/// All others have to stand for this long: longer than a gate that opened takes to be seen and obeyed.
+/// Time for which all other vehicles have to stand before a detour begins, seconds: longer than a
+/// gate that opened takes to be seen and obeyed.
 const QUIET_S: u64 = 3;
-/// A turn is claimed for this long before it is taken.
+/// Time for which a vehicle claims its turn before it takes the turn.
 const CLAIM: Duration = Duration::from_secs(1);
-/// Each blocked vehicle with a lower id is given this time to begin.
+/// Time that each blocked vehicle with a lower id has to begin its detour, seconds.
 const TURN_S: u64 = 2;
-/// After a way around was not found the next is sought so much later.
+/// Time from a search that found no detour to the next search, seconds.
 const RETRY_S: u64 = 10;
-/// Standing and waiting while all others stand for this long is a dead end: the vehicle that is waited for has found no way around.
+/// Wait while all others stand that is a dead end: the vehicle that is waited for found no detour.
 const DEAD_END: Duration = Duration::from_secs(30);
-/// After no place to land was found aside, the next is sought so much later.
+/// Time from a search that found no landing place aside to the next search, seconds.
 const ASIDE_AGAIN_S: u64 = 30;
-/// A vehicle that hears nobody seeks it once its landing has waited for so long.
+/// Wait of a landing after which a vehicle that hears no other one seeks a landing place aside.
 const DEAF_ASIDE: Duration = Duration::from_secs(60);
-/// So many ways around that are not found are enough, or one less in this time, seconds.
+/// Searches without a detour after which a vehicle gives up, or one fewer within [`GIVES_UP_S`].
 const DETOURS_TRIED: u8 = 4;
+/// Time after which one search fewer is enough, seconds.
 const GIVES_UP_S: u64 = 60;
-/// A way around on which there is no progress for this long is blocked too.
+/// Time without progress after which a detour is blocked too.
 const STUCK: Duration = Duration::from_secs(20);
-/// One that was blocked and has come so much further is blocked anew, metres.
+/// Progress after which a vehicle that was blocked is blocked again, not still, metres.
 const FURTHER_M: f32 = 2.0;
-/// What kept the vehicle from going on within this time still does; once it counts as blocked, within [`FREE`]: what sways
-/// at the edge of its way must not make it begin again and again.
+/// Time for which whatever kept the vehicle from going on still does; once the vehicle counts as
+/// blocked it is [`FREE`]: a neighbour that sways at the edge of the path must not make the block
+/// begin again and again.
 const LATELY: Duration = Duration::from_millis(500);
+/// Time without a hindrance after which a blocked vehicle is free.
 const FREE: Duration = Duration::from_secs(3);
-/// A pilot who keeps a vehicle for this long keeps it for good: others fly around it.
+/// Time under a pilot's control after which the pilot keeps the vehicle for good: others fly around it.
 const KEPT: Duration = Duration::from_secs(20);
-/// An abort whose end the autopilot does not report is over by then.
+/// Time after which an abort is over whose end the autopilot does not report.
 const SETTLED: Duration = Duration::from_secs(5);
-/// On its pad a vehicle that nobody hears for so long waits like one that waits for others.
+/// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for others.
 const UNHEARD: Duration = Duration::from_secs(10);
-/// A position older than this is vague.
+/// Age from which a neighbour's position is vague.
 const FRESH: Duration = Duration::from_secs(2);
-/// What a vehicle may stray from its path, metres: a path that comes nearer to what lies there by that much is blocked.
+/// Greatest stray from the path, metres: a path that much nearer to a keep-out zone is blocked.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
-/// What a way around is asked for.
+/// Purpose of a requested detour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Aim {
     /// To fly to the goal.
     Goal,
-    /// To be out from under a vehicle that lands.
+    /// To leave the column under a vehicle that lands.
     Aside,
-    /// To land where nobody lies.
+    /// To land where no vehicle lies.
     Landing,
     /// To fly home over a field.
     Home,
-    /// To fly on along its path over a field, beyond what blocks that.
+    /// To fly on along the own path over a field, beyond what blocks the path.
     Beyond,
 }
 
-/// What is known of the way ahead, and of ways around.
+/// Knowledge of the path ahead, and of detours.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Detours {
     obstacles: Obstacles,
     /// The path is blocked, or the plan was left.
     blocked: bool,
-    /// It was out once: the others do not count on it any more.
+    /// This vehicle was out of the plan once: the others do not count on it any more.
     left: bool,
     /// The path is one around.
     flying: bool,
-    /// That path, or the one asked for, leads aside only, out from under a vehicle that lands.
+    /// The detour, or the one requested, leads aside only, out of the column under a vehicle that lands.
     aside: bool,
-    /// And it lands at the end of that.
+    /// The vehicle lands at the end of that detour.
     lands: bool,
-    /// Its way home over a field.
+    /// The vehicle's way home over a field.
     pub(crate) home: Homeward,
-    /// Its way around something over a field, and back.
+    /// The vehicle's detour beside its path over a field, and back.
     pub(crate) beside: Beside,
     /// Progress on the plan when it was left for a way around, metres.
     left_at_m: f32,
@@ -128,7 +133,7 @@ pub(crate) struct Detours {
     fruitless: u8,
     /// When no way aside was found.
     no_way_aside_at: Option<Instant>,
-    /// Where and when it was before its position jumped.
+    /// Place and time of the vehicle before its position jumped.
     lost_at: Option<(Point, Instant)>,
     quiet_since: Option<Instant>,
     /// Since when it claims its turn.
@@ -136,14 +141,15 @@ pub(crate) struct Detours {
     /// When a look was last due, and when the one that goes on began.
     looked_at: Instant,
     look_began: Option<Instant>,
-    /// How far that is, and what the last one found.
+    /// Progress of the scan along the path, and the result of the last one.
     sweep: Sweep,
     in_the_way: bool,
-    /// Where along its path it was blocked, metres, and since when: it has come no further, though clear in between.
+    /// Place along the path where the vehicle was blocked, metres, and since when: the vehicle has
+    /// come no further, though its path was clear in between.
     blocked_here: Option<(f32, Instant)>,
 }
 
-/// What a look along the path found.
+/// Result of a check of the path.
 struct Looked {
     /// When one that found nothing began.
     clear_at: Option<Instant>,
@@ -183,7 +189,7 @@ impl Detours {
         self.blocked || self.home.seeks()
     }
 
-    /// For how long it has come no further because its path was blocked, now and again.
+    /// Time for which the vehicle has come no further because its path was blocked, now and again.
     pub(crate) fn blocked_for(&self, now: Instant) -> Duration {
         self.blocked_here.map_or(Duration::default(), |(_, since)| now - since)
     }
@@ -203,7 +209,7 @@ impl Detours {
         self.aside || self.beside.flies()
     }
 
-    /// Where it could come back to its path over a field, metres, beyond what blocks that.
+    /// Place where the vehicle could come back to its path over a field, metres, beyond what blocks the path.
     pub(crate) fn returns_m<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &View<'_, V, W, G>,
@@ -230,7 +236,7 @@ impl Detours {
             && self.beside.may_seek(view.now)
     }
 
-    /// Its own plan has come, or there is none: it is on its path again, or has to do without.
+    /// The vehicle's own plan has come, or will not: the vehicle is on its path again, or has to do without.
     pub(crate) fn come_back(&mut self, came: bool) {
         self.beside.answered(came);
         if came {
@@ -295,13 +301,13 @@ impl Detours {
             }
             // Blocked on its way down it stays there.
             State::Blocked => view.guidance.pauses() && rests,
-            // It goes on by itself only once its column is free.
+            // The vehicle goes on by itself only once its column is free.
             State::LandingHeld => view.telemetry.velocity.norm() < STANDING_MPS,
             _ => false,
         }
     }
 
-    /// What it reports of where it is.
+    /// The place that the vehicle reports.
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> Reported {
         let t = telemetry;
         let vague = self.lost_at.is_some() || t.position_age(now) > FRESH;
@@ -354,7 +360,7 @@ impl Detours {
         looked.and_then(|looked| looked.clear_at)
     }
 
-    /// What a look that has ended found.
+    /// Takes the result of a check of the path that has ended.
     fn go_on_looking<const V: usize, const W: usize, const G: usize>(
         &mut self,
         on_ground: bool,
@@ -367,7 +373,7 @@ impl Detours {
         Some(Looked { clear_at: (!in_the_way).then_some(began) })
     }
 
-    /// What follows from what is known: whether it is blocked, for how long all have stood, and whether it claims its turn.
+    /// Decides whether the vehicle is blocked, since when all have stood, and whether it claims its turn.
     fn weigh<const V: usize, const W: usize, const G: usize>(&mut self, view: &View<'_, V, W, G>) {
         let now = view.now;
         let stuck = self.flying
@@ -385,7 +391,7 @@ impl Detours {
             self.blocked_here = Some((along_m, now));
         }
         if !view.neighbours.all_stand(now) {
-            // Somebody moved: what blocked the path may have gone.
+            // Another vehicle moved: the block of the path may have gone.
             (self.quiet_since, self.failed, self.hopeless) = (None, 0, false);
         } else if self.quiet_since.is_none() {
             self.quiet_since = Some(now);

@@ -17,21 +17,23 @@ mod lots;
 
 pub use lots::{Lot, Lots};
 
-/// A vehicle photographs for so long after a majority last said that it hears it.
+/// Time for which a vehicle goes on photographing after a majority last reported that they hear it.
 pub const LEASE: Duration = Duration::from_secs(20);
-/// What was heard within this time counts for the lease.
+/// Greatest age of a report that renews the lease.
 pub const HEARD: Duration = Duration::from_secs(1);
-/// After this silence a vehicle's part is the others'.
+/// Silence after which a vehicle's share is divided among the others.
 pub const SILENT: Duration = Duration::from_secs(45);
-/// A vehicle promises to fly on for so long, seconds, to the last picture that it takes by then; and as long before its path
-/// ends it asks for a division where its route goes on.
+/// Time for which a vehicle commits itself to fly on, seconds, up to the last picture that it takes
+/// within it. A vehicle requests a division this long before its path ends if its route goes on
+/// there.
 pub const PROMISE_S: f32 = 10.0;
-/// Most divisions of a mission; after them what a vehicle leaves stays undone.
+/// Most divisions of a mission; after the last one the waypoints that a vehicle leaves stay
+/// unphotographed.
 pub const DIVISIONS: usize = 12;
 /// Incarnations that can be told apart: 3 bits.
 const INCARNATIONS: u8 = 8;
 
-/// What a fleet's times are measured by. A vehicle that has no lease lands after twice the lease.
+/// Time limits of a fleet. A vehicle that has no lease lands after twice the lease.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct Limits {
     /// As [`LEASE`].
@@ -45,13 +47,14 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// Those of a flight in which a vehicle that nobody hears any more is down after `down`.
+    /// Time limits of a flight in which a vehicle that no other vehicle hears any more is down
+    /// after `down`.
     pub const fn of_flight(down: Duration) -> Self {
         Self { lease: LEASE, heard: HEARD, silent: SILENT, down }
     }
 }
 
-/// What a vehicle says of itself.
+/// State that a vehicle reports of itself.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Own {
     /// Whether it takes part.
@@ -60,9 +63,9 @@ pub struct Own {
     pub waits: bool,
     /// Divisions that count for the path it flies: what follows is along that.
     pub division: usize,
-    /// How far along its path it has come, decimetres.
+    /// Progress of the vehicle along its path, decimetres.
     pub done_dm: u16,
-    /// Where it would hold if it were asked now; none while it cannot say.
+    /// Place where the vehicle would hold if it were requested now; none while it cannot say.
     pub promise_dm: Option<u16>,
     /// Whether it stands where it promised.
     pub holds: bool,
@@ -70,7 +73,7 @@ pub struct Own {
     pub asks: bool,
 }
 
-/// What it hears of another vehicle.
+/// State of another vehicle, as this one hears it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Hearing {
     /// When it was last heard itself.
@@ -90,7 +93,7 @@ struct Member {
     heard_at: Instant,
     /// Whether this vehicle heard it lately itself.
     heard_itself: bool,
-    /// Its hash of the division under way; 0 for none.
+    /// The vehicle's hash of the division under way; 0 for none.
     hash: u32,
 }
 
@@ -102,10 +105,10 @@ pub struct Fleet<const V: usize> {
     /// The divisions that count.
     divisions: Vec<Lots<V>, DIVISIONS>,
     counted: u32,
-    /// What the division under way follows from, once all of it is known.
+    /// Inputs of the division under way, once all of them are known.
     lots: Lots<V>,
     hash: u32,
-    /// The same as it was reported before that changed.
+    /// Inputs as they were reported before the last change.
     before: Lots<V>,
     hash_before: u32,
     lease_at: Instant,
@@ -148,12 +151,12 @@ impl<const V: usize> Fleet<V> {
         self.members[self.own].entry.incarnation = incarnation;
     }
 
-    /// One step: what is known of all vehicles, the lease, and the division under way.
+    /// One step: the knowledge of all vehicles, the lease, and the division under way.
     pub fn step(&mut self, now: Instant, own: &Own, hearing: impl Fn(usize) -> Hearing) {
-        // Its path may be that of the division before yet.
+        // The vehicle's path may be that of the division before yet.
         let caught_up = own.division == self.divisions.len();
         let entry = &mut self.members[self.own].entry;
-        // What it flies after it has left is not its part.
+        // The path that the vehicle flies after it has left is not its share.
         if caught_up && entry.standing == Standing::Alive {
             entry.done_dm = entry.done_dm.max(own.done_dm);
         }
@@ -179,7 +182,7 @@ impl<const V: usize> Fleet<V> {
         }
         let asks = own.asks && self.lives(self.own) && !self.divisions.is_full();
         if (self.is_dividing() || asks) && caught_up {
-            // Others see by a promise that it asks.
+            // The promise shows others that this vehicle requests a division.
             let entry = &mut self.members[self.own].entry;
             entry.promise_dm = entry.promise_dm.or(own.promise_dm);
             entry.holds |= own.holds && entry.promise_dm.is_some();
@@ -216,7 +219,8 @@ impl<const V: usize> Fleet<V> {
         2 * these > all().count() || (2 * these == all().count() && lowest)
     }
 
-    /// What the division follows from, once all that live have stated their promise, and whoever is lost has been silent here too.
+    /// The inputs of the division, once all vehicles that live have stated their promise, and every
+    /// lost vehicle has been silent here too.
     fn draw_lots(&mut self, now: Instant) {
         let known = |m: &Member| match m.entry.standing {
             Standing::Alive => m.entry.promise_dm.is_some(),
@@ -236,7 +240,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// What was reported last does not hold any more.
+    /// The last reported inputs do not hold any more.
     fn withdraw(&mut self) {
         if self.hash != 0 {
             (self.before, self.hash_before) = (self.lots.clone(), self.hash);
@@ -320,7 +324,8 @@ impl<const V: usize> Fleet<V> {
                 self.hear_of_itself(entry, waits);
             } else if rank < self.members.len() {
                 let behind = roster.divisions < self.divisions.len() as u8 && rank != sender;
-                // It may have finished its part of a division that the sender does not know; it says so itself.
+                // The vehicle may have finished its share of a division that the sender does not
+                // know; it reports that itself.
                 if !(behind && entry.standing == Standing::Left && self.members[rank].heard_itself) {
                     self.merge(rank, entry, same);
                 }
@@ -366,14 +371,14 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// What others know of this vehicle.
+    /// Takes what others know of this vehicle.
     fn hear_of_itself(&mut self, entry: &Entry, waits: bool) {
         let own = self.members[self.own].entry;
         let newer = entry.incarnation.wrapping_sub(own.incarnation) % INCARNATIONS;
         let outlived = newer < INCARNATIONS / 2 && (newer > 0 || entry.standing > own.standing);
         match (outlived, waits) {
             (false, _) => {}
-            // It was restarted: what they know is of its flight before.
+            // This vehicle was restarted: what others know is of its flight before.
             (true, true) => self.renew((entry.incarnation + 1) % INCARNATIONS),
             (true, false) => self.excluded = true,
         }
@@ -381,7 +386,8 @@ impl<const V: usize> Fleet<V> {
 
     /// The vehicles from rank `first` on, as they are to be reported.
     pub fn message(&self, first: usize) -> Roster {
-        // Who has left computes no more, so what it knows of the division under way gets old.
+        // A vehicle that has left computes no more, so its knowledge of the division under way gets
+        // old.
         let hash = if self.lives(self.own) { self.hash } else { 0 };
         let entry = |m: &Member| Entry { agrees: hash != 0 && m.hash == hash, ..m.entry };
         Roster {
@@ -394,8 +400,9 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// The same on a clock that says `then` where this one's says `now`. Of times that are past every limit only that is kept:
-    /// fleets that will act alike are equal then, so a search knows that it has been here before.
+    /// The same fleet on a clock that shows `then` where this one's shows `now`. A time past every
+    /// limit keeps only that: fleets that will act alike are equal then, so a search recognises a
+    /// state that it has visited.
     pub fn set_clock(&mut self, now: Instant, then: Instant) {
         let Limits { lease, silent, down, .. } = self.limits;
         let moved = |at: Instant, most: Duration| {
@@ -409,7 +416,7 @@ impl<const V: usize> Fleet<V> {
         }
     }
 
-    /// How many vehicles there are.
+    /// Number of vehicles.
     pub(crate) fn count_all(&self) -> usize {
         self.members.len()
     }
@@ -424,7 +431,7 @@ impl<const V: usize> Fleet<V> {
         if self.lives(self.own) { now - self.lease_at } else { Duration::default() }
     }
 
-    /// What the division to be computed follows from, or the last one that counts, in a few bits.
+    /// Hash of the inputs of the division to be computed, or of the last one that counts.
     pub fn fingerprint(&self) -> u32 {
         let mut digest = CRC32.digest();
         for lot in self.losses().flatten() {
@@ -434,12 +441,14 @@ impl<const V: usize> Fleet<V> {
         digest.finalize()
     }
 
-    /// Where it is to hold, decimetres along its path, while a division is under way.
+    /// Place where this vehicle is to hold, decimetres along its path, while a division is under
+    /// way.
     pub fn promise_dm(&self) -> Option<u16> {
         self.members[self.own].entry.promise_dm.filter(|_| self.is_dividing())
     }
 
-    /// Where this vehicle held for the last division that counts, decimetres along its path before.
+    /// Place where this vehicle held for the last division that counts, decimetres along its path
+    /// before.
     pub fn held_at_dm(&self) -> u16 {
         let lots = self.divisions.last().and_then(|lots| lots.get(self.own));
         lots.map_or(0, |lot| lot.along_dm)

@@ -46,21 +46,22 @@ pub struct Neighbours<const V: usize> {
     fastest_mps: f32,
     /// An unheard one makes this much at least, m/s.
     reckoned_mps: f32,
-    /// From here on the radio may not reach, metres.
+    /// Distance from which on the radio may not reach, metres.
     edge_m: f32,
-    /// Where the own vehicle is.
+    /// Place of the own vehicle.
     place: Point,
     /// With the vehicle of this rank the next relay begins.
     relay_next: u16,
     /// The own place in the roster.
     own_rank: u16,
-    /// What all agree on in a coverage mission.
+    /// The fleet: the state that all vehicles of a coverage mission agree on.
     fleet: Option<Fleet<V>>,
     /// The ground of an area that is not level.
     ground: Option<Ground>,
     /// After this silence a vehicle is down.
     down: Duration,
-    /// By so much two vehicles in the air may be nearer than they believe, metres: over an area, where it is kept.
+    /// Distance by which two vehicles in the air may be nearer than they believe, metres: over an
+    /// area, where it is kept.
     stray_m: f32,
     /// With the vehicle of this rank the next report of all begins.
     roster_next: usize,
@@ -174,7 +175,7 @@ impl<const V: usize> Neighbours<V> {
         Some(self.contacts.len() - 1)
     }
 
-    /// Where in the roster a vehicle is whose intents are of our mission.
+    /// Rank in the roster of a vehicle whose intents are of our mission.
     fn member(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.in_roster(id)?;
         self.contacts[at].belongs_at.is_some_and(|heard| now - heard < BELONGS).then_some(at)
@@ -276,7 +277,7 @@ impl<const V: usize> Neighbours<V> {
         let Some(at) = self.in_roster(intent.system_id).filter(|_| intent.mission_crc == mission_crc) else {
             return;
         };
-        // It is no stranger.
+        // The vehicle is no stranger.
         self.keep_strangers(|c| c.id != intent.system_id);
         let contact = &mut self.contacts[at];
         contact.shares_plan = plan_crc.is_some_and(|crc| crc == intent.plan_crc);
@@ -322,7 +323,7 @@ impl<const V: usize> Neighbours<V> {
             }
             let dead = contact.is_dead(self.clear_at);
             let state = Neighbour {
-                // Of one that was never heard itself only the progress is known.
+                // Of a vehicle that was never heard itself only the progress is known.
                 position: placed_at.map_or(NOWHERE, |_| contact.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
                 rank: contact.rank,
@@ -332,7 +333,7 @@ impl<const V: usize> Neighbours<V> {
                 detours: contact.tells(DETOURS),
                 ..contact.state
             };
-            // As many slots as contacts.
+            // Cannot overflow: there are as many slots as contacts.
             let _ = self.heard.push(state);
         }
         &self.heard
@@ -410,7 +411,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts[..self.roster].iter().all(|c| c.waits(now))
     }
 
-    /// The same, but some may have claimed the turn to fly around.
+    /// As [`Self::all_wait`], but some vehicles may have claimed the turn for a detour.
     pub fn all_stand(&self, now: Instant) -> bool {
         self.contacts[..self.roster].iter().all(|c| c.waits(now) || c.claims(now))
     }
@@ -420,7 +421,7 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().any(|c| c.id < id && c.claims(now))
     }
 
-    /// How many blocked vehicles have a lower system id than `id`.
+    /// Number of blocked vehicles that have a lower system id than `id`.
     pub fn blocked_before(&self, id: u8) -> u64 {
         self.contacts.iter().filter(|c| c.id < id && c.tells(BLOCKED)).count() as u64
     }
@@ -437,12 +438,12 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().find(|c| c.state.id == id).is_none_or(Contact::on_plan)
     }
 
-    /// What was flown around counts again.
+    /// Vehicles that a detour led around count again.
     pub(crate) fn forget_avoided(&mut self) {
         self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
     }
 
-    /// How many contacts there are.
+    /// Number of contacts.
     pub fn len(&self) -> usize {
         self.contacts.len()
     }
@@ -452,7 +453,8 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.is_empty()
     }
 
-    /// There is another plan: what was found, and the vehicles flown around, do not count any more.
+    /// The plan is another one: results of the scan, and the vehicles flown around, do not count
+    /// any more.
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
         for contact in &mut self.contacts {

@@ -7,11 +7,12 @@ use planner_core::frames::{self, Geodetic};
 
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 
-/// Obstacles that were not on the map.
+/// Most reported obstacles that were not on the map.
 pub(crate) const OBSTACLES: usize = 16;
-/// The greatest radius of one, metres: a wrong digit must not close a whole building.
+/// Greatest radius of a reported obstacle, metres: a wrong digit must not close a whole building.
 pub(crate) const OBSTACLE_MAX_M: f32 = 20.0;
-/// Two nearer than this are one that was sent twice, metres; a revocation this near means it.
+/// Two obstacles nearer than this are one that was sent twice, metres; a revocation this near an
+/// obstacle revokes it.
 const SAME_OBSTACLE_M: f32 = 0.1;
 
 /// Obstacles that were not on the map, and for how many of them a way around was planned.
@@ -19,12 +20,13 @@ const SAME_OBSTACLE_M: f32 = 0.1;
 pub(crate) struct Obstacles {
     known: Vec<KeepOff, OBSTACLES>,
     avoided: usize,
-    /// How many were known when a way around was last requested: those that came later it does not avoid.
+    /// Number of obstacles known when a detour was last requested: the detour does not avoid those
+    /// that came later.
     requested: usize,
 }
 
 impl Obstacles {
-    /// How many.
+    /// Number of obstacles.
     pub(crate) fn count(&self) -> usize {
         self.known.len()
     }
@@ -69,12 +71,12 @@ impl Obstacles {
         &self.known
     }
 
-    /// Those that no way around was planned for.
+    /// Obstacles that no detour was planned around.
     pub(crate) fn new_ones(&self) -> &[KeepOff] {
         &self.known[self.avoided..]
     }
 
-    /// None has been planned for.
+    /// No detour around any obstacle has been planned.
     pub(crate) fn forget_avoided(&mut self) {
         self.avoided = 0;
     }
@@ -84,7 +86,7 @@ impl Obstacles {
         self.requested = self.known.len();
     }
 
-    /// It has come.
+    /// The requested detour has come.
     pub(crate) fn avoid_requested(&mut self) {
         self.avoided = self.requested;
     }

@@ -6,7 +6,7 @@
 
 use planner_core::detour::KeepOff;
 
-/// How far the question has come.
+/// Progress of the scan.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sweep {
     /// The source that is asked now, of how many.
@@ -126,7 +126,7 @@ mod tests {
         assert_eq!(sweep.go_on(7, &mut 12, 1, tell, |_| false), None);
         assert_eq!(sweep.go_on(2, &mut 12, 1, tell, |_| false), Some(false));
         assert_eq!(sweep.go_on(2, &mut 2, 1, tell, |_| false), None);
-        // Its first things were asked about already.
+        // The first zones were checked already.
         let first = |k: &KeepOff| k.from.x == 1.0 && k.from.y == 0.0;
         assert_eq!(sweep.go_on(7, &mut 99, 1, tell, first), Some(true));
     }

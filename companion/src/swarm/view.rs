@@ -9,7 +9,7 @@ use crate::mission::course::Mission;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
 
-/// What decisions about ways around follow from.
+/// The view that decisions about detours follow from.
 pub(crate) struct View<'a, const V: usize, const W: usize, const G: usize> {
     pub(crate) now: Instant,
     pub(crate) config: &'a Config<V>,
@@ -20,7 +20,7 @@ pub(crate) struct View<'a, const V: usize, const W: usize, const G: usize> {
     pub(crate) scene: Scene<'a, W, G>,
 }
 
-/// What it reports to the others of where it is.
+/// The place that the vehicle reports to the others.
 pub(crate) struct Reported {
     pub(crate) position: Point,
     pub(crate) velocity: Point,

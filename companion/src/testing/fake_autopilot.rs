@@ -67,7 +67,7 @@ pub struct Bench {
     pub climbs_mps: f32,
     pub silent: bool,
     pub no_position: bool,
-    /// What ESTIMATOR_STATUS reports, metres; none: it is not sent.
+    /// Accuracy that ESTIMATOR_STATUS reports, metres; none: the message is not sent.
     pub accuracy_m: Option<f32>,
     /// ArduCopter: variance ratio of EKF_STATUS_REPORT.
     pub variance: f32,
@@ -76,14 +76,14 @@ pub struct Bench {
     pub never_arms: bool,
     /// No setpoint moves it.
     pub stuck: bool,
-    /// What is left cannot be divided.
+    /// The rest of the area cannot be divided.
     pub undividable: bool,
-    /// How far it moves in 50 ms, metres.
+    /// Distance that the vehicle moves in 50 ms, metres.
     pub step_m: f32,
     pub never_lands: bool,
     pub events: Vec<Event>,
     pub setpoints: Vec<(Instant, Point, u16)>,
-    /// Where it is to look at each of them, radians from east to the left; none: as it does.
+    /// Heading at each of the pictures, radians from east to the left; none: as the vehicle flies.
     pub headings: Vec<Option<f32>>,
     pub commands: Vec<(u16, f32, f32, f32)>,
     pub texts: Vec<std::string::String>,
@@ -103,14 +103,14 @@ pub struct Bench {
     pub answer_detour: Option<Result<(), crate::PlanFailure>>,
     /// Whether a division is planned.
     pub answer_division: bool,
-    /// Its plan before it asked for a way around.
+    /// The vehicle's plan before it requested a detour.
     own_plan: Option<Plan>,
     /// The first other vehicle of the roster, or 77, as it reports itself five times a second: place,
     /// flags of its intent, progress, CRC of its plan.
     pub neighbour: Option<(Point, u8, f32, u32)>,
     /// When it last knew where it is; none: always.
     pub neighbour_clock: Option<Instant>,
-    /// How far its gates are open, metres along its path.
+    /// Place along its path up to which the neighbour's gates are open, metres.
     pub neighbour_clear_m: f32,
     neighbour_sequence: u8,
 }
@@ -264,7 +264,7 @@ impl Bench {
         }
     }
 
-    /// What way around it asks for.
+    /// The detour that the vehicle requests.
     fn requested(&self) -> Option<(DetourRequest, Vec<KeepOff>)> {
         let mut obstacles = Vec::new();
         let request = self.companion.detour(|obstacle| obstacles.push(obstacle))?;

@@ -18,7 +18,7 @@ use rand_pcg::Pcg32;
 use crate::storage::mission_file::{self, Block, MissionHeader, MissionVehicle};
 use crate::storage::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
 
-/// As the H743's bank, but smaller, so that many cuts are tried in little time.
+/// Layout like the H743's bank, but smaller, so that many cuts are tried in little time.
 pub const LAYOUT: Layout =
     Layout { sector_len: 8 << 10, slot_len: 24 << 10, half_len: 8 << 10, stalls: false };
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 };
@@ -37,7 +37,7 @@ pub struct Flash {
 }
 
 impl Flash {
-    /// As it comes: anything may be in it, and some words cannot be read.
+    /// A flash as delivered: any bytes may be in it, and some words cannot be read.
     pub fn new(seed: u64) -> Self {
         let mut rng = Pcg32::new(seed, 7);
         let bytes = (0..LAYOUT.len()).map(|_| rng.next_u32() as u8).collect();

@@ -102,7 +102,7 @@ fn relax(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut Paths<'
 enum Nearest {
     /// A free column: the end of a path.
     Free(u16),
-    /// So many taken columns were queued.
+    /// Number of taken columns that were queued.
     Taken(usize),
 }
 

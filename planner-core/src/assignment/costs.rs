@@ -3,7 +3,7 @@
 /// Why an assignment was refused.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AssignmentError {
-    /// There are no rows or no columns.
+    /// The matrix has no rows or no columns.
     Empty,
     /// The costs are not `rows · cols` long.
     Shape,
@@ -11,14 +11,14 @@ pub enum AssignmentError {
     OutputLength,
     /// Rows or columns exceed the workspace.
     WorkspaceTooSmall,
-    /// This cost is NaN.
+    /// The cost at this place is NaN.
     NotANumber {
         /// Row of the cost.
         row: u16,
         /// Column of the cost.
         col: u16,
     },
-    /// This cost is minus infinity.
+    /// The cost at this place is minus infinity.
     MinusInfinity {
         /// Row of the cost.
         row: u16,
@@ -44,7 +44,7 @@ impl<'a> Costs<'a> {
         if rows.checked_mul(cols) != Some(data.len()) {
             return Err(AssignmentError::Shape);
         }
-        // One pass that vectorises; which cost it was is only asked when there is one.
+        // One pass that vectorises; the place of the bad cost is only sought when there is one.
         let sound =
             data.chunks(64).all(|chunk| chunk.iter().fold(true, |ok, &c| ok & (c > f32::NEG_INFINITY)));
         if !sound && let Some(at) = data.iter().position(|c| c.is_nan() || *c == f32::NEG_INFINITY) {

@@ -1,8 +1,9 @@
 //! The matching so far, and the memory of one search.
 
-/// "Not assigned", as an index.
+/// Index that means "not assigned".
 pub(super) const NONE: u16 = u16::MAX;
-/// Columns handled together; enough for the widest vectors, small enough to stay in registers.
+/// Columns handled together; enough for the widest vector registers, small enough to stay in
+/// registers.
 pub(super) const LANES: usize = 8;
 
 /// Dual prices and the matching so far, sides swapped so that there are never more rows than columns.

@@ -10,18 +10,18 @@ use super::Flat;
 
 /// Furthest coordinate, metres: at 100 km f32 steps by 8 mm.
 pub const MAX_VERTEX_M: f32 = 150_000.0;
-/// Vertices nearer than this are one, metres.
+/// Two vertices nearer than this are one vertex, metres.
 pub const SAME_M: f32 = 1e-3;
-/// Edges cross if each reaches so far beyond the other, metres: neighbouring fields share borders, and coordinates are
-/// rounded.
+/// Two edges cross if each reaches at least this far beyond the other, metres: neighbouring fields
+/// share borders, and coordinates are rounded.
 const CROSSING_M: f64 = 0.01;
 
-/// What a ring encloses.
+/// Kind of the region that a ring encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RingKind {
     /// Area to photograph.
     Outer,
-    /// Not photographed, flown over.
+    /// A region that is not photographed, and may be flown over.
     Hole,
     /// Neither photographed nor flown over, transit included.
     NoFly,
@@ -32,14 +32,14 @@ pub enum RingKind {
 pub struct Ring {
     /// Index after the last vertex.
     pub end: u16,
-    /// What it encloses.
+    /// Kind of the region that the ring encloses.
     pub kind: RingKind,
 }
 
 /// Why rings are no area. Numbers are indices of rings and of vertices, from 0.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AreaError {
-    /// There is no outer ring.
+    /// The area has no outer ring.
     NoOuter,
     /// The rings do not end in rising order with the vertices.
     Shape,
@@ -75,7 +75,7 @@ pub enum AreaError {
     },
     /// Edges of two outer rings or holes cross.
     RingsCross {
-        /// One of them.
+        /// The ring that is touched.
         ring: u16,
         /// The other one.
         other: u16,
@@ -90,7 +90,7 @@ pub enum AreaError {
         /// The inner one.
         ring: u16,
     },
-    /// There are more vertices than the memory holds.
+    /// The area has more vertices than the memory holds.
     AreaFull,
 }
 
@@ -102,7 +102,7 @@ pub struct Area<'a> {
 }
 
 impl<'a> Area<'a> {
-    /// No rings at all.
+    /// An area without rings.
     pub(super) const NOWHERE: Self = Self { vertices: &[], rings: &[] };
 
     /// Checks the rings.

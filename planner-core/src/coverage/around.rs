@@ -20,21 +20,22 @@ use crate::search::SearchError;
 
 /// Most places of the visibility graph.
 const PLACES: usize = 320;
-/// Corners around an end of what is kept off.
+/// Corners of the polygon around an end of a keep-out zone's axis.
 const CORNERS: usize = 8;
-/// The radius of those corners, as a share of the distance kept: what joins two neighbours keeps it still.
+/// Radius of those corners, as a share of the distance to keep: the line between two neighbouring
+/// corners still keeps that distance.
 const OUTWARD: f32 = 1.09;
-/// And this much more, metres: rounding.
+/// Rounding added to the radius of the corners, metres.
 const OUTWARD_M: f32 = 0.05;
-/// Nearer than this is the same place, metres.
+/// Two corners nearer than this are one place, metres.
 const SAME_CORNER_M: f32 = 0.01;
-/// More samples of one leg are not taken: they are further apart then.
+/// Most height samples of one leg: on a longer leg the samples are further apart.
 const MOST_SAMPLES: f32 = 65_536.0;
-/// A leg is so high above the field at least, but for one straight up or down, metres.
+/// Least height of a leg above the field, metres; a leg straight up or down is exempt.
 const OVER_FIELD_M: f32 = 1.5;
-/// A place aside is so many metres away at most, in steps of a metre.
+/// Rings around a vehicle on which a landing place aside is sought, a metre apart.
 const RINGS: usize = 20;
-/// Directions that are looked in for it.
+/// Directions on each ring in which a landing place aside is sought.
 const DIRECTIONS: usize = 16;
 
 /// Zones, ground and things that no leg meets.
@@ -118,7 +119,8 @@ pub fn plan<const N: usize, const W: usize>(
     Err(DetourError::Search(SearchError::NoPath))
 }
 
-/// As [`plan`], as the plan of one vehicle that leaves the others' plan: of it the path alone counts, it has no gates.
+/// As [`plan`], as the plan of one vehicle that leaves the others' plan: only the path of that plan
+/// counts; the plan has no gates.
 ///
 /// # Errors
 /// Why there is none.
@@ -171,7 +173,9 @@ impl Graph {
         to: &Point,
         points: &mut Vec<Point, W>,
     ) -> Result<bool, DetourError> {
+        /// Index of the path's start in the visibility graph.
         const HERE: usize = 0;
+        /// Index of the path's end in the visibility graph.
         const THERE: usize = 1;
         let height_m = from.z;
         self.gather(clear, from, to);

@@ -11,7 +11,7 @@ use super::CoverageError;
 use super::pack::Work;
 use crate::sort;
 
-/// Most vehicles that are distinguished.
+/// Most vehicles that the bound distinguishes.
 const MOST: usize = 32;
 
 /// The bound, seconds.

@@ -11,16 +11,16 @@
 use super::CoverageError;
 use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_costs};
 
-/// Most vehicles.
+/// Most vehicles of an exact division.
 pub const MOST_VEHICLES: usize = 10;
-/// T is found to this share of itself.
+/// Relative resolution to which the mission time T is found.
 pub const RESOLUTION: f32 = 1e-5;
 
 /// Memory lent: lengths by [`Workspace::lengths`].
 pub struct Workspace<'a> {
     /// Ways from every vehicle's place to every waypoint, and from there home.
     pub ways_m: &'a mut [f32],
-    /// How far each vehicle in each layer comes from each waypoint.
+    /// Distance that each vehicle in each layer reaches from each waypoint.
     pub reaches: &'a mut [u32],
     /// States of the dynamic program: most waypoints done, and the step that led there.
     pub states: &'a mut [(u32, u16)],
@@ -54,7 +54,7 @@ pub fn exact<const L: usize, const N: usize, const K: usize>(
     if ws.ways_m.len() < ways || ws.reaches.len() < reaches || ws.states.len() < states {
         return Err(CoverageError::WorkspaceTooSmall);
     }
-    // What BINPAT finds can be done; nothing can be done in no time.
+    // The division that BINPAT finds is possible; a division in no time is not.
     binpat(work, pack, out)?;
     let mut table = Table { work, ws, count, waypoints };
     table.measure();

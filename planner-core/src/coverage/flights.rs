@@ -18,9 +18,9 @@ use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
 
-/// Braking and accelerating that is planned with, m/s².
+/// Acceleration and braking that coverage flights are planned with, m/s².
 pub const ACCEL_MPS2: f32 = 1.5;
-/// Longest path, metres: vehicles tell each other their places in 16 bits, decimetres.
+/// Longest path, metres: vehicles report their progress to each other in 16 bits, in decimetres.
 pub const FURTHEST_M: f32 = 6_553.0;
 
 /// A vehicle of the mission, beside what it is packed by.
@@ -43,15 +43,15 @@ pub struct Pad {
 /// How pictures are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Manner {
-    /// From one picture to the next, metres: at most.
+    /// Greatest distance from one picture to the next, metres.
     pub waypoint_m: f32,
-    /// Where vehicles look.
+    /// Heading of the vehicles.
     pub look: Look,
-    /// What takes the pictures.
+    /// Trigger of the pictures.
     pub trigger: Trigger,
 }
 
-/// What flights follow from, beside the routes.
+/// Inputs of flights beside the routes.
 #[derive(Clone, Copy, Debug)]
 pub struct Swarm<'a> {
     /// The vehicles, in the order of [`Work::vehicles`].
@@ -68,7 +68,8 @@ pub struct Swarm<'a> {
     pub done: &'a [Range],
     /// Layers that are not free, a bit each.
     pub layers_held: u64,
-    /// What lanes, and ways between them, follow where the ground is not level: all below the lowest layer.
+    /// Surface that lanes, and paths between them, follow where the ground is not level: all below
+    /// the lowest layer.
     pub following: Option<Following<'a>>,
 }
 
@@ -95,7 +96,7 @@ pub fn plan<const L: usize, const N: usize, const K: usize, const V: usize, cons
         let flight = match routes.routes.iter().find(|route| usize::from(route.vehicle) == index) {
             Some(route) => flight(work, route, swarm, pad),
             None if pad.aloft => {
-                // There are more layers than vehicles.
+                // Cannot fail: there are more layers than vehicles.
                 homeward(work, layers.next().unwrap_or(u8::MAX), &work.vehicles[index], swarm, pad)
             }
             None => grounded(pad),
@@ -224,7 +225,7 @@ struct Draft<'a, const N: usize, const W: usize> {
     transit: &'a Transit<'a, N>,
     clearance_m: f32,
     following: Option<Following<'a>>,
-    /// Where it has come to.
+    /// Place that the flight has reached.
     here: Point,
 }
 
@@ -275,7 +276,7 @@ impl<'a, const N: usize, const W: usize> Draft<'a, N, W> {
         self.path.last().ok_or(PathError::NotFinite)
     }
 
-    /// The same around no-fly zones.
+    /// As `low`, around no-fly zones.
     fn low_around(&mut self, to: &Flat, mission_m: f32) -> Result<usize, PathError> {
         self.way(to).try_for_each(|corner| self.low(&corner, mission_m).map(|_| ()))?;
         self.path.last().ok_or(PathError::NotFinite)
@@ -398,10 +399,10 @@ fn homeward<const L: usize, const N: usize, const W: usize>(
 
 /// A vehicle's way home.
 struct WayHome<'a> {
-    /// Its layer.
+    /// Layer of the flight.
     layer_m: f32,
     vehicle: &'a Vehicle,
-    /// What it has photographed by then.
+    /// Pictures taken by then.
     photographs: Photographs,
 }
 

@@ -9,14 +9,14 @@ use super::CoverageError;
 /// A camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Camera {
-    /// By its field of view.
+    /// A camera stated by its field of view.
     Diagonal {
         /// Across the picture's diagonal, degrees, below 180.
         fov_deg: f32,
         /// Long side by short side.
         aspect: f32,
     },
-    /// By its sensor.
+    /// A camera stated by its sensor.
     Sensor {
         /// Sides of the sensor, millimetres.
         sides_mm: [f32; 2],
@@ -36,7 +36,7 @@ pub struct Footprint {
     pub across_m: f32,
 }
 
-/// How far apart lanes and waypoints lie.
+/// Spacing of lanes and waypoints.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Spacing {
     /// The rectangle that one picture shows.

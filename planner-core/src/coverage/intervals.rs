@@ -28,7 +28,7 @@ impl<const N: usize> Intervals<N> {
 
     /// Adds an interval to the set.
     pub(super) fn add(&mut self, [from, to]: Span) -> Result<(), CoverageError> {
-        // Those it touches are one with it: they follow each other.
+        // Spans that the new one touches become one span with it: they follow each other.
         let first = self.spans.partition_point(|span| span[1] < from);
         let after = self.spans.partition_point(|span| span[0] <= to);
         if first < after {

@@ -7,10 +7,10 @@ use super::footprint::Spacing;
 use super::transit::Transit;
 use super::{CoverageError, Flat};
 
-/// Most waypoints: an f32 counts them.
+/// Most waypoints of an area: an f32 counts them exactly.
 const WAYPOINTS: f32 = (1 << 24) as f32;
 
-/// What lanes follow from, besides the area.
+/// Inputs of lanes, besides the area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pattern {
     /// Footprint and spacings.
@@ -26,9 +26,9 @@ pub struct Pattern {
 /// One lane. Waypoint `k` lies `k / (count − 1)` of the way from `from` to `to`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lane {
-    /// Where it begins.
+    /// Begin of the lane.
     pub from: Flat,
-    /// Where it ends.
+    /// End of the lane.
     pub to: Flat,
     /// Number of its first waypoint, counted along the whole path.
     pub first: u32,
@@ -41,7 +41,7 @@ pub struct Lane {
 }
 
 impl Lane {
-    /// From end to end, metres.
+    /// Length of the lane, metres.
     pub fn length_m(&self) -> f32 {
         (self.to - self.from).norm()
     }
@@ -55,7 +55,7 @@ impl Lane {
         if self.count < 2 { 0.0 } else { k.min(self.count - 1) as f32 / (self.count - 1) as f32 }
     }
 
-    /// The same lane flown the other way.
+    /// Turns the lane round.
     pub(super) fn turn(&mut self) {
         core::mem::swap(&mut self.from, &mut self.to);
     }
@@ -84,7 +84,7 @@ impl<const L: usize> Tracks<L> {
         &self.lanes
     }
 
-    /// How many waypoints there are.
+    /// Number of waypoints.
     pub fn waypoint_count(&self) -> u32 {
         self.lanes.last().map_or(0, |lane| lane.first + lane.count)
     }
@@ -99,7 +99,7 @@ impl<const L: usize> Tracks<L> {
         self.lanes.partition_point(|lane| lane.first <= waypoint).saturating_sub(1)
     }
 
-    /// Where a waypoint is.
+    /// Place of a waypoint.
     pub fn waypoint(&self, number: u32) -> Option<Flat> {
         let lane = self.lanes.get(self.lane_of(number))?;
         let k = number.checked_sub(lane.first).filter(|k| *k < lane.count)?;

@@ -16,16 +16,18 @@ use crate::flight::{Done, Range, Task};
 use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::ScheduleWorkspace;
 
-/// Most stretches of waypoints that are done, apart from each other.
+/// Most separate ranges of waypoints that are done.
 const RANGES: usize = 128;
 
-/// What all vehicles agree on about one of them before the area is divided again.
+/// State of one vehicle that all agree on before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Fate {
     /// Whether it flies on.
     pub lives: bool,
-    /// How far along its path the pictures are its own, taken or promised, metres. One that lives holds there; at 0 it still
-    /// stands on its pad. Of one that does not live the last of them is taken again: it may be missing. Infinite: it took all.
+    /// Place along its path up to which the pictures are the vehicle's own, taken or promised,
+    /// metres. A vehicle that lives holds there; at 0 it still stands on its pad. Of a vehicle that
+    /// does not live the last picture is taken again: it may be missing. Infinite: the vehicle took
+    /// all pictures.
     pub along_m: f32,
 }
 
@@ -97,11 +99,11 @@ impl<const L: usize, const K: usize> Default for Workspace<L, K> {
 /// A loss: the plan before it, and what all agree on.
 #[derive(Clone, Copy)]
 pub struct Loss<'a, const L: usize, const N: usize> {
-    /// What was divided before: the lanes of the whole area, all vehicles.
+    /// The division before: the lanes of the whole area, all vehicles.
     pub work: &'a Work<'a, L, N>,
-    /// What flights follow from.
+    /// Inputs of the flights.
     pub swarm: &'a Swarm<'a>,
-    /// One of each vehicle.
+    /// State of each vehicle.
     pub fates: &'a [Fate],
 }
 
@@ -190,7 +192,7 @@ fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
     Ok(())
 }
 
-/// Where each vehicle goes on from.
+/// Place from which each vehicle goes on.
 fn place<const L: usize, const N: usize, const K: usize, const V: usize, const W: usize>(
     loss: &Loss<'_, L, N>,
     ws: &mut Workspace<L, K>,

@@ -10,7 +10,7 @@ use super::Flat;
 use super::lanes::Lane;
 use super::transit::Transit;
 
-/// Gains below it are rounding, metres.
+/// Least shortening of the tour that counts, metres: a smaller gain is rounding.
 const GAIN_M: f32 = 1e-3;
 /// Most lanes that Or-opt moves together.
 const MOVED: usize = 3;
@@ -39,7 +39,7 @@ fn first_turned(lanes: &[Lane]) -> bool {
     gain_m > GAIN_M
 }
 
-/// From the first lane on, always the nearest end.
+/// Order that begins with the first lane and always goes to the nearest end.
 fn nearest_first<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>) {
     for done in 1..lanes.len() {
         let here = lanes[done - 1].to;

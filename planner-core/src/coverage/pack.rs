@@ -21,9 +21,9 @@ use crate::assignment::{AssignmentWorkspace, assign};
 /// One vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Vehicle {
-    /// Where its transit to the first waypoint begins.
+    /// Begin of the vehicle's transit to the first waypoint.
     pub place: Flat,
-    /// Where its transit home ends.
+    /// End of the vehicle's transit home.
     pub home: Flat,
     /// Speed over ground, metres a second.
     pub cruise_mps: f32,
@@ -40,11 +40,11 @@ pub struct Vehicle {
 pub struct Heights {
     /// h_m: the height at which pictures are taken, above the ground from which vehicles take off, metres.
     pub mission_m: f32,
-    /// From one transit layer to the next, metres.
+    /// Height from one transit layer to the next, metres.
     pub layer_m: f32,
 }
 
-/// What a track is: the smallest part of the path that goes to one vehicle as a whole.
+/// Definition of a track: the smallest part of the path that goes to one vehicle as a whole.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Unit {
     /// A lane: the simple back-and-forth pattern, SIMPLE-BINPAT.
@@ -56,13 +56,13 @@ pub enum Unit {
 /// Which way a route is flown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heading {
-    /// By rising number of the waypoints.
+    /// In rising order of the waypoints' numbers.
     Forward,
-    /// By falling number.
+    /// In falling order of the waypoints' numbers.
     Backward,
 }
 
-/// What one vehicle flies: waypoints `first` up to before `end`, without a break.
+/// Route of one vehicle: waypoints `first` up to before `end`, without a break.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Route {
     /// Index of the vehicle.
@@ -77,7 +77,7 @@ pub struct Route {
     pub layer: u8,
     /// Way over ground: to the first waypoint, along the route, home; metres.
     pub ground_m: f32,
-    /// The same with climb and descent, metres.
+    /// Length with climb and descent, metres.
     pub cost_m: f32,
     /// C_k, seconds: way over ground at cruise speed, and H_d.
     pub cost_s: f32,
@@ -158,7 +158,7 @@ impl<const K: usize> Default for PackWorkspace<K> {
     }
 }
 
-/// What is divided: the path, the ways around what is in between, the vehicles.
+/// Work to divide: the path, the transits around no-fly zones, the vehicles.
 #[derive(Clone, Copy)]
 pub struct Work<'a, const L: usize, const N: usize> {
     /// The lanes.
@@ -169,7 +169,7 @@ pub struct Work<'a, const L: usize, const N: usize> {
     pub vehicles: &'a [Vehicle],
     /// Heights.
     pub heights: Heights,
-    /// What a track is.
+    /// Definition of a track.
     pub unit: Unit,
 }
 
@@ -226,7 +226,7 @@ impl<const L: usize, const N: usize> Work<'_, L, N> {
         let inside = self.tracks.along_m(end - 1) - self.tracks.along_m(first);
         let forward = self.transit_m(vehicle, first, end - 1);
         let backward = if vehicle.place == vehicle.home {
-            // The same ways the other way round.
+            // The same transits the other way round.
             forward
         } else {
             self.transit_m(vehicle, end - 1, first)
@@ -280,7 +280,7 @@ pub fn by_shares<const L: usize, const N: usize, const K: usize>(
 pub(super) enum Bins {
     /// Any.
     Anyone,
-    /// Those with the weight that the bin was filled by.
+    /// Bins that were filled by equal weights.
     SameWeight,
 }
 

@@ -14,9 +14,9 @@ use super::lanes::Tracks;
 use super::strips::{Strips, Workspace};
 use super::transit::CLEARANCE_M;
 
-/// How often a strip is halved.
+/// Number of times that a strip is halved.
 const HALVINGS: u32 = 3;
-/// Parts in the end.
+/// Parts into which a strip is cut.
 const EIGHTHS: u32 = 1 << HALVINGS;
 
 /// Lays the lanes that are missing.
@@ -123,7 +123,7 @@ fn need_left<const L: usize, const V: usize>(
             ws.need.remove([fminf(from, to) - along, fmaxf(from, to) + along])?;
         }
     }
-    // What rounding left over.
+    // Intervals that rounding left over are dropped.
     ws.need.drop_shorter(strips.wide / 100.0);
     Ok(())
 }

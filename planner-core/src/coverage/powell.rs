@@ -18,20 +18,20 @@ pub struct Config {
 }
 
 impl Config {
-    /// What the plans of `host-sim` take.
+    /// Configuration of the plans that `host-sim` makes.
     pub const USUAL: Self = Self { evaluations: 4000 };
 }
 
-/// Points of a line search along the whole line.
+/// Points that a line search tries along the whole line.
 const ALONG: u32 = 8;
-/// Halvings of the step around the best of them.
+/// Halvings of the step around the best of those points.
 const HALVINGS: u32 = 7;
-/// A round that gains less than this share of the cost was the last.
+/// The search ends with a round that gains less than this share of the cost.
 const GAIN: f32 = 1e-4;
 
 /// The shares, and the directions along which they are searched.
 pub struct Workspace<const K: usize> {
-    /// Of the packings.
+    /// Workspace of the packings.
     pub pack: PackWorkspace<K>,
     best: [f32; K],
     here: [f32; K],
@@ -188,7 +188,8 @@ impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
     }
 }
 
-/// How far the line may be followed back and forth inside the box; none for a line of no length.
+/// Range in which the line may be followed back and forth inside the box; none for a line of no
+/// length.
 fn range(from: &[f32], line: &[f32]) -> Option<(f32, f32)> {
     let (mut low, mut high) = (f32::NEG_INFINITY, f32::INFINITY);
     for (from, step) in from.iter().zip(line).filter(|(_, step)| **step != 0.0) {

@@ -92,7 +92,7 @@ impl<'a> Strips<'a> {
         self.base + self.direction.along * u + self.direction.across * v
     }
 
-    /// Where the line `v` crosses these edges, in rising order.
+    /// Places where the line `v` crosses these edges, in rising order.
     fn crossings<const V: usize>(
         &self,
         edges: impl Iterator<Item = (Flat, Flat)>,
@@ -141,7 +141,7 @@ impl<'a> Strips<'a> {
         ws: &mut Workspace<V>,
     ) -> Result<(), CoverageError> {
         ws.need.clear();
-        // What only touches the border of a strip is its neighbour's.
+        // An area that only touches the border of a strip is its neighbour's.
         let inset = self.wide * 1e-4;
         let span = [span[0] + inset, span[1] - inset];
         self.shadow(self.area.edges(), span, 0.0, &mut ws.crossings, &mut ws.need)
@@ -179,7 +179,7 @@ impl<'a> Strips<'a> {
         Ok(())
     }
 
-    /// From where to where an edge runs between two `v`, if it does.
+    /// Range of an edge between two `v`; none where it does not reach them.
     fn between(&self, (a, b): (Flat, Flat), [low, high]: Span) -> Option<Span> {
         let (mut a, mut b) = (self.rotated(&a), self.rotated(&b));
         if a.1 > b.1 {
@@ -264,8 +264,8 @@ impl<'a> Strips<'a> {
         out.lanes.push(lane).map_err(|_| CoverageError::LanesFull)
     }
 
-    /// From where to where a lane runs for an area that reaches over `need` in its strip and over `line` along it: from
-    /// border to border, further where the first or last picture would else leave something out.
+    /// Range of a lane for an area that reaches over `need` in its strip and over `line` along it:
+    /// from border to border, further where the first or last picture would else leave a part out.
     fn extent(&self, need: Span, line: Span) -> Span {
         let reach = self.reach();
         let (from, to) = (fminf(line[0], need[0] + reach), fmaxf(line[1], need[1] - reach));
@@ -274,7 +274,8 @@ impl<'a> Strips<'a> {
         [from - self.pattern.margin_m, to + self.pattern.margin_m]
     }
 
-    /// How far beyond its middle a picture shows the lane: a little less than half its side.
+    /// Distance beyond its middle to which a picture shows the lane: a little less than half its
+    /// side.
     pub(super) fn reach(&self) -> f32 {
         let half = self.pattern.spacing.footprint.along_m / 2.0;
         half - fminf(self.wide / 10.0, half / 2.0)

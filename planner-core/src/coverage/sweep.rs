@@ -14,7 +14,7 @@ use crate::sort;
 pub struct Direction {
     /// Along the lanes.
     pub along: Flat,
-    /// From lane to lane.
+    /// Vector from lane to lane.
     pub across: Flat,
 }
 
@@ -77,7 +77,8 @@ fn convex_hull<const V: usize>(area: &Area<'_>, hull: &mut Vec<Flat, V>) -> Resu
     let mut side = 0;
     for step in 0..2 * count {
         let place = sorted[if step < count { step } else { 2 * count - 1 - step }];
-        // What lies above the line between both ends is no corner of the lower side, and the other way round.
+        // A vertex above the line between both ends is no corner of the lower side, and the other
+        // way round.
         let above = (sorted[count - 1] - sorted[0]).perp(&(place - sorted[0]));
         if (step < count && above > 0.0) || (step > count && step + 1 < 2 * count && above <= 0.0) {
             continue;

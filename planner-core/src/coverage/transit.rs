@@ -10,11 +10,12 @@ use libm::fminf;
 use super::area::{Area, RingKind, signed_area};
 use super::{CoverageError, Flat};
 
-/// Ways and lanes keep this from no-fly zones, metres: more than rounding, less than anybody's margin. A margin for the
-/// vehicle belongs into the zone.
+/// Distance that paths and lanes keep from no-fly zones, metres: more than rounding, less than any
+/// vehicle's margin. A margin for the vehicle belongs into the zone.
 pub const CLEARANCE_M: f32 = 0.25;
 
-/// What shortest ways are asked of: corners and the ways between them, of at most `N` corners: 4 · N² bytes.
+/// The visibility graph of shortest transits: corners and the lines between them, of at most `N`
+/// corners: 4 · N² bytes.
 pub struct Transit<'a, const N: usize> {
     area: Area<'a>,
     corners: Vec<Flat, N>,
@@ -23,7 +24,7 @@ pub struct Transit<'a, const N: usize> {
 
 /// The memory of a [`Transit`], before it knows an area.
 impl<const N: usize> Transit<'_, N> {
-    /// For an area that is not known yet.
+    /// A graph for an area that is not known yet.
     pub const fn empty() -> Self {
         Self { area: Area::NOWHERE, corners: Vec::new(), between_m: [[0.0; N]; N] }
     }
@@ -84,7 +85,7 @@ impl<'a, const N: usize> Transit<'a, N> {
         }
     }
 
-    /// Where ways turn: the zones' outward corners.
+    /// Places where transits turn: the zones' outward corners.
     pub fn corners(&self) -> &[Flat] {
         &self.corners
     }

@@ -11,10 +11,10 @@ use super::FieldView;
 use crate::Point;
 use crate::coverage::Flat;
 
-/// More samples of one leg are not taken: they are further apart then.
+/// Most height samples of one leg: on a longer leg the samples are further apart.
 const MOST_SAMPLES: f32 = 65_536.0;
 
-/// What a path keeps from the field.
+/// Height that a path keeps from the field.
 #[derive(Clone, Copy, Debug)]
 pub struct Following<'a> {
     /// The field.
@@ -38,7 +38,7 @@ impl Following<'_> {
         self.field.highest_m() + self.height_m + self.tolerance_m
     }
 
-    /// Where a path begins that goes to `to` with the fewest corners, and of those the lowest.
+    /// Begin of a path to `to` with the fewest corners, and of those the lowest.
     pub fn begin(&self, from: &Flat, to: &Flat) -> Point {
         let low_m = self.lowest_m(from);
         let mut best = (usize::MAX, low_m);

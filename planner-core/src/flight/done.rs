@@ -18,7 +18,7 @@ pub struct Done<const N: usize> {
 }
 
 impl<const N: usize> Done<N> {
-    /// None yet.
+    /// A set without waypoints.
     pub const fn new() -> Self {
         Self { ranges: Vec::new() }
     }
@@ -28,7 +28,7 @@ impl<const N: usize> Done<N> {
         &self.ranges
     }
 
-    /// How many waypoints there are.
+    /// Number of waypoints.
     pub fn count(&self) -> u32 {
         self.ranges.iter().map(|range| range.end - range.first).fold(0, u32::saturating_add)
     }
@@ -52,7 +52,7 @@ impl<const N: usize> Done<N> {
     }
 }
 
-/// Whatever the capacity, so that there is one of it.
+/// Independent of the capacity, so that the program has one copy of this function.
 fn insert(ranges: &mut VecView<Range>, range: Range) -> Result<bool, Range> {
     if range.first >= range.end {
         return Ok(false);
@@ -66,7 +66,8 @@ fn insert(ranges: &mut VecView<Range>, range: Range) -> Result<bool, Range> {
         }
         whole = Range { first: whole.first.min(held.first), end: whole.end.max(held.end) };
     }
-    // From there on the later ones move: one on, or back to behind the one that holds all that were touched.
+    // The later ranges move from there: one on, or back to behind the one that holds all touched
+    // ranges.
     if touched == 0 {
         ranges.push(whole)?;
         ranges[from..].rotate_right(1);

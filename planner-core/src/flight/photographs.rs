@@ -2,26 +2,26 @@
 
 use super::{Path, PathError, Range, Waypoint};
 
-/// Nearer than this along a path is the same place, metres.
+/// Two points nearer than this along a path are the same place, metres.
 const SAME_PLACE_M: f32 = 1e-2;
 
-/// Where a vehicle looks while it photographs.
+/// Heading of a vehicle while it photographs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Look {
-    /// One way on the whole flight: radians from east to the left.
+    /// One heading on the whole flight: radians from east to the left.
     Fixed(f32),
     /// The way it flies.
     Ahead,
 }
 
-/// What takes the pictures.
+/// Trigger of the pictures.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Trigger {
     /// The autopilot by distance, switched at both ends of a lane.
     Distance,
     /// A command for each picture.
     Waypoint,
-    /// Something else.
+    /// Another trigger, which the vehicle does not command.
     None,
 }
 
@@ -29,13 +29,14 @@ pub enum Trigger {
 /// over ground. Both ends are the same where one picture is enough.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shots<'p> {
-    /// Where the first is taken.
+    /// Place of the first picture.
     pub from_m: f32,
-    /// Where the last is.
+    /// Place of the last picture.
     pub to_m: f32,
-    /// From one to the next over ground; the whole stretch is a multiple of it. 0 for a single picture.
+    /// Distance over ground from one picture to the next; the whole stretch is a multiple of it. 0
+    /// for a single picture.
     pub step_m: f32,
-    /// How many there are, at least one.
+    /// Number of pictures, at least one.
     pub count: u32,
     /// The corners of the path from the one end to the other.
     corners: &'p [Waypoint],
@@ -73,14 +74,14 @@ impl<'p> Shots<'p> {
         if along_m < self.from_m || along_m.is_nan() {
             0
         } else if self.step_m > 0.0 && along_m < self.to_m {
-            // What is too large for a count is the largest.
+            // A number that is too large for a count becomes the largest.
             ((self.ground_m(along_m) / self.step_m) as u32).saturating_add(1).min(self.count)
         } else {
             self.count
         }
     }
 
-    /// From its begin over ground to where the path is so long, metres.
+    /// Distance over ground from the stretch's begin to `along_m`, metres.
     fn ground_m(&self, along_m: f32) -> f32 {
         let mut ground_m = 0.0;
         for piece in pieces(self.corners) {
@@ -93,7 +94,7 @@ impl<'p> Shots<'p> {
         ground_m
     }
 
-    /// Where picture `k` is taken, metres along the path; the last of all where there are fewer.
+    /// Place of picture `k`, metres along the path; the last of all where there are fewer.
     pub fn place_m(&self, k: u32) -> f32 {
         let mut left_m = self.step_m * k as f32;
         for piece in pieces(self.corners) {
@@ -113,33 +114,33 @@ pub struct Photographs {
     begins: u64,
     /// Bit `i`: it ends at waypoint `i`.
     ends: u64,
-    /// Of each stretch in its order, the lowest number that one of its waypoints has in the area.
+    /// For each stretch in its order the lowest number that one of its waypoints has in the area.
     numbers: [u16; Self::STRETCHES],
-    /// Of each stretch, how many pictures it has.
+    /// For each stretch the number of its pictures.
     counts: [u16; Self::STRETCHES],
     /// Whether numbers fall along the path.
     backward: bool,
     /// Waypoints of the whole area.
     area: u32,
-    /// From one picture to the next, metres: at most.
+    /// Greatest distance from one picture to the next, metres.
     pub spacing_m: f32,
-    /// Where the vehicle looks.
+    /// Heading of the vehicle.
     pub look: Look,
-    /// What takes the pictures.
+    /// Trigger of the pictures.
     pub trigger: Trigger,
     /// Whether the route has more lanes than the path: a stretch of it, after which all divide what is left.
     pub goes_on: bool,
 }
 
 impl Photographs {
-    /// Most waypoints of a path that is photographed along.
+    /// Most waypoints of a path along which a vehicle photographs.
     pub const WAYPOINTS: usize = 64;
-    /// Most stretches of a path.
+    /// Most photographed stretches of a path.
     pub const STRETCHES: usize = 32;
     /// Most waypoints of an area.
     pub const NUMBERS: u32 = u16::MAX as u32 + 1;
 
-    /// None yet; pictures are to be `spacing_m` apart at most.
+    /// A flight without pictures yet; they are to be `spacing_m` apart at most.
     pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
         let (numbers, counts) = ([0; Self::STRETCHES], [0; Self::STRETCHES]);
         Self {
@@ -156,7 +157,7 @@ impl Photographs {
         }
     }
 
-    /// The same of an area with so many waypoints, along its path or back.
+    /// The pictures of an area with so many waypoints, along its path or back.
     pub const fn of_area(self, area: u32, backward: bool) -> Self {
         Self { area, backward, ..self }
     }
@@ -205,18 +206,20 @@ impl Photographs {
         self.stretches(path).map(|shots| shots.taken_by(reached_m)).fold(0, u32::saturating_add)
     }
 
-    /// The same, but for one that it has not come a spacing further than yet: that one may be missing.
+    /// The pictures passed by `along_m`, but for one that the vehicle has not come a spacing
+    /// further than yet: that one may be missing.
     pub fn passed_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> u32 {
         self.taken_by(path, along_m - self.spacing_m)
     }
 
-    /// Where the last picture of all is taken; none where there is none.
+    /// Place of the last picture of all; none where there is none.
     pub fn end_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
         let last = Self::WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
         path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
-    /// Where the last picture is taken no further than `along_m` metres along the path; none before the first.
+    /// Place of the last picture no further than `along_m` metres along the path; none before the
+    /// first.
     pub fn last_by<const W: usize>(&self, path: &Path<W>, along_m: f32) -> Option<f32> {
         let last = |shots: Shots<'_>| shots.taken_by(along_m).checked_sub(1).map(|k| shots.place_m(k));
         self.stretches(path).filter_map(last).last()

@@ -18,11 +18,13 @@ use crate::flight::Flight;
 use crate::schedule::{self, ScheduleError};
 use crate::sort;
 
-/// Comparisons of a take-off time with a scheduled flight: a third of a second on a board.
+/// Most comparisons of a take-off time with a scheduled flight, over a whole search: a third of a
+/// second on a board.
 const LOOKS: u32 = 150_000;
-/// The same for each pair of more vehicles than boards have room for.
+/// Comparisons for each pair of vehicles in a swarm larger than [`BOARD_VEHICLES`].
 const LOOKS_A_PAIR: u32 = 200;
-/// Share of the mean landing time beside the last one: of two orders that end together the one with less waiting counts.
+/// Weight of the mean landing time beside the last landing time: of two orders that end together
+/// the one with less waiting wins.
 const MEAN_SHARE: f32 = 0.02;
 
 /// The differences of take-off times, of flight `i` after flight `j`, that are forbidden.
@@ -131,7 +133,7 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
     Ok(())
 }
 
-/// Swarms of no more vehicles are planned on boards.
+/// Largest swarm that is planned on a board.
 const BOARD_VEHICLES: usize = 32;
 
 /// Each vehicle in turn takes off as early as those before it allow; one that stays on its pad comes before all.

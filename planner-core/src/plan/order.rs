@@ -97,33 +97,34 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
     failed
 }
 
-/// Rounds in which a vehicle that cannot be fitted in goes first, before others are held back for it instead. No more than vehicles:
-/// in a crowd, where many swap places, nearly everybody has to leave its place before somebody else comes.
+/// Most rounds in which a vehicle that finds no free times is moved to the front, before other
+/// vehicles are held back for it instead. The number of vehicles bounds it as well: in a crowd,
+/// where many swap places, nearly every vehicle has to leave its place before another one comes.
 const REORDERINGS: usize = 64;
-/// Rounds in which others are held back, each by [`HEAD_START_S`] more.
+/// Most rounds in which other vehicles are held back, each round by [`HEAD_START_S`] more.
 const HEAD_STARTS: usize = 8;
-/// What two vehicles head-on need to clear a side room, seconds.
+/// Time that two vehicles head-on need to clear a side room, seconds.
 const HEAD_START_S: f32 = 3.0;
 
 /// The last `count` in the order may leave at once, all others only after a head start.
 struct Rush {
     count: usize,
     head_start_s: f32,
-    /// From when a vehicle has left a place until another one is to be there, seconds.
+    /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
 }
 
 /// One vehicle's turn among the others.
 struct Turn<'a> {
-    /// Its place in the request.
+    /// Index of the vehicle in the request.
     index: usize,
-    /// Those scheduled already.
+    /// Vehicles scheduled already.
     before: &'a [u16],
-    /// Those still to come.
+    /// Vehicles still to be scheduled.
     waiting: &'a [u16],
-    /// It takes off no earlier, seconds.
+    /// Earliest take-off, seconds.
     not_before_s: f32,
-    /// From when a vehicle has left a place until another one is to be there, seconds.
+    /// Time from when a vehicle has left a place until another one may be there, seconds.
     handover_s: f32,
 }
 
@@ -236,9 +237,10 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
     Err(ScheduleError::Blocked)
 }
 
-/// Departure times tried for one vehicle, at most.
+/// Most departure times that are tried for one vehicle.
 const DEPARTURES: usize = 6;
-/// A longer wait in one place in the air is avoided where it can be, seconds: half of what counts as a standstill (20 s).
+/// Longest wait in one place in the air that the planner does not try to avoid, seconds: half of
+/// what counts as a standstill (20 s).
 const LONG_WAIT_S: f32 = 10.0;
 
 /// The longest wait on the way, and all of them together, seconds.
@@ -247,14 +249,14 @@ fn waits_s<const W: usize>(flight: &Flight<W>) -> (f32, f32) {
     waits.fold((0.0, 0.0), |(longest, all), wait| (fmaxf(longest, wait), all + wait))
 }
 
-/// What a path keeps clear of beyond obstacles.
+/// Vehicles that a path keeps clear of, beyond obstacles.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Avoid {
     /// The pads of vehicles that may still stand there.
     WaitingPads,
     /// The pads and landing places of all others: then waiting on the pad is always enough.
     AllPlaces,
-    /// Nothing: somebody has to leave before.
+    /// No vehicle: another one has to leave before.
     Nothing,
 }
 

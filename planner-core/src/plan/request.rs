@@ -6,7 +6,7 @@ use crate::flight::PathError;
 use crate::schedule::{ScheduleConfig, ScheduleError};
 use crate::search::SearchError;
 
-/// What an assignment makes small.
+/// Objective that an assignment minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objective {
     /// The sum of all path lengths.

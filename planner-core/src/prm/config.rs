@@ -1,10 +1,11 @@
 //! What to build, why it could not be built, and which lengths an edge may have.
 
-/// Draws a free node may take before the map counts as full. A map with one free cell in a thousand still yields
-/// a node with a probability of 1 − e⁻¹⁰.
+/// Random points tried for one free node before the map counts as full. A map with one free cell in
+/// a thousand still yields a node with a probability of 1 − e⁻¹⁰.
 pub const TRIES_PER_NODE: usize = 10_000;
 
-/// Draws a bridge may take before a uniform node stands in for it: a map without narrow passages has none.
+/// Random pairs tried for one bridge sample before a uniform node replaces it: a map without narrow
+/// passages has none.
 pub const TRIES_PER_BRIDGE: usize = 1_000;
 
 /// How nodes are spread.
@@ -19,7 +20,7 @@ pub enum Sampling {
     Bridge,
 }
 
-/// What to build.
+/// Settings of the roadmap to build.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Config {
     /// Random nodes, beside the terminals.
@@ -41,13 +42,13 @@ pub struct Config {
 pub enum PrmError {
     /// The named field is NaN, infinite, negative, or makes an empty range.
     Config(&'static str),
-    /// This terminal is not finite, not in the map or inside an obstacle.
+    /// The terminal of this index is not finite, not in the map or inside an obstacle.
     TerminalBlocked(usize),
     /// More nodes than the caller's memory holds.
     TooManyNodes,
-    /// So many nodes were found and then none in [`TRIES_PER_NODE`] draws: hardly any space is free.
+    /// After this many nodes none was found in [`TRIES_PER_NODE`] draws: hardly any space is free.
     NoFreeSpace(usize),
-    /// This node is not finite.
+    /// The node of this index is not finite.
     NotFinite(usize),
     /// More edges than the caller's memory holds.
     RoadmapFull,

@@ -13,13 +13,14 @@ use crate::segment::{
 };
 use crate::voxel::VoxelGrid;
 
-/// Cells. Places below are computed to within 2⁻¹¹ cell as long as the grid has at most [`MAX_CELLS`] cells a side:
-/// two roundings of a coordinate make 2 · 4096 · 2⁻²⁴ = 2⁻¹¹ at worst, and snapping in the exact check 2⁻¹⁵.
+/// Margin for rounding, in cells. Places below are computed to within 2⁻¹¹ cell as long as the grid
+/// has at most [`MAX_CELLS`] cells a side: two roundings of a coordinate make 2 · 4096 · 2⁻²⁴ =
+/// 2⁻¹¹ at worst, and snapping in the exact check 2⁻¹⁵.
 const GUARD: f32 = 1.0 / 512.0;
 const MAX_CELLS: u32 = 4096;
-/// How deep behind a face the cell is probed, cells.
+/// Depth behind a face at which the cell is probed, cells.
 const DEPTH: f32 = 1.0 / 64.0;
-/// Boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
+/// Most free boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
 const BOXES: usize = 32;
 
 /// Cells `low..high` on each axis, all free.
@@ -35,7 +36,7 @@ pub(super) struct Sight<'g, 'a> {
     clearance_m: f32,
     clearance_cells: f32,
     cells_per_m: f32,
-    /// How far a box may reach from the node it is made for, cells.
+    /// Reach of a box from the node it is made for, cells.
     reach: i32,
     boxes: [FreeBox; BOXES],
     newest: usize,
@@ -56,7 +57,7 @@ struct View {
     /// The faces, [`DEPTH`] farther out.
     face_low: [f32; 3],
     face_high: [f32; 3],
-    /// What a ray keeps from the faces where it is known to be clear.
+    /// Distance that a ray keeps from the faces where it is known to be clear.
     inset: f32,
 }
 
@@ -212,13 +213,13 @@ impl<'g, 'a> Sight<'g, 'a> {
     }
 }
 
-/// What the box alone tells of a ray.
+/// Judgement of a ray by the box alone.
 enum Judgement {
-    /// It ends inside, so many cells from the nearest face, but for rounding.
+    /// The ray ends inside, so many cells from the nearest face, but for rounding.
     Clear(f32),
-    /// It meets an obstacle behind a face.
+    /// The ray meets an obstacle behind a face.
     Blocked,
-    /// This share of it lies in the box; the rest is open.
+    /// This share of the ray lies in the box; the rest is open.
     Leaves(f32),
 }
 
@@ -241,7 +242,7 @@ impl FreeBox {
         Some(grown)
     }
 
-    /// How far up the box could be extended along `axis`.
+    /// Cells by which the box could be extended up along `axis`.
     fn free_up_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
         let start = self.high[axis];
         let mut brick = start >> 2;
@@ -258,7 +259,7 @@ impl FreeBox {
         limit.max(start)
     }
 
-    /// How far down the box could be extended along `axis`.
+    /// Cells by which the box could be extended down along `axis`.
     fn free_down_to(&self, grid: &VoxelGrid<'_>, axis: usize, limit: i32) -> i32 {
         let start = self.low[axis];
         let mut brick = (start - 1) >> 2;

@@ -6,7 +6,7 @@
 use super::config::{Config, LengthRange, PrmError, squared_length};
 use crate::Point;
 
-/// Candidates measured at once.
+/// Candidates whose distances are computed at once.
 const LANES: usize = 16;
 
 /// Scratch for `NODES` nodes and `CUBES` cubes: 14 bytes a node, 2 a cube. The default board has 4096 of each.
@@ -131,7 +131,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         self.node[place]
     }
 
-    /// Where the node at a place is.
+    /// Position of the node at a place.
     #[inline(always)]
     pub(super) fn point(&self, place: usize) -> [f32; 3] {
         [self.x[place], self.y[place], self.z[place]]

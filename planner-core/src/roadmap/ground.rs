@@ -9,10 +9,11 @@ use libm::{fmaxf, fminf};
 use super::{MAX_WAY_M, RoadmapError, RoadmapView};
 use crate::Point;
 
-/// Nodes this near, across, show the ground below a place, metres.
+/// Horizontal distance within which nodes show the ground below a place, metres.
 pub const GROUND_REACH_M: f32 = 3.0;
-/// So many of them at most, the nearest. Fewer know too little where the floor has edges, more see it too wide to leave a way;
-/// measured by `tests/tests/detours.rs`.
+/// Most nodes, the nearest ones, that show the ground below a place. Fewer know too little where
+/// the floor has edges, more see the ground too wide to leave a path; measured by
+/// `tests/tests/detours.rs`.
 const WITNESSES: usize = 6;
 
 impl RoadmapView<'_> {

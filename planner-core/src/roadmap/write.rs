@@ -12,7 +12,7 @@ use crate::sort;
 /// An undirected edge to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Edge {
-    /// One node.
+    /// One node of the edge.
     pub a: u16,
     /// The other node.
     pub b: u16,

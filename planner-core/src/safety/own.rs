@@ -12,11 +12,14 @@ use super::{POINTS, Set};
 use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 
-/// Coming nearer by less than this is none, metres: rounding, and nothing that a vehicle could creep by.
+/// Rounding of distances, metres: an approach by less than this is not counted as one, and no
+/// vehicle can creep past another by so little.
 const NEARER_M: f32 = 0.003;
-/// Bounds are wider by this, metres: more than a coordinate of the mission frame is rounded by.
+/// Margin added to bounding boxes, metres: more than a coordinate of the mission frame is rounded
+/// by.
 const WIDER_M: f32 = 0.01;
-/// More legs than this are worth the look at the line between their ends.
+/// Paths of more legs than this are first bounded by the line between their ends, which is cheaper
+/// than to compare each leg.
 const FEW: usize = 2;
 
 /// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
@@ -54,9 +57,9 @@ impl Leg {
 pub struct OwnSet<'a> {
     set: &'a Set,
     legs: Vec<Leg, POINTS>,
-    /// How far it reaches from its first point, metres.
+    /// Reach of the set from its first point, metres.
     reach_m: f32,
-    /// How far from the line between its first point and its last it lies at most, metres.
+    /// Greatest distance of the set from the line between its first point and its last, metres.
     beside_m: f32,
     /// Middle and size of the box around it.
     middle: Point,
@@ -64,7 +67,7 @@ pub struct OwnSet<'a> {
 }
 
 impl<'a> OwnSet<'a> {
-    /// What a vehicle can no longer take back.
+    /// The set that a vehicle can no longer avoid.
     pub fn new(set: &'a Set) -> Self {
         let (first, _) = set.ends();
         // Filled in place: a board takes long to copy it.
@@ -76,7 +79,7 @@ impl<'a> OwnSet<'a> {
             middle: *first,
             size: *first,
         };
-        // Where the second leg begins a first one without length is.
+        // The second leg begins at the same point where a first leg has no length.
         let double = set.points.len() > 2 && set.points[0] == set.points[1];
         let (mut low, mut high) = (*first, *first);
         set.segments()
@@ -91,7 +94,7 @@ impl<'a> OwnSet<'a> {
 
     #[inline(never)]
     fn add(&mut self, from: &Point, to: &Point, low: &mut Point, high: &mut Point) {
-        // As many as there are points at most.
+        // Cannot overflow: as many legs as points at most.
         let _ = self.legs.push(Leg::new(from, to));
         (*low, *high) = (each(low, to, |a, b| a < b), each(high, to, |a, b| a > b));
     }
@@ -103,7 +106,7 @@ impl<'a> OwnSet<'a> {
         root_above(self.legs.iter().map(beside_sq).fold(0.0, |most, sq| if sq > most { sq } else { most }))
     }
 
-    /// How far from its first point it reaches at most, metres.
+    /// Greatest distance of the set from its first point, metres.
     #[inline]
     pub fn reach_m(&self) -> f32 {
         self.reach_m
@@ -164,7 +167,8 @@ impl<'a> OwnSet<'a> {
         if is_nearer(motion_sq, distance_sq(other, here, most_m * most_m)) {
             return true;
         }
-        // It stays as far from where the neighbour may come; but it must not fly towards where it comes from.
+        // The vehicle stays as far from where the neighbour may come; but it must not fly towards
+        // where the neighbour comes from.
         let now_sq = (here - place).norm_squared();
         is_nearer(distance_sq(self.set, place, f32::INFINITY), now_sq.min(4.0 * most_m * most_m))
     }

@@ -13,7 +13,7 @@ use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
-/// Timed segments of a block: more make capsules wide at corners, fewer make more of them.
+/// Timed segments of a block: more make capsules wide at corners, fewer make more capsules.
 pub(super) const BLOCK: usize = 8;
 /// Most blocks of a flight, a bit each.
 pub(super) const BLOCKS: usize = PIECES / BLOCK;
@@ -21,7 +21,7 @@ pub(super) const BLOCKS: usize = PIECES / BLOCK;
 const GROUP: usize = 8;
 /// Most groups of a flight.
 const GROUPS: usize = BLOCKS.div_ceil(GROUP);
-/// What rounding may take from a distance between places kilometres away, metres.
+/// Most that rounding takes from a distance between places kilometres away, metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
 /// Blocks of a flight, a bit each.
@@ -33,9 +33,9 @@ const _: () = assert!(BLOCKS <= Bits::BITS as usize && PIECES.is_multiple_of(BLO
 #[derive(Clone, Copy, Debug)]
 struct Block {
     around: Extent,
-    /// From the beginning of the first to the end of the last.
+    /// Line from the beginning of the first segment to the end of the last.
     line: (Point, Point),
-    /// How far the others lie beside that line at most, metres.
+    /// Greatest distance of the other segments beside that line, metres.
     beside_m: f32,
 }
 
@@ -50,7 +50,7 @@ impl Block {
         block
     }
 
-    /// The same with how far its segments lie beside its line.
+    /// The block with the greatest distance of its segments from its line.
     fn with_line(mut self, pieces: &[Piece]) -> Self {
         let beside =
             |piece: &Piece| segments_distance_sq((&self.line.0, &self.line.1), (&piece.to, &piece.to));
@@ -159,7 +159,7 @@ impl Blocks {
     }
 }
 
-/// What is further apart is in no conflict, metres.
+/// Distance from which on two segments are in no conflict, metres.
 fn reach_m(cfg: &ScheduleConfig) -> f32 {
     fmaxf(cfg.separation_m, cfg.parked_separation_m) + BLOCK_ROUNDING_M
 }

@@ -31,9 +31,9 @@ impl ScheduleConfig {
 /// Why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
-    /// More than [`PIECES`](super::PIECES) pieces in one flight.
+    /// A flight has more than [`PIECES`](super::PIECES) timed segments.
     PiecesFull,
-    /// More than `G` gates for one vehicle.
+    /// A vehicle has more than `G` gates.
     GatesFull,
     /// No delay keeps this vehicle clear of those already scheduled.
     Blocked,

@@ -8,9 +8,9 @@ use libm::{fmaxf, fminf};
 use super::pieces::Piece;
 use crate::sort;
 
-/// Cells along one side.
+/// Cells along one side of the grid.
 const SIDE: usize = 32;
-/// A cell is no smaller, metres: far below any separation finer cells find nothing less.
+/// Least side of a cell, metres: far below any separation finer cells find nothing less.
 const CELL_LEAST_M: f32 = 0.5;
 
 /// Pieces by the cell of their middle, seen from above.
@@ -20,7 +20,7 @@ pub(super) struct Cells {
     cell_m: f32,
     /// Half of the longest piece, metres.
     half_m: f32,
-    /// Where the pieces of each cell begin, row by row.
+    /// First timed segment of each cell, row by row.
     starts: [u16; SIDE * SIDE + 1],
 }
 

@@ -8,13 +8,15 @@ use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
-/// Longest timed segment, metres: finer lets vehicles follow one another closer, coarser costs less.
+/// Longest timed segment, metres: shorter ones let vehicles follow one another closer, longer ones
+/// cost less.
 pub const PIECE_M: f32 = 1.5;
-/// Most timed segments of one flight; on a flight that would need more they are longer.
+/// Most timed segments of one flight; a flight that would need more has longer ones.
 pub const PIECES: usize = 320;
-/// Timed segments grow at most this often, by two: to 1.5 km.
+/// Most doublings of the length of timed segments: to 1.5 km.
 const DOUBLINGS: usize = 10;
-/// A pad is held for at least this long after take-off, seconds: a vehicle that stands on it has not left it.
+/// Least time for which a pad is held after the take-off, seconds: a vehicle that stands on its pad
+/// has not left it.
 pub(super) const OFF_PAD_S: f32 = 0.05;
 
 /// A timed segment: a part of a flight, and when it is held. Times are relative to take-off; the pad is held from −∞, the
@@ -23,9 +25,10 @@ pub(super) const OFF_PAD_S: f32 = 0.05;
 pub(super) struct Piece {
     pub(super) from: Point,
     pub(super) to: Point,
-    /// Where the vehicle waits before this segment, metres along its path: nobody waits within a climb or a descent.
+    /// Place where the vehicle waits before this segment, metres along its path: no vehicle waits
+    /// within a climb or a descent.
     pub(super) from_m: f32,
-    /// Where it ends, metres.
+    /// End of the segment, metres.
     pub(super) to_m: f32,
     /// When it may have to be free: when its vehicle leaves the place where it waits before it.
     pub(super) from_s: f32,
@@ -46,7 +49,7 @@ impl<const W: usize> Flight<W> {
         }
     }
 
-    /// From take-off to landing, seconds; nothing for a vehicle that stays on its pad.
+    /// Time from take-off to landing, seconds; zero for a vehicle that stays on its pad.
     pub(crate) fn lasts_s(&self, cfg: &ScheduleConfig) -> f32 {
         let landed_s = |w: &Waypoint| w.leave_s + self.descent_m / cfg.vertical_mps;
         self.path.waypoints().last().filter(|_| self.task.flies()).map_or(0.0, landed_s)
@@ -130,7 +133,7 @@ pub(super) fn cut<const W: usize>(
     push(Piece { from_m: last.along_m, ..stay(ground, end_m, last.leave_s, f32::INFINITY) })
 }
 
-/// Where a vehicle may wait on a leg.
+/// Places where a vehicle may wait on a leg.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stops {
     /// Before each of its timed segments.
@@ -162,7 +165,7 @@ impl Leg {
         (self.length_m * share, (self.to_s - self.from_s) * share)
     }
 
-    /// Its timed segments; `from_m` and `to_m` are its ends along the path.
+    /// Timed segments of the leg; `from_m` and `to_m` are its ends along the path.
     pub(super) fn pieces(self, from_m: f32, to_m: f32, piece_m: f32) -> impl Iterator<Item = Piece> {
         let parts = parts(self.length_m, piece_m);
         let at = move |part: u32| {

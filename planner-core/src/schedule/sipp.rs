@@ -54,7 +54,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     heap: Heap<N>,
     cut: Vec<Piece, PIECES>,
     forbidden: Forbidden,
-    /// Of the route that is sought.
+    /// Handover time of the route that is sought.
     handover_s: f32,
 }
 
@@ -81,7 +81,7 @@ impl<const N: usize, const P: usize> Default for SippWorkspace<N, P> {
     }
 }
 
-/// What to route.
+/// The route to find.
 #[derive(Clone, Copy, Debug)]
 pub struct Route<'a> {
     /// Separation and nominal speeds.
@@ -94,7 +94,7 @@ pub struct Route<'a> {
     pub not_before_s: f32,
     /// Places where others stand all the time.
     pub parked: &'a [Point],
-    /// From when a vehicle has left a place until another one is to be there, seconds.
+    /// Time from when a vehicle has left a place until another one may be there, seconds.
     pub handover_s: f32,
 }
 
@@ -338,7 +338,7 @@ impl<const N: usize, const P: usize> SippWorkspace<N, P> {
         let apart_m = fmaxf(cfg.separation_m, cfg.parked_separation_m);
         let held_s = self.handover_s;
         for q in self.cells.around(&self.pieces, &whole, apart_m) {
-            // What ends before or begins after cannot even touch the times asked for.
+            // A segment that ends before or begins after cannot even touch the times in question.
             if q.to_s < leave_s.0 || q.from_s - held_s - leg.to_s > leave_s.1 || !conflict(cfg, &whole, q) {
                 continue;
             }
@@ -404,7 +404,8 @@ fn write<const N: usize, const P: usize, const W: usize>(
         let earliest_s = reached.left_parent_s;
         let latest_s = fminf(leave_s - duration_s, until_s);
         ws.forbid_departures(cfg, &leg, flight.piece_m, (earliest_s, latest_s));
-        // Not before the way was found to be free: intervals that are merged for want of room may swallow that time.
+        // Not before the way was found to be free: intervals that are merged for want of room may
+        // swallow that time.
         let left_s = fmaxf(last_allowed(&ws.forbidden, latest_s), earliest_s);
         way.push((reached.node, left_s + duration_s, leave_s)).map_err(|_| ScheduleError::PiecesFull)?;
         leave_s = left_s;
@@ -413,7 +414,7 @@ fn write<const N: usize, const P: usize, const W: usize>(
         }
         at = reached.parent;
     }
-    // What is left is the departure from the pad.
+    // The remaining time is the departure from the pad.
     flight.depart_s = leave_s;
     flight.path = Path::new();
     let mut before = None;

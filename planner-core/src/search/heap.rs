@@ -1,10 +1,11 @@
 //! An indexed 4-ary min-heap of node indices: each node is in it at most once, so `N` entries always suffice.
 
-/// The node was not reached yet.
+/// Mark of a node that the search has not reached yet.
 const UNSEEN: u16 = 0;
-/// The node has left the heap: its distance is final.
+/// Mark of a node that has left the heap: its distance is final.
 pub(crate) const SETTLED: u16 = u16::MAX;
 
+/// Children of a node of the heap.
 const ARITY: usize = 4;
 
 pub(crate) struct Heap<const N: usize> {

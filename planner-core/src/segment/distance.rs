@@ -16,9 +16,9 @@ use crate::Point;
 use crate::geometry::within;
 use crate::voxel::{Outside, VoxelGrid};
 
-/// Half the diagonal of a cell.
+/// Half the diagonal of a cell, in cells.
 const CELL_RADIUS: f32 = 0.866_025_5;
-/// Half the diagonal of a brick.
+/// Half the diagonal of a brick, in cells.
 const BRICK_RADIUS: f32 = 4.0 * CELL_RADIUS;
 
 /// A segment in cells.

@@ -3,8 +3,9 @@
 use crate::Point;
 use crate::voxel::{GridShape, MAX_DIM};
 
-/// Bits after the point of a snapped coordinate, in cells.
+/// Fraction bits of a snapped coordinate: its unit is 2⁻¹⁴ cell.
 pub const FRACTION_BITS: u32 = 14;
+/// Side of a cell, in units of a snapped coordinate.
 pub(super) const ONE: i32 = 1 << FRACTION_BITS;
 
 /// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
@@ -16,6 +17,7 @@ pub type Snapped = [i32; 3];
 /// `p` on the lattice of 2⁻¹⁴ cell, or `None` where it is not finite or more than [`MAX_DIM`] cells beyond the grid.
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
+    /// Largest coordinate that is snapped, in cells.
     const REACH: f32 = MAX_DIM as f32;
     let mut out = [0; 3];
     for axis in 0..3 {

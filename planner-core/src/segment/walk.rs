@@ -38,7 +38,7 @@ struct Walk<'g, const U: usize, const V: usize, const W: usize> {
     words: &'g [u64],
     a: Snapped,
     b: Snapped,
-    /// Where along `U` the walk begins and ends.
+    /// Begin and end of the walk along `U`.
     start: i32,
     end: i32,
     /// Cells along each axis.
@@ -47,7 +47,7 @@ struct Walk<'g, const U: usize, const V: usize, const W: usize> {
     strides: [i32; 3],
     /// Change of each coordinate over one lattice unit of `U`, times 2³⁰.
     slopes: [i64; 3],
-    /// What a coordinate at a place along `U` may err by, in lattice units.
+    /// Greatest error of a coordinate at a place along `U`, in lattice units.
     slack: i32,
 }
 
@@ -189,6 +189,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 /// two products and their difference below 2⁶³.
 #[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
+    /// Half a cell, in units of a snapped coordinate.
     const HALF: i64 = (ONE / 2) as i64;
     let mut d = [0_i64; 3];
     let mut to_center = [0_i64; 3];

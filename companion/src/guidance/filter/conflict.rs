@@ -11,25 +11,28 @@ use crate::mission::State;
 use crate::swarm::neighbours::{Met, Neighbours, Reach};
 use crate::time::{Duration, Instant};
 
-/// The vehicle that yields waits until so many seconds of the other one's way are free.
+/// Time of the other vehicle's path ahead that has to be free before the vehicle that yields goes
+/// on, seconds.
 const AHEAD_S: f32 = 3.0;
-/// More neighbours than this are not compared in one step: with more nearby the vehicle stops.
+/// Most neighbours that are compared in one step: with more nearby the vehicle stops.
 const NEAR_MOST: usize = 6;
-/// By how much two vehicles in the air overshoot their stops, added up, metres; the schedule leaves 0.5 m for this and for
-/// tracking errors.
+/// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
+/// 0.5 m for this and for tracking errors.
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
 /// Tracking error of this vehicle alone, off its path, metres.
 const TRACKING_MARGIN_M: f32 = 0.1;
-/// Distance between two hulls that is kept from a stranger then, metres.
+/// Distance between the hulls of two vehicles that is kept from a stranger while passing it slowly,
+/// metres.
 const HULLS_M: f32 = 0.3;
-/// What a vehicle may fly faster than its reference and yet stop with it, m/s.
+/// Speed above its reference's at which a vehicle still stops with the reference, m/s.
 const SWAY_MPS: f32 = 0.3;
-/// A landing that waited for so long needs no more room than the hulls.
+/// Wait of a landing after which it needs no more room than the hulls.
 const LANDS_LATE: Duration = Duration::from_secs(40);
 
 impl Guidance {
-    /// What the vehicle can no longer take back on its path, and `extra_m`. It begins at the setpoint, which is all that a
-    /// stop can hold back: the vehicle flies on to it in any case.
+    /// The set that the vehicle can no longer avoid on its path, and `extra_m`. The set begins at
+    /// the setpoint, which is all that a stop can hold back: the vehicle flies on to the setpoint
+    /// in any case.
     pub(super) fn own_set<const W: usize>(
         &self,
         path: &Path<W>,
@@ -54,7 +57,7 @@ impl Guidance {
             let behind = points[..next].iter().rev().map(|w| w.position);
             return Set::along(here, core::iter::once(here).chain(join).chain(behind), fly_m);
         }
-        // It stops for its gates in any case.
+        // The vehicle stops for its gates in any case.
         let join_m = join.map_or(0.0, |join| (join - here).norm());
         let fly_m = fly_m.min(join_m + (self.stops_at_m - along_m).max(0.0));
         let next = points.partition_point(|w| w.along_m <= along_m);
@@ -98,7 +101,7 @@ impl Guidance {
             let mut met = neighbours.met(contact, now);
             let by_gates = met.on_plan && on_plan;
             if met.far && (by_gates || lands) {
-                // Not within radio range, and where the plan has it.
+                // The neighbour is not within radio range, and is where the plan has it.
                 continue;
             }
             if by_gates {
@@ -106,7 +109,8 @@ impl Guidance {
                 met.heard.delay_s = 0.0;
             }
             if met.lost && !lands && hears_nobody {
-                // Where nobody is heard it may be this vehicle's receiver that fails: the others fly on.
+                // Where no neighbour is heard this vehicle's receiver may have failed: the others
+                // fly on.
                 (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
             }
             let silent = met.lost || met.heard.age_s > safety::FRESH_S;
@@ -183,7 +187,7 @@ impl Guidance {
         scene: &Scene<'_, W, G>,
         met: &Met<'_>,
     ) -> bool {
-        // Of two with different plans neither follows the other one's.
+        // Two vehicles with different plans do not follow each other's plan.
         let on_plan = self.on_plan(state, scene) && met.shares_plan;
         if met.stranger || met.on_plan != on_plan {
             return met.stranger || met.on_plan;

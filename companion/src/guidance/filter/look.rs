@@ -43,7 +43,8 @@ impl Guidance {
             | State::Stopping
                 if self.on_path =>
             {
-                // What stopped its descent is looked at on while it stands.
+                // The filter goes on checking the neighbour that stopped the vehicle's descent
+                // while the vehicle stands.
                 match self.descends() {
                     true => {
                         Way::Vertical { to_m: ground_m(), speed_mps: (-self.smoother.velocity().z).max(0.0) }
@@ -135,7 +136,8 @@ impl Guidance {
         let z_m = scene.telemetry.position.z;
         let mut ground_m = self.ground_m(plan).min(z_m);
         if self.returning && scene.detours {
-            // Its way back ends where a way around began: nobody knows how high that is above the ground.
+            // The way back ends where a detour began: the height of that place above the ground is
+            // unknown.
             ground_m = plan.path.point_at(0.0).map_or(ground_m, |from| ground_m.min(from.z - plan.climb_m));
         }
         // Between pad and goal the ground may be lower than below either.

@@ -5,13 +5,13 @@
 pub(crate) enum Place {
     /// The plan's own.
     OnPath,
-    /// One around something on that, near it and back to it.
+    /// A detour around a keep-out zone on the path, near the path and back to it.
     Beside,
     /// Another one, or none.
     Elsewhere,
 }
 
-/// How far along its path a vehicle is, as its task sees it.
+/// Progress of a vehicle along its path, as its task sees it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Along {
     /// Way made along the path, metres.

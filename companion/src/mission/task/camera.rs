@@ -16,21 +16,21 @@ use crate::link::Links;
 use crate::link::outbox::Outgoing;
 use crate::time::{Duration, Instant};
 
-/// Commands that wait.
+/// Most camera commands that wait.
 const ORDERS: usize = 4;
-/// A command that was not acknowledged is repeated after this long.
+/// Time after which a command that was not acknowledged is repeated.
 const REPEAT_EVERY: Duration = Duration::from_millis(300);
-/// So often a command is sent; then it is given up and reported.
+/// Number of times that a command is sent before it is given up and reported.
 const TRIES: u8 = 5;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
-/// A stretch that leads less far leads no way, metres.
+/// Shortest stretch from which a direction of flight is taken, metres.
 const STRETCH_LEAST_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
 
-/// What the autopilot is commanded.
+/// A camera command to the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Order {
     /// A picture now, and one after each distance in metres; 0 ends that.
@@ -58,7 +58,7 @@ impl Order {
     }
 }
 
-/// How far the pictures have come.
+/// Progress of the pictures.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Camera {
     /// The stretch at hand, and the next picture on it.
@@ -69,7 +69,7 @@ pub(super) struct Camera {
     /// Whether the autopilot was commanded to trigger by distance.
     on: bool,
     orders: Deque<Order, ORDERS>,
-    /// How often the first of them was sent, and when last.
+    /// Number of times that the first command was sent, and the time of the last.
     tries: u8,
     sent_at: Option<Instant>,
     /// Commands given up, or refused; none was reported yet.
@@ -135,7 +135,8 @@ impl Camera {
             }
             Trigger::Distance => self.order(Order::Every(0.0)),
             _ => {
-                // Of several that were passed at once one is enough: all would show the same.
+                // Of several pictures that were passed at once one is enough: all would show the
+                // same.
                 let before = self.picture;
                 while self.picture < shots.count && shots.place_m(self.picture) <= progress_m {
                     self.picture += 1;
@@ -198,8 +199,8 @@ impl Camera {
     }
 }
 
-/// Where the vehicle looks `along_m` metres along its path: along the stretch at hand, on the way to one along that one, so that
-/// it has turned before the first picture.
+/// Heading of the vehicle `along_m` metres along its path: along the stretch at hand, and before a
+/// stretch along that stretch, so that the vehicle has turned before the first picture.
 pub(super) fn heading<const W: usize>(
     photographs: &Photographs,
     path: &Path<W>,

@@ -6,11 +6,11 @@
 use super::packet::{NakError, Print, Request, op, print};
 use crate::time::{Duration, Instant};
 
-/// A repeated request is known as one for this long.
+/// Time for which a repeated request is recognised as a duplicate.
 const MEMORY: Duration = Duration::from_secs(3);
-/// What came of the last session is answered for this long.
+/// Time for which the result of the last session is still answered.
 const CLOSED_MEMORY: Duration = Duration::from_secs(10);
-/// Requests remembered.
+/// Most requests remembered for duplicate detection.
 const REQUESTS: usize = 8;
 
 type Outcome = Result<(), NakError>;
@@ -50,14 +50,14 @@ impl Memory {
         }
     }
 
-    /// What came of the same request a short time ago.
+    /// Outcome of the same request a short time ago.
     pub fn recall(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let print = print(request);
         let known = |done: &&Done| done.request == print && now - done.at < MEMORY;
         self.done.iter().flatten().find(known).map(|done| done.outcome)
     }
 
-    /// What closing came to of the session that a request is of.
+    /// Outcome of closing the session that a request is of.
     pub fn recall_closed(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let known = |closed: &&Closed| {
             (closed.client, closed.session) == (request.client, request.session)

@@ -4,14 +4,14 @@
 use crate::link::frame::Frame;
 use crate::storage::store::{File, UploadError, crc32};
 
-/// Most data of a packet.
+/// Most data of an FTP packet, bytes.
 pub const DATA: usize = 239;
 
-/// Bytes before the data.
+/// Bytes of an FTP packet before its data.
 pub const HEAD: usize = 12;
-/// Opcode of an answer that says yes.
+/// Opcode of a positive answer.
 pub const ACK: u8 = 128;
-/// Opcode of an answer that says no.
+/// Opcode of a negative answer.
 pub const NAK: u8 = 129;
 
 /// Opcodes.
@@ -60,10 +60,10 @@ impl From<UploadError> for NakError {
     }
 }
 
-/// What a person reads: whether it is a warning, and the text.
+/// A text for a person: whether it is a warning, and the text.
 pub type Text = (bool, &'static str);
 
-/// All texts.
+/// All texts that the FTP service reports.
 pub const TEXTS: [Text; 9] = [
     (false, "Roadmap stored: used from the next start"),
     (false, "Mission stored: used from the next start"),
@@ -76,10 +76,10 @@ pub const TEXTS: [Text; 9] = [
     (false, "Field stored: used from the next start"),
 ];
 
-/// What is said when a file was removed.
+/// Text of a file that was removed.
 pub const REMOVED: Text = TEXTS[2];
 
-/// What is said when an upload has ended.
+/// The text for the end of an upload.
 pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
     TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,
@@ -150,8 +150,8 @@ pub fn is_open(request: &Request) -> bool {
     matches!(request.opcode, op::OPEN_READ | op::CREATE | op::OPEN_WRITE)
 }
 
-/// What a repeated request is known by. Two programs of one client's id may begin at the same sequence number: session and data
-/// may tell them apart.
+/// The fields by which a repeated request is recognised. Two programs of one client's id may begin
+/// at the same sequence number: session and data may tell them apart.
 pub type Print = ((u8, u8), u16, (u8, u8), u32, u32);
 
 pub fn print(request: &Request) -> Print {

@@ -2,7 +2,7 @@
 
 use super::packet::{Request, chunk};
 
-/// Packets of one burst; then the client asks for the next.
+/// Packets of one burst; after it the client requests the next burst.
 pub const BURST: u8 = 16;
 
 /// A burst that has begun.

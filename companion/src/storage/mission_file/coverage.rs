@@ -22,13 +22,13 @@ const SHARE_LEN: usize = 12;
 const RING_LEN: usize = 4;
 /// Bytes of a vertex.
 const VERTEX_LEN: usize = 8;
-/// Most changes of the lanes' order that a file asks for: a board looks at each.
+/// Most changes of the lanes' order that a mission file may request: a board tries each of them.
 pub const MAX_LOOKS: u32 = 20_000_000;
 
-/// Where vehicles look along the lanes.
+/// Heading of vehicles along the lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Heading {
-    /// One way on all lanes.
+    /// One heading on all lanes.
     Sweep,
     /// The way they fly.
     Lane,
@@ -39,11 +39,11 @@ pub enum Heading {
 pub enum Parts {
     /// Any: the shares are those that POWELL found, or all alike.
     Anyone,
-    /// Those with its share: the shares are the vehicles' weights.
+    /// Vehicles with equal weights: the shares are the weights.
     SameWeight,
 }
 
-/// What all vehicles of a coverage mission share.
+/// Settings that all vehicles of a coverage mission share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CoverageHeader {
     /// The smallest part of the work.
@@ -52,7 +52,7 @@ pub struct CoverageHeader {
     pub parts: Parts,
     /// Heading of the vehicles along their lanes.
     pub heading: Heading,
-    /// What takes the pictures.
+    /// Trigger of the pictures.
     pub trigger: Trigger,
     /// Changes of the lanes' order that are looked at, at most.
     pub looks: u32,
@@ -68,10 +68,10 @@ pub struct CoverageHeader {
     pub ground: Option<Ground>,
 }
 
-/// What one vehicle brings to the work.
+/// Capability of one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Share {
-    /// Its weight, or the size of the part that comes at its place: at least 0.
+    /// Weight of the vehicle, or the size of the share that comes at its place: at least 0.
     pub weight: f32,
     /// Speed upwards, m/s.
     pub climb_mps: f32,
@@ -82,13 +82,13 @@ pub struct Share {
 /// The block as it is written.
 #[derive(Clone, Copy, Debug)]
 pub struct CoverageParts<'a> {
-    /// What all share.
+    /// Settings that all vehicles share.
     pub header: CoverageHeader,
-    /// One a vehicle, in the order of the mission's.
+    /// Share of each vehicle, in the order of the mission's.
     pub shares: &'a [Share],
     /// The rings.
     pub rings: &'a [Ring],
-    /// Their vertices, metres east and north of the mission origin.
+    /// Vertices of the rings, metres east and north of the mission origin.
     pub vertices: &'a [Flat],
 }
 
@@ -158,8 +158,9 @@ pub struct CoverageView<'a> {
     vertices: &'a [[u8; VERTEX_LEN]],
 }
 
-/// A vehicle that nobody hears any more flies on for so long and hovers, and so much is added for its landing, seconds: the
-/// lease, a message's age and delay, the stop, what the row `Alone` waits, and the slow end of a descent.
+/// Time after which a vehicle that no other vehicle hears any more is on the ground, beside its
+/// flight, seconds: the lease, a message's age and delay, the stop, what the row `Alone` waits, and
+/// the slow end of a descent.
 const DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
@@ -235,12 +236,12 @@ impl<'a> CoverageView<'a> {
         Ok(view)
     }
 
-    /// What all vehicles share.
+    /// Settings that all vehicles share.
     pub fn header(&self) -> &CoverageHeader {
         &self.header
     }
 
-    /// What each vehicle brings, in the order of the mission's vehicles.
+    /// Share of each vehicle, in the order of the mission's vehicles.
     pub fn shares(&self) -> impl ExactSizeIterator<Item = Share> + '_ {
         self.shares.iter().map(|b| Share {
             weight: f32_at(b, 0),
@@ -261,7 +262,7 @@ impl<'a> CoverageView<'a> {
         })
     }
 
-    /// Their vertices, metres east and north of the mission origin.
+    /// Vertices of the rings, metres east and north of the mission origin.
     pub fn vertices(&self) -> impl ExactSizeIterator<Item = Flat> + '_ {
         self.vertices.iter().map(|b| Flat::new(f32_at(b, 0), f32_at(b, 4)))
     }

@@ -10,7 +10,7 @@ use super::numbers::{MAX_SPEED_MPS, f32_at, in_range, point_at, positive, put, u
 pub const VEHICLE_LEN: usize = 32;
 /// Bytes of a goal.
 pub const GOAL_LEN: usize = 16;
-/// The vehicle's goal that means: none of its own.
+/// Goal index of a vehicle without a goal of its own.
 pub const NO_GOAL: u16 = u16::MAX;
 
 /// One vehicle; vehicle `i` starts at node `i` of the roadmap.
@@ -29,9 +29,9 @@ pub struct MissionVehicle {
 /// One goal; goal `i` is node `vehicles + i` of the roadmap.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionGoal {
-    /// Where it is.
+    /// Position of the goal.
     pub position: Point,
-    /// Its height over where a vehicle stands on the ground below it, metres.
+    /// Height of the goal over where a vehicle stands on the ground below it, metres.
     pub descent_m: f32,
 }
 

@@ -12,7 +12,7 @@
 
 use super::flash::{BLOCK, Fault, Layout, ReadFlash, WORD, crc32};
 
-/// Where an area's data begins, bytes.
+/// Offset of a slot's data, bytes.
 pub const DATA_AT: u32 = BLOCK as u32;
 const USED_AT: u32 = WORD as u32;
 const SEAL_AT: u32 = 2 * WORD as u32;
@@ -31,7 +31,7 @@ pub enum Area {
 }
 
 impl Area {
-    /// Its first byte in the storage bank.
+    /// Offset of the area's first byte in the storage bank.
     pub fn at(self, layout: &Layout) -> u32 {
         match self {
             Self::Slot(i) => i as u32 * layout.slot_len,
@@ -39,7 +39,7 @@ impl Area {
         }
     }
 
-    /// Its length.
+    /// Length of the area.
     pub fn len(self, layout: &Layout) -> u32 {
         match self {
             Self::Slot(_) => layout.slot_len,
@@ -47,12 +47,12 @@ impl Area {
         }
     }
 
-    /// Where its data begins in the storage bank.
+    /// Offset of the area's data in the storage bank.
     pub fn data_at(self, layout: &Layout) -> u32 {
         self.at(layout) + DATA_AT
     }
 
-    /// Where it ends in the storage bank.
+    /// End of the area in the storage bank.
     pub fn end(self, layout: &Layout) -> u32 {
         self.at(layout) + self.len(layout)
     }
@@ -76,7 +76,7 @@ pub fn seal(layout: &Layout, area: Area, seal: &Seal) -> WordAt {
     (area.at(layout) + SEAL_AT, seal.to_bytes())
 }
 
-/// What a sealed area holds.
+/// Content of a sealed area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Seal {
     /// The larger, the newer.
@@ -127,10 +127,10 @@ pub fn u32_at(bytes: &[u8], at: usize) -> u32 {
     u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
 }
 
-/// What an area is good for.
+/// Condition of an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Condition {
-    /// To be erased before it is written.
+    /// The area is to be erased before it is written.
     Dirty,
     /// May be written.
     Clean,

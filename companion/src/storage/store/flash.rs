@@ -2,7 +2,8 @@
 
 use planner_core::file::CRC32;
 
-/// Bytes that are programmed at once and are whole or torn: the H743's flash word. Smaller ones divide it.
+/// Bytes that are programmed together and are whole or torn after a power loss: the H743's flash
+/// word. Smaller ones divide it.
 pub const WORD: usize = 32;
 /// Most bytes of one request to program: a page of the RP2350's flash.
 pub const BLOCK: usize = 256;
@@ -23,10 +24,11 @@ pub(crate) fn crc32(bytes: &[u8]) -> u32 {
     CRC32.checksum(bytes)
 }
 
-/// Where things are in the storage bank, counted from its first byte: two slots, then two halves of the journal.
+/// Layout of the storage bank, counted from its first byte: two slots, then two halves of the
+/// journal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// What is erased at once, bytes.
+    /// Length of a sector, which is erased at once, bytes.
     pub sector_len: u32,
     /// Length of a roadmap slot, whole sectors.
     pub slot_len: u32,
@@ -68,26 +70,26 @@ pub trait ReadFlash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault>;
 }
 
-/// What the shell is asked to do, at an offset of the storage bank.
+/// Request to the shell at an offset of the storage bank.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FlashRequest<'a> {
     /// Erase the sector that begins there.
     Erase {
-        /// Its first byte.
+        /// Offset of the first byte.
         at: u32,
     },
     /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`BLOCK`], all erased before.
     Program {
         /// The first byte.
         at: u32,
-        /// What to put there.
+        /// Bytes to program.
         bytes: &'a [u8],
     },
     /// Read bytes, at most [`READ`].
     Read {
         /// The first byte.
         at: u32,
-        /// How many.
+        /// Number of bytes.
         len: usize,
     },
 }
@@ -95,7 +97,7 @@ pub enum FlashRequest<'a> {
 /// Whether areas may be erased now: it may stall the processor for seconds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Erasing {
-    /// Nothing flies.
+    /// Erasing is allowed: the vehicle does not fly.
     Allowed,
     /// The vehicle is armed, or about to be.
     Forbidden,
@@ -119,7 +121,7 @@ impl File {
     /// All, in the order of a listing.
     pub const ALL: [Self; 3] = [Self::Roadmap, Self::Field, Self::Mission];
 
-    /// Its name.
+    /// Name of the file.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Roadmap => "roadmap.bin",
@@ -129,13 +131,13 @@ impl File {
     }
 }
 
-/// What came of reading.
+/// Result of a read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer<'a> {
     /// The bytes asked for by [`Store::read`](super::Store::read).
     Bytes(&'a [u8]),
     /// The running CRC asked for by [`Store::sum`](super::Store::sum).
     Sum(u32),
-    /// They cannot be read.
+    /// The bytes cannot be read.
     Failed,
 }

@@ -3,12 +3,12 @@
 use super::area::{Area, Seal};
 use super::records::Record;
 
-/// What the store is at.
+/// Work of the store.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Job {
-    /// Nothing.
+    /// No work.
     None,
-    /// What is under way does not matter any more.
+    /// The result of the request under way does not matter any more.
     Ignored,
     /// Reading for somebody.
     Read { at: u32, len: usize },

@@ -9,7 +9,7 @@ use super::records::{Compaction, Record, Source, Step};
 use super::upload_state::{UploadError, UploadState};
 
 impl Store {
-    /// What the shell is to do next, once; its result goes to [`Self::handle`]. Areas are erased only
+    /// The shell's next request, once; its result goes to [`Self::handle`]. Areas are erased only
     /// where that is allowed; a flash that stalls the processor only reads where it is forbidden.
     pub fn poll(&mut self, erasing: Erasing) -> Option<FlashRequest<'_>> {
         if self.asked {
@@ -231,7 +231,7 @@ impl Store {
         }
     }
 
-    /// Something of an area failed: it is to be erased.
+    /// A request to an area failed: the area is to be erased.
     pub(super) fn fail(&mut self, area: Area) {
         *self.condition(area) = Condition::Dirty;
         match area {

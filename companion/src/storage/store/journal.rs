@@ -16,13 +16,13 @@ pub(super) const MAGIC: [u8; 4] = *b"FLKR";
 /// The state of the journal.
 #[derive(Clone, Debug)]
 pub struct Journal {
-    /// Its halves.
+    /// Condition of both halves.
     pub halves: [Condition; 2],
     /// The half that counts.
     pub active: Option<usize>,
-    /// Where the next record goes, in the storage bank; the end of the half when it is full.
+    /// Offset of the next record in the storage bank; the end of the half when it is full.
     pub end: u32,
-    /// Where the mission file is.
+    /// Place of the mission file.
     pub mission: Option<Range<u32>>,
     /// CRC-32 of the mission file's record.
     pub mission_crc: u32,

@@ -3,7 +3,7 @@
 use super::flash::WORD;
 use core::ops::Range;
 
-/// What a record holds.
+/// Kind of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Kind {
@@ -11,18 +11,18 @@ pub enum Kind {
     Parameters = 1,
     /// The mission file; of length 0 when it was removed.
     Mission = 2,
-    /// What of an area is photographed: as [`crate::mission::photographed`] writes it.
+    /// Photographed waypoints of an area: as [`crate::mission::photographed`] writes them.
     Photographed = 3,
 }
 
-/// Tries to write the journal before that is given up until the next start.
+/// Attempts to write the journal before the store gives up until the next start.
 pub(super) const TRIES: u8 = 4;
 
 /// A record being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Record {
     pub kind: Kind,
-    /// Where it begins.
+    /// Offset of the record.
     pub at: u32,
     pub len: u32,
     pub crc: u32,
@@ -41,7 +41,7 @@ impl Record {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
-    /// In the buffer, whole.
+    /// The record is in the buffer, whole.
     Buffer,
     Window,
     Flash(u32),

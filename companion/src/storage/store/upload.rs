@@ -9,7 +9,7 @@ use crate::storage::mission_file::MissionView;
 use planner_core::{field, roadmap};
 
 impl Store {
-    /// How far the upload has come, if there is one.
+    /// Progress of the upload, if there is one.
     pub fn upload(&self) -> Option<UploadState> {
         self.upload.map(|(_, state)| state)
     }

@@ -9,16 +9,16 @@ pub enum UploadError {
     Waiting,
     /// Pieces are missing.
     Incomplete,
-    /// It is no such file, or damaged.
+    /// The file is of another kind, or damaged.
     Damaged,
     /// The flash failed.
     Flash,
 }
 
-/// How far an upload has come.
+/// Progress of an upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UploadState {
-    /// Its area is being erased or marked.
+    /// The upload's area is being erased or marked.
     Opening,
     /// Pieces are taken.
     Taking,

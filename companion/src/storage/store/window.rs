@@ -2,15 +2,16 @@
 
 use super::flash::BLOCK;
 
-/// Bytes of the window: a mission file waits here whole, a roadmap passes through. 4 kB, and 512 bytes of marks.
+/// Bytes of the reassembly window: a mission file waits here whole, a roadmap passes through. 4 kB,
+/// and 512 bytes of marks.
 pub const WINDOW: usize = 4096;
 
-/// What became of a piece.
+/// Fate of a piece of the upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Taken {
-    /// It is here, or was already.
+    /// The piece is here, or was already.
     Yes,
-    /// There is no room for it yet.
+    /// The window has no room for the piece yet.
     Later,
     /// The file would be larger than there is room for.
     TooLarge,
@@ -24,7 +25,7 @@ pub struct Window {
     marks: [u64; WINDOW / 64],
     /// Place of the first byte in the file; a multiple of [`BLOCK`].
     front: u32,
-    /// Where the furthest piece ended in the file.
+    /// End of the furthest piece in the file.
     high: u32,
 }
 
@@ -60,7 +61,7 @@ impl Window {
             return Taken::Later;
         }
         self.high = self.high.max(end);
-        // What lies before the window is in flash already.
+        // The part before the window is in flash already.
         let skipped = self.front.saturating_sub(offset).min(piece.len() as u32);
         let at = (offset + skipped - self.front.min(offset + skipped)) as usize;
         let piece = &piece[skipped as usize..];
@@ -118,7 +119,8 @@ mod tests {
             let mut missing: Vec<usize> = (0..len.div_ceil(piece)).collect();
             let mut turn = 0;
             while !missing.is_empty() {
-                // One of the next few, as a client with several under way sends them.
+                // One of the next few pieces, as a client with several requests under way sends
+                // them.
                 let pick = usize::from(order[turn % order.len()]) % missing.len().min(5);
                 let start = missing[pick] * piece;
                 let bytes = &file[start..(start + piece).min(len)];

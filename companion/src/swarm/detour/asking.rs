@@ -10,7 +10,7 @@ use crate::guidance::evade;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
-/// What is sought this near to where it was sought before is sought from the same place, metres.
+/// Two searches from places nearer than this are searches from the same place, metres.
 const HERE_M: f32 = 1.0;
 
 /// Whether a way around that was not found may be found later.
@@ -18,9 +18,9 @@ const HERE_M: f32 = 1.0;
 pub(crate) enum Outlook {
     /// A silent vehicle may still come down, and leave more room once it lies.
     Settles,
-    /// Somebody may still move.
+    /// Some vehicle may still move.
     Open,
-    /// Nothing can change.
+    /// The situation cannot change.
     Closed,
 }
 
@@ -36,7 +36,7 @@ impl Detours {
         self.ready = false;
     }
 
-    /// What is requested; `None` without a plan. `tell` is given all that is to be kept off.
+    /// The requested detour; `None` without a plan. `tell` is given all keep-out zones.
     pub(crate) fn requested<const V: usize, const W: usize, const G: usize>(
         &self,
         view: &View<'_, V, W, G>,
@@ -76,7 +76,7 @@ impl Detours {
             },
             None => match plan.task.goal() {
                 Some(goal) => (Goal::Node(goal), plan.descent_m),
-                // It ends over its own pad.
+                // The flight ends over the vehicle's own pad.
                 None if plan.task.flies() => view.mission.home(),
                 None => return None,
             },
@@ -103,16 +103,16 @@ impl Detours {
         self.obstacles.avoid_requested();
         let Self { aside, lands, left_at_m, .. } = *self;
         let (home, beside) = (self.home.taken(aside), self.beside.taken());
-        // It comes back to its plan.
+        // The vehicle comes back to its plan.
         let left = self.left || !beside.flies();
         let obstacles = core::mem::take(&mut self.obstacles);
         let flying = Self { left, flying: true, ready: true, obstacles, ..Self::default() };
         *self = Self { aside, lands, left_at_m, fruitless, home, beside, ..flying };
     }
 
-    /// It has not; `along_m` is the place on the path.
+    /// The requested detour has not come; `along_m` is the place on the path.
     pub(crate) fn miss(&mut self, along_m: f32, outlook: Outlook, now: Instant) {
-        // It is sought again.
+        // The way home is sought again.
         if self.home.seeks() {
             self.home.miss(now);
             return;
@@ -120,13 +120,13 @@ impl Detours {
         if self.beside.miss(now) {
             return;
         }
-        // Where no way aside is found there may yet be one around.
+        // Where no path aside is found a detour may yet exist.
         if self.aside {
             self.no_way_aside_at = Some(now);
             return;
         }
         if outlook == Outlook::Settles {
-            // It asks again later and later, and once more when that vehicle lies.
+            // The vehicle requests a detour later and later, and once more when that vehicle lies.
             self.failed = self.failed.saturating_add(1).min(DETOURS_TRIED - 1);
             return;
         }

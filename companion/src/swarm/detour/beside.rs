@@ -13,44 +13,46 @@ use planner_core::detour::{KeepOff, Nature};
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
-/// What is further ahead along the path than this does not block it yet, metres: from 8 m/s a vehicle stops in less than half of
-/// it.
+/// Distance ahead along the path within which a keep-out zone blocks it, metres: from 8 m/s a
+/// vehicle stops in less than half of it.
 pub(super) const FIELD_M: f32 = 60.0;
-/// Beyond the safety distance, so that what strays a little does not block the way again, metres.
+/// Margin beyond the safety distance on a detour, metres: a zone that strays a little does not
+/// block the detour again.
 pub(super) const MARGIN_M: f32 = 0.5;
-/// After no way was found the next is sought so much later.
+/// Time from a search that found no detour to the next search.
 const AGAIN: Duration = Duration::from_secs(30);
-/// So often it flies around things in one plan.
+/// Most detours in one plan.
 const TURNS: u8 = 16;
-/// Things that are looked at.
+/// Most keep-out zones that are compared with the path.
 const THINGS: usize = 8;
-/// Looks along the path, at most.
+/// Most samples of the path.
 const LOOKS: usize = 100;
-/// They are so far apart at least, metres.
+/// Least spacing of the samples along the path, metres.
 const LOOK_M: f32 = 0.5;
-/// What is to be kept off begins a little before what blocks the path, metres.
+/// Distance before a block of the path within which keep-out zones already count, metres.
 const FREE_M: f32 = 1.0;
-/// It comes back so much further, metres: from the very edge the same thing would block it again.
+/// Distance beyond the last blocked sample at which a detour returns to the path, metres: at the
+/// very edge the same zone would block the path again.
 const BEYOND_M: f32 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Phase {
-    /// It is on its path.
+    /// The vehicle is on its path.
     #[default]
     Off,
-    /// It seeks the way to this place of its path, metres.
+    /// The vehicle seeks the detour to this place of its path, metres.
     Seeks(f32),
-    /// It flies it, and waits there for its plan.
+    /// The vehicle flies the detour, and waits at its end for its plan.
     Flies(f32),
-    /// It was stopped on the way there, and seeks another one.
+    /// The vehicle was stopped on the detour, and seeks another one.
     SeeksAgain(f32),
-    /// Its plan has come.
+    /// The vehicle's plan has come.
     Back,
-    /// There is none.
+    /// The vehicle's plan will not come.
     Lost,
 }
 
-/// Where a vehicle is on its way around.
+/// Progress of a vehicle on its detour.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Beside {
     phase: Phase,
@@ -81,7 +83,7 @@ impl Beside {
         matches!(before, Phase::Seeks(_) | Phase::SeeksAgain(_))
     }
 
-    /// It has come, or another one.
+    /// The requested detour has come, or another one.
     pub(super) fn taken(self) -> Self {
         let phase = match self.phase {
             Phase::Seeks(back_m) | Phase::SeeksAgain(back_m) => Phase::Flies(back_m),
@@ -90,17 +92,18 @@ impl Beside {
         Self { phase, turns: self.turns.saturating_add(1), ..self }
     }
 
-    /// What remains of it where the vehicle turns to something else.
+    /// The state that remains where the vehicle turns to another task.
     pub(crate) fn end(&mut self) {
         self.phase = Phase::Off;
     }
 
-    /// Its own plan has come, or there is none.
+    /// The vehicle's own plan has come, or will not.
     pub(super) fn answered(&mut self, came: bool) {
         self.phase = if came { Phase::Back } else { Phase::Lost };
     }
 
-    /// Where it is to come back to its path, metres, while it seeks the way there or flies it.
+    /// Place where the vehicle is to come back to its path, metres, while it seeks the detour or
+    /// flies it.
     pub(crate) fn back_m(&self) -> Option<f32> {
         match self.phase {
             Phase::Seeks(back_m) | Phase::Flies(back_m) | Phase::SeeksAgain(back_m) => Some(back_m),
@@ -136,7 +139,8 @@ impl Beside {
     }
 }
 
-/// What other vehicles leave no room for over a field: where they are, and where those in the air off the plan may come down.
+/// Zones that other vehicles occupy over a field: their places, and the columns in which those in
+/// the air off the plan may come down.
 pub(super) fn others<const V: usize, const W: usize, const G: usize>(
     view: &View<'_, V, W, G>,
     tell: &mut dyn FnMut(KeepOff),
@@ -176,7 +180,7 @@ pub(super) fn returns_m<const V: usize, const W: usize, const G: usize>(
             return None;
         }
         let place = plan.path.point_at(at_m)?;
-        // Nothing is nearer than that.
+        // No zone is nearer than that.
         let free_m = things.iter().map(|thing| far_m(thing, &place)).fold(FIELD_M, f32::min);
         if met && free_m > 0.0 {
             return Some(at_m + BEYOND_M);

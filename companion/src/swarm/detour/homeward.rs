@@ -7,36 +7,37 @@
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
-/// After no way home was found the next is sought so much later.
+/// Time from a search that found no way home to the next search.
 const AGAIN: Duration = Duration::from_secs(5);
-/// So often it turns home in one flight: whatever stops it then is not flown around.
+/// Most times that a vehicle turns home in one flight: a block after the last time is not flown
+/// around.
 const TURNS: u8 = 4;
 
-/// Where a vehicle is on its way home.
+/// Progress of a vehicle on its way home.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Homeward {
-    /// It stops and seeks its way since then.
+    /// Time since which the vehicle stands and seeks its way.
     seeks_since: Option<Instant>,
     /// When it was last not found.
     missed_at: Option<Instant>,
-    /// It flies it.
+    /// The vehicle flies its way home.
     flies: bool,
     turns: u8,
 }
 
 impl Homeward {
-    /// What remains of it when a way around has come; `aside` if that leads aside only.
+    /// The state that remains when a detour has come; `aside` if the detour leads aside only.
     pub(super) fn taken(self, aside: bool) -> Self {
         Self { flies: !aside && self.seeks_since.is_some(), turns: self.turns, ..Self::default() }
     }
 
-    /// It turns home.
+    /// The vehicle turns home.
     pub(crate) fn turn(&mut self, now: Instant) {
         let turns = self.turns.saturating_add(1);
         *self = Self { seeks_since: Some(now), turns, ..Self::default() };
     }
 
-    /// It flies back another way.
+    /// The vehicle flies back another way.
     pub(crate) fn forget(&mut self) {
         *self = Self { turns: self.turns, ..Self::default() };
     }
@@ -56,7 +57,7 @@ impl Homeward {
         self.seeks_since.is_some()
     }
 
-    /// For how long the vehicle has been seeking its path home.
+    /// Time for which the vehicle has been seeking its path home.
     pub(crate) fn sought_for(&self, now: Instant) -> Option<Duration> {
         self.seeks_since.map(|since| now - since)
     }

@@ -4,20 +4,22 @@ use heapless::Vec;
 
 use crate::link::roster::{Entry, Standing};
 
-/// What a division follows from, of one vehicle: as [`planner_core::coverage::losses::Fate`], in decimetres.
+/// Inputs of a division, of one vehicle: as [`planner_core::coverage::losses::Fate`], in
+/// decimetres.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Lot {
     /// Whether it flies on.
     pub lives: bool,
-    /// How far along its path the pictures are its own; [`Lot::WHOLE`] where it took all of them.
+    /// Place along its path up to which the pictures are the vehicle's own; [`Lot::WHOLE`] where
+    /// the vehicle took all of them.
     pub along_dm: u16,
 }
 
 impl Lot {
-    /// All its path.
+    /// Mark of a vehicle's whole path.
     pub const WHOLE: u16 = u16::MAX;
 
-    /// What is known of a vehicle of the roster.
+    /// The inputs of a vehicle of the roster.
     pub fn of(entry: &Entry) -> Self {
         let along_dm = match entry.standing {
             Standing::Alive => entry.promise_dm.unwrap_or(entry.done_dm),
@@ -27,7 +29,7 @@ impl Lot {
         Self { lives: entry.standing == Standing::Alive, along_dm }
     }
 
-    /// The same place, metres; infinite for [`Lot::WHOLE`].
+    /// The place, metres; infinite for [`Lot::WHOLE`].
     pub fn along_m(&self) -> f32 {
         if self.along_dm == Self::WHOLE { f32::INFINITY } else { f32::from(self.along_dm) / 10.0 }
     }

@@ -4,80 +4,91 @@ use planner_core::Point;
 
 use crate::time::Duration;
 
-/// A hovering vehicle sways more slowly, m/s.
+/// Greatest speed of a hovering vehicle's sway, m/s.
 pub(crate) const STANDING_MPS: f32 = 0.3;
-/// A position older than the one held by less than this is late; by more, the sender was restarted.
+/// Time by which a position is older than the one held: by less than this it is late; by more, its
+/// sender was restarted.
 pub(super) const RESTART_MS: u32 = 10_000;
-/// Heard within this time counts as heard: four positions and intents.
+/// Age within which a neighbour counts as heard: four positions and intents.
 pub(super) const LATELY: Duration = Duration::from_millis(800);
-/// Further from its pad, seen from above, a vehicle on its plan is not on the way up from it or down to it, metres.
+/// Horizontal distance from its pad beyond which a vehicle on its plan is neither on the way up
+/// from the pad nor on the way down to it, metres.
 pub(super) const OVER_PAD_M: f32 = 10.0;
-/// After this silence a vehicle counts as dead. One that is unheard stops within 3 s (row `NeighboursSilent`) and lands
-/// 20 s later; this leaves it 20 s to come down.
+/// Silence after which a vehicle counts as lost. One that is unheard stops within 3 s (row
+/// `NeighboursSilent`) and lands 20 s later; this leaves it 20 s to come down.
 pub(super) const DEAD: Duration = Duration::from_millis(DEAD_MS);
+/// [`DEAD`], milliseconds.
 pub(super) const DEAD_MS: u64 = 45_000;
-/// Last heard further away than this share of the radio's range, a vehicle that falls silent is out of range.
+/// Share of the radio's range: a vehicle last heard further away than this that falls silent is out
+/// of range.
 pub(super) const EDGE_SHARE: f32 = 0.7;
-/// An unheard vehicle makes progress at this share of its nominal speed at least: it slows in corners and where it lags.
+/// Least share of its nominal speed at which an unheard vehicle makes progress: it slows in corners
+/// and where it lags.
 pub(super) const RECKONED_SHARE: f32 = 0.4;
-/// That counts once it has been unheard for so long, seconds.
+/// Silence after which progress is reckoned at [`RECKONED_SHARE`], seconds.
 pub(super) const RECKONED_AFTER_S: f32 = 2.0;
-/// For so long at most a vehicle flies on unheard, seconds.
+/// Longest time for which a vehicle flies on unheard, seconds.
 pub(super) const FLIES_ON_S: f32 = 75.0;
-/// An unheard vehicle stands on its path for so long before it lands.
+/// Time for which an unheard vehicle stands on its path before it lands.
 pub(super) const STANDS_UNHEARD: Duration = Duration::from_secs(15);
-/// After this silence it is down from the highest floors too: 50 m at 1.5 m/s.
+/// Silence after which a vehicle is down from the highest floors too: 50 m at 1.5 m/s.
 pub(super) const DOWN: Duration = Duration::from_secs(75);
-/// Over an area the column of a vehicle that left the plan in the air is kept off for so long after it was last heard: then it is
-/// down, whatever it flew there.
+/// Silence after which the column of a vehicle that left the plan in the air over an area is free
+/// again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
-/// How far along its path an unheard vehicle may have come, metres: it notices after [`LATELY`] and 1 s, and stops.
+/// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
+/// [`LATELY`] and 1 s, and stops.
 pub(super) const STRETCH_M: f32 = 6.0;
-/// And by so much for each second that messages are late, m/s.
+/// Growth of [`STRETCH_M`] for each second that messages are late, m/s.
 pub(super) const STRETCH_MPS: f32 = 2.0;
-/// Spacing of the places on that stretch below which it may lie, metres.
+/// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const STRETCH_STEP_M: f32 = 1.0;
-/// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens it where it knows the
-/// ground.
+/// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens the
+/// column where it knows the ground.
 pub(super) const COLUMN_M: f32 = 60.0;
-/// An airborne vehicle of which nothing is heard for this long may land before more is heard.
+/// Silence after which an airborne vehicle may land before it is heard again.
 pub(super) const SILENT: Duration = Duration::from_secs(3);
-/// Further below a vehicle whose height is known there is time until it is nearer, metres.
+/// Height difference, metres: this vehicle has time while a vehicle of known height is further
+/// above it.
 pub(super) const BELOW_M: f32 = 15.0;
-/// Fastest landing, m/s: how the column of a vehicle that does not know where it is grows.
+/// Fastest landing, m/s: the rate at which the column of a vehicle grows that does not know where
+/// it is.
 pub(super) const LANDS_MPS: f32 = 2.0;
-/// A place older than this does not show how low a vehicle is that lands, seconds.
+/// Age from which a landing vehicle's reported place does not show how low the vehicle is, seconds.
 pub(super) const OLD_S: f32 = 1.0;
-/// The same: what was heard within this time is no older.
+/// [`OLD_S`] as a duration.
 pub(super) const FRESHLY: Duration = Duration::from_secs(1);
-/// A vehicle this little below may yet be above in a moment, metres.
+/// Height difference up to which a vehicle below may be above in a moment, metres.
 pub(super) const LEVEL_M: f32 = 1.0;
-/// What may be missing on the place of a vehicle whose own knowledge of it is old, metres.
+/// Position error of a vehicle whose own knowledge of its place is old, metres.
 pub(super) const VAGUE_M: f32 = 0.5;
-/// What two vehicles in the air may stray together, one of which hovers, metres.
+/// Stray of two vehicles in the air together, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;
-/// A position counts as the vehicle's of the roster if an intent of our mission was heard from it within this time: ten intents
-/// at the lowest rate.
+/// Time for which an intent of our mission shows that the sender's positions are those of the
+/// roster's vehicle: ten intents at the lowest rate.
 pub(super) const BELONGS: Duration = Duration::from_secs(5);
 /// Most strangers that are kept; a full roster leaves room for one.
 pub(super) const STRANGERS: usize = 4;
-/// A stranger that was not heard for this long is forgotten.
+/// Silence after which a stranger is forgotten.
 pub(super) const STRANGER_STAYS: Duration = Duration::from_secs(60);
-/// Rank of a stranger: behind everyone.
+/// Rank of a stranger: behind every vehicle of the roster.
 pub(super) const STRANGER: u16 = u16::MAX;
-/// A vehicle that stood for so long is not about to go on.
+/// Time of standing after which a vehicle is not about to go on.
 pub(super) const STANDS: Duration = Duration::from_secs(5);
-/// Progress is believed as if it were that of so much later, seconds: messages come up to a second late, and then at once.
+/// Greatest delay of a message, seconds: progress is believed as if this much later, since messages
+/// come up to a second late, and then at once.
 pub(super) const LATE_S: f32 = 1.0;
-/// What progress may jump, metres: where a vehicle takes up its path again, its nearest point is new.
+/// Greatest jump of progress, metres: where a vehicle takes up its path again, its nearest point is
+/// new.
 pub(super) const STRIDE_M: f32 = 1.0;
-/// For so long a vehicle that nobody hears may fly on at the top of its climb, seconds.
+/// Longest time for which a vehicle that no other vehicle hears flies on at the top of its climb,
+/// seconds.
 pub(super) const BEYOND_TOP_S: f32 = 1.2;
-/// A climb leads straight up, this little beside, metres.
+/// Greatest horizontal distance from the vertical of a climb, metres.
 pub(super) const CLIMB_BESIDE_M: f32 = 0.9;
-/// A top this little above is reached, metres.
+/// A top at most this far above is reached, metres.
 pub(super) const TOP_M: f32 = 0.3;
-/// Further away than any vehicle.
+/// A place further away than any vehicle.
 pub(super) const NOWHERE: Point = Point::new(1e6, 1e6, 1e6);
-/// Nobody flies higher over another than this, metres.
+/// Greatest height of one vehicle over another, metres.
 pub(super) const SKY_M: f32 = 1000.0;

@@ -14,14 +14,14 @@ use crate::link::echo::Lateness;
 use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, LANDED, OUT, POINTS, WAITING};
 use crate::time::{Duration, Instant};
 
-/// What is known of the ground of an area.
+/// Ground of an area.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Field {
-    /// Where it is not level.
+    /// Ground that is not level.
     pub(super) ground: Option<Ground>,
     /// After this silence a vehicle is down.
     pub(super) down: Duration,
-    /// By so much two vehicles in the air may be nearer than they believe, metres.
+    /// Distance by which two vehicles in the air may be nearer than they believe, metres.
     pub(super) stray_m: f32,
 }
 
@@ -39,7 +39,7 @@ pub(crate) struct Contact {
     pub(super) hears_us_at: Option<Instant>,
     /// Whom it hears, a bit for each rank.
     pub(super) hears: u32,
-    /// Its progress as others passed it on, metres.
+    /// Progress of the vehicle as others passed it on, metres.
     pub(super) relayed_m: Option<f32>,
     /// When that was so.
     pub(super) relayed_at: Option<Instant>,
@@ -49,14 +49,15 @@ pub(crate) struct Contact {
     /// When an intent of our mission was last heard from it.
     pub(super) belongs_at: Option<Instant>,
     pub(super) points: Vec<Point, POINTS>,
-    /// Where its position is on them.
+    /// Place of the vehicle on its reported points.
     pub(super) joint: Joint,
-    /// How far from the first of them they lead, metres.
+    /// Distance to which the points lead from the first of them, metres.
     pub(super) extent_m: f32,
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
     pub(super) column: bool,
     pub(super) floor_m: f32,
-    /// How far along its path its gates were open, or would be, metres: so far it flies on unheard.
+    /// Place along its path up to which the vehicle's gates were open, or would be, metres: the
+    /// vehicle flies on to there unheard.
     pub(super) clear_m: f32,
     /// Seconds until the last of those is open.
     pub(super) clear_in_s: u8,
@@ -74,9 +75,9 @@ pub(crate) struct Contact {
     pub(super) moved_at: Instant,
     /// The furthest it can have come, metres along its path, and when that was.
     pub(super) furthest: Option<(f32, Instant)>,
-    /// Where it stood before it took off: its autopilot may fly it back there.
+    /// Place of the vehicle before it took off: its autopilot may fly it back there.
     pub(super) pad: Option<Point>,
-    /// Where it rested when a way around was planned.
+    /// Place where the vehicle rested when a detour was planned.
     pub(super) avoided: Option<Point>,
     pub(super) state: Neighbour,
 }
@@ -91,7 +92,7 @@ impl Contact {
         self.heard_at.is_some_and(|at| now - at < span)
     }
 
-    // One copy of it, and of what else many ask: a board has little room.
+    // The contact has one copy of this and of other common calls: a board has little room.
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most are heard.
@@ -129,7 +130,8 @@ impl Contact {
             .is_some_and(|progress_m| self.at_edge && self.on_plan() && self.clear_m > progress_m + 0.5)
     }
 
-    /// How far it has come along the shared plan for sure, metres: unheard it flies on as far as its gates were open.
+    /// Progress of the vehicle along the shared plan for sure, metres: unheard the vehicle flies on
+    /// as far as its gates were open.
     pub(super) fn passed_m(&self, now: Instant) -> Option<f32> {
         let known_m = self.progress_m(now)?;
         let Some(known_at) = self.belongs_at.max(self.relayed_at) else { return Some(known_m) };
@@ -160,9 +162,10 @@ impl Contact {
         self.tells(OUT) || self.is_dead(now)
     }
 
-    /// What is believed of a reported progress, metres: no more than the vehicle can have flown since the report before, at
-    /// `fastest_mps`. The rest comes by and by, a landing that reports the whole way at once too. Less than before is
-    /// believed: it opens no gate. The first report of a plan is taken as it is, that of a vehicle that was restarted too.
+    /// The part of a reported progress that is believed, metres: no more than the vehicle can have
+    /// flown since the report before, at `fastest_mps`. The rest comes by and by, a landing that
+    /// reports the whole way at once too. Less than before is believed: it opens no gate. The first
+    /// report of a plan is taken as it is, that of a vehicle that was restarted too.
     pub(super) fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
         let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
         let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
@@ -225,7 +228,7 @@ impl Contact {
         if age_s < OLD_S {
             column(here, (BELOW_M + fallen_m).min(COLUMN_M), Nature::Landing);
         } else {
-            // It may be anywhere down to there by now, and comes down from there.
+            // The vehicle may be anywhere down to there by now, and comes down from there.
             column(here, fallen_m, Nature::Solid);
             column(here - up(fallen_m), BELOW_M, Nature::Landing);
         }
@@ -239,8 +242,8 @@ impl Contact {
         (climbs && top.z > here.z + TOP_M).then_some(top.z)
     }
 
-    /// How far along its path it may come unheard, metres: further where messages are late, its own and
-    /// those by which it learns that nobody hears it.
+    /// Stretch of its path that the vehicle may fly unheard, metres: further where messages are
+    /// late, its own and those by which it learns that no vehicle hears it.
     pub(super) fn stretch_m(&self) -> f32 {
         STRETCH_M + STRETCH_MPS * 2.0 * self.late.delay_s
     }
@@ -278,7 +281,8 @@ impl Contact {
         libm::fmaxf(self.floor_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
-    /// Where it may be from now on, `apart_m` around it. Over a field it lies on the ground that it reported.
+    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it. Over
+    /// a field it lies on the ground that it reported.
     pub(super) fn obstacles(
         &self,
         now: Instant,
@@ -287,7 +291,7 @@ impl Contact {
         tell: &mut dyn FnMut(KeepOff),
     ) {
         let here = self.state.position;
-        // In the air: those on the ground lie beside each other's pads.
+        // The zone is for vehicles in the air: those on the ground lie beside each other's pads.
         let wide_m = apart_m + field.map_or(0.0, |field| field.stray_m);
         let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
         let column = |from: Point, nature: Nature| {
@@ -301,10 +305,11 @@ impl Contact {
         } else if self.tells(OUT) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
             let below = column(here, Nature::Solid);
             tell(KeepOff { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
-            // Where it is it may not be come near from above or the side, whatever its column leaves.
+            // The place of the vehicle may not be approached from above or the side, whatever its
+            // column leaves.
             tell(place(wide_m + PAIR_SWAY_M));
         } else if self.is_dead(now) && self.flies_on() {
-            // Where the plan has it.
+            // The vehicle is where the plan has it.
         } else if self.is_dead(now) {
             if let Some(pad) = self.pad {
                 tell(KeepOff { from: pad, to: pad, ..place(apart_m) });

@@ -5,7 +5,7 @@ use crate::config::Ground;
 use crate::link::roster::{ENTRIES, Roster};
 use crate::swarm::fleet::{HEARD, Hearing, Limits, Own};
 
-/// So long what one said of its plan counts.
+/// Time for which a vehicle's report of its plan counts.
 const LATELY: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
@@ -18,12 +18,12 @@ impl<const V: usize> Neighbours<V> {
         self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
     }
 
-    /// What they agree on; none where the mission is no area.
+    /// The fleet; none where the mission is no area.
     pub(crate) fn fleet(&self) -> Option<&Fleet<V>> {
         self.fleet.as_ref()
     }
 
-    /// The same, to be changed.
+    /// The fleet, to be changed.
     pub(crate) fn fleet_mut(&mut self) -> Option<&mut Fleet<V>> {
         self.fleet.as_mut()
     }

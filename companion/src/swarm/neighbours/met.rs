@@ -23,22 +23,23 @@ pub(crate) struct Met<'a> {
     pub(crate) waits: bool,
     /// Whether it has been silent for so long that it counts as lost.
     pub(crate) lost: bool,
-    /// What its set follows from.
+    /// Inputs of the neighbour's set.
     pub(crate) heard: Heard<'a>,
-    /// Where it was last heard, if its set is that of a climb since: it may not have begun that.
+    /// Place where the neighbour was last heard, if its set is that of a climb since: it may not
+    /// have begun the climb.
     pub(crate) low: Option<Point>,
 }
 
-/// What a vehicle compares with its neighbours at first.
+/// Inputs of the first comparison of a vehicle with its neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Reach<'a> {
-    /// Where it is.
+    /// Place of the vehicle.
     pub(crate) place: Point,
-    /// How far its own set reaches, and what is kept at most, metres.
+    /// Reach of the vehicle's own set, and the greatest distance kept, metres.
     pub(crate) within_m: f32,
-    /// What is expected of them.
+    /// Bounds expected of the neighbours.
     pub(crate) bounds: &'a Bounds,
-    /// So many seconds of their flight count as well.
+    /// Time of the neighbours' flight that counts as well, seconds.
     pub(crate) ahead_s: f32,
     /// Whether it follows the shared plan: gates keep it apart from those that do.
     pub(crate) on_plan: bool,
@@ -115,7 +116,7 @@ impl Contact {
         away_sq >= most_m * most_m
     }
 
-    /// How far it is at most from where it stopped unheard, metres.
+    /// Greatest distance of the vehicle from where it stopped unheard, metres.
     #[inline(never)]
     fn rests_m(&self, reach: &Reach<'_>) -> f32 {
         let rests = Heard {
@@ -168,7 +169,8 @@ impl<const V: usize> Neighbours<V> {
         let placed_s = placed_for.secs_f32();
         // Most are heard: then nothing of what follows is so.
         let silent = placed_for >= FRESHLY;
-        // Where positions are lost, an intent says as well where it is: at its setpoint.
+        // Where positions are lost, an intent reports the place as well: the vehicle is at its
+        // setpoint.
         let told_at = contact.belongs_at.filter(|_| silent && placed_s > OLD_S && !contact.points.is_empty());
         let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < OLD_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));

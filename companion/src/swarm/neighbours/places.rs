@@ -9,7 +9,8 @@ use crate::link::intent::{GROUNDED, LANDED};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
-    /// By so much vehicles in the air, off the plan, may be nearer than they believe, metres: 0 where walls leave no room for it.
+    /// Distance by which vehicles in the air, off the plan, may be nearer than they believe,
+    /// metres: 0 where walls leave no room for it.
     pub(crate) fn stray_m(&self) -> f32 {
         self.stray_m
     }
@@ -19,8 +20,8 @@ impl<const V: usize> Neighbours<V> {
         self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down, stray_m: self.stray_m })
     }
 
-    /// What of contact `i` lies, stands or hovers where neither the plan nor the way around it knows of: `apart_m` away from it
-    /// is far enough.
+    /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
+    /// detour says so: `apart_m` away from it is far enough.
     pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
@@ -39,8 +40,9 @@ impl<const V: usize> Neighbours<V> {
         self.clear_at >= at
     }
 
-    /// Where the other vehicles of the roster are while they stand, those out of the plan among them: `apart_m` away from one in
-    /// the air is far enough, and `lying_m` from one that lies, and no longer strays.
+    /// Places of the other vehicles of the roster while they stand, those out of the plan among
+    /// them: `apart_m` away from one in the air is far enough, and `lying_m` from one that lies,
+    /// and no longer strays.
     pub fn places(&self, now: Instant, [apart_m, lying_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| {
@@ -49,12 +51,12 @@ impl<const V: usize> Neighbours<V> {
         });
     }
 
-    /// Where vehicles that land without looking may come nearer than `apart_m`.
+    /// Columns in which vehicles that land without looking may come nearer than `apart_m`.
     pub fn landing_columns(&self, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         (0..self.len()).for_each(|i| self.landing_column(i, now, apart_m, &mut tell));
     }
 
-    /// The same of contact `i`.
+    /// The columns of contact `i`.
     pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
@@ -62,8 +64,8 @@ impl<const V: usize> Neighbours<V> {
         }
     }
 
-    /// Where a landing would end within `apart_m` of a vehicle that is there: flying over it is
-    /// allowed, ending there is not.
+    /// Zones in which a landing would end within `apart_m` of a vehicle that is there: a path may
+    /// lead over them, and not end there.
     pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;

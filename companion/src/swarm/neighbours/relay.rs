@@ -30,25 +30,27 @@ use crate::time::{Duration, Instant};
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
-/// Most vehicles reported at once.
+/// Most vehicles reported in one message.
 const MOST: usize = 14;
 const VERSION: u8 = 2;
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 12;
 const ITEM: usize = 8;
-/// Longest payload with its head.
+/// Longest TUNNEL payload, bytes.
 pub(crate) const LENGTH: usize = TUNNEL_HEAD + HEAD + MOST * ITEM;
-/// Heard within this time a vehicle speaks for itself.
+/// Age within which a vehicle's own messages replace relayed ones.
 const SPEAKS: Duration = Duration::from_secs(1);
-/// Unheard for so long a vehicle is out of range rather than a victim of lost messages.
+/// Silence after which a vehicle is out of range, and not a victim of lost messages.
 const FAR: Duration = Duration::from_secs(3);
-/// Reported to follow the plan within this time it still does: three hops, and the loss of a message.
+/// Time for which a relayed report that a vehicle follows the plan counts: three hops, and the loss
+/// of a message.
 const RECENT: Duration = Duration::from_secs(6);
-/// What each hop adds to the age: longer than most messages take.
+/// Age that each hop adds, microseconds: longer than most messages take.
 const HOP_US: u64 = 500_000;
+/// Unit of an age in the message, microseconds.
 const TICK_US: u64 = 100_000;
 
-/// How far the vehicle of a rank has come, and how old that is in 0.1 s.
+/// Progress of the vehicle of a rank, and the age of that progress in 0.1 s.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Item {
     rank: u8,
@@ -58,7 +60,7 @@ struct Item {
     clear_in_s: u8,
 }
 
-/// What a vehicle passes on.
+/// Relayed reports of a vehicle.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Relay {
     pub(crate) mission_crc: u32,
@@ -109,8 +111,8 @@ impl Relay {
 }
 
 impl Contact {
-    /// Its progress on the shared plan, metres: as it reports it, or as others do while it is not heard. None if it was last
-    /// heard off the plan.
+    /// Progress of the vehicle on the shared plan, metres: as it reports it, or as others do while
+    /// it is not heard. None if it was last heard off the plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
         if self.heard_within(now, SPEAKS) || (own_m.is_none() && self.belongs_at.is_some()) {
@@ -135,11 +137,11 @@ impl Contact {
             && self.progress_m(now).is_some()
     }
 
-    /// What is passed on of it: none off the plan.
+    /// The relayed report of this vehicle: none off the plan.
     fn item(&self, now: Instant) -> Option<Item> {
         let progress_m = self.progress_m(now)?;
         let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(TICK_US);
-        // Not below zero, and 0 where it is no number.
+        // The difference is not below zero, and 0 where it is no number.
         let clear = (self.clear_m - progress_m) as u8;
         let age = age.min(u64::from(u8::MAX)) as u8;
         Some(Item { rank: self.rank as u8, age, progress_m, clear, clear_in_s: self.clear_in_s })
@@ -147,12 +149,13 @@ impl Contact {
 }
 
 impl<const V: usize> Neighbours<V> {
-    /// What neighbours do not hear themselves, beginning where the last one was full.
+    /// Reports of vehicles that neighbours do not hear themselves, beginning where the last message
+    /// was full.
     pub(crate) fn relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
         let speaking = || roster.iter().filter(|c| c.heard_within(now, LATELY));
-        // What one neighbour misses is reported to all.
+        // A report that one neighbour misses is sent to all.
         let missed = |c: &Contact| speaking().any(|by| by.rank != c.rank && by.hears & (1 << c.rank) == 0);
         let first = roster.partition_point(|c| c.rank < self.relay_next);
         let mut next = self.relay_next;
@@ -181,7 +184,8 @@ impl<const V: usize> Neighbours<V> {
             }
             let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
             if item.progress_m > known_m {
-                // What others say of it is believed no faster than what it says itself.
+                // Progress that others report of a vehicle is believed no faster than progress that
+                // the vehicle reports itself.
                 let believed_m = contact.believed_m(item.progress_m, fastest_mps, now);
                 contact.relayed_m = Some(libm::fmaxf(believed_m, known_m));
                 // Gates that are open stay open.

@@ -10,7 +10,7 @@ use crate::link::frame::{self, Header, MAX_SENT};
 use crate::link::intent::Intent;
 
 impl Bench {
-    /// Its intent and its position, five times a second.
+    /// Sends the neighbour's intent and position, five times a second.
     pub(super) fn report_neighbour(&mut self) {
         let Some((place, flags, progress_m, plan_crc)) = self.neighbour else { return };
         let roster = &self.companion.config.roster;

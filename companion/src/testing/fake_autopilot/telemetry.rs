@@ -49,7 +49,7 @@ impl Bench {
         }
     }
 
-    /// What is due at this tick.
+    /// Sends the messages that are due at this tick.
     pub(super) fn report(&mut self) {
         if self.silent {
             return;
