@@ -16,7 +16,7 @@ pub const VEHICLES: usize = 256;
 pub const WAYPOINTS: usize = 64;
 /// Gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 2048;
-/// Pieces of flights among which a vehicle steps aside: 44 bytes each.
+/// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
 pub const PIECES: usize = 32_768;
 
 /// A companion with the desk's capacities.
@@ -32,10 +32,10 @@ pub fn new_companion(config: Config<VEHICLES>) -> anyhow::Result<Box<DeskCompani
     Ok(Box::new(companion))
 }
 
-/// What a board can hold: its firmware's capacities.
+/// Capacities of a board's firmware.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Board {
-    /// Its name, as `cargo xtask build --board` takes it.
+    /// Name of the board, as `cargo xtask build --board` takes it.
     pub name: &'static str,
     /// Nodes of a roadmap.
     pub nodes: usize,
@@ -100,7 +100,7 @@ impl Board {
         BOARDS.iter().find(|board| board.name == name).ok_or_else(|| format!("boards are {}", names()))
     }
 
-    /// What of a roadmap file is more than it holds: the first limit that is exceeded.
+    /// The first of the board's limits that a roadmap file exceeds.
     pub fn roadmap_excess(&self, roadmap: &RoadmapView<'_>) -> Option<String> {
         self.excess(&[
             ("nodes", roadmap.node_count(), self.nodes),
@@ -109,12 +109,12 @@ impl Board {
         ])
     }
 
-    /// What of an area is more than it holds.
+    /// The first of the board's limits that an area exceeds.
     pub fn area_excess(&self, vertices: usize, lanes: usize) -> Option<String> {
         self.excess(&[("vertices", vertices, self.vertices), ("lanes", lanes, self.lanes)])
     }
 
-    /// What of a mission file is more than it holds.
+    /// The first of the board's limits that a mission file exceeds.
     pub fn mission_excess(&self, mission: &MissionView<'_>) -> Option<String> {
         self.excess(&[
             ("vehicles", mission.vehicles().len(), self.vehicles),

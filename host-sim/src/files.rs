@@ -77,7 +77,7 @@ impl Results {
         Ok(results)
     }
 
-    /// The same for one file.
+    /// Results of one file.
     ///
     /// # Errors
     /// As [`Self::open`], or the path names no file.
@@ -89,7 +89,7 @@ impl Results {
         Self::open(path.parent().unwrap_or(Path::new(".")), &[name])
     }
 
-    /// Where a file of this name goes: what a link leads to.
+    /// Place of a file of this name: the target of a link.
     fn target(&self, name: &str) -> anyhow::Result<PathBuf> {
         let path = self.dir.join(name);
         let cannot = || format!("cannot write: {}", quoted_path(&path));
@@ -109,7 +109,7 @@ impl Results {
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
-            // As for any new file, less what the user's mask forbids.
+            // Permissions as of any new file, less those that the user's mask forbids.
             builder.permissions(fs::Permissions::from_mode(0o666));
         }
         let made = builder.tempfile_in(&self.dir);
@@ -159,7 +159,8 @@ impl Results {
         Ok(())
     }
 
-    /// What has a name now, under another one until all is kept; it is gone when that is dropped.
+    /// Keeps an existing file under another name until all results are written; dropping the result
+    /// removes it.
     fn set_aside(&self, target: &Path) -> io::Result<Option<TempPath>> {
         if !target.try_exists()? {
             return Ok(None);
@@ -172,7 +173,7 @@ impl Results {
 
 /// Undoes the keeping of one file.
 fn put_back(target: &Path, before: Option<TempPath>) {
-    // What cannot be undone stays as it is: the error says that the results are not whole.
+    // A step that cannot be undone stays as it is: the error says that the results are not whole.
     let _ = match before {
         Some(before) => before.persist(target).map_err(|error| error.error),
         None => fs::remove_file(target),
@@ -183,7 +184,7 @@ impl Drop for Results {
     fn drop(&mut self) {
         self.files.clear();
         for dir in &self.made {
-            // Where somebody else put something into it, it stays.
+            // A folder that another program filled stays.
             let _ = fs::remove_dir(dir);
         }
     }
@@ -223,7 +224,8 @@ mod tests {
         let names: Vec<_> = fs::read_dir(&out).unwrap().map(|e| e.unwrap().file_name()).collect();
         assert_eq!((names.len(), fs::read(out.join("two")).unwrap()), (2, b"2".to_vec()));
 
-        // One that cannot have its name, here since a folder has it by now, leaves all that was there before.
+        // A file that cannot have its name, here since a folder has it by now, leaves all that was
+        // there before.
         let mut results = Results::open(&out, &["one", "three", "last"]).unwrap();
         for name in ["one", "three", "last"] {
             results.add(name, b"new").unwrap();

@@ -10,7 +10,7 @@ use companion::storage::store::{Fault, FlashRequest, Layout, READ, ReadFlash};
 use crate::files;
 use crate::quote::quoted_path;
 
-/// What a desk's companion keeps its files in: the default board's bank.
+/// Flash layout of a companion on the desk: the default board's bank.
 pub const LAYOUT: Layout = Layout::H743;
 
 /// The bank.
@@ -61,14 +61,14 @@ impl DeskFlash {
                 self.change(at, LAYOUT.sector_len as usize, |part| part.fill(0xFF))?;
             }
             FlashRequest::Program { at, bytes } => self.change(at, bytes.len(), |part| {
-                // As flash does it: bits only fall.
+                // Programmed as flash does it: bits only fall.
                 part.iter_mut().zip(bytes).for_each(|(held, byte)| *held &= byte);
             })?,
         }
         Ok(&[])
     }
 
-    /// What it holds.
+    /// Content of the flash.
     pub fn into_bytes(self) -> Vec<u8> {
         self.bytes
     }

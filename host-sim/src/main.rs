@@ -53,7 +53,7 @@ fn main() -> ExitCode {
     // Results that nobody could read are none.
     let done = done.and_then(|code| progress::printed().map(|()| code));
     done.unwrap_or_else(|error| {
-        // Where that cannot be printed either, the exit code says it.
+        // Where the error cannot be printed either, the exit code reports it.
         let _ = writeln!(std::io::stderr(), "error: {}", quote::message(&format!("{error:#}")));
         ExitCode::from(BAD_INPUT)
     })

@@ -20,17 +20,18 @@ use sim_autopilot::{AutopilotKind, Estimator};
 
 use crate::scenario::{Simulation, Vehicle};
 
-/// What two vehicles together may stray from their paths, beyond the safety distance, metres.
+/// Stray of two vehicles from their paths, together, beyond the safety distance, metres.
 pub const STRAY_M: f32 = 0.5;
-/// The same over fields, where there is room, and receivers without RTK.
+/// Stray of two vehicles together over fields, where there is room, and receivers without RTK,
+/// metres.
 pub const STRAY_OVER_FIELDS_M: f32 = 2.4;
-/// What one vehicle may stray beside another that stands on the ground, metres.
+/// Stray of one vehicle beside another that stands on the ground, metres.
 pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
-/// How much further gusts carry one vehicle, for each m/s of their peak, seconds. Two are not carried towards each other
-/// at once, so this is for one beside another that stands, or a wall.
+/// Further stray of one vehicle in gusts, for each m/s of their peak, seconds. Two vehicles are not
+/// carried towards each other at once, so this is for one beside another that stands, or a wall.
 pub const STRAY_PER_GUST_S: f32 = 0.05;
 
-/// How far an estimate may be from the truth, beyond what tracking covers, metres.
+/// Greatest distance of an estimate from the truth, beyond the part that tracking covers, metres.
 pub fn estimate_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.0,
@@ -39,16 +40,16 @@ pub fn estimate_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     }
 }
 
-/// What a scenario has to keep, metres.
+/// Distances that a scenario has to keep, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needed {
-    /// To walls, beyond the hull.
+    /// Distance to walls, beyond the hull.
     pub margin_m: f32,
     /// Between the paths of two vehicles, centre to centre.
     pub separation_m: f32,
 }
 
-/// What a swarm has to keep: that of its worst vehicles.
+/// Distances that a swarm has to keep: those of its worst vehicles.
 pub fn needed(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> Needed {
     let mut errors: Vec<f32> =
         vehicles.iter().map(|v| TRACKING_M + estimate_m(simulation.estimator, v.personality)).collect();
@@ -60,10 +61,12 @@ pub fn needed(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
     }
 }
 
-/// From a waypoint that is passed to the picture, seconds: a step of the companion, a command, a look of the autopilot's.
+/// Delay from passing a waypoint to its picture, seconds: a step of the companion, a command, and a
+/// check of the autopilot's.
 pub const TRIGGER_S: f32 = 0.15;
 
-/// How far apart pads have to be, metres: a vehicle comes down beside one that came down, and both err.
+/// Least distance between pads, metres: a vehicle comes down beside one that came down, and both
+/// err.
 pub fn pads_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
     let own = |v: &Vehicle| {
         estimate_m(simulation.estimator, v.personality) + touchdown_m(simulation.gust_mps, v.personality)
@@ -72,8 +75,9 @@ pub fn pads_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
         + vehicles.iter().map(own).fold(0.0, f32::max)
 }
 
-/// How much further than it flies beside its path a vehicle touches down beside its pad, metres. A PX4 that comes over its
-/// pad fast, or is blown, has its integrator against it, which carries it on once the companion no longer holds it.
+/// Distance by which a vehicle touches down further beside its pad than it flies beside its path,
+/// metres. A PX4 that comes over its pad fast, or is blown, has its integrator against it, which
+/// carries it on once the companion no longer holds it.
 fn touchdown_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     match autopilot {
         AutopilotKind::Px4 => 0.5 + STRAY_PER_GUST_S * gust_mps,
@@ -81,7 +85,7 @@ fn touchdown_m(gust_mps: f32, autopilot: AutopilotKind) -> f32 {
     }
 }
 
-/// How much lower than it believes a vehicle may be, metres.
+/// Greatest depth of a vehicle below where it believes to be, metres.
 pub fn lower_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     match (estimator, autopilot) {
         (Estimator::Perfect | Estimator::Rtk, _) => 0.15,
@@ -90,8 +94,9 @@ pub fn lower_m(estimator: Estimator, autopilot: AutopilotKind) -> f32 {
     }
 }
 
-/// What of a picture taken at `height_m` is planned with: it is taken beside its waypoint, lower and late. No less than the
-/// spacings: where these leave no overlap there is none to plan with.
+/// Part of a picture taken at `height_m` that the plan counts on: the picture is taken beside its
+/// waypoint, lower and late. No less than the spacings: where these leave no overlap there is none
+/// to plan with.
 pub fn usable(
     spacing: &Spacing,
     height_m: f32,
@@ -109,7 +114,7 @@ pub fn usable(
     Spacing { footprint, ..*spacing }
 }
 
-/// What a path keeps from a vehicle that stands on the ground, metres.
+/// Distance that a path keeps from a vehicle that stands on the ground, metres.
 pub fn parked_separation_m(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehicle]) -> f32 {
     let estimates = vehicles.iter().map(|v| estimate_m(simulation.estimator, v.personality));
     safety_distance_m

@@ -79,14 +79,14 @@ pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyho
     let largest_m = mission.scenario.vehicles.iter().map(|v| v.radius_m).fold(0.0, f32::max);
     let body = Limit { value: largest_m, label: "vehicle radius".to_owned() };
     page.plots = vec![plot("Smallest separation", safety, |s| s.separation_m)];
-    // Nothing stands on the ground below an area.
+    // Only a mission without an area has goals on the ground.
     if mission.scenario.area.is_none() {
         page.plots.push(plot("Smallest wall clearance", body, |s| s.clearance_m));
     }
     Ok(page)
 }
 
-/// What every command with a result writes.
+/// Files that every command with a result writes.
 pub const NAMES: [&str; 3] = ["result.json", "timing.json", "report.html"];
 
 /// Adds the files of [`NAMES`].

@@ -52,7 +52,7 @@ pub struct Stage {
 }
 
 impl Stage {
-    /// How far it has come.
+    /// Shows the progress of the stage.
     pub fn at(&self, position: u64) {
         if let Some(bar) = &self.bar {
             bar.set_position(position);
@@ -68,7 +68,7 @@ impl Drop for Stage {
     }
 }
 
-/// What was wrong with standard output when it took a line last.
+/// Error with which standard output last refused a line.
 static UNPRINTED: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Prints a line: what [`say!`](crate::say) calls.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 /// Longest quotation, characters.
 pub const MOST: usize = 200;
-/// Longest line of an error, characters: what is said around two quotations.
+/// Longest line of an error, characters: the words around two quotations.
 const LINE: usize = 600;
 
 /// A character that changes how a terminal shows what stands around it.
@@ -19,7 +19,7 @@ pub fn quoted(text: &str) -> String {
     shortened(&escaped(&shortened(text, 2 * MOST)), MOST)
 }
 
-/// The same for a path.
+/// As `quoted`, for a path.
 pub fn quoted_path(path: &Path) -> String {
     quoted(&path.to_string_lossy())
 }

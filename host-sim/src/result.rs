@@ -21,18 +21,18 @@ pub struct MissionResult {
     pub vehicles: Vec<VehicleResult>,
     /// The swarm as a whole.
     pub totals: Totals,
-    /// What kept, or failed to keep, apart.
+    /// Least distances that were kept, or not.
     pub safety: Safety,
     /// The roadmap planned on.
     pub roadmap: RoadmapSize,
-    /// What the assignment could not serve.
+    /// Goals and vehicles that the assignment could not serve.
     pub left: Left,
-    /// What became of the area, in a coverage mission.
+    /// Coverage of the area, in a coverage mission.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub coverage: Option<CoverageResult>,
 }
 
-/// What became of an area.
+/// Coverage of an area.
 #[derive(Clone, Debug, Serialize)]
 pub struct CoverageResult {
     /// Share of the area that pictures show.
@@ -41,9 +41,9 @@ pub struct CoverageResult {
     pub waypoints: u32,
     /// Lanes.
     pub lanes: usize,
-    /// From one lane to the next, metres: at most.
+    /// Greatest distance from one lane to the next, metres.
     pub lane_m: f64,
-    /// From one waypoint to the next, metres: at most.
+    /// Greatest distance from one waypoint to the next, metres.
     pub waypoint_m: f64,
     /// Direction of the lanes, degrees from east to the left.
     pub angle_deg: f64,
@@ -51,13 +51,13 @@ pub struct CoverageResult {
     pub max_cost_s: f64,
     /// Mean of the costs, seconds.
     pub mean_cost_s: f64,
-    /// Their standard deviation, seconds.
+    /// Standard deviation of the costs, seconds.
     pub sd_cost_s: f64,
     /// The greatest cost, metres.
     pub max_cost_m: f64,
     /// No division can cost less, seconds.
     pub lower_bound_s: f64,
-    /// How far the greatest cost is above that, as a share.
+    /// Excess of the greatest cost over that, as a share.
     pub gap: f64,
     /// Pictures.
     pub photos: u64,
@@ -68,7 +68,7 @@ pub struct CoverageResult {
     /// Heights above the ground, where there is terrain.
     #[serde(flatten)]
     pub terrain: Option<TerrainResult>,
-    /// One for each vehicle that flies.
+    /// Route of each vehicle that flies.
     pub routes: Vec<RouteResult>,
 }
 
@@ -92,9 +92,9 @@ pub struct TerrainResult {
 pub struct RouteResult {
     /// MAVLink system id.
     pub vehicle: u8,
-    /// Its waypoint with the lowest number.
+    /// Lowest number of the route's waypoints.
     pub first: u32,
-    /// Its waypoint with the highest number.
+    /// Highest number of the route's waypoints.
     pub last: u32,
     /// Whether it is flown from the last to the first.
     pub backward: bool,
@@ -104,18 +104,18 @@ pub struct RouteResult {
     pub depart_s: f64,
     /// C_k, seconds: of all sorties and the swaps between them.
     pub cost_s: f64,
-    /// The same, metres.
+    /// Cost of the route, metres.
     pub cost_m: f64,
-    /// What is flown on each battery, in turn.
+    /// Sorties of the route, one for each battery, in turn.
     pub sorties: Vec<SortieResult>,
 }
 
-/// What a vehicle flies on one battery.
+/// Flight of a vehicle on one battery.
 #[derive(Clone, Debug, Serialize)]
 pub struct SortieResult {
-    /// Its waypoint with the lowest number.
+    /// Lowest number of the sortie's waypoints.
     pub first: u32,
-    /// Its waypoint with the highest number.
+    /// Highest number of the sortie's waypoints.
     pub last: u32,
     /// When its round begins, seconds.
     pub begin_s: f64,
@@ -123,13 +123,14 @@ pub struct SortieResult {
     pub depart_s: f64,
     /// C_k of it, seconds.
     pub cost_s: f64,
-    /// The same, metres.
+    /// Cost of the sortie, metres.
     pub cost_m: f64,
-    /// From pad to pad, down to the lanes and up again too, seconds.
+    /// Time from pad to pad, down to the lanes and up again too, seconds.
     pub flown_s: f64,
 }
 
-/// What the assignment could not serve: more of one than of the other, or no way between them.
+/// Goals and vehicles that the assignment could not serve: more of one than of the other, or no
+/// path between them.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Left {
     /// Goals, by index.
@@ -166,7 +167,8 @@ pub struct VehicleResult {
 pub struct Totals {
     /// Sum of all path lengths, metres.
     pub path_m: f64,
-    /// From the start command to the last landing, seconds; in a plan, the longest nominal flight.
+    /// Time from the start command to the last landing, seconds; in a plan, the longest nominal
+    /// flight.
     pub makespan_s: f64,
 }
 
@@ -179,7 +181,7 @@ pub struct Safety {
     pub min_clearance_m: Option<f64>,
     /// Smallest distance between two centres, one of them flying, metres.
     pub min_separation_m: Option<f64>,
-    /// What the scenario asks for, metres.
+    /// Safety distance of the scenario, metres.
     pub safety_distance_m: f64,
     /// Times a pair came closer than that.
     pub violations: u32,
@@ -205,7 +207,7 @@ pub struct Timing {
     pub map_s: f64,
     /// Starts and goals checked; the roadmap: nodes, edges and their clearances, file.
     pub roadmap_s: f64,
-    /// What of that each part took.
+    /// Time of each part of the roadmap's construction.
     pub roadmap_parts: Parts,
     /// The shortest paths that give what each goal would cost each vehicle.
     pub search_s: f64,

@@ -24,13 +24,14 @@ use rayon::prelude::*;
 use crate::capacity::{Board, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
 use crate::map::{BoxTree, VoxelMap};
 
-/// Where the clearance stored with an edge saturates, metres: beyond it no vehicle of ours is any wider.
+/// Greatest clearance stored with an edge, metres: no vehicle of ours is any wider.
 pub const CLEARANCE_MAX_M: f32 = 6.0;
-/// Nodes whose edges are one piece of work: a fifth of a millisecond.
+/// Nodes whose edges are one job of a thread: a fifth of a millisecond.
 const NODES_A_PIECE: usize = 32;
-/// Numbers of each node in a file beside its place: ways to the landmarks, height over the ground.
+/// Numbers that a file stores for each node beside its place: distances to the landmarks, height
+/// over the ground.
 const COLUMNS: usize = LANDMARKS + 1;
-/// Clearances that differ by less are one, metres: the file keeps millimetres.
+/// Two clearances that differ by less than this are one, metres: the file keeps millimetres.
 const ALIKE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
@@ -109,7 +110,7 @@ fn height_m(map: &VoxelMap, node: &Point) -> f32 {
     map.ground_below(node).map_or(f32::INFINITY, |ground_m| node.z - ground_m)
 }
 
-/// What some work gives, and how long it took, seconds.
+/// Result of some work, and its time, seconds.
 fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let begun = Instant::now();
     let done = work();
@@ -145,9 +146,9 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     })
 }
 
-/// The same edges, each with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`]. `tree` is over `grid`: it
-/// gives the distances, and with them which segments are clear; only one that keeps almost exactly the clearance is checked
-/// by cells.
+/// The edges, each with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`].
+/// `tree` is over `grid`: it gives the distances, and with them which segments are clear; only an
+/// edge that keeps almost exactly the clearance is checked by cells.
 pub fn join<const NODES: usize, const CUBES: usize>(
     grid: &VoxelGrid<'_>,
     tree: &BoxTree,
@@ -189,7 +190,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     })
 }
 
-/// What `work` adds for all nodes, piece by piece on all threads, in the order of the pieces.
+/// Results of `work` for all nodes, piece by piece on all threads, in the order of the pieces.
 fn in_pieces<T: Copy + Send>(
     nodes: usize,
     work: impl Fn(Range<usize>, &mut Vec<T>) -> Result<(), PrmError> + Sync,
@@ -205,14 +206,15 @@ fn in_pieces<T: Copy + Send>(
     Ok(pieces.concat())
 }
 
-/// What distances from cells and from boxes may differ by, metres, many times over: both are rounded as coordinates are.
+/// Greatest difference of distances from cells and from boxes, metres, many times over: both are
+/// rounded as coordinates are.
 fn rounding_m(shape: &GridShape) -> f32 {
     let longest = shape.dims.into_iter().max().unwrap_or(0) as f32;
     (1e-3 + longest * 16.0 * f32::EPSILON) * shape.resolution_m
 }
 
 impl Roadmap {
-    /// The same nodes with as many of the edges as a board holds: [`cap::cap`] chooses them.
+    /// The nodes with as many of the edges as a board holds: [`cap::cap`] chooses them.
     ///
     /// # Errors
     /// It has more nodes than the board holds, or needs more edges to stay connected.

@@ -14,11 +14,11 @@ use planner_core::segment::point_clearance;
 use crate::map::VoxelMap;
 use crate::mission::{Mission, SwarmPlan};
 
-/// Widths that differ by less are the same, metres.
+/// Two widths that differ by less than this are the same, metres.
 const STEP_M: f32 = 0.05;
-/// Larger grids are not flooded: the list of cells takes 4 bytes each.
+/// Most cells of a grid that is flooded: the list of cells takes 4 bytes each.
 const MOST_CELLS: usize = 1 << 25;
-/// Most lines about goals; the rest are counted.
+/// Most lines about goals; further goals are counted.
 const MOST_LINES: usize = 8;
 
 /// One line for each goal that is left and each vehicle without one, with its place and what would help.
@@ -33,7 +33,7 @@ pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     for &goal in left.goals.iter().take(MOST_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
-    // Where goals are left, what would help stands with them.
+    // Where goals are left, the remedy stands with them.
     let asks = left.goals.is_empty();
     for &id in left.vehicles.iter().take(MOST_LINES.max(lines.len()) - lines.len()) {
         lines.push(vehicle_line(&mut asked, id, asks));
@@ -44,7 +44,7 @@ pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     lines
 }
 
-/// What was found out so far.
+/// Findings so far.
 struct Asked<'a> {
     mission: &'a Mission,
     reach: Reach,
@@ -105,7 +105,7 @@ fn smallest(mission: &Mission) -> usize {
     (0..mission.tasks.len()).min_by(|a, b| radius(a).total_cmp(&radius(b))).unwrap_or_default()
 }
 
-/// What would bring this vehicle to this goal.
+/// Remedy that would bring this vehicle to this goal.
 fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
     let mission = asked.mission;
     let settings = &mission.scenario.vehicles[vehicle];
@@ -143,7 +143,7 @@ fn what_helps(asked: &mut Asked<'_>, vehicle: usize, goal: usize) -> String {
 
 /// Which goals each vehicle's start is joined to by edges that are wide enough for it.
 struct Reach {
-    /// For each vehicle, for each goal.
+    /// Whether each vehicle is joined to each goal.
     joined: Vec<Vec<bool>>,
 }
 

@@ -18,11 +18,12 @@ use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 use self::retransmission::Retransmission;
 use crate::link::Link;
 
-/// System id of a ground station, unless another one is chosen.
+/// System id of the ground station, unless another one is chosen.
 const USUAL_SYSTEM: u8 = 255;
-/// Its component id.
+/// Component id of the ground station.
 const COMPONENT_ID: u8 = 190;
-/// The companion may have to erase its flash first: eight sectors of two seconds each.
+/// Longest wait for an answer: the companion may have to erase its flash first, eight sectors of
+/// two seconds each.
 const PATIENCE: Duration = Duration::from_secs(30);
 const BEAT: Duration = Duration::from_secs(1);
 
@@ -67,7 +68,8 @@ impl Client {
     /// A client that talks to the companion of one vehicle, or of the first it hears.
     pub fn new(link: Box<dyn Link>, system: Option<u8>) -> Self {
         let now = link.now();
-        // Not that of a client before us: a server knows repeated requests by it.
+        // The number is not that of a client before us: a server recognises repeated requests by
+        // it.
         let sequence = std::time::SystemTime::now()
             .duration_since(std::time::UNIX_EPOCH)
             .map_or(0, |since| (since.as_millis() % 65_536) as u16);
@@ -85,7 +87,7 @@ impl Client {
         }
     }
 
-    /// The same from another ground station than 255.
+    /// The client with another system id than 255.
     #[must_use]
     pub fn from_ground_station(self, own_system: u8) -> Self {
         Self { own_system, ..self }
@@ -214,7 +216,7 @@ impl Client {
     pub fn upload(&mut self, file: File, bytes: &[u8], progress: impl Fn(u64)) -> anyhow::Result<()> {
         self.done(RESET, &[])?;
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
-        // That it took long to erase its flash says nothing of the link.
+        // The time for erasing its flash says nothing about the link.
         self.retransmission = Retransmission::new(self.link.now());
         let mut pieces = bytes.chunks(DATA).enumerate();
         let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
@@ -241,7 +243,7 @@ impl Client {
                 if let Some(piece) = under_way.remove(&answer.sequence) {
                     arrived += piece.length;
                     heard_at = self.link.now();
-                    // Of one that was sent twice nobody knows which was answered.
+                    // For a piece that was sent twice it is unknown which copy was answered.
                     if !piece.repeated {
                         let took = self.link.now().duration_since(piece.sent_at);
                         self.retransmission.note_round_trip(took);

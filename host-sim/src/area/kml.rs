@@ -5,7 +5,7 @@ use kml::types::{Geometry, LinearRing, Polygon};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Folders in folders, at most: a file that goes deeper is refused before it is read.
+/// Most folders within each other: a file that nests deeper is refused before it is read.
 const DEPTH: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {

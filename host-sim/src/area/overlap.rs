@@ -6,7 +6,8 @@
 
 use planner_core::coverage::Flat;
 
-/// So near to a border is on it, metres: neighbouring fields share borders, and coordinates are rounded.
+/// A point within this distance of a border is on the border, metres: neighbouring fields share
+/// borders, and coordinates are rounded.
 const BORDER_M: f64 = 0.01;
 
 /// How rings lie to each other that share ground where they must not.
@@ -62,7 +63,7 @@ struct Wide {
     high: [f64; 2],
 }
 
-/// Where parts of a ring lie, as another one sees it.
+/// Places of the parts of a ring, as another ring sees them.
 #[derive(Default)]
 struct Sides {
     inside: bool,
@@ -100,7 +101,7 @@ impl Wide {
         self.edges().map(|(a, b)| (b[0] - a[0]).hypot(b[1] - a[1])).sum()
     }
 
-    /// Where the pieces of this ring's edges lie.
+    /// Places of the pieces of this ring's edges.
     fn sides(&self, other: &Self) -> Sides {
         let mut sides = Sides::default();
         for (a, b) in self.edges() {
@@ -121,7 +122,7 @@ impl Wide {
         sides
     }
 
-    /// Where this ring meets a segment, as shares of it, both ends among them.
+    /// Places where this ring meets a segment, as shares of the segment, both ends among them.
     fn cuts(&self, a: [f64; 2], b: [f64; 2]) -> Vec<f64> {
         let along = [b[0] - a[0], b[1] - a[1]];
         let length2 = along[0] * along[0] + along[1] * along[1];
@@ -187,7 +188,7 @@ mod tests {
         [x0, y0, x1, y1]
     }
 
-    /// Of rectangles on a grid every square metre can be counted.
+    /// Every square metre of rectangles on a grid can be counted.
     #[test]
     fn rectangles_overlap_where_a_square_metre_says_so() {
         let mut seen = [0; 5];

@@ -10,12 +10,12 @@ pub const MOST_VERTICES: usize = 10_000;
 /// One closed line; whether its last vertex repeats the first does not matter.
 pub type RingXy = Vec<[f64; 2]>;
 
-/// What a file holds.
+/// Content of a file.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Polygons {
-    /// To photograph.
+    /// Areas to photograph.
     pub outers: Vec<RingXy>,
-    /// Not photographed, flown over.
+    /// Areas that are not photographed, and may be flown over.
     pub holes: Vec<RingXy>,
     /// Neither.
     pub no_fly: Vec<RingXy>,
@@ -24,24 +24,24 @@ pub struct Polygons {
 /// Why a file holds no area.
 #[derive(Debug, Error)]
 pub enum AreaFileError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// Its name says nothing about its format.
+    /// The file's name says nothing about its format.
     #[error("is in no known format: its name ends in none of .geojson, .json, .wkt, .kml, .plan")]
     Format,
-    /// It is not what its name says.
+    /// The file is not what its name says.
     #[error("is not {format}: {why}")]
     Malformed {
-        /// What it should be.
+        /// Format by the file's name.
         format: &'static str,
-        /// What is wrong.
+        /// Fault of the file.
         why: String,
     },
-    /// There is no polygon in it.
+    /// The file holds no polygon.
     #[error("holds no polygon{0}")]
     NoPolygon(&'static str),
-    /// There are too many vertices in it.
+    /// The file holds too many vertices.
     #[error("holds {0} vertices; at most {MOST_VERTICES} can be used")]
     TooManyVertices(usize),
 }

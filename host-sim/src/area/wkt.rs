@@ -7,7 +7,7 @@ use wkt::types::{LineString, Polygon};
 
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
-/// Collections in a file, at most: the reader calls itself for each collection within another one.
+/// Most collections in a file: the reader calls itself for each collection within another one.
 const COLLECTIONS: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {

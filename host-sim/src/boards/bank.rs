@@ -9,18 +9,19 @@ use planner_core::field;
 
 use crate::flash::{DeskFlash, LAYOUT};
 
-/// Where bank 2 of the emulated flash lies.
+/// Address of bank 2 of the emulated flash.
 pub const BANK2: u32 = 0x6000_0000;
-/// Where a byte for each of its words keeps what happened to that last: nothing since it was erased, or it was programmed, or
-/// it is being programmed or erased.
+/// Address of the marks, a byte for each flash word: the state of that word, erased, programmed, or
+/// torn while it was being programmed or erased.
 pub const MARKS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;
 pub const WHOLE: u8 = 1;
 pub const TORN: u8 = 2;
-/// Where it is noted that the bank holds something.
+/// Address and value of the mark that the bank holds something.
 pub const MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 
-/// What a bank of flash holds after these files were uploaded to an empty one, its other slot erased.
+/// Content of a bank of flash after these files were uploaded to an empty one, its other slot
+/// erased.
 ///
 /// # Errors
 /// A file is refused.

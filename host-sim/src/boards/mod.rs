@@ -22,10 +22,11 @@ pub use self::bank::bank;
 pub use self::probe::STACK_LEN;
 use crate::quote::quoted_path;
 
-/// A board that answers nothing for so long of this machine's time hangs.
+/// Wall time without an answer after which a board counts as hanging.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Semihosting prints what the board logs to the standard output, so the board answers by another descriptor.
+/// Shell command that starts a board. Semihosting prints the board's log to standard output, so the
+/// board answers by another descriptor.
 const START: &str = r#"exec qemu-system-arm "$@" 3>&1 >"$LOG""#;
 
 /// Bytes that a port of a board receives or sent.
@@ -39,16 +40,16 @@ pub struct Piece {
     pub bytes: Vec<u8>,
 }
 
-/// What a board did with a grant.
+/// Result of a grant to a board.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub struct Answer {
     /// The board's time, microseconds since its start.
     pub now_us: u64,
     /// Whether it started again instead: its time begins at zero.
     pub restarted: bool,
-    /// What it sent, in order.
+    /// Bytes that the board sent, in order.
     pub sent: Vec<Piece>,
-    /// What was read of its memory.
+    /// Bytes that were read of the board's memory.
     memory: Vec<u8>,
 }
 
@@ -164,7 +165,7 @@ impl Emulated {
 
 impl Drop for Emulated {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // The process may have ended by itself.
         let _ = self.qemu.kill();
         let _ = self.qemu.wait();
     }

@@ -12,15 +12,15 @@ use companion::storage::store::WORD;
 
 /// Bytes of memory in a message.
 const CHUNK: usize = 32 << 10;
-/// Where the stack lies, as in the board's memory map.
+/// Address of the stack, as in the board's memory map.
 const STACK: u32 = 0x2008_A000;
-/// Its length, bytes.
+/// Length of the stack, bytes.
 pub const STACK_LEN: usize = 88 << 10;
-/// What no stack has touched since the start.
+/// Value of a byte that no stack has touched since the start.
 const PAINT: u8 = 0xcc;
 
 impl Emulated {
-    /// Its memory from an address on.
+    /// Reads the board's memory from an address on.
     ///
     /// # Errors
     /// The board is gone.

@@ -20,7 +20,7 @@ use crate::say;
 
 const STEP: Duration = Duration::from_millis(4);
 const LATEST: Duration = Duration::from_secs(1);
-/// Small enough for any path's datagrams.
+/// Longest datagram, bytes: small enough for any path.
 const DATAGRAM: usize = 1400;
 
 /// Arguments of `host-sim autopilot`.

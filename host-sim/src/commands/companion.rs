@@ -46,11 +46,12 @@ pub struct Args {
     flash: Option<PathBuf>,
 }
 
-/// Sleep between two looks at the links.
+/// Sleep between two polls of the links.
 const NAP: Duration = Duration::from_millis(1);
-/// After its end it goes on telling the others and ground stations so, as a board does for good.
+/// Time for which a companion whose mission has ended goes on reporting that to the others and to
+/// ground stations, as a board does for good.
 const FAREWELL: Duration = Duration::from_secs(2);
-/// A vehicle whose autopilot is silent for longer cannot be helped.
+/// Silence of its autopilot after which a vehicle cannot be helped.
 const HEARD: companion::Duration = companion::Duration::from_secs(5);
 
 /// Runs until the mission ends. Exit code 0 if it was flown to its end.
@@ -59,7 +60,7 @@ const HEARD: companion::Duration = companion::Duration::from_secs(5);
 /// Bad input or a link that fails, by name and place.
 pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = load(&args.scenario, None)?;
-    // What it needs is tried before the work.
+    // The flash is opened before the work.
     let mut flash = DeskFlash::open(args.flash.as_deref())?;
     let mut mission = Mission::prepare(scenario, &Progress::on_terminal())?;
     let index = mission.index_of(args.id)?;
@@ -142,7 +143,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
             companion = start(&config, &mut flash)?;
         }
         let state = companion.state();
-        // In the air there may be something left to do: whoever flies it may hand it back.
+        // In the air work may be left: a pilot may hand the vehicle back.
         let t = companion.telemetry();
         let heard = t.heartbeat_age(now()) < HEARD;
         let flies = t.armed && t.on_ground == Some(false) && heard;

@@ -140,7 +140,7 @@ fn remove_stale(dir: &Path, written: &[String]) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What `result.json` says of a plan.
+/// Description of a plan for `result.json`.
 pub(crate) fn described(planned: &Planned<'_>, findings: &Findings) -> CoverResult {
     let scenario = planned.scenario;
     let routes = &planned.plan.routes;

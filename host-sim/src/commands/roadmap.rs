@@ -93,7 +93,7 @@ pub(super) fn parse(bytes: &[u8]) -> anyhow::Result<RoadmapView<'_>> {
     Ok(view)
 }
 
-/// What is wrong with a file.
+/// Description of a file's fault.
 fn why(error: &RoadmapError) -> String {
     match error {
         RoadmapError::File(error) => error.to_string(),

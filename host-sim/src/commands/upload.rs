@@ -61,7 +61,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     Ok(ExitCode::SUCCESS)
 }
 
-/// What the file is, if the board holds it.
+/// Kind of the file, if the board holds it.
 fn kind(bytes: &[u8], board: &Board) -> anyhow::Result<File> {
     let (file, excess) = if bytes.starts_with(&roadmap::MAGIC) {
         let view = super::roadmap::parse(bytes).context("no sound roadmap")?;

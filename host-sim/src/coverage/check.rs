@@ -15,10 +15,10 @@ use super::flight::{Act, Stop};
 use super::heights::{self, HeightFindings};
 use super::{Flight, Planned};
 
-/// Most cells looked at; larger areas are looked at in larger cells.
+/// Most cells of the area that are checked; a larger area is checked in larger cells.
 const MOST_CELLS: f64 = 4e7;
 
-/// What was found.
+/// Findings of the check.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Findings {
     /// Share of the cells that are photographed.
@@ -39,7 +39,7 @@ pub struct Findings {
     pub broken: u64,
     /// Legs that enter a no-fly zone.
     pub forbidden: u64,
-    /// What was found of the heights above terrain.
+    /// Findings about the heights above terrain.
     pub heights: Option<HeightFindings>,
     /// When each picture first showed a cell: time and number of cells, by rising time.
     pub over_time: Vec<(f32, u64)>,
@@ -57,13 +57,13 @@ impl Findings {
 /// A picture: when, where, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Picture {
-    /// Who took it, its MAVLink system id; none in an earlier flight.
+    /// Vehicle that took the picture, its MAVLink system id; none in an earlier flight.
     pub vehicle: Option<u8>,
     /// Seconds.
     pub t_s: f32,
-    /// Where the camera is, which looks straight down.
+    /// Position of the camera, which looks straight down.
     pub position: Point,
-    /// Where its upper edge points, radians from east to the left.
+    /// Direction of the picture's upper edge, radians from east to the left.
     pub heading: f32,
 }
 
@@ -291,13 +291,14 @@ impl Cells {
     fn judge(&self, planned: &Planned<'_>, mut pictures: Vec<Picture>, findings: &mut Findings) {
         let spacing = planned.wanted.spacing;
         let counted = self.held(planned, self.size, 0.5);
-        // Where pictures overlap by a cell, one of them must show all its corners.
+        // Where pictures overlap by a cell, one of them must show all corners of the cell.
         let whole = f64::from(spacing.footprint.across_m - spacing.lane_m)
             .min(f64::from(spacing.footprint.along_m - spacing.waypoint_m))
             >= self.side;
         pictures.sort_by(|a, b| a.t_s.total_cmp(&b.t_s));
         let [columns, rows] = self.size;
-        // Elsewhere each corner that is in the area must be in a picture, and the middle.
+        // In other cells each corner that is in the area must be in a picture, and so must the
+        // middle.
         let mut corners: Vec<bool> = match whole {
             true => vec![false; (columns + 1) * (rows + 1)],
             false => self.held(planned, [columns + 1, rows + 1], 0.0).iter().map(|held| !held).collect(),

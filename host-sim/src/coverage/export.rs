@@ -23,9 +23,9 @@ const NAV_DELAY: u16 = 93;
 const DO_CHANGE_SPEED: u16 = 178;
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
-/// MAV_FRAME_GLOBAL_RELATIVE_ALT: for what has a place.
+/// MAV_FRAME_GLOBAL_RELATIVE_ALT: frame of an item that has a place.
 const FRAME_RELATIVE: u8 = 3;
-/// MAV_FRAME_MISSION: for what has none.
+/// MAV_FRAME_MISSION: frame of an item without a place.
 const FRAME_MISSION: u8 = 2;
 
 /// One item of a mission.
@@ -192,7 +192,7 @@ pub fn plan(planned: &Planned<'_>, route: &Route, items: &[Item]) -> Value {
     })
 }
 
-/// The same as `.waypoints`: one item a line, the home first.
+/// The mission as `.waypoints`: one item a line, the home first.
 pub fn waypoints(planned: &Planned<'_>, route: &Route, items: &[Item]) -> String {
     let home = home(planned, route);
     let mut text = "QGC WPL 110\n".to_owned();

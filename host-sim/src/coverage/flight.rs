@@ -13,19 +13,19 @@ use planner_core::coverage::pack::Route;
 use super::{CORNERS, Planned};
 use crate::scenario::coverage::Trigger;
 
-/// A corner so near to a picture is at its place, metres.
+/// A corner within this distance of a picture is at the picture's place, metres.
 const SAME_M: f32 = 0.01;
 
-/// What a vehicle does at a point of its flight.
+/// Action of a vehicle at a point of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Act {
-    /// It stands on its pad.
+    /// The vehicle stands on its pad.
     Pad,
-    /// It passes in its layer.
+    /// The vehicle passes in its layer.
     Transit,
-    /// It comes down to the lanes, or is about to leave them; no picture.
+    /// The vehicle comes down to the lanes, or is about to leave them; no picture.
     Lane,
-    /// It takes a picture: the waypoint of this number.
+    /// The vehicle takes a picture: the waypoint of this number.
     Photo(u32),
 }
 
@@ -34,7 +34,7 @@ pub enum Act {
 pub struct Stop {
     /// Where.
     pub position: Point,
-    /// What happens there.
+    /// Action at the stop.
     pub act: Act,
     /// The lane it lies on, where it does.
     pub lane: Option<u16>,
@@ -105,7 +105,7 @@ fn low(planned: &Planned<'_>, route: &Route, stops: &mut Vec<Stop>) {
     }
 }
 
-/// Where the first lane begins.
+/// Begin of the first lane.
 fn begins(planned: &Planned<'_>, begin: &Flat, end: &Flat) -> Point {
     match &planned.following {
         Some(following) => following.begin(begin, end),
@@ -168,8 +168,8 @@ fn corners(planned: &Planned<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, CORNERS
     corners
 }
 
-/// Where a vehicle looks on a lane, degrees from north to the right, if it flies from `from` to `to`: the way it flies, or
-/// one of the two along the lanes.
+/// Heading of a vehicle on a lane, degrees from north to the right, if it flies from `from` to
+/// `to`: the way it flies, or one of the two along the lanes.
 pub fn heading_deg(from: &Point, to: &Point) -> f32 {
     (to.x - from.x).atan2(to.y - from.y).to_degrees().rem_euclid(360.0)
 }

@@ -8,9 +8,9 @@ use crate::report::{Outline, Plot};
 use crate::result::CoverageResult;
 use crate::scenario::Scenario;
 
-/// What was found of a flight.
+/// Findings about a flight.
 pub struct Judged {
-    /// For `result.json`.
+    /// Findings for `result.json`.
     pub result: CoverageResult,
     /// Borders of the area.
     pub outlines: Vec<Outline>,

@@ -5,12 +5,13 @@ use planner_core::Point;
 use super::Planned;
 use super::flight::{Act, Flown, Stop};
 
-/// Samples of a leg lie no further apart, metres; over fine maps a quarter of a cell.
+/// Greatest distance between the height samples of a leg, metres; over fine maps a quarter of a
+/// cell.
 const SAMPLE_M: f32 = 1.0;
-/// Rounding, metres.
+/// Rounding of a height, metres.
 const ROUNDING_M: f32 = 0.02;
 
-/// What was found of the heights above terrain.
+/// Findings about the heights above terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightFindings {
     /// The least height of lanes and of ways between them above the ground, metres.

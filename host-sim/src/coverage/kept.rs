@@ -9,13 +9,13 @@ use super::check::Picture;
 use crate::files::{self, Results};
 use crate::quote::quoted_path;
 
-/// What they are kept in.
+/// File that keeps the pictures taken.
 const NAME: &str = "pictures.json";
 
 /// Time, place and heading of a picture.
 type Row = [f32; 5];
 
-/// Where they are kept.
+/// Store of the pictures.
 pub struct Kept {
     path: PathBuf,
     before: Vec<Picture>,

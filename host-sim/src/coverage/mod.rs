@@ -34,10 +34,10 @@ use crate::area::MOST_VERTICES;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
 
-/// Changes of the lanes' order that the desk looks at.
+/// Changes of the lanes' order that the desk tries.
 pub const LOOKS: u32 = 20_000_000;
 
-/// No start may be further above or below the ground, metres.
+/// Greatest distance of a start above or below the ground, metres.
 const MOST_OFF_GROUND_M: f32 = 1.5;
 
 /// A sortie, its stops, and when each is passed, seconds.
@@ -52,7 +52,7 @@ impl<'a> Planned<'a> {
         Self::searched(scenario, method, LOOKS)
     }
 
-    /// The same as companions plan it: they compare no more orders of the lanes than a board can.
+    /// The plan as companions make it: they compare no more orders of the lanes than a board can.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -153,13 +153,13 @@ impl<'a> Planned<'a> {
         self.sorties.iter().filter(|sortie| sortie.route.vehicle == route.vehicle)
     }
 
-    /// What a route costs with all its sorties and the swaps between them, seconds.
+    /// Cost of a route with all its sorties and the swaps between them, seconds.
     pub fn cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
         self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>() + swaps * SWAP_S
     }
 
-    /// The same without the swaps, metres.
+    /// Cost of a route without the swaps, metres.
     pub fn cost_m(&self, route: &Route) -> f32 {
         self.sorties_of(route).map(|sortie| sortie.route.cost_m).sum()
     }
@@ -201,7 +201,7 @@ impl<'a> Planned<'a> {
         Ok(sorties)
     }
 
-    /// In each round nobody leaves before it keeps the separation to the others.
+    /// In each round no vehicle leaves before it keeps the separation to the others.
     fn set_departures(&mut self) -> anyhow::Result<()> {
         let flights = self.flights();
         let separation_m = self.scenario.deconfliction.separation_m;
@@ -228,7 +228,8 @@ impl<'a> Planned<'a> {
         Ok(())
     }
 
-    /// Nobody is sent out of the geofence: companions, and autopilots that have it, would land there.
+    /// No vehicle is sent out of the geofence: companions, and autopilots that have it, would land
+    /// there.
     fn check_fence(&self) -> anyhow::Result<()> {
         let Some(fence) = &self.scenario.mission.geofence else { return Ok(()) };
         for sortie in &self.sorties {
@@ -312,7 +313,7 @@ fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
     }
 }
 
-/// The least share of the path, metres: far below any spacing of waypoints.
+/// Least share of the path, metres: far below any spacing of waypoints.
 const LEAST_SHARE_M: f32 = 1e-3;
 
 /// Divides the path by a method. Returns the shares by which companions divide it in the same way, if there are some.

@@ -9,10 +9,10 @@ use super::flight::Stop;
 use super::{Flight, Planned, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
-/// From point to point of a profile, metres.
+/// Spacing of the points of a height profile, metres.
 const PROFILE_M: f32 = 5.0;
 
-/// What the page shows.
+/// Data of the report page.
 pub fn page(
     planned: &Planned<'_>,
     flights: &[Flight],

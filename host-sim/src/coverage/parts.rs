@@ -16,10 +16,10 @@ use crate::report::{CoverageLayers, Division, Footprint, Part, Taken};
 use crate::swarm::Flight as Flown;
 use crate::swarm::divisions::Division as Begun;
 
-/// Whose each waypoint is.
+/// Vehicle of each waypoint.
 type Owners = BTreeMap<u32, u8>;
 
-/// What the page shows of a plan.
+/// Data of the report page about a plan.
 pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
     let mut parts: Vec<Part> = Vec::new();
     for (sortie, stops, _) in flights {
@@ -43,7 +43,7 @@ pub fn planned(planned: &Planned<'_>, flights: &[Flight]) -> CoverageLayers {
     layers(planned, divisions, pictures)
 }
 
-/// What the page shows of a flight: its plan and what became of that, and its pictures.
+/// Data of the report page about a flight: its plan and the plan's fate, and its pictures.
 ///
 /// # Errors
 /// A division that cannot be planned here, though companions did.
@@ -60,7 +60,8 @@ pub fn flown(
     let (mut before, mut gone, mut losses) = (Owners::new(), Vec::new(), Vec::<&[Lot]>::new());
     let whole = Begun { t_s: 0.0, vehicle: 0, number: 0, lots: Vec::new(), plan_crc: 0 };
     for division in std::iter::once(&whole).chain(&flight.divisions) {
-        // Others fly the same later; a division of which nobody said what it follows from cannot be planned here.
+        // Other vehicles fly the same later; a division whose inputs no vehicle reported cannot be
+        // planned here.
         if usize::from(division.number) != shown.len() || (division.number > 0 && division.lots.is_empty()) {
             continue;
         }
@@ -121,7 +122,7 @@ fn owners(flights: &[PathFlight<WAYPOINTS>]) -> Owners {
     owners
 }
 
-/// What changed hands.
+/// Waypoints that changed hands.
 fn taken(before: &Owners, now: &Owners) -> Vec<Taken> {
     let mut counts = BTreeMap::<(u8, u8), u32>::new();
     for (number, to) in now {

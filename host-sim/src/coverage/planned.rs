@@ -16,20 +16,20 @@ pub const LANES: usize = 8192;
 /// Most outward corners of no-fly zones on the desk.
 pub const CORNERS: usize = 256;
 
-/// What a vehicle flies on one battery.
+/// Flight of a vehicle on one battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sortie {
-    /// Its part of the vehicle's route.
+    /// The sortie's part of the vehicle's route.
     pub route: Route,
     /// Which one of its vehicle, from 1; also its round.
     pub number: u16,
-    /// How many its vehicle flies.
+    /// Number of sorties of the vehicle.
     pub of: u16,
     /// When its round begins, seconds.
     pub begin_s: f32,
     /// When it leaves its pad, seconds after that.
     pub depart_s: f32,
-    /// From pad to pad, seconds.
+    /// Time from pad to pad, seconds.
     pub flown_s: f32,
 }
 
@@ -42,13 +42,13 @@ impl Sortie {
 
 /// A planned coverage mission.
 pub struct Planned<'a> {
-    /// What was asked for.
+    /// Scenario of the plan.
     pub scenario: &'a Scenario,
-    /// Its `[area]`.
+    /// Section `[area]` of the scenario.
     pub wanted: &'a coverage::Area,
-    /// What vehicles follow above terrain.
+    /// Surface that vehicles follow above terrain.
     pub following: Option<Following<'a>>,
-    /// Its area.
+    /// Area of the plan.
     pub area: Area<'a>,
     /// How work was divided.
     pub method: Method,
@@ -64,10 +64,11 @@ pub struct Planned<'a> {
     pub shares: Option<Vec<f32>>,
     /// No division can end before, seconds.
     pub lower_bound_s: f32,
-    /// What each vehicle flies on each battery, by round: without `batteries`, each route.
+    /// Sorties of the vehicles, one for each battery, by round; without `batteries` each sortie is
+    /// a whole route.
     pub sorties: Vec<Sortie>,
     /// The least distance between two vehicles, as planned; infinite for one.
     pub least_separation_m: f32,
-    /// What lanes, ways and routes took of the clock, seconds.
+    /// Computing time of lanes, transits and routes, seconds.
     pub seconds: [f64; 3],
 }

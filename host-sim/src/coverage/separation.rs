@@ -8,13 +8,13 @@ use planner_core::Point;
 
 use super::flight::Stop;
 
-/// Times at which places are compared, seconds apart.
+/// Time between two comparisons of the vehicles' places, seconds.
 const STEP_S: f32 = 0.25;
-/// Departures that are tried, seconds apart.
+/// Time between two departures that are tried, seconds.
 const DELAY_S: f32 = 2.0;
-/// A vehicle that is no further from its pad, seen from above, is over it, metres.
+/// Horizontal distance from its pad up to which a vehicle is over its pad, metres.
 const OVER_PAD_M: f32 = 0.01;
-/// Nobody waits longer on the ground, seconds.
+/// Longest wait of a vehicle on the ground, seconds.
 const LONGEST_S: f32 = 900.0;
 
 /// A flight as planned, from its own departure on.
@@ -51,7 +51,7 @@ pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>,
     Some((delays.iter().map(|delay| delay.unwrap_or(0) as f32 * STEP_S).collect(), least_m))
 }
 
-/// Where a vehicle is at each step of its flight.
+/// Place of a vehicle at each step of its flight.
 fn sampled(flight: &Timed<'_>) -> Vec<Point> {
     let end_s = flight.times_s.last().copied().unwrap_or(0.0);
     let mut next = 1;

@@ -20,9 +20,9 @@ use super::flight::Act;
 pub use super::planned::Sortie;
 use crate::scenario;
 
-/// Share of its charge that a vehicle flies with: then it lands (`FLK_BATT_LOW`).
+/// Share of its charge that a vehicle uses before it lands (`FLK_BATT_LOW`).
 pub const USABLE_CHARGE: f32 = 0.85;
-/// From landing to the next start with another battery, seconds.
+/// Time from a landing to the next start with another battery, seconds.
 pub const SWAP_S: f32 = 120.0;
 
 /// The whole of a route.
@@ -35,7 +35,7 @@ pub fn lasts_s(vehicle: &scenario::Vehicle) -> f32 {
     vehicle.endurance_s.unwrap_or(VehicleLimits::default().endurance_s)
 }
 
-/// What a route takes from pad to pad, seconds: at cruise speed, from rest to rest on each leg across.
+/// Time of a route from pad to pad, seconds: at cruise speed, from rest to rest on each leg across.
 pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let index = usize::from(route.vehicle);
     let (vehicle, heights) = (&planned.vehicles[index], planned.wanted.heights);
@@ -49,8 +49,8 @@ pub fn flown_s(planned: &Planned<'_>, route: &Route) -> f32 {
     level_s + up_m / vehicle.climb_mps + up_m / vehicle.descend_mps
 }
 
-/// What all ways up and down take where the ground rises and falls, as if each were flown alone, and stops at the corners
-/// that follow it, seconds.
+/// Time of all climbs and descents where the ground rises and falls, as if each were flown alone,
+/// and of stops at the corners that follow the ground, seconds.
 fn over_terrain_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let vehicle = &planned.vehicles[usize::from(route.vehicle)];
     let stops = super::flight::stops(planned, route);
@@ -62,14 +62,14 @@ fn over_terrain_s(planned: &Planned<'_>, route: &Route) -> f32 {
     ups.sum::<f32>() + corners * vehicle.cruise_mps / ACCEL_MPS2
 }
 
-/// What stops at both ends of each lane, and over the pad, take beyond that, seconds: a lane, and a way from or to the pad, is
-/// taken to be long enough for the cruise speed.
+/// Further time of stops at both ends of each lane, and over the pad, seconds: a lane, and a
+/// transit from or to the pad, is taken to be long enough for the cruise speed.
 fn turns_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
     let stop_s = cruise_mps / ACCEL_MPS2;
-    // From one lane to the next it may be too short for that.
+    // The distance from one lane to the next may be too short for that.
     let step_m = planned.wanted.spacing.lane_m.min(cruise_mps * stop_s);
     let step_s = 2.0 * (step_m / ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
@@ -125,7 +125,7 @@ struct Lanes<'a> {
     route: &'a Route,
     /// The first waypoint of each, and what follows the last one.
     bounds: Vec<u32>,
-    /// From the pad to the first waypoint of each, and to its last, metres.
+    /// Distances from the pad to the first waypoint of each sortie, and to its last, metres.
     ways_m: Vec<[f32; 2]>,
 }
 

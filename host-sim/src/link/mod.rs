@@ -30,7 +30,7 @@ use crate::quote::quoted;
 /// The longest wait for a TCP server at the start.
 const CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
 
-/// Where a link leads.
+/// Target of a link.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum LinkUrl {
     /// TCP client of HOST:PORT.
@@ -61,7 +61,7 @@ pub enum LinkError {
     Open {
         /// The link.
         url: LinkUrl,
-        /// What the system said.
+        /// Error of the system.
         why: io::Error,
     },
 }
@@ -127,7 +127,7 @@ impl LinkUrl {
         })
     }
 
-    /// This URL with the port that was got where 0 was asked for.
+    /// This URL with the actual port where port 0 was requested.
     pub fn opened(&self, link: &dyn Link) -> Self {
         match (self, link.local_address()) {
             (Self::TcpListen(_), Some(at)) => Self::TcpListen(at.to_string()),

@@ -6,15 +6,15 @@ use std::time::{Duration, Instant};
 
 use super::transport::Link;
 
-/// Between two tries.
+/// Time between two attempts to connect.
 pub(super) const RETRY: Duration = Duration::from_secs(1);
 
 /// Opens the link again, if it can be opened now.
 type Open = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
 
-/// Nothing is heard while it is lost, and what is sent is dropped.
+/// A link that connects again: while it is lost it receives nothing and drops what is sent.
 pub struct ReconnectingLink {
-    /// Its URL.
+    /// URL of the link.
     name: String,
     open: Open,
     link: Option<Box<dyn Link>>,

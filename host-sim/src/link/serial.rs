@@ -8,10 +8,10 @@ use serialport::SerialPort;
 
 use super::transport::{Link, is_quiet};
 
-/// What waits for a line that is slower than what is sent, bytes: at 57600 baud less than a second. Beyond it frames are
-/// dropped, since old setpoints are worse than none.
+/// Most bytes that wait for a line slower than its sender: at 57600 baud less than a second. Beyond
+/// it frames are dropped, since old setpoints are worse than none.
 const QUEUE: usize = 4096;
-/// Written at once: the system takes this much without waiting whenever it says that it takes any.
+/// Bytes written at once: the system takes this much without waiting whenever it is ready for any.
 const PIECE: usize = 256;
 
 /// An open serial port.

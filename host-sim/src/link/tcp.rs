@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use super::transport::{Link, is_quiet};
 
-/// About ten seconds of PX4's flood.
+/// Most bytes that wait for a client: about ten seconds of PX4's flood.
 const QUEUE: usize = 256 * 1024;
 
 struct Connection {

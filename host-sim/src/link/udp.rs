@@ -6,9 +6,9 @@ use std::time::{Duration, Instant};
 
 use super::transport::{Link, is_quiet};
 
-/// A client not heard for this long gets nothing more.
+/// Silence after which a client gets nothing more.
 const FORGET: Duration = Duration::from_secs(60);
-/// The most clients of one hub; the one longest unheard makes room.
+/// Most clients of one hub; the one longest unheard makes room.
 const CLIENTS: usize = 16;
 
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {

@@ -16,11 +16,12 @@ use search::{FAN, Node, Search, Segment};
 mod lanes;
 mod search;
 
-/// More boxes than this are parted on several threads.
+/// Most boxes that one thread parts; more are parted on several threads.
 const BOXES_A_PIECE: usize = 512;
 /// Places along an axis at which boxes may be parted.
 const BINS: usize = 16;
-/// A node is opened by segments that pass it this near, metres: the clearance of most edges is less.
+/// Distance within which a segment opens the nodes that it passes, metres: the clearance of most
+/// edges is less.
 const NEAR_M: f32 = 0.6;
 
 /// Cells `low..high`.
@@ -63,7 +64,8 @@ fn take_apart(mut word: u64, brick: [usize; 3], out: &mut Vec<CellBox>) {
     while word != 0 {
         let bit = word.trailing_zeros();
         let first = [bit & 3, bit >> 2 & 3, bit >> 4];
-        // As far along x as it goes, then as many such rows, then as many such layers.
+        // A box reaches as far along x as it goes, then over as many such rows, then as many such
+        // layers.
         let mut size = [1, 1, 1];
         let mut mask = 1_u64 << bit;
         for (axis, stride) in [1, 4, 16].into_iter().enumerate() {

@@ -307,7 +307,7 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever the bytes: a tree or an error, and a tree that is written as it was read.
+        /// Any bytes give a tree or an error, and a tree that is written as it was read.
         #[test]
         fn any_bytes_are_read_or_refused(data in proptest::collection::vec(any::<u8>(), 0..400), size in 0u64..3000) {
             let header = format!("{HEADER}size {size}\nres 0.1\ndata\n");

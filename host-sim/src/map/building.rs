@@ -18,9 +18,9 @@ use super::octree::Occupancy;
 
 /// Outer size along x, y, z, metres.
 pub const SIZE_M: [f32; 3] = [41.0, 24.0, 49.0];
-/// Floors.
+/// Number of floors.
 pub const FLOORS: u32 = 9;
-/// From one floor's slab to the next, metres.
+/// Height from one floor's slab to the next, metres.
 pub const FLOOR_HEIGHT_M: f32 = 5.44;
 /// The seed of the building that has no `?seed=`.
 pub const DEFAULT_SEED: u64 = 1;

@@ -11,11 +11,11 @@ use planner_core::voxel::Outside;
 
 use super::VoxelMap;
 
-/// How far [`nearest_column`] looks, metres.
+/// Greatest distance at which [`nearest_column`] searches, metres.
 const NEAREST_M: f32 = 5.0;
-/// Most cells it looks at: a second or two.
+/// Most cells that [`nearest_column`] reads: a second or two.
 const NEAREST_CELLS: f32 = 3e8;
-/// Spacing of the places it tries, metres.
+/// Spacing of the places that [`nearest_column`] tries, metres.
 const NEAREST_STEP_M: f32 = 0.1;
 
 /// Why a vehicle cannot fly straight up or down between the ground and a point.
@@ -23,11 +23,11 @@ const NEAREST_STEP_M: f32 = 0.1;
 pub enum ColumnError {
     /// The point lies in an obstacle, in unknown space or outside the map.
     NotFree,
-    /// Nothing is below the point.
+    /// No ground is below the point.
     NoGround,
     /// Unknown space below the point, up to this height: what is below it nobody has seen.
     UnknownBelow {
-        /// Its top, metres.
+        /// Top of the ground, metres.
         top_m: f32,
     },
     /// The point is nearer to the ground than the vehicle's radius.
@@ -35,11 +35,11 @@ pub enum ColumnError {
         /// Height of the ground, metres.
         ground_m: f32,
     },
-    /// Something that rises above the ground is too near.
+    /// An obstacle above the ground is too near.
     TooNear {
         /// The nearest place of it, metres.
         place: Point,
-        /// Its distance from the vehicle's centre on its way, metres.
+        /// Distance of the obstacle from the vehicle's centre on its way, metres.
         distance_m: f32,
         /// Whether it is unknown space or lies beyond the map, rather than an obstacle.
         unknown: bool,
@@ -72,8 +72,9 @@ pub fn column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> 
     Err(ColumnError::TooNear { place, distance_m: distance_m as f32, unknown })
 }
 
-/// What comes nearest to the segment from the height `low_m` up to `point`, of all cells above layer `ground` and the
-/// faces of the map but the lowest: its place, its distance, and whether it is unknown. Beyond `reach_m` it is not looked for.
+/// The nearest cell or face to the segment from the height `low_m` up to `point`, of all cells
+/// above layer `ground` and the faces of the map but the lowest: its place, its distance, and
+/// whether it is unknown. Only cells within `reach_m` are compared.
 fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m: f32) -> (Point, f64, bool) {
     let shape = &map.shape;
     let (min, max, cell_m) =
@@ -90,7 +91,7 @@ fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m
     let mut reach_m = reach_m;
     if map.outside == Outside::Blocked {
         for (axis, end) in [(0, min.x), (0, max.x), (1, min.y), (1, max.y), (2, max.z)] {
-            // Nothing beyond the nearest face can be nearer.
+            // No cell beyond the nearest face can be nearer.
             reach_m = reach_m.min((end - at[axis]).abs());
             let mut place = [at.x, at.y, at.z];
             place[axis] = end;

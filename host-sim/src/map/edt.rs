@@ -90,7 +90,7 @@ struct Scratch {
 #[derive(Clone, Copy, Debug)]
 struct Parabola {
     site: i32,
-    /// Its value at x = 0.
+    /// Value of the parabola at x = 0.
     at_zero: i32,
     /// The first place where it is the lowest.
     from: i32,

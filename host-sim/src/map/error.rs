@@ -10,11 +10,11 @@ pub enum MapError {
     /// The file system said no.
     #[error("cannot {action} the map: {}", quoted_path(file))]
     Io {
-        /// What was tried: "read", "write".
+        /// Attempted action: "read", "write".
         action: &'static str,
         /// The file.
         file: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// The bytes are not what the format asks for.
@@ -24,9 +24,9 @@ pub enum MapError {
         file: PathBuf,
         /// Where, in bytes from its beginning.
         offset: u64,
-        /// What the format asks for there.
+        /// Text that the format requires there.
         expected: String,
-        /// What is there.
+        /// Text that stands there.
         found: String,
     },
     /// No reader for such a name.
@@ -34,7 +34,7 @@ pub enum MapError {
     UnknownKind {
         /// The name as given.
         file: String,
-        /// What can be read.
+        /// Formats that can be read.
         expected: &'static str,
     },
     /// The map cannot be laid on the grid that was asked for.

@@ -7,7 +7,7 @@ use super::error::MapError;
 use super::occupancy::OccupancyMap;
 use super::octree::Occupancy;
 
-/// Most cells; larger grounds have larger cells.
+/// Most cells of a ground; larger grounds have larger cells.
 const MOST_CELLS: f32 = 4e6;
 
 /// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m` or larger ones.

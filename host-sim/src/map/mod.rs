@@ -22,13 +22,13 @@ pub use ground::level;
 pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 
-/// The maps that can be given.
+/// Description of the maps that can be given.
 pub const READS: &str = "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
 
-/// Edges of planning cells that can be asked for, metres.
+/// Range of the planning resolution, metres.
 pub const RESOLUTIONS_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
 
-/// What a map's name stands for.
+/// Map that a name stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Source<'a> {
     /// The nine-floor building with this seed.

@@ -11,7 +11,8 @@ use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
 use super::error::MapError;
 use super::octree::{KEY_ORIGIN, KEYS, Occupancy, Octree};
 
-/// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over [`MAX_DIM`] cells.
+/// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over
+/// [`MAX_DIM`] cells.
 pub const HAIR: f64 = 2e-3;
 /// Most cells of a planning grid; 4 bytes each while a map is laid on it.
 pub const MAX_CELLS: u64 = 1 << 27;
@@ -40,7 +41,7 @@ pub struct OccupancyMap {
 pub struct CellCounts {
     /// Obstacles.
     pub occupied: u64,
-    /// Known to be empty.
+    /// Cells known to be empty.
     pub free: u64,
     /// Neither.
     pub unknown: u64,
@@ -134,8 +135,8 @@ impl OccupancyMap {
         }
     }
 
-    /// The same cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner lies on a
-    /// multiple of the resolution (an error otherwise, or beyond ±32768 cells).
+    /// The cells as a pruned octree, its keys aligned with this grid; exact if the grid's corner
+    /// lies on a multiple of the resolution (an error otherwise, or beyond ±32768 cells).
     pub fn to_octree(&self, name: &str) -> Result<Octree, MapError> {
         let refuse = |why: String| MapError::Grid { file: name.into(), why };
         let corner = self.shape.min;
@@ -150,8 +151,9 @@ impl OccupancyMap {
         tree.ok_or_else(|| refuse("it reaches beyond OctoMap's 65536 cells a side".into()))
     }
 
-    /// The same cells as a pruned octree beside its place, and what brings it there, metres east, north, up. `None` where
-    /// the tree would have no root: see [`Octree::from_cells`].
+    /// The cells as a pruned octree beside its place, and the shift that brings the tree there,
+    /// metres east, north, up. `None` where the tree would have no root: see
+    /// [`Octree::from_cells`].
     pub fn to_shifted_octree(&self) -> (Option<Octree>, [f64; 3]) {
         // The shortest decimal that reads as this f32: 0.1, not 0.10000000149.
         let resolution: f64 = self.shape.resolution_m.to_string().parse().expect("a float prints as a float");
@@ -269,9 +271,9 @@ pub struct VoxelMap {
     pub words: Vec<u64>,
     /// Obstacles that were seen, if those are fewer: without unknown space.
     pub seen: Option<Vec<u64>>,
-    /// Where nothing is sampled, if that is more than the obstacles.
+    /// Cells where no sample is drawn, if they are more than the obstacles.
     pub never_sample: Option<Vec<u64>>,
-    /// What lies beyond the faces.
+    /// Content of the space beyond the faces.
     pub outside: Outside,
 }
 
@@ -281,7 +283,7 @@ impl VoxelMap {
         VoxelGrid::new(self.shape, self.outside, &self.words).expect("the words were made for the shape")
     }
 
-    /// Where no sample may lie; beyond its faces neither.
+    /// Cells where no sample may lie; beyond the grid's faces none lies either.
     pub fn never_sample(&self) -> VoxelGrid<'_> {
         let words = self.never_sample.as_deref().unwrap_or(&self.words);
         VoxelGrid::new(self.shape, Outside::Blocked, words).expect("the words were made for the shape")

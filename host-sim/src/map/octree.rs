@@ -4,14 +4,14 @@
 //! Only inner nodes are stored, eight bytes each: two bits a child as in the `.bt` file, and where the inner
 //! children of that node begin. A lookup walks at most 16 nodes; a walk over all leaves touches each inner node once.
 
-/// Levels below the root; the smallest cell has depth 16.
+/// Levels below the root; the smallest cell has this depth.
 pub const DEPTH: u32 = 16;
 /// Smallest cells along one edge of the root.
 pub const KEYS: u32 = 1 << DEPTH;
 /// Key of the cell whose lower faces pass through coordinate 0.
 pub const KEY_ORIGIN: u32 = KEYS / 2;
 
-/// What is known of a place.
+/// Occupancy of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Occupancy {
     /// Never seen.
@@ -40,7 +40,7 @@ impl Inner {
         self.children >> (2 * index) & 3
     }
 
-    /// Where the inner child `index` is stored.
+    /// Index at which the inner child `index` is stored.
     pub(super) fn inner_index(self, index: u32) -> usize {
         let before = self.children & ((1 << (2 * index)) - 1);
         let inner = before & before >> 1 & 0x5555;
@@ -59,7 +59,7 @@ pub struct Leaf {
     pub occupied: bool,
 }
 
-/// What a tree holds.
+/// Content of a tree.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Counts {
     /// All nodes, root and leaves included (OctoMap's `size()`).
@@ -136,7 +136,7 @@ impl Octree {
         }
     }
 
-    /// What is known of the smallest cell with these keys; beyond the key space, nothing.
+    /// Occupancy of the smallest cell with these keys; beyond the key space it is unknown.
     pub fn at_key(&self, key: [u32; 3]) -> Occupancy {
         let Some(mut node) = self.root() else { return Occupancy::Unknown };
         if key.iter().any(|&k| k >= KEYS) {
@@ -154,7 +154,7 @@ impl Octree {
         Occupancy::Unknown
     }
 
-    /// What is known of a point, metres in the map's frame.
+    /// Occupancy of a point, metres in the map's frame.
     pub fn at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
         if key.iter().all(|k| (0.0..f64::from(KEYS)).contains(k)) {

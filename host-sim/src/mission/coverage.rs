@@ -31,9 +31,10 @@ use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
 
-/// The take-off ends, and the landing begins, so high over the pad: between them all is path. Metres.
+/// Height over the pad at which the take-off ends and the landing begins, metres: everything
+/// between them is path.
 const OVER_PAD_M: f32 = 3.0;
-/// The ground reaches so far beyond area and pads, and the air so far over the highest layer, metres.
+/// Extent of the ground beyond area and pads, and of the air over the highest layer, metres.
 const AROUND_M: f32 = 30.0;
 
 type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
@@ -94,7 +95,8 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
     Ok(mission)
 }
 
-/// Nobody is sent out for longer than its simulated battery lasts until it has to land: companions fly a route whole.
+/// No vehicle is sent out for longer than its simulated battery lasts until it has to land:
+/// companions fly a route whole.
 fn check_batteries(planned: &Planned<'_>) -> anyhow::Result<()> {
     for route in &planned.plan.routes {
         let index = usize::from(route.vehicle);
@@ -285,7 +287,7 @@ impl Mission {
         Ok(own)
     }
 
-    /// What of the area is more than a board holds.
+    /// The first of a board's limits that the area exceeds.
     pub(super) fn area_excess(&self, view: &CoverageView<'_>, board: &Board) -> Option<String> {
         let (vertices, rings): (Vec<_>, Vec<_>) = (view.vertices().collect(), view.rings().collect());
         let zones = Area::new(&vertices, &rings).map(|area| Transit::<BOARD_CORNERS>::empty().learn(area));

@@ -11,7 +11,7 @@ use super::ready::{Mission, SwarmPlan};
 use crate::capacity::{Board, HALF, NUCLEO_H743, WAYPOINTS, on_heap};
 
 impl Mission {
-    /// What of the mission is more than a board holds: the first limit that is exceeded.
+    /// The first of a board's limits that the mission exceeds.
     pub fn excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
         let mission = self.mission_view();
         let of_mission = || board.mission_excess(&mission);
@@ -28,7 +28,7 @@ impl Mission {
         }
     }
 
-    /// What hinders a board from planning the same.
+    /// The first reason why a board cannot make the same plan.
     fn plan_excess(&self, plan: &SwarmPlan, board: &Board) -> Option<String> {
         let planned = if board.nodes == NUCLEO_H743.nodes {
             self.crc_on::<{ NUCLEO_H743.nodes }, { NUCLEO_H743.vehicles }, { NUCLEO_H743.pieces }>(board)

@@ -97,7 +97,7 @@ pub(super) fn goals(
     let (largest_m, required_m) = (scenario.largest_radius_m(), scenario.required_clearance_m());
     // Vehicles that stand on two of them must not keep each other from landing.
     let apart_m = schedule.separation_m.max(schedule.parked_separation_m);
-    // As many discs of half the spacing as fit a circle, with room to spare for walls.
+    // The circle fits this many discs of half the spacing, with room to spare for walls.
     let reach_m = apart_m * (2.0 + (wanted as f32).sqrt() * 2.0);
     let steps = (reach_m / SLOT_GRID_M) as i32;
     let mut offsets: Vec<(i32, i32)> =

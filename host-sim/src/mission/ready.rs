@@ -20,19 +20,19 @@ use crate::scenario::{self, Scenario};
 
 /// The plan of a swarm with the desk's capacities.
 pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
-/// One companion's part of it.
+/// One companion's part of the swarm's plan.
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
-/// Braking and accelerating that is planned with, m/s².
+/// Acceleration and braking that missions are planned with, m/s².
 pub const ACCEL_MPS2: f32 = 1.5;
 /// Nominal speed of take-off and landing, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
-/// Share of the cruise speed that corners, braking and gusts leave over a flight.
+/// Mean speed of a flight over its cruise speed: corners, braking and gusts take the rest.
 const PACE: f32 = 0.9;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
-    /// What was asked for.
+    /// Scenario of the mission.
     pub scenario: Scenario,
     /// The map on the planning grid.
     pub map: VoxelMap,
@@ -50,7 +50,7 @@ pub struct Mission {
     pub descents_m: Vec<f32>,
     /// Separation and nominal speeds.
     pub schedule: ScheduleConfig,
-    /// What the clock said so far.
+    /// Computing times so far.
     pub timing: Timing,
     /// The board that the files are for; none if they are for the desk.
     pub(super) board: Option<&'static Board>,
@@ -72,7 +72,7 @@ pub(super) fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
 }
 
 impl Mission {
-    /// One without goals, roadmap and files.
+    /// A mission without goals, roadmap and files.
     pub(super) fn new(
         scenario: Scenario,
         map: VoxelMap,
@@ -121,7 +121,7 @@ impl Mission {
         Some(terrain.and_then(|terrain| terrain.grid.height_at(&place.xy())).unwrap_or(below_m))
     }
 
-    /// Its size.
+    /// Size of the roadmap.
     pub fn roadmap_size(&self) -> RoadmapSize {
         RoadmapSize {
             nodes: self.roadmap.nodes.len(),
@@ -142,7 +142,7 @@ impl Mission {
         })
     }
 
-    /// Where the centre of a vehicle's body is while it stands on its pad.
+    /// Place of the centre of a vehicle's body while it stands on its pad.
     pub fn pad(&self, index: usize) -> Geodetic {
         let start = self.scenario.vehicles[index].start;
         let pad = start - Point::new(0.0, 0.0, self.tasks[index].climb_m);

@@ -18,7 +18,7 @@ fn division_requested_at_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     Some(flight.depart_s + end.at_s - PROMISE_S)
 }
 
-/// What is agreed about a flight if all are to hold so many seconds after the plan began.
+/// Lot of a flight if all are to hold `t_s` seconds after the plan began.
 fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
     let waypoints = flight.path.waypoints();
     let flown_s = t_s - flight.depart_s;
@@ -39,7 +39,7 @@ fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
     Lot { lives: true, along_dm: ((along_m * 10.0).ceil() as u16).max(1) }
 }
 
-/// What is agreed when the first vehicle of a plan asks for a division, by rank; none where no route goes on.
+/// Lots when the first vehicle of a plan requests a division, by rank; none where no route goes on.
 pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
     let hold_s = plan.flights.iter().filter_map(division_requested_at_s).min_by(f32::total_cmp)? + PROMISE_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();

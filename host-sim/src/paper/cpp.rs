@@ -22,18 +22,18 @@ use crate::scenario::coverage::Method;
 use crate::scenario::{self, Scenario};
 use crate::{output, report};
 
-/// Lanes to 150 m.
+/// Area of the short track: lanes of up to 150 m.
 const SHORT_TRACK: &str = "[[0, 0], [150, 0], [150, 180], [0, 180]]";
-/// Lanes to 320 m.
+/// Area of the long track: lanes of up to 320 m.
 const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
-/// Of Table 2: convex, five vertices.
+/// Area of Table 2: convex, five vertices.
 const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
-/// Of Fig. 9: two more that are convex.
+/// Areas of Fig. 9: two more that are convex.
 const COMPARED: [&str; 2] =
     ["[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]", "[[0, 0], [200, -15], [260, 120], [90, 200]]"];
-/// Of Table 4: small, so that the way there counts.
+/// Area of Table 4: small, so that the distance to the area counts.
 const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
-/// Where the UAVs of Table 4 stand: one is far away.
+/// Starts of the UAVs of Table 4: one is far away.
 const FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
 /// Plans of each kind that are timed.
@@ -58,7 +58,7 @@ fn in_a_row(count: usize) -> Vec<[f64; 2]> {
     (0..count).map(|i| [5.0 * i as f64, -20.0]).collect()
 }
 
-/// What all plans together come to.
+/// Results of all plans together.
 struct Tables {
     rows: Vec<Row>,
     complete: bool,
@@ -147,7 +147,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     Ok(if tables.complete { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-/// What the paper draws of our plans.
+/// The paper's drawings of our plans.
 fn figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     let convex = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let compared =

@@ -2,7 +2,7 @@
 
 /// One of Tables A1 to A12: flight times of each vehicle in Gazebo, seconds, for six pairs of lane spacing and height.
 pub(super) struct Flown {
-    /// Its number.
+    /// Number of the table.
     pub(super) name: &'static str,
     /// Whether lanes are 320 m long, or 150 m.
     pub(super) long: bool,
@@ -15,7 +15,7 @@ pub(super) struct Flown {
 /// Columns of the tables of the short track: spacing and height, metres.
 pub(super) const SHORT: [(f64, f64); 6] =
     [(10.0, 35.0), (10.0, 45.0), (10.0, 55.0), (5.0, 35.0), (5.0, 45.0), (5.0, 55.0)];
-/// Those of the long track.
+/// Columns of the tables of the long track: spacing and height, metres.
 pub(super) const LONG: [(f64, f64); 6] =
     [(10.0, 35.0), (10.0, 45.0), (10.0, 55.0), (15.0, 35.0), (15.0, 45.0), (15.0, 55.0)];
 

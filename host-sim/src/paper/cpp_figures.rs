@@ -100,7 +100,7 @@ fn map(title: String, planned: &Planned<'_>, shown: bool) -> Panel {
     })
 }
 
-/// What is drawn of a row.
+/// Drawn part of a row.
 #[derive(Clone, Copy)]
 enum Figures {
     Ours,

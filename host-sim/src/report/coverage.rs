@@ -9,7 +9,7 @@ use super::track::Footprint;
 /// A coverage mission.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct CoverageLayers {
-    /// From one lane to the next, metres.
+    /// Distance from one lane to the next, metres.
     pub lane_m: f32,
     /// The plan, and what became of it, by rising time: at least one.
     pub divisions: Vec<Division>,
@@ -18,27 +18,27 @@ pub struct CoverageLayers {
     pub footprints: Vec<Footprint>,
 }
 
-/// Who photographs what, from a time on.
+/// Division of the area among the vehicles from a time on.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Division {
     /// Seconds.
     pub t_s: f32,
     /// Vehicles that do not take part any more.
     pub lost: Vec<u8>,
-    /// One of each vehicle that flies.
+    /// Part of each vehicle that flies.
     pub parts: Vec<Part>,
-    /// What changed hands.
+    /// Waypoints that changed hands.
     pub taken: Vec<Taken>,
 }
 
-/// What one vehicle photographs.
+/// Part of one vehicle.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Part {
     /// MAVLink system id.
     pub vehicle: u8,
     /// Waypoints.
     pub waypoints: u32,
-    /// Its path, metres.
+    /// Path of the vehicle, metres.
     #[serde(serialize_with = "pack::points")]
     pub path: Vec<Point>,
     /// Both ends of each stretch of a lane that it photographs, metres.
@@ -49,10 +49,10 @@ pub struct Part {
 /// Waypoints that go from one vehicle to another.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Taken {
-    /// Whose they were.
+    /// Vehicle that had the waypoints before.
     pub from: u8,
-    /// Whose they are.
+    /// Vehicle that has the waypoints now.
     pub to: u8,
-    /// How many.
+    /// Number of waypoints.
     pub waypoints: u32,
 }

@@ -28,19 +28,19 @@ pub struct ReportData {
     pub vehicles: Vec<VehicleTrack>,
     /// Borders on the ground: the area of a coverage mission.
     pub outlines: Vec<Outline>,
-    /// Who photographs what, in a coverage mission.
+    /// Division of the area, in a coverage mission.
     pub coverage: Option<CoverageLayers>,
     /// Obstacles that are not in the map.
     pub obstacles: Vec<SphereObstacle>,
-    /// What happened, in any order.
+    /// Events, in any order.
     pub events: Vec<Event>,
     /// Plots over time, in order.
     pub plots: Vec<Plot>,
     /// Figures of a paper, below all that.
     pub figures: Vec<Figure>,
-    /// What `result.json` holds.
+    /// Content of `result.json`.
     pub result: serde_json::Value,
-    /// What `timing.json` holds.
+    /// Content of `timing.json`.
     pub timing: Option<serde_json::Value>,
 }
 
@@ -49,12 +49,12 @@ pub struct ReportData {
 pub struct Outline {
     /// Area, hole or no-fly zone.
     pub kind: OutlineKind,
-    /// Its corners, metres.
+    /// Corners of the border, metres.
     #[serde(serialize_with = "pack::points")]
     pub points: Vec<Point>,
 }
 
-/// What a border encloses.
+/// Kind of the region that a border encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum OutlineKind {
@@ -62,7 +62,7 @@ pub enum OutlineKind {
     Area,
     /// A part of it that is left out.
     Hole,
-    /// Nobody enters it.
+    /// A region that no vehicle enters.
     NoFly,
 }
 
@@ -77,7 +77,7 @@ pub struct RoadmapLines {
     pub edges: Vec<[u16; 2]>,
 }
 
-/// One vehicle: what it was asked to do, and where it was when.
+/// One vehicle: its task, and its track.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct VehicleTrack {
     /// MAVLink system id.
@@ -88,10 +88,10 @@ pub struct VehicleTrack {
     pub color: Option<[u8; 3]>,
     /// Index of the goal it was given.
     pub goal_index: Option<usize>,
-    /// Where it starts, metres.
+    /// Start of the vehicle, metres.
     #[serde(serialize_with = "pack::point")]
     pub start: Point,
-    /// Where it shall land or hold, metres.
+    /// Place where the vehicle shall land or hold, metres.
     #[serde(serialize_with = "pack::maybe_point")]
     pub goal: Option<Point>,
     /// Planned path, metres.
@@ -116,7 +116,7 @@ pub struct SphereObstacle {
     pub until_s: Option<f32>,
 }
 
-/// How much a person should care about an event.
+/// Severity of an event.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
@@ -134,11 +134,11 @@ pub enum Level {
 pub struct Event {
     /// Time, seconds.
     pub t_s: f32,
-    /// Whose it is; `None` concerns the swarm.
+    /// Vehicle of the event; `None` concerns the swarm.
     pub vehicle: Option<u8>,
     /// Severity.
     pub level: Level,
-    /// What happened.
+    /// Text of the event.
     pub text: String,
 }
 
@@ -160,7 +160,7 @@ pub struct Plot {
 pub struct Limit {
     /// Value in the plot's unit.
     pub value: f32,
-    /// What it is, such as `safety distance`.
+    /// Label of the curve, such as `safety distance`.
     pub label: String,
 }
 

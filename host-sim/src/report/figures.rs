@@ -8,11 +8,11 @@ use super::pack;
 /// A figure: panels side by side.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Figure {
-    /// Such as `Fig. 8`.
+    /// Name of the figure, such as `Fig. 8`.
     pub name: String,
-    /// What it shows.
+    /// Caption of the figure.
     pub caption: String,
-    /// Its panels, in order.
+    /// Panels of the figure, in order.
     pub panels: Vec<Panel>,
 }
 
@@ -31,9 +31,9 @@ pub enum Panel {
 /// Routes from above, metres.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct RouteMap {
-    /// Its heading.
+    /// Heading of the panel.
     pub title: String,
-    /// What stands below it.
+    /// Note below the panel.
     pub note: String,
     /// Corners of the area.
     #[serde(serialize_with = "pack::points")]
@@ -47,10 +47,10 @@ pub struct RouteMap {
 pub struct MapRoute {
     /// MAVLink system id.
     pub vehicle: u8,
-    /// Where it starts.
+    /// Start of the path.
     #[serde(serialize_with = "pack::point")]
     pub start: Point,
-    /// From pad to pad.
+    /// Path from pad to pad.
     #[serde(serialize_with = "pack::points")]
     pub path: Vec<Point>,
 }
@@ -58,7 +58,7 @@ pub struct MapRoute {
 /// Values by case and series.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Chart {
-    /// Its heading.
+    /// Heading of the panel.
     pub title: String,
     /// Unit of the values.
     pub unit: String,
@@ -73,8 +73,8 @@ pub struct Chart {
 /// One series: a value for each case.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Series {
-    /// Its name.
+    /// Name of the series.
     pub name: String,
-    /// As many as cases.
+    /// Values, as many as cases.
     pub values: Vec<f64>,
 }

@@ -27,7 +27,7 @@ const SCRIPT: &str = concat!(
     "})();\n"
 );
 
-/// What the scripts read.
+/// Data that the scripts read.
 #[derive(Serialize)]
 struct PageData<'a> {
     #[serde(flatten)]

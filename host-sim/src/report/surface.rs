@@ -13,10 +13,10 @@ use super::pack;
 /// Most rectangles a page carries: 12 bytes each, so 2.4 MB of base64. A map that has more is drawn from cells twice as
 /// large, again and again, until it fits; the page says so.
 pub const FACE_LIMIT: usize = 150_000;
-/// Most cells that are looked at, for the same reason: time and memory of writing a page stay bounded.
+/// Most cells that are compared: time and memory of writing a page stay bounded.
 const CELL_LIMIT: usize = 1 << 25;
 
-/// What is drawn of a map.
+/// Drawn surface of a map.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct MapSurface {
     /// Minimum corner, metres.

@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 
-/// Where a vehicle was at one time.
+/// Place of a vehicle at one time.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrackPoint {
     /// Time, seconds.
@@ -11,13 +11,13 @@ pub struct TrackPoint {
     pub position: Point,
 }
 
-/// What a picture shows.
+/// Footprint of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
     /// When it was taken, seconds.
     pub t_s: f32,
-    /// Who took it; 0 for a flight before.
+    /// Vehicle that took the picture; 0 for a flight before.
     pub vehicle: u8,
-    /// Its corners in turn, metres east and north.
+    /// Corners of the footprint in turn, metres east and north.
     pub corners: [[f32; 2]; 4],
 }

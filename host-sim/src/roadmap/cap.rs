@@ -20,16 +20,17 @@ use planner_core::Point;
 use planner_core::roadmap::Edge;
 use rayon::prelude::*;
 
-/// Required clearances that paths are kept short for, metres.
+/// Required clearances for which paths are kept short, metres.
 pub const CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
-/// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer the usual ones; measured on
-/// the scanned maps of `tests/tests/boards_hold.rs`.
+/// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer
+/// the usual ones; measured on the scanned maps of `tests/tests/boards_hold.rs`.
 const NEAR_SHARE: f32 = 0.65;
 /// Nodes from which shortest paths are counted.
 const SOURCES: usize = 64;
 /// Rounds in which the far edges are chosen; a third one gains a tenth of what the second does.
 const ROUNDS: usize = 2;
-/// A way around an edge is looked for up to so many times its length; one that is longer counts as that.
+/// Greatest length of a detour around an edge, over the edge's length; a longer detour counts as
+/// this long.
 const MAX_DETOUR_RATIO: f32 = 1.5;
 
 /// At most `most` of the edges, in their order, or `None` where that many cannot keep the nodes connected.
@@ -60,7 +61,7 @@ pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
 #[derive(Clone, Copy)]
 struct Out {
     to: u16,
-    /// How many of [`CLASSES_M`] it is wider than.
+    /// Number of [`CLASSES_M`] that the edge is wider than.
     class: u8,
     length_m: f32,
     edge: u32,

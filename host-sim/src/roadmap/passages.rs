@@ -18,9 +18,9 @@ use planner_core::voxel::GridShape;
 
 use crate::map::{BoxTree, VoxelMap};
 
-/// What a way keeps beyond the clearance, metres: more than rounding.
+/// Distance that a path keeps beyond the clearance, metres: more than rounding.
 const SLACK_M: f32 = 2e-4;
-/// Larger grids are not searched: the search keeps nine bytes a cell.
+/// Most cells of a grid that is searched: the search keeps nine bytes a cell.
 const MOST_CELLS: usize = 1 << 25;
 
 /// A start and a goal, by their nodes, and the clearance that the vehicle between them needs, metres.
@@ -44,7 +44,7 @@ pub fn missing(
     wanted: &[Wanted],
 ) -> Vec<Point> {
     let mut wanted = wanted.to_vec();
-    // What is wide enough for a large vehicle is so for a smaller one.
+    // A passage that is wide enough for a large vehicle is so for a smaller one.
     wanted.sort_by(|a, b| b.required_m.total_cmp(&a.required_m));
     let mut found = Vec::new();
     let mut ways: Vec<Wanted> = Vec::new();
@@ -114,7 +114,7 @@ struct Search<'a> {
 }
 
 impl<'a> Search<'a> {
-    /// None where the map is too large.
+    /// The search; none where the map is too large.
     fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
         let cells = map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
         (cells <= MOST_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })

@@ -14,7 +14,7 @@ use planner_core::frames::Geodetic;
 
 use crate::terrain::HeightGrid;
 
-/// What helps where a vehicle does not stand on the ground.
+/// Hint of an error about a vehicle that does not stand on the ground.
 pub const ORIGIN_HINT: &str =
     "area.origin = { lat_deg = …, lon_deg = …, alt_m = … } says how high the ground is";
 
@@ -33,7 +33,7 @@ pub struct Area {
     pub camera: Option<Camera>,
     /// Footprint and spacings.
     pub spacing: Spacing,
-    /// The same with what of a picture is planned with.
+    /// Spacing with the part of a picture that the plan counts on.
     pub usable: Spacing,
     /// Height of the pictures above the origin, or above the ground.
     pub height_m: f32,
@@ -49,18 +49,18 @@ pub struct Area {
     pub batteries: bool,
     /// How work is divided.
     pub method: Method,
-    /// Where vehicles look.
+    /// Heading of the vehicles.
     pub heading: Heading,
-    /// What takes the pictures.
+    /// Trigger of the pictures.
     pub trigger: Trigger,
 }
 
 /// The ground below an area.
 #[derive(Clone, Debug)]
 pub struct Terrain {
-    /// Its heights, metres above the mission's origin.
+    /// Heights of the terrain, metres above the mission's origin.
     pub grid: Arc<HeightGrid>,
-    /// What vehicles follow: the bytes of a field.
+    /// Bytes of the field that vehicles follow.
     pub field: Arc<[u8]>,
     /// Vehicles fly at most so much higher above the field than [`Area::height_m`], metres.
     pub tolerance_m: f32,
@@ -69,7 +69,7 @@ pub struct Terrain {
 }
 
 impl Terrain {
-    /// What paths keep at this height above the ground.
+    /// Surface that paths follow at this height above the ground.
     ///
     /// # Errors
     /// The bytes are no field.
@@ -129,7 +129,7 @@ impl Method {
             .ok_or_else(|| "must be one of simple-binpat, binpat, powell-binpat, exact".to_owned())
     }
 
-    /// Its name in results.
+    /// Name of the method in results.
     pub fn name(self) -> &'static str {
         Self::NAMES.iter().find(|(_, method)| *method == self).map_or("", |(name, _)| name)
     }

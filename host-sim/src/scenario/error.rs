@@ -5,28 +5,28 @@ use std::ops::Range;
 
 use crate::quote::{MOST, quoted};
 
-/// Of a long line, this many characters are shown before what is meant.
+/// Characters of a long line that are shown before the one in error.
 const BEFORE: usize = 40;
 
-/// What is wrong with a scenario, where, and what would be right.
+/// Error of a scenario: the fault, its place, and a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ScenarioError {
     /// The scenario's name, usually its path.
     pub file: String,
     /// Line and column, counted from 1, and the line's text; none where the file itself could not be read.
     pub place: Option<Place>,
-    /// What is wrong.
+    /// Fault of the scenario.
     pub why: String,
-    /// What to do about it, if that can be said.
+    /// Remedy, if one can be stated.
     pub hint: Option<String>,
 }
 
 /// A place in a scenario.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// From 1.
+    /// Line, from 1.
     pub line: usize,
-    /// From 1, in characters.
+    /// Column in characters, from 1.
     pub column: usize,
     /// The whole line.
     pub text: String,

@@ -25,7 +25,7 @@ pub(super) struct Text<'a> {
 }
 
 impl Text<'_> {
-    /// Where it is, as `FILE:LINE`.
+    /// Place of the span, as `FILE:LINE`.
     pub(super) fn line(&self, span: &Span) -> String {
         format!("{}:{}", self.file, Place::of(self.text, span).line)
     }

@@ -32,14 +32,14 @@ use crate::map::{RESOLUTIONS_M, Source, Unknown};
 use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
-/// A flight is given up after this, seconds.
+/// Time after which a flight is given up unless the scenario says otherwise, seconds.
 const LIMIT_S: f32 = 600.0;
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 1000;
-/// Mission origin where none is given: a test field.
+/// Mission origin where the scenario gives none: a test field.
 const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
-/// What a scenario's root table says, if it is TOML and all its keys are known.
+/// Content of a scenario's root table, if it is TOML and all its keys are known.
 pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
     let root = DeTable::parse(text.text).map_err(|error| {
         let span = error.span().unwrap_or(0..0);
@@ -124,17 +124,17 @@ pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> 
     })
 }
 
-/// What the scenarios of all kinds of mission say.
+/// Settings of scenarios of all kinds of mission.
 struct Common {
     seed: u64,
     deconfliction: Deconfliction,
     simulation: Simulation,
-    /// Where the estimator is chosen.
+    /// Place where the estimator is chosen.
     estimator_span: Option<Span>,
 }
 
-/// What they say where nothing is written follows from the kind: how far two vehicles stray, metres, and when a flight is given up,
-/// seconds.
+/// Settings of scenarios of all kinds of mission. Defaults depend on the kind: the stray of two
+/// vehicles, metres, and the time limit of a flight, seconds.
 fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> Result<Common> {
     let seed = root.whole("seed", 1, 0..=i64::MAX as u64)?;
     let deconfliction = root.get("deconfliction").map(|v| v.table()).transpose()?;
@@ -146,7 +146,7 @@ fn common(text: Text<'_>, root: &Table<'_>, (stray_m, limit_s): (f32, f32)) -> R
     Ok(Common { seed, deconfliction, simulation, estimator_span })
 }
 
-/// What strikes the vehicles.
+/// Faults of the vehicles.
 fn faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<Fault>> {
     let ids: Vec<u8> = vehicles.iter().map(|(v, _)| v.id).collect();
     let Some(value) = root.get("faults") else { return Ok(Vec::new()) };
@@ -155,7 +155,7 @@ fn faults(root: &Table<'_>, vehicles: &[(Vehicle, VehicleSpans)]) -> Result<Vec<
     items.iter().map(|v| fault(&v.table()?, &ids)).collect()
 }
 
-/// What usually is behind text that is no TOML.
+/// Usual cause of text that is no TOML.
 fn syntax_hint(rest: &str, what: &str) -> Option<&'static str> {
     match rest.chars().next() {
         Some('“' | '”' | '„' | '‘' | '’' | '«') => Some("quotes of TOML are straight: \""),

@@ -17,11 +17,11 @@ use crate::map::Unknown;
 /// A scenario, checked.
 #[derive(Clone, Debug)]
 pub struct Scenario {
-    /// Its name: the path it was read from.
+    /// Name of the scenario: the path it was read from.
     pub path: String,
-    /// Its text, as read.
+    /// Text of the scenario, as read.
     pub text: String,
-    /// Of everything random.
+    /// Seed of all randomness.
     pub seed: u64,
     /// `[map]`
     pub map: Map,
@@ -31,7 +31,7 @@ pub struct Scenario {
     pub mission: Mission,
     /// `[[vehicles]]`, as they stand in the file.
     pub vehicles: Vec<Vehicle>,
-    /// Where the start of each stands, as `FILE:LINE`.
+    /// Place of each vehicle's start in the file, as `FILE:LINE`.
     pub vehicle_places: Vec<String>,
     /// `[deconfliction]`
     pub deconfliction: Deconfliction,
@@ -43,7 +43,7 @@ pub struct Scenario {
     pub area: Option<Area>,
     /// `[formation]`
     pub formation: Option<Unbuilt>,
-    /// What is asked for and not built yet, in the file's order.
+    /// Settings that are requested and not built yet, in the file's order.
     pub(super) unsupported: Vec<ScenarioError>,
 }
 
@@ -77,7 +77,7 @@ pub struct Roadmap {
     pub edge_min_m: f32,
     /// Longest edge.
     pub edge_max_m: f32,
-    /// The same as shares of the map's longest side, where they are given so (P2D).
+    /// Range of edges as shares of the map's longest side, where they are given so (P2D).
     pub edge_min_share: Option<f32>,
     /// See `edge_min_share`.
     pub edge_max_share: Option<f32>,
@@ -94,7 +94,7 @@ pub struct Roadmap {
 /// Whether edges join two starts or goals.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Terminals {
-    /// As any other nodes (P3D).
+    /// Terminals are joined as any other nodes (P3D).
     Joined,
     /// Never (P2D).
     Apart,
@@ -105,15 +105,15 @@ pub enum Terminals {
 pub struct Mission {
     /// Which vehicle goes where.
     pub mode: Mode,
-    /// What an assignment minimises.
+    /// Objective that an assignment minimises.
     pub objective: Objective,
     /// Speed along a path, metres a second.
     pub cruise_mps: f32,
     /// Tasks, ENU metres.
     pub goals: Vec<Point>,
-    /// Where each stands, as `FILE:LINE`.
+    /// Place of each goal in the file, as `FILE:LINE`.
     pub goal_places: Vec<String>,
-    /// Where vehicles may be.
+    /// Volume in which vehicles may be.
     pub geofence: Option<Geofence>,
     /// System ids whose commands count; 0 is no id.
     pub ground_stations: [u8; GROUND_STATIONS],
@@ -134,7 +134,7 @@ pub enum Mode {
     Formation,
 }
 
-/// What an assignment minimises.
+/// Objective that an assignment minimises.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Objective {
     /// The sum of path lengths.
@@ -159,32 +159,32 @@ impl Geofence {
     }
 }
 
-/// One of `[[vehicles]]`.
+/// One vehicle of `[[vehicles]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Vehicle {
     /// MAVLink system id, 1 to 250.
     pub id: u8,
-    /// Where it stands, ENU metres.
+    /// Start of the vehicle, ENU metres.
     pub start: Point,
     /// Index of its goal, in labelled missions.
     pub goal: Option<usize>,
     /// Radius of its hull.
     pub radius_m: f32,
-    /// Its layer on 2D maps.
+    /// Layer of the vehicle on 2D maps.
     pub altitude_m: Option<f32>,
     /// Highest speed, metres a second.
     pub speed_max_mps: f32,
     /// Flight time on one battery.
     pub endurance_s: Option<f32>,
-    /// What it can carry.
+    /// Payload of the vehicle.
     pub payload_kg: Option<f32>,
-    /// What autopilot it has.
+    /// Kind of the vehicle's autopilot.
     pub personality: AutopilotKind,
-    /// Its home, if not its start.
+    /// Home of the vehicle, if not its start.
     pub home: Option<Geodetic>,
-    /// Its EKF origin, if not its home.
+    /// EKF origin of the vehicle, if not its home.
     pub ekf_origin: Option<Geodetic>,
-    /// Where its companion runs.
+    /// Place where the vehicle's companion runs.
     pub companion: Companion,
     /// Coverage: its share of the work beside those of the others.
     pub weight: Option<f32>,
@@ -194,9 +194,9 @@ pub struct Vehicle {
     pub descend_mps: Option<f32>,
 }
 
-/// V_a where a vehicle has none of its own, metres a second.
+/// Climbing speed V_a of a vehicle that has none of its own, m/s.
 const CLIMB_MPS: f32 = 3.0;
-/// V_d likewise.
+/// Descending speed V_d of a vehicle that has none of its own, m/s.
 const DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
@@ -206,26 +206,27 @@ impl Vehicle {
     }
 }
 
-/// Where a companion runs.
+/// Place where a companion runs.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Companion {
-    /// In this process.
+    /// The companion runs in this process.
     InProcess {
-        /// What it keeps its flash in; no scenario's file says so.
+        /// File of the companion's flash; no scenario's file names one.
         flash: Option<PathBuf>,
     },
     /// On a board, or in another process.
     Url {
-        /// Its port for the autopilot.
+        /// Companion's port for the autopilot.
         autopilot: LinkUrl,
-        /// Its port for the radio; none where that is joined to others by something else, or to nothing.
+        /// Companion's port for the radio; none where the radio is joined to others by another
+        /// program, or to none.
         radio: Option<LinkUrl>,
     },
     /// On a board in QEMU, in lock step with the simulation; no scenario's file says so.
     Emulated {
         /// The firmware for the board `qemu`.
         program: PathBuf,
-        /// What the board logs.
+        /// Log of the board.
         log: PathBuf,
     },
 }
@@ -235,9 +236,9 @@ pub enum Companion {
 pub struct Deconfliction {
     /// How vehicles keep apart.
     pub method: Method,
-    /// What they keep, centre to centre.
+    /// Distance that vehicles keep, centre to centre.
     pub safety_distance_m: f32,
-    /// What the schedule plans between their paths, centre to centre.
+    /// Distance that the schedule plans between vehicles' paths, centre to centre.
     pub separation_m: f32,
 }
 
@@ -266,7 +267,7 @@ pub struct Simulation {
     pub time_limit_s: f32,
 }
 
-/// One of `[[faults]]`.
+/// One fault of `[[faults]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fault {
     /// When it strikes.
@@ -275,7 +276,7 @@ pub struct Fault {
     pub duration_s: Option<f32>,
     /// The vehicle that it strikes, if one.
     pub vehicle: Option<u8>,
-    /// What it is, one of [`FAULT_KINDS`].
+    /// Kind of the fault, one of [`FAULT_KINDS`].
     pub kind: &'static str,
     /// `radio-cut`: which way.
     pub direction: Option<String>,

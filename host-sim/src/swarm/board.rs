@@ -29,23 +29,23 @@ pub struct Board {
     progress_m: Option<f32>,
 }
 
-/// What a board is joined to.
+/// Links that a board is joined to.
 pub struct Lines<'a> {
-    /// From its autopilot.
+    /// Bytes from the board's autopilot.
     pub up: &'a mut SerialLink,
-    /// To its autopilot.
+    /// Bytes to the board's autopilot.
     pub down: &'a mut SerialLink,
-    /// Its radio.
+    /// Radio of the board.
     pub radio: &'a mut Radio,
-    /// Its place among the radio's stations.
+    /// Index of the board among the radio's stations.
     pub station: usize,
-    /// Where the stations are.
+    /// Places of the stations.
     pub places: &'a [Point],
     /// Takes its words.
     pub said: &'a mut dyn FnMut(&str),
 }
 
-/// What joins us to it.
+/// Ends of our connection to the board.
 enum Ends {
     /// Links, at the speed of the clock.
     Links { autopilot: Box<dyn Link>, radio: Option<Box<dyn Link>> },
@@ -86,12 +86,13 @@ impl Board {
         Ok(Self::new(Ends::Links { autopilot: autopilot.open()?, radio }))
     }
 
-    /// Its state as last reported.
+    /// State of the board's companion as last reported.
     pub fn state(&self) -> State {
         self.state
     }
 
-    /// Its way along its own path as last reported, metres; none if it has reported none.
+    /// Progress of the vehicle along its own path as last reported, metres; none if it has reported
+    /// none.
     pub fn progress_m(&self) -> Option<f32> {
         self.progress_m
     }
@@ -140,7 +141,7 @@ impl Board {
         }
     }
 
-    /// What has come by now, of links.
+    /// Bytes that have come by now on the links.
     fn exchange(&mut self, now_us: u64, lines: &mut Lines<'_>) -> anyhow::Result<()> {
         let Ends::Links { autopilot, radio } = &mut self.ends else { return Ok(()) };
         while let Some((_, bytes)) = lines.up.next_by(now_us) {
@@ -210,7 +211,7 @@ impl Board {
 }
 
 impl LockStep {
-    /// What it sent in the step that ends now.
+    /// Bytes that the board sent in the step that ends now.
     fn end(&mut self, now_us: u64) -> anyhow::Result<Vec<Piece>> {
         if !core::mem::take(&mut self.runs) {
             return Ok(Vec::new());

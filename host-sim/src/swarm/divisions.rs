@@ -17,7 +17,7 @@ use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 pub struct Division {
     /// When the vehicle first reported that it flies it, seconds.
     pub t_s: f32,
-    /// Its MAVLink system id.
+    /// MAVLink system id of the vehicle.
     pub vehicle: u8,
     /// Divisions that count, this one among them.
     pub number: u8,
@@ -27,7 +27,7 @@ pub struct Division {
     pub plan_crc: u32,
 }
 
-/// What one vehicle reported last.
+/// Last report of one vehicle.
 #[derive(Clone, Copy, Debug, Default)]
 struct Reported {
     plan_crc: u32,
@@ -38,11 +38,11 @@ struct Reported {
     flown_crc: u32,
 }
 
-/// What was heard.
+/// Reports heard so far.
 #[derive(Debug, Default)]
 pub struct Divisions {
     vehicles: HashMap<u8, Reported>,
-    /// By the hash under which they were reported.
+    /// Lots by the hash under which they were reported.
     lots: HashMap<u32, Vec<Lot>>,
     reported: Vec<Division>,
 }
@@ -72,7 +72,7 @@ impl Divisions {
         if roster.hash == 0 {
             return;
         }
-        // Who had no part in the division before has none in this one.
+        // A vehicle without a part in the division before has none in this one.
         let before = self.lots.get(&roster.counted).cloned().unwrap_or_default();
         let lots = self.lots.entry(roster.hash).or_default();
         for (i, entry) in roster.entries.iter().enumerate() {

@@ -36,11 +36,11 @@ use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
 const CORRUPTION: f64 = 0.01;
 /// Charge left by `battery-low`: below the companions' limit, above the autopilots'.
 const BATTERY_LEFT: f32 = 0.1;
-/// Where `position-jump` moves the estimate.
+/// Offset by which `position-jump` moves the estimate, metres.
 const JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
-/// Where `origin-change` moves the origin.
+/// Offset by which `origin-change` moves the origin, metres.
 const ORIGIN_MOVES_M: Point = Point::new(40.0, -30.0, 5.0);
-/// How long a stall or a boot lasts where the script does not say, seconds.
+/// Length of a stall or a boot where the script states none, seconds.
 const SPELL_S: f32 = 3.0;
 
 /// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in this process.
@@ -68,11 +68,11 @@ pub fn check(scenario: &Scenario) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What a fault acts on.
+/// Parts of the simulation that a fault acts on.
 pub struct World<'a> {
     /// The vehicles, in the order of the scenario.
     pub members: &'a mut [Member],
-    /// What carries their words.
+    /// Radio of the swarm.
     pub radio: &'a mut Radio,
     /// The ground station that commands them to go on.
     pub ground_station: &'a mut GroundStation,

@@ -17,7 +17,7 @@ use crate::link::Link;
 
 /// HEARTBEAT, COMMAND_ACK, STATUSTEXT.
 const FROM_COMPANIONS: [u32; 3] = [0, 77, 253];
-/// Small enough for any path's datagrams.
+/// Longest datagram, bytes: small enough for any path.
 const DATAGRAM: usize = 1400;
 
 /// A link to a ground station.
@@ -37,7 +37,8 @@ impl Gateway {
         members.iter_mut().for_each(|member| member.autopilot.add_ground_port());
     }
 
-    /// What came in since the last step, then what is to go out: of the radio's packets those `overheard`.
+    /// Takes the frames that came in since the last step, then sends those that are to go out: of
+    /// the radio's packets those `overheard`.
     ///
     /// # Errors
     /// The link is gone for good.

@@ -14,23 +14,24 @@ use super::radio::Radio;
 
 /// MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
-/// A command is repeated this often until it is obeyed, microseconds.
+/// Time after which a command that was not obeyed is repeated, microseconds.
 const REPEAT_US: u64 = 1_000_000;
-/// After this long with some vehicle ready those that are ready are started, microseconds.
+/// Time with some vehicle ready after which the ready vehicles are started without the rest,
+/// microseconds.
 const PATIENCE_US: u64 = 90_000_000;
-/// An order is repeated for this long, microseconds: some of it is lost.
+/// Time for which an order is repeated, microseconds: some messages are lost.
 const ORDERED_US: u64 = 10_000_000;
 
-/// What it commands one vehicle to do.
+/// Command to one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Order {
-    /// To go on after its pilot, or after a pause.
+    /// To go on after a pilot's control, or after a pause.
     Resume,
-    /// To stop where it is.
+    /// To stop.
     Pause,
     /// To fly home.
     Return,
-    /// To land where it is.
+    /// To land.
     Land,
 }
 
@@ -71,7 +72,7 @@ pub struct GroundStation {
     ready_us: Option<u64>,
     first_us: Option<u64>,
     last_us: u64,
-    /// What vehicles are told, and until when.
+    /// Commands to vehicles, and until when they are repeated.
     orders: Vec<(usize, Order, u64)>,
     /// Centres and radii of obstacles to report, metres.
     obstacles: Vec<(Geodetic, f32)>,
@@ -121,7 +122,7 @@ impl GroundStation {
         }
     }
 
-    /// What it has to say.
+    /// Frames that the ground station sends.
     fn frames(&mut self, now_us: u64, members: &[Member]) -> Vec<Vec<u8>> {
         let state = |m: &Member| m.state();
         if self.first_us.is_none() {

@@ -19,7 +19,7 @@ use crate::mission::{Mission, OwnPlan};
 use crate::report::{self, Level};
 use crate::say;
 
-/// Steps between two looks for the ground below, which changes slowly.
+/// Steps between two readings of the height of the ground below, which changes slowly.
 const GROUND_STEPS: u64 = 25;
 
 /// How the shell answers a companion that asks for a plan.
@@ -28,21 +28,21 @@ pub enum Planner {
     /// At once and rightly.
     #[default]
     Sound,
-    /// Not yet.
+    /// The plan is late.
     Late,
-    /// From a damaged roadmap.
+    /// The plan is from a damaged roadmap.
     BadRoadmap,
 }
 
 /// One vehicle.
 pub struct Member {
-    /// What flies.
+    /// Autopilot of the vehicle.
     pub autopilot: Autopilot,
-    /// What decides, unless a board does.
+    /// Companion of the vehicle, unless a board runs it.
     pub companion: Box<DeskCompanion>,
     /// A board that decides in its place.
     board: Option<Board>,
-    /// What the companion keeps its files in.
+    /// Flash of the companion.
     flash: Option<DeskFlash>,
     /// The plan that the companion waits for.
     pub wants_plan: Option<Wanted>,
@@ -98,7 +98,7 @@ impl Member {
         })
     }
 
-    /// From now on its companion has this flash.
+    /// Gives the companion this flash from now on.
     ///
     /// # Errors
     /// None that the first start had not.
@@ -115,7 +115,7 @@ impl Member {
         Ok(())
     }
 
-    /// From now on a board decides.
+    /// A board runs the companion from now on.
     pub fn put_on(&mut self, board: Board) {
         self.board = Some(board);
     }
@@ -132,7 +132,7 @@ impl Member {
         Ok(())
     }
 
-    /// Where its mission is.
+    /// State of the companion's mission.
     pub fn state(&self) -> State {
         self.board.as_ref().map_or_else(|| self.companion.state(), Board::state)
     }
@@ -314,12 +314,12 @@ impl Member {
         }
         self.drain(now_us, station, radio, places);
         if restarts {
-            // It could be made once, so it can again.
+            // Cannot fail: the companion was made once, so it can be made again.
             let _ = self.reset_companion(now_us);
         }
     }
 
-    /// What was wrong with its serial link over `lasted_s` seconds, the worse direction first.
+    /// Faults of the vehicle's serial link over `lasted_s` seconds, the worse direction first.
     pub fn link_trouble(&self, lasted_s: f64) -> Option<String> {
         self.up.trouble(lasted_s).or_else(|| self.down.trouble(lasted_s))
     }
@@ -418,11 +418,11 @@ impl Member {
         self.autopilot.take_photos().into_iter().map(picture).collect()
     }
 
-    /// What the referee sees.
+    /// State of the vehicle as the referee sees it.
     pub fn observation(&self) -> Observation {
         let truth = self.autopilot.truth();
         let state = self.state();
-        // What a board reports of its state is up to a second old; what its autopilot does is seen.
+        // A board's report of its state is up to a second old; the autopilot's actions are seen.
         let lands = self.board.is_some() && self.autopilot.lands();
         let phase = match (truth.touching, on_path(state) && !lands) {
             (touching, _) if self.wrecked => {

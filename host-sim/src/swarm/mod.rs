@@ -44,15 +44,16 @@ use crate::shortage;
 
 /// A vehicle within this distance of its goal has reached it, metres.
 const REACHED_M: f32 = 0.5;
-/// Further from its pad than this, a vehicle has left it, metres.
+/// Distance from its pad beyond which a vehicle has left the pad, metres.
 const AWAY_M: f32 = 2.0;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
-/// When all have stood still for this long after a fault, no one will fly any more, seconds: longer than from a gate's
-/// opening to the take-off.
+/// Standstill of all vehicles after a fault after which no vehicle will fly any more, seconds:
+/// longer than from a gate's opening to the take-off.
 const STILL_S: f64 = 30.0;
-/// What the clock is ahead by more than this is not made up for: in a rush autopilots would live through seconds in which no companion
-/// in another process can say anything.
+/// Greatest lag of the simulation behind the wall clock that is made up for: if the simulation
+/// hurried, autopilots would live through seconds in which no companion in another process can say
+/// anything.
 const LATEST: Duration = Duration::from_millis(200);
 
 /// A flown mission.
@@ -65,11 +66,11 @@ pub struct Flight {
     pub samples: Vec<Sample>,
     /// Pictures taken, vehicle by vehicle.
     pub pictures: Vec<Picture>,
-    /// What the companions reported.
+    /// Events that the companions reported.
     pub log: Vec<report::Event>,
     /// Waypoints of a coverage mission that were photographed in flights before.
     pub done: Vec<Range>,
-    /// What companions of a coverage mission divided, in order of time.
+    /// Divisions that companions of a coverage mission made, in order of time.
     pub divisions: Vec<Division>,
     /// Simulated seconds.
     pub simulated_s: f64,
@@ -88,7 +89,7 @@ pub fn fly(
     simulate(mission, plan, command, realtime, None, progress)
 }
 
-/// The same at the speed of the clock, with a ground station looking on.
+/// As `fly`, at the speed of the clock, with a ground station that looks on.
 ///
 /// # Errors
 /// The link to the ground station is gone.
@@ -253,7 +254,7 @@ impl<'a> Run<'a> {
                 let nearest_m = &mut self.nearest_goal_m[i];
                 *nearest_m = match plan.flights[i].task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
-                    // It began where it ends: over its pad.
+                    // The flight began where it ends: over its pad.
                     None if off.xy().norm() > AWAY_M => f32::INFINITY,
                     None => nearest_m.min(off.xy().norm()),
                 };
@@ -325,7 +326,7 @@ impl<'a> Run<'a> {
 
     fn vehicle_result(&self, i: usize) -> VehicleResult {
         let scenario = &self.mission.scenario;
-        // As far as the estimate is wrong, the vehicle cannot know.
+        // The vehicle cannot know of an error of its estimate.
         let error_m = margins::estimate_m(scenario.simulation.estimator, scenario.vehicles[i].personality);
         let nearest_goal_m = self.nearest_goal_m[i] - error_m;
         let flown_m = self.referee.flown_m(i);
@@ -370,7 +371,7 @@ fn left_to_pilot(member: &Member) -> bool {
     matches!(member.state(), State::PilotControl | State::PilotReturned)
 }
 
-/// What planning on a roadmap with one bit changed comes to.
+/// Result of planning on a roadmap with one bit changed.
 fn plan_on_damaged(file: &[u8]) -> Result<Box<OwnPlan>, PlanFailure> {
     let mut damaged = file.to_vec();
     let middle = damaged.len() / 2;
@@ -392,7 +393,7 @@ fn vehicle_result(
     let reached = nearest_goal_m <= REACHED_M;
     let end = match (flight.task.flies(), member.state()) {
         (false, _) => "no goal".to_owned(),
-        // By its estimate it was there.
+        // By its estimate the vehicle was at the goal.
         (_, State::Done) if !reached => "Aborted: Landed beside its goal".to_owned(),
         _ => member.end(),
     };

@@ -19,12 +19,12 @@ pub struct RadioConfig {
     pub delay_s: f64,
 }
 
-/// What a station cannot do.
+/// Failures of a station.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cut {
-    /// It sends nothing.
+    /// The station sends nothing.
     pub tx: bool,
-    /// It hears nothing.
+    /// The station hears nothing.
     pub rx: bool,
 }
 
@@ -35,7 +35,7 @@ pub struct Radio {
     rng: Pcg32,
     cuts: Vec<Cut>,
     under_way: Vec<VecDeque<(u64, Rc<[u8]>)>>,
-    /// What stations sent since it was last asked for, if anybody overhears.
+    /// Packets that stations sent since the last call, if a gateway overhears.
     overheard: Option<Vec<Rc<[u8]>>>,
 }
 
@@ -47,12 +47,12 @@ impl Radio {
         Self { config, rng: Pcg32::new(seed, u64::from(u32::MAX)), cuts, under_way, overheard: None }
     }
 
-    /// From now on keeps what stations send for [`Self::overheard`].
+    /// Keeps the packets that stations send from now on, for [`Self::overheard`].
     pub fn overhear(&mut self) {
         self.overheard = Some(Vec::new());
     }
 
-    /// What stations sent since this was last asked, at once and without loss.
+    /// Packets that stations sent since the last call, at once and without loss.
     pub fn overheard(&mut self) -> Vec<Rc<[u8]>> {
         self.overheard.as_mut().map(core::mem::take).unwrap_or_default()
     }

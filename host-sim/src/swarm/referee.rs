@@ -11,18 +11,19 @@ use planner_core::voxel::VoxelGrid;
 use crate::map::edt::ClearanceField;
 use crate::terrain::HeightGrid;
 
-/// Rounding of positions that is no contact, metres.
+/// Rounding of positions, metres: an overlap by less than this is no contact.
 const TOUCH_M: f32 = 1e-3;
-/// No progress for this long while a way is left is a deadlock, seconds.
+/// Time without progress, while a path is left, that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
-/// Progress that counts, metres.
+/// Least movement along the path that counts as progress, metres.
 const PROGRESS_M: f32 = 0.1;
-/// From where one that reports no progress hovered, metres: more than it sways.
+/// Distance from its hover at which a vehicle that reports no progress has moved on, metres: more
+/// than it sways.
 const AWAY_M: f32 = 1.0;
-/// Spacing of recorded points, seconds.
+/// Time between two recorded points, seconds.
 const RECORD_S: f64 = 0.2;
 
-/// What a vehicle is doing, as the referee needs to know.
+/// Phase of a vehicle's flight, as the referee needs to know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
     /// On the ground before or after its flight.
@@ -42,7 +43,7 @@ pub enum Phase {
 pub struct Observation {
     /// Centre of the body, ENU metres.
     pub position: Point,
-    /// What it is doing.
+    /// Phase of the vehicle.
     pub phase: Phase,
     /// Whether it stands by order of a person.
     pub ordered: bool,
@@ -50,7 +51,7 @@ pub struct Observation {
     pub progress_m: Option<f32>,
 }
 
-/// What was recorded at one time.
+/// Record of one time.
 #[derive(Clone, Copy, Debug)]
 pub struct Sample {
     /// Seconds since the start of the simulation.
@@ -68,7 +69,8 @@ struct Watched {
     last: Option<Point>,
     flown_m: f64,
     in_contact: bool,
-    /// Where its distance to the nearest obstacle was last measured, and that distance, metres.
+    /// Place where the vehicle's distance to the nearest obstacle was last measured, and that
+    /// distance, metres.
     measured: Option<(Point, f32)>,
     best_progress_m: f32,
     progressed_at: Point,
@@ -107,7 +109,7 @@ pub struct Referee<'a> {
     pub min_separation_m: f32,
     /// Smallest distances over time.
     pub samples: Vec<Sample>,
-    /// What went wrong: seconds, vehicle, and what.
+    /// Incidents: seconds, vehicle, and text.
     pub incidents: Vec<(f64, usize, String)>,
 }
 
@@ -345,7 +347,7 @@ fn no_progress() -> String {
     format!("no progress for {DEADLOCK_S} s")
 }
 
-/// Clearances beyond this are not measured, metres.
+/// Greatest clearance that is measured, metres.
 const CLEARANCE_LOOK_M: f32 = 3.0;
 const NOTHING: Sample = Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
 
@@ -413,7 +415,7 @@ mod tests {
             referee.observe(0.1, &pair(1.4, Phase::Flying));
             referee.observe(0.2, &pair(1.3, Phase::Flying));
             assert_eq!(referee.violations, 1);
-            // Of the two it names the other one, by its id.
+            // Of the two vehicles the text names the other one, by its id.
             assert_eq!(
                 (referee.incidents[0].1, &*referee.incidents[0].2),
                 (1, "nearer than the safety distance to vehicle 7")

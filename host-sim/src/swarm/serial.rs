@@ -20,7 +20,7 @@ pub struct SerialConfig {
     pub buffer: usize,
 }
 
-/// Shares of bytes lost, or of writes damaged, above which a link explains a failure.
+/// Share of bytes lost, or of writes damaged, above which the link explains a failure.
 const TELLS: f64 = 0.02;
 /// The usual rates of lines, bits per second.
 const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
@@ -62,7 +62,7 @@ impl SerialLink {
         }
     }
 
-    /// What was wrong with the link over `lasted_s` seconds, if anything, and what would do.
+    /// Fault of the link over `lasted_s` seconds, if any, and a remedy.
     pub fn trouble(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         let lost = share(self.overrun, self.offered);

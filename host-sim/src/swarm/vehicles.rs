@@ -14,9 +14,9 @@ use crate::flash::DeskFlash;
 use crate::mission::{ACCEL_MPS2, Mission};
 use crate::scenario::Companion;
 
-/// A simulated radio of this range, the default, reaches everybody, metres.
+/// Default range of a simulated radio, metres: a radio of this range reaches every vehicle.
 const DEFAULT_RANGE_M: f32 = 500.0;
-/// The least range that a companion may be given, metres.
+/// Least radio range that a companion may be given, metres.
 const RANGE_LEAST_M: f32 = 1.0;
 
 /// The vehicles of a mission, each on its pad, in the order of the scenario.
@@ -48,7 +48,8 @@ pub fn members(mission: &Mission) -> anyhow::Result<Vec<Member>> {
                 system_id: vehicle.id,
                 personality: vehicle.personality,
                 world_origin: scenario.map.origin,
-                // Where it was switched on, unless the scenario says otherwise: no two vehicles share it.
+                // EKF origin where the autopilot was switched on, unless the scenario says
+                // otherwise: no two vehicles share it.
                 ekf_origin: vehicle.ekf_origin.unwrap_or_else(|| enu_to_geodetic(&scenario.map.origin, &pad)),
                 home: vehicle.home,
                 start: pad,

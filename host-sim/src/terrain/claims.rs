@@ -7,7 +7,7 @@ use std::io::{self, Read, Seek, SeekFrom};
 
 /// Most chunks of a compressed cloud: 64 MB of entries.
 const MOST_CHUNKS: u32 = 1 << 22;
-/// Number of the compressor's record.
+/// Number of the record that names the compressor.
 const COMPRESSOR: u64 = 22204;
 
 /// Whether no size that a reader would take memory for is beyond the file. It reads from the beginning again.

@@ -20,11 +20,11 @@ use super::{claims, guard};
 use crate::files;
 
 const FORMAT: &str = "a point cloud";
-/// Returns in a cell, on average.
+/// Mean number of returns in a cell.
 const RETURNS: f64 = 4.0;
 /// Least side of a cell, metres.
 const LEAST_CELL_M: f64 = 0.5;
-/// Cells without returns are bridged over this many.
+/// Most cells without returns that are bridged.
 const REACH: usize = 3;
 /// Returns read at a time.
 const BATCH: u64 = 4096;
@@ -83,7 +83,8 @@ where
     Ok(grid)
 }
 
-/// Where its numbers are, and metres in a unit of height: heights without a unit of their own are in that of the places.
+/// Coordinate system of the file's numbers, and metres in a unit of height: heights without a unit
+/// of their own are in that of the places.
 fn system(header: &Header) -> Result<(Crs, f64), TerrainError> {
     let record = |id: u16| {
         let found =

@@ -13,12 +13,12 @@ pub(super) const FOOT_M: f64 = 0.3048;
 /// Metres in a foot of the US survey.
 pub(super) const US_FOOT_M: f64 = 1200.0 / 3937.0;
 
-/// What a file's numbers are.
+/// Coordinate system of a file's numbers.
 #[derive(Debug)]
 pub(super) enum Crs {
-    /// It does not say.
+    /// The file does not state one.
     Unsaid,
-    /// What it says.
+    /// The file states this one.
     Said(Box<System>),
 }
 
@@ -32,7 +32,7 @@ pub(super) struct System {
 }
 
 impl System {
-    /// By its number in the EPSG register.
+    /// The system by its number in the EPSG register.
     pub(super) fn epsg(code: u16) -> Result<Self, TerrainError> {
         let name = format!("EPSG:{code}");
         let Some(found) = crs_definitions::from_code(code) else { return Err(TerrainError::system(&name)) };
@@ -43,7 +43,7 @@ impl System {
     pub(super) fn wkt(text: &str) -> Result<Self, TerrainError> {
         let name: String = text.split('"').nth(1).unwrap_or("an unnamed system").to_owned();
         let unusable = || TerrainError::system(&name);
-        // What is said of heights stands beside it: only what is said of places is parsed.
+        // The system of heights stands beside that of places: only the latter is parsed.
         let start = ["PROJCS", "PROJCRS", "PROJECTEDCRS", "GEOGCS", "GEOGCRS", "GEODCRS"];
         let start = start.iter().find_map(|word| text.find(word)).ok_or_else(unusable)?;
         let proj = proj4wkt::wkt_to_projstring(balanced(&text[start..])).map_err(|_| unusable())?;

@@ -8,43 +8,43 @@ use crate::quote::quoted;
 /// Why a file gives no heights.
 #[derive(Debug, Error)]
 pub enum TerrainError {
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
-    /// It is longer than is read.
+    /// The file is longer than is read.
     #[error("cannot be read: it has {0} bytes, at most {MOST_BYTES} are read")]
     TooLong(u64),
-    /// Its name says nothing about its format.
+    /// The file's name says nothing about its format.
     #[error("is in no known format: its name ends in none of .asc, .tif, .tiff, .las, .laz")]
     Format,
-    /// It is not what its name says.
+    /// The file is not what its name says.
     #[error("is not {format}: {why}")]
     Malformed {
-        /// What it should be.
+        /// Format by the file's name.
         format: &'static str,
-        /// What is wrong.
+        /// Fault of the file.
         why: String,
     },
-    /// Where its numbers are cannot be honoured.
+    /// The file's coordinate system cannot be used.
     #[error("is in {what}, which cannot be used; {hint}")]
     System {
-        /// What it says.
+        /// Coordinate system that the file states.
         what: String,
-        /// What would help.
+        /// Remedy.
         hint: &'static str,
     },
-    /// It does not say where it is.
+    /// The file does not state its place.
     #[error("does not say where it is; {0}")]
     Nowhere(&'static str),
-    /// It has too many cells, or the box would have.
+    /// The file has too many cells, or the box would have.
     #[error("has {0} cells here; at most {MOST_CELLS} are held")]
     TooManyCells(u128),
-    /// There is no height in the box that was asked for.
+    /// The requested box has no height.
     #[error("has no height here: {0} lies elsewhere, or holds none")]
     Elsewhere(String),
 }
 
-/// What helps where a coordinate system does not.
+/// Hint of an error about a coordinate system.
 pub(super) const WARP: &str = "convert it: gdalwarp -t_srs EPSG:32630, with your zone, or pdal translate";
 
 impl TerrainError {

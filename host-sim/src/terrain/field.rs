@@ -9,17 +9,19 @@ use thiserror::Error;
 
 use super::grid::HeightGrid;
 
-/// A path's samples are half a cell apart, and nodes of a sample a cell around it.
+/// Reach of heights read around a path, in cells: samples of the path are half a cell apart, and
+/// the nodes of a sample lie within one cell of the sample.
 pub const STEPS: f32 = 1.5;
 /// Least side of a cell, metres.
 const LEAST_CELL_M: f32 = 2.0;
-/// Nodes beside each other may differ by so many of their steps at least: fewer would round the slope away.
+/// Height steps by which neighbouring nodes may differ at the least: fewer would round the slope
+/// away.
 const LEAST_RISE: f32 = 5.0;
 
 /// Why there is no field.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
 pub enum FieldError {
-    /// Somewhere the map has no height: the place, metres east and north.
+    /// The map has no height at this place, metres east and north.
     #[error("it has no height at [{0:.0}, {1:.0}], metres east and north of the origin")]
     Hole(f32, f32),
     /// A height does not fit into the file.
@@ -30,25 +32,26 @@ pub enum FieldError {
     Shape,
 }
 
-/// What a field follows from, beside the heights.
+/// Inputs of a field, beside the heights.
 #[derive(Clone, Copy, Debug)]
 pub struct FieldConfig {
     /// The box that is flown over, metres.
     pub area: [Flat; 2],
-    /// How far beside its path a vehicle may be, metres.
+    /// Greatest distance of a vehicle beside its path, metres.
     pub reach_m: f32,
     /// Metres up or down for each metre over ground, at most.
     pub slope: f32,
 }
 
 impl FieldConfig {
-    /// How far beyond the box heights are looked at where nodes are so far apart, metres.
+    /// Distance beyond the box within which heights are read where nodes are `cell_m` apart,
+    /// metres.
     fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
         // A height map's cell holds what is within one of its cells.
         STEPS * cell_m + self.reach_m + own_cell_m
     }
 
-    /// From node to node, metres, over a map of fine cells.
+    /// Distance from node to node over a map of fine cells, metres.
     fn least_cell_m(&self) -> f32 {
         let sides = self.area[1] - self.area[0];
         let rise = LEAST_RISE * STEP_M * std::f32::consts::SQRT_2 / self.slope;

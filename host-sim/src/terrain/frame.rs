@@ -3,7 +3,7 @@
 use planner_core::coverage::Flat;
 use planner_core::frames::Geodetic;
 
-/// Where heights are asked for.
+/// Box in which heights are requested.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame<'a> {
     /// Origin of the mission frame. Heights stay above sea level whatever its altitude.

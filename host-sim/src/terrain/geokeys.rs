@@ -17,17 +17,17 @@ const METRES: [u16; 18] = [
     3855, 5701, 5702, 5703, 5705, 5709, 5711, 5714, 5720, 5728, 5730, 5773, 5776, 5782, 5783, 6647, 7837,
     9274,
 ];
-/// The same in feet, international and of the US survey.
+/// Heights above sea level in feet, international and of the US survey.
 const FEET: [u16; 1] = [8228];
 const US_FEET: [u16; 1] = [6360];
 
-/// What the keys say.
+/// Values of the keys.
 #[derive(Debug)]
 pub(super) struct GeoKeys(Vec<(u16, u16)>);
 
 impl GeoKeys {
-    /// From the directory: four numbers, then four a key. Keys whose values stand elsewhere are passed over: none of those
-    /// used do.
+    /// The keys of the directory: four numbers, then four a key. Keys whose values stand elsewhere
+    /// are passed over: none of those used do.
     pub(super) fn new(directory: &[u16]) -> Self {
         let entries = directory.chunks_exact(4).skip(1);
         Self(entries.filter(|entry| entry[1] == 0).map(|entry| (entry[0], entry[3])).collect())

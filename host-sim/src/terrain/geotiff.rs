@@ -106,7 +106,7 @@ fn same(value: f64, missing: f64) -> bool {
     value == missing || value as f32 == missing as f32
 }
 
-/// Where the first cell's corner is, and how large cells are.
+/// Place of the first cell's corner, and the size of cells.
 fn georeference<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     points: bool,

@@ -17,7 +17,7 @@ pub struct HeightGrid {
     middles_m: Vec<f32>,
 }
 
-/// What the cells of a box hold.
+/// Content of the cells of a box.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Heights {
     /// The greatest height, metres, where there is one.
@@ -56,7 +56,7 @@ impl HeightGrid {
         self.size
     }
 
-    /// Its least and its greatest corner, metres.
+    /// Least and greatest corner of the grid, metres.
     pub fn bounds(&self) -> [Flat; 2] {
         let sides = Flat::new(self.size[0] as f32, self.size[1] as f32) * self.cell_m;
         [self.low, self.low + sides]
@@ -67,7 +67,7 @@ impl HeightGrid {
         self.low + Flat::new(column as f32 + 0.5, row as f32 + 0.5) * self.cell_m
     }
 
-    /// Its height.
+    /// Height of the cell.
     pub fn height(&self, [column, row]: [usize; 2]) -> Option<f32> {
         let height_m = *self.heights_m.get(row * self.size[0] + column)?;
         (column < self.size[0] && !height_m.is_nan()).then_some(height_m)
@@ -98,7 +98,7 @@ impl HeightGrid {
         self.middles_m.clone_from(&self.heights_m);
     }
 
-    /// What the cells hold that a box touches.
+    /// Content of the cells that a box touches.
     pub fn highest(&self, low: &Flat, high: &Flat) -> Heights {
         let index = |at: f32, from: f32| ((at - from) / self.cell_m).floor();
         let mut found = Heights::default();
@@ -128,7 +128,7 @@ impl HeightGrid {
         found
     }
 
-    /// The same heights above another zero.
+    /// The heights above another zero.
     pub fn above(mut self, zero_m: f64) -> Self {
         for height_m in self.heights_m.iter_mut().chain(&mut self.middles_m) {
             *height_m = (f64::from(*height_m) - zero_m) as f32;

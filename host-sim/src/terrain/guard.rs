@@ -8,7 +8,7 @@ thread_local! {
     static QUIET: Cell<bool> = const { Cell::new(false) };
 }
 
-/// What `decode` returns; none where it panics.
+/// Result of `decode`; none where it panics.
 pub(super) fn caught<T>(decode: impl FnOnce() -> T) -> Option<T> {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
@@ -20,7 +20,7 @@ pub(super) fn caught<T>(decode: impl FnOnce() -> T) -> Option<T> {
         }));
     });
     let outer = QUIET.replace(true);
-    // What a panic leaves half done is dropped with the closure.
+    // State that a panic leaves half done is dropped with the closure.
     let outcome = catch_unwind(AssertUnwindSafe(decode));
     QUIET.set(outer);
     outcome.ok()

@@ -7,15 +7,17 @@
 
 use std::time::{Duration, Instant as Clock};
 
-/// The first wait, and the shortest: a companion that plans answers later than one that rests.
+/// First and shortest timeout, seconds: a companion that plans answers later than one that rests.
 const SHORTEST_S: f32 = 0.4;
-/// The longest: MAVLink FTP servers know a repeated request as such for a few seconds, ours for at least three.
+/// Longest timeout, seconds: MAVLink FTP servers recognise a repeated request for a few seconds,
+/// ours for at least three.
 const LONGEST_S: f32 = 2.0;
-/// Weights of a new round trip and of its deviation, and how many deviations are waited for (section 2).
+/// Weights of a new round trip and of its deviation, and number of deviations added to the timeout
+/// (section 2).
 const GAIN: f32 = 0.125;
 const DEVIATION_GAIN: f32 = 0.25;
 const DEVIATIONS: f32 = 4.0;
-/// Pieces under way at once, at most: the companion keeps six requests.
+/// Most requests under way at once: the companion keeps six.
 const UNDER_WAY: usize = 4;
 
 /// Retransmission timeout and window of one link.
@@ -29,7 +31,7 @@ pub struct Retransmission {
 }
 
 impl Retransmission {
-    /// That of a link on which nothing was answered yet.
+    /// The state of a link on which no request was answered yet.
     pub fn new(now: Clock) -> Self {
         Self {
             round_trip: None,
@@ -39,7 +41,7 @@ impl Retransmission {
         }
     }
 
-    /// How many pieces may be under way at once.
+    /// Number of pieces that may be under way at once.
     pub fn window(&self) -> usize {
         self.window
     }

@@ -4,7 +4,7 @@ use std::ops::{Add, Div, Mul, Sub};
 
 use pulp::Simd;
 
-/// So many f32, one beside another.
+/// A vector of f32 lanes.
 #[derive(Clone, Copy)]
 pub(super) struct Lanes<S: Simd> {
     simd: S,
@@ -29,7 +29,7 @@ impl<S: Simd> Lanes<S> {
         [Self::all(simd, x), Self::all(simd, y), Self::all(simd, z)]
     }
 
-    /// As many zeros.
+    /// A vector of zeros.
     #[inline(always)]
     pub(super) fn zero(self) -> Self {
         Self::all(self.simd, 0.0)
@@ -69,7 +69,7 @@ impl<S: Simd> Lanes<S> {
         self.simd.less_than_f32s(self.numbers, other.numbers)
     }
 
-    /// These where a mask is true, the other's elsewhere.
+    /// Lanes of `self` where a mask is true, of the other elsewhere.
     #[inline(always)]
     pub(super) fn select(self, mask: S::m32s, other: Self) -> Self {
         Self::new(self.simd, self.simd.select_f32s(mask, self.numbers, other.numbers))

@@ -10,12 +10,13 @@ use super::lanes::Lanes;
 
 /// Boxes of a node.
 pub(super) const FAN: usize = 8;
-/// Nodes waiting to be opened: 7 a level, and the last one's 8. Seven partings, always of the largest part and into two of
-/// which neither has less than a third, leave none with more than a quarter: 2³² boxes make 16 levels.
+/// Most nodes that wait to be opened: 7 a level, and the last one's 8. Seven partings, always of
+/// the largest part and into two of which neither has less than a third, leave none with more than
+/// a quarter: 2³² boxes make 16 levels.
 const WAITING: usize = 120;
-/// Child of a node whose boxes are obstacles.
+/// Child index of a node whose boxes are obstacles.
 const LEAF: u32 = 0;
-/// Where boxes are that are beyond everything, cells: squares of it are finite.
+/// Coordinate of a box that is beyond everything, cells: its square is finite.
 const BEYOND: f32 = 1e18;
 
 /// Up to [`FAN`] boxes, coordinate by coordinate so that they are compared together; cells. All of them are obstacles, or
@@ -24,7 +25,7 @@ const BEYOND: f32 = 1e18;
 pub(super) struct Node {
     pub(super) low: [[f32; FAN]; 3],
     pub(super) high: [[f32; FAN]; 3],
-    /// How many nodes further on the one below a box is, or [`LEAF`].
+    /// Number of nodes from this one to the one below a box, or [`LEAF`].
     pub(super) child: [u32; FAN],
 }
 
@@ -188,7 +189,7 @@ impl Segment {
             let (mut rate_from, mut rate_to) = (boxes.at(zero).1, boxes.at(one).1);
             for axis in 0..3 {
                 for face in [zero - boxes.half[axis], boxes.half[axis]] {
-                    // Where it does not move that may be no number: then this is `from`.
+                    // An axis without motion may give NaN here: then this is `from`.
                     let t = ((face - boxes.start[axis]) * per_d[axis]).max(from).min(to);
                     let (_, rate) = boxes.at(t);
                     let falls = rate.is_below(zero);
@@ -196,7 +197,7 @@ impl Segment {
                     (rate_from, rate_to) = (rate.select(falls, rate_from), rate_to.select(falls, rate));
                 }
             }
-            // Between them it falls, then rises, and its rate is linear.
+            // Between both ends the distance falls, then rises, and its rate is linear.
             let between = from + (to - from) * (rate_from / (rate_from - rate_to));
             let t = between.select(rate_from.is_below(zero), from);
             let t = t.select(zero.is_below(rate_to), to);

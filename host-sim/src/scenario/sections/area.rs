@@ -23,15 +23,16 @@ use crate::scenario::error::ScenarioError;
 use crate::scenario::reader::{Result, Span, Table, Text, Value};
 use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
-/// A flight over an area is given up after this, seconds: batteries last for less.
+/// Time after which a flight over an area is given up unless the scenario says otherwise, seconds:
+/// batteries last for less.
 const LIMIT_S: f32 = 3600.0;
 
 /// Cell of the level ground where there is no map, metres.
 const GROUND_CELL_M: f32 = 1.0;
-/// Metres that are no more than this across are taken for degrees.
+/// Extent up to which coordinates given as metres are taken for degrees, metres.
 const DEGREES_M: f64 = 0.5;
 
-/// What the numbers of a polygon are.
+/// Meaning of the numbers of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Coordinates {
     Wgs84,
@@ -47,7 +48,7 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
     let mut unsupported = Vec::new();
     let mut vehicles = vehicles(&root.required("vehicles", hint)?, Some(&area.origin), &mut unsupported)?;
-    // What goals missions leave to coverage.
+    // Errors of goals missions that coverage missions do not have.
     unsupported.retain(|error| !FLOWN_KEYS.iter().any(|key| error.why.ends_with(key)));
     let formation = unbuilt(root, "formation", &mut unsupported)?;
     let mission = root.get("mission").map(|v| v.table()).transpose()?;
@@ -117,7 +118,7 @@ fn check_pads(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], apar
     Ok(())
 }
 
-/// Nobody starts as high as pictures are taken, or higher.
+/// No vehicle starts as high as pictures are taken, or higher.
 fn check_heights(text: Text<'_>, vehicles: &[Vehicle], spans: &[VehicleSpans], height_m: f32) -> Result<()> {
     let Some((vehicle, spans)) = vehicles.iter().zip(spans).find(|(v, _)| v.start.z >= height_m) else {
         return Ok(());
@@ -351,7 +352,7 @@ fn overlapping(area: &core_area::Area<'_>) -> Option<(String, &'static str)> {
     })
 }
 
-/// What is wrong with an area, for a person.
+/// Description of an area's fault, for a person.
 fn reason(error: core_area::AreaError, rings: &[Ring]) -> String {
     use core_area::AreaError as E;
     let ring = |index: u16| {

@@ -7,7 +7,7 @@ use crate::margins;
 use crate::scenario::reader::{Result, Span, Table, Text};
 use crate::scenario::{Deconfliction, Mission, Mode, Roadmap, Simulation, Vehicle};
 
-/// What errors about a vehicle point at.
+/// Places that errors about a vehicle point at.
 pub(super) struct VehicleSpans {
     pub(super) start: Span,
     pub(super) goal: Option<Span>,
@@ -90,7 +90,7 @@ pub(super) fn check_goals_apart(
     Ok(())
 }
 
-/// Nobody starts or lands outside the geofence.
+/// No vehicle starts or lands outside the geofence.
 pub(super) fn check_inside(
     table: &Table<'_>,
     vehicles: &[(Vehicle, VehicleSpans)],
@@ -111,7 +111,7 @@ pub(super) fn check_inside(
     }
 }
 
-/// Where a goal stands in the scenario.
+/// Place of a goal in the scenario.
 fn goal_span(table: &Table<'_>, index: usize) -> Span {
     let Some(goals) = table.get("goals") else {
         return table.get("goals_file").map_or(table.span.clone(), |v| v.span);

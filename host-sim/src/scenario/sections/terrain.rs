@@ -16,12 +16,12 @@ use crate::scenario::reader::{Result, Span, Table, Text};
 use crate::scenario::{Mission, Simulation, Vehicle};
 use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError};
 
-/// A pad is on the ground; a height that is given beside that may differ by so much, metres.
+/// Greatest difference between a pad's given height and the ground, on which the pad lies, metres.
 const PAD_M: f32 = 5.0;
-/// Ways beside lanes, around corners, metres.
+/// Extent of paths beside lanes and around corners, metres.
 const AROUND_M: f32 = 5.0;
 
-/// What the table says of the ground.
+/// Content of the table about the ground.
 pub(super) struct TerrainFile {
     path: PathBuf,
     span: Span,
@@ -30,7 +30,7 @@ pub(super) struct TerrainFile {
 }
 
 impl TerrainFile {
-    /// From `[area]`; `metres` where its coordinates are.
+    /// The terrain by `[area]`; `metres` where its coordinates are.
     pub(super) fn of(table: &Table<'_>, folder: &Path, metres: bool) -> Result<Option<Self>> {
         let tolerance = table.get("terrain_tolerance_m");
         let Some(file) = table.get("terrain") else {
