@@ -4,13 +4,13 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-/// What the linker checks last, when all is placed. The guard is `GUARD_LEN` of `boards/mod.rs`;
-/// emulated UARTs have 10 kB in `.data`.
+/// Checks that the linker makes last, when all is placed. The guard is `GUARD_LEN` of
+/// `boards/mod.rs`; emulated UARTs have 10 kB in `.data`.
 const CHECKS: &str = r#"
 ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
 ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");
 "#;
-/// Of the firmware for the chip, which is one program.
+/// Linker sections of the firmware for the chip, which is one program.
 const PARTS: &str = r#"
 ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
   "a part has lost its name, or its first value is not all zeros");

@@ -19,13 +19,13 @@ pub const VEHICLES: usize = share(32);
 pub const WAYPOINTS: usize = 64;
 /// Gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 128;
-/// Pieces of flights among which a vehicle steps aside: 44 bytes each.
+/// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
 pub const PIECES: usize = share(2048);
 /// Lanes of a coverage mission: 72 bytes each in scratch, in all and in what is left of them.
 pub const LANES: usize = share(512);
-/// Vertices of its area: 36 bytes each in scratch.
+/// Vertices of a coverage mission's area: 36 bytes each in scratch.
 pub const AREA_VERTICES: usize = 256;
-/// Outward corners of its no-fly zones: 4 bytes for each pair, and 8 each.
+/// Outward corners of that area's no-fly zones: 4 bytes for each pair, and 8 each.
 pub const AREA_CORNERS: usize = 32;
 
 /// A companion with these.

@@ -19,22 +19,22 @@ use rand_pcg::Pcg32;
 
 use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 
-/// Cases of [`PlanCase`] that board and desk are compared in.
+/// Cases of [`PlanCase`] in which board and desk are compared.
 pub const PLANS: u64 = 200;
 /// Cases of [`StepCase`] of which the worst counts.
 pub const STEPS: usize = 10_000;
 /// Most vehicles of a [`PlanCase`].
 const SWARM: usize = 10;
-/// Looks at neighbours along each path of a [`PlanCase`].
+/// Places along each path of a [`PlanCase`] at which the neighbours' advice is computed.
 const LOOKS: usize = 4;
 const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
-/// How every swarm of these cases flies.
+/// Schedule of every swarm of these cases.
 pub const SCHEDULE: ScheduleConfig =
     ScheduleConfig { separation_m: 2.0, parked_separation_m: 1.75, cruise_mps: 2.0, vertical_mps: 1.0 };
 /// Radius and safety margin of every vehicle of these cases, metres.
 pub const CLEARANCE_M: f32 = 0.8;
-/// How goals are given out in the cases of whole swarms.
+/// Assignment of goals in the cases of whole swarms.
 pub const MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
 
 /// A swarm for the terminals of a roadmap: one vehicle a start.
@@ -54,7 +54,7 @@ pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
     (0..view.header().goals.min(VEHICLES as u16)).map(|_| 1.0).collect()
 }
 
-/// What is asked for that swarm.
+/// The plan request for that swarm.
 pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
     PlanRequest { vehicles, descents_m, mode: MODE, schedule: SCHEDULE, gates_most: GATES }
 }
@@ -81,13 +81,13 @@ impl Default for Workspace {
 /// CRC-32 of every bit of a case's results.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanCase {
-    /// Of the cost matrix.
+    /// CRC of the cost matrix.
     pub costs: u32,
-    /// Of which vehicle flies where, and the total.
+    /// CRC of the assignment of vehicles to goals, and of the total.
     pub assignment: u32,
-    /// Of the nodes, places, arc lengths and clearances of all paths.
+    /// CRC of the nodes, places, arc lengths and clearances of all paths.
     pub paths: u32,
-    /// Of the speed scales and stops that random neighbours leave, by both methods.
+    /// CRC of the speed scales and stops that random neighbours leave, by both methods.
     pub scales: u32,
 }
 
@@ -139,7 +139,7 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
     PlanCase { costs, assignment, paths, scales }
 }
 
-/// By its type: the crate has one of each width.
+/// Value of the digest by its type: the crate has one of each width.
 fn finished(digest: Digest<'_, u32, Table<1>>) -> u32 {
     digest.finalize()
 }
@@ -222,7 +222,7 @@ impl StepCase {
         Self { cfg, position, along_m, path, gates, neighbours }
     }
 
-    /// What is counted.
+    /// The call that is counted.
     pub fn advise(&self, method: Method) -> Advice {
         let Self { position, along_m, path, .. } = self;
         let own = Own { rank: 0, position: *position, along_m: *along_m, path, detours: false };
@@ -245,7 +245,7 @@ pub fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
     Point::from_fn(|_, _| uniform(rng, -reach_m, reach_m))
 }
 
-/// What is built on board: P3D's building with 2300 nodes.
+/// Configuration of the roadmap built on board: P3D's building with 2300 nodes.
 pub const BUILT: Config = Config {
     nodes: 2300,
     edge_min_m: 0.5,

@@ -11,19 +11,20 @@ use crate::chips::ResetCause;
 
 /// Longest text of a STATUSTEXT.
 pub const TEXT: usize = 50;
-/// Words that it takes: what is kept, then the checksum.
+/// Words of the kept record: its contents, then the checksum.
 pub const WORDS: usize = 25;
-/// Words of the text, and before it.
+/// Words of the text.
 const TEXT_WORDS: usize = TEXT.div_ceil(4);
+/// Words before the text.
 const HEAD: usize = 5 + 2 * WORKS;
 /// Kinds of work.
 const WORKS: usize = 3;
-/// Starts in a row that files may bring down before they are set aside.
+/// Crashed starts in a row after which files are set aside.
 const PATIENCE: u32 = 3;
-/// What is said where neither the program nor the chip knows better.
+/// Report of a restart whose cause neither the program nor the chip knows better.
 const UNANNOUNCED: &str = "Restarted: watchdog, reset key or brown-out";
 
-/// A few bytes at a start and at an end need no table.
+/// Checksum of the kept record: a few bytes at a start and at an end need no table.
 static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// How a start ended.
@@ -35,17 +36,17 @@ enum End {
     None = 0,
     /// The firmware runs. Found at a start: the run before was cut off without a record.
     Runs = 0x464c_4b22,
-    /// By a panic or a fault.
+    /// The program ended by a panic or a fault.
     Crashed = 0x464c_4b21,
-    /// Somebody asked for it.
+    /// A person requested the restart.
     Asked = 0x464c_4b23,
 }
 
-/// What is done with uploaded files.
+/// Work on uploaded files.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Work {
-    /// Nothing.
+    /// No work on files.
     #[default]
     None = 0,
     /// The roadmap is checked.
@@ -59,22 +60,22 @@ pub enum Work {
 /// Work with certain files, identified by a checksum.
 type Task = (Work, u32);
 
-/// What is kept.
+/// The record that is kept over a restart.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Kept {
     end: End,
     text: String<TEXT>,
     /// Under way.
     task: Task,
-    /// Of each kind of work: the files with which it brought starts down, and how many in a row.
+    /// For each kind of work: the files with which it brought starts down, and how many in a row.
     failed: [(u32, u32); WORKS],
     /// A bit for each kind that came to its end in this start, with those files.
     done: u32,
 }
 
 impl Kept {
-    /// What a start finds: `kept` is what the memory holds, `cause` why the chip started. Returns
-    /// what is kept from now on, and what is to be said of the end before.
+    /// Result of a start: `kept` is the record that the memory holds, `cause` why the chip started.
+    /// Returns the record to keep from now on, and the report of the end before.
     pub fn start(kept: Option<Self>, cause: ResetCause) -> (Self, Option<String<TEXT>>) {
         let mut kept = kept.filter(|_| cause != ResetCause::Power).unwrap_or_default();
         let crashed = kept.end == End::Crashed;
@@ -105,7 +106,7 @@ impl Kept {
         (kept, said)
     }
 
-    /// It ends by a panic or a fault, of which the next start says this.
+    /// The program ends by a panic or a fault, of which the next start reports `text`.
     pub fn crash(&mut self, text: &str) {
         self.end = End::Crashed;
         self.text.clear();
@@ -118,7 +119,7 @@ impl Kept {
         self.end == End::Crashed
     }
 
-    /// It ends because somebody asked for that.
+    /// The program ends because a person requested that.
     pub fn ask(&mut self) {
         self.end = End::Asked;
     }
@@ -148,7 +149,7 @@ impl Kept {
         }
     }
 
-    /// As words of memory.
+    /// The record as words of memory.
     pub fn to_words(&self) -> [u32; WORDS] {
         let mut text = [0; 4 * TEXT_WORDS];
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
@@ -162,7 +163,7 @@ impl Kept {
         words
     }
 
-    /// From words of memory; `None` where the checksum is wrong.
+    /// The record from words of memory; `None` where the checksum is wrong.
     pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
         let end =
             [End::None, End::Runs, End::Crashed, End::Asked].into_iter().find(|e| *e as u32 == words[0])?;

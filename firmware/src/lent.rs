@@ -15,14 +15,14 @@ impl Deref for Lent {
     }
 }
 
-/// What a flash has lent: one piece at a time.
+/// The ranges that a flash has lent: one at a time.
 #[derive(Debug, Default)]
 pub struct Lender {
     lent: Option<Range<u32>>,
 }
 
 impl Lender {
-    /// Nothing is lent.
+    /// A flash that has lent nothing.
     pub const fn new() -> Self {
         Self { lent: None }
     }
@@ -36,7 +36,7 @@ impl Lender {
         Some(Lent(bytes))
     }
 
-    /// They are not used any more.
+    /// The lent bytes are not used any more.
     pub fn take_back(&mut self, _lent: Lent) {
         self.lent = None;
     }

@@ -31,14 +31,14 @@ use planner_core::plan::SwarmPlan;
 use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};
 
-/// Longest mission file.
+/// Longest mission file, bytes.
 const MISSION: usize = mission_file::MOST_BYTES;
-/// Where a board without a mission believes to be.
+/// Place of a board without a mission.
 const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
-/// What a board says to which its mission gives nothing to do.
+/// Report of a board whose mission does not name its system id.
 const STRANGER: &str = "This system id is not in the mission: no plan";
 
-/// What is said of files that are not used any more.
+/// Reports of files that are not used any more.
 const ROADMAP_ASIDE: &str = "Roadmap set aside: it crashed 3 starts in a row";
 const MISSION_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
@@ -87,7 +87,7 @@ fn main() -> ! {
 /// A line's two ends.
 type Ends = (Receiver, Transmitter);
 
-/// What the start has to say.
+/// Reports of the start.
 struct Said {
     crashed: Option<String<50>>,
     warnings: Vec<&'static str, WARNINGS>,
@@ -142,7 +142,7 @@ async fn work(
     }
     if let Some(error) = refused {
         let mut text = String::new();
-        // What has no room is left out; a test sees that all of it has.
+        // Text without room is left out; a test checks that all of it has room.
         let _ = write!(text, "Mission: {error}");
         companion.say(true, REFUSED.init(text).as_str());
     }
@@ -176,7 +176,7 @@ fn find_roadmap(store: &mut Store, flash: &mut Flash) -> (Option<Lent>, bool) {
     }
 }
 
-/// What was found of a mission.
+/// Result of the search for a mission.
 #[derive(Default)]
 struct FoundMission {
     /// It, if it is one on this roadmap, or needs none.
@@ -205,7 +205,7 @@ fn find_mission(
     let Some(bytes) = found else { return FoundMission::default() };
     let sum = bytes.last_chunk().copied().map_or(0, u32::from_le_bytes);
     let files = map_crc ^ sum.rotate_left(1);
-    // What it crashed may be its reading, or a plan.
+    // The crash may have come from reading the mission, or from a plan.
     if !crash::may_begin(Work::Plan, files) || !crash::begin(Work::ReadMission, files) {
         return FoundMission { files, aside: true, ..FoundMission::default() };
     }

@@ -19,13 +19,14 @@ use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPO
 use crate::kept::Work;
 use crate::scratch::Scratch;
 
-/// Most things that are flown around. A vehicle that fell silent may lie below a dozen places, any other is one or two; more
-/// than these and there is no way around, not one past what was left out.
+/// Most keep-out zones of a detour. A vehicle that fell silent may lie below a dozen places, any
+/// other makes one zone or two; with more zones than these there is no detour, not one past a zone
+/// that was left out.
 const OBSTACLES: usize = 4 * VEHICLES;
 
-/// What planning needs beside roadmap and mission: pieces that lie in memories of their own.
+/// Memory for planning beside roadmap and mission: pieces that lie in memories of their own.
 pub struct Memory<'a> {
-    /// To search in.
+    /// Workspace of the search.
     pub scratch: &'a mut Scratch,
     /// The swarm's plan.
     pub swarm: &'a mut SwarmPlan<VEHICLES, WAYPOINTS>,
@@ -66,32 +67,32 @@ impl Default for Own {
 
 /// A planner over a roadmap or field and a mission that belong together, or over none.
 pub struct Planner<'a> {
-    /// What to plan on.
+    /// Roadmap to plan on.
     pub roadmap: Option<RoadmapView<'a>>,
     /// The heights to fly above.
     pub field: Option<FieldView<'a>>,
-    /// What to plan.
+    /// Mission to plan.
     pub mission: Option<MissionView<'a>>,
-    /// Whose plan it is.
+    /// System id of the vehicle whose plan it is.
     pub system_id: u8,
     /// A checksum of all.
     pub files: u32,
-    /// Its memory.
+    /// Memory of the planner.
     pub memory: Memory<'a>,
 }
 
 impl Planner<'_> {
-    /// What the plan that the companion wants follows from: what was lost, or what it would have flown around.
+    /// Inputs of the plan that the companion wants: lost vehicles, or keep-out zones of its detour.
     pub fn note(&mut self, wanted: Wanted, companion: &BoardCompanion) -> Option<DetourRequest> {
         let Own { obstacles, crowded, done, losses, .. } = &mut *self.memory.own;
         obstacles.clear();
         done.clear();
         losses.clear();
         *crowded = false;
-        // As many as the companion keeps.
+        // Cannot overflow: as many as the companion keeps.
         let _ = done.extend_from_slice(companion.done());
         if wanted == Wanted::Division {
-            // As many as the companion keeps, and the one under way.
+            // Cannot overflow: as many as the companion keeps, and the one under way.
             companion.losses().for_each(|lots| _ = losses.push(lots.iter().copied().collect()));
         }
         if wanted != Wanted::Detour {

@@ -64,8 +64,7 @@ union Memory {
     area: ManuallyDrop<Area>,
 }
 
-/// All zeros are a value of each use: the compiler refuses a constant that is no value of its
-/// type.
+/// Zero values of each use: the compiler refuses a constant that is no value of its type.
 #[expect(dead_code, reason = "made by the compiler alone")]
 const ZEROS: (Planner, Builder, Coverage, Area) = {
     // SAFETY: the compiler checks it.
@@ -82,28 +81,28 @@ impl Scratch {
         Self { memory: Memory { plan: ManuallyDrop::new(Planner::new()) }, used: Use::Plan }
     }
 
-    /// For planning from here on.
+    /// The memory for planning from here on.
     pub fn planner(&mut self) -> &mut Planner {
         self.turn(Use::Plan);
         // SAFETY: it was all zeros at the last turn, which is an empty planner, and only a planner was written since.
         unsafe { &mut self.memory.plan }
     }
 
-    /// For building from here on; empty.
+    /// The memory for building from here on; empty.
     pub fn builder(&mut self) -> &mut Builder {
         self.turn(Use::Build);
         // SAFETY: as above; all zeros is an empty builder.
         unsafe { &mut self.memory.build }
     }
 
-    /// For a coverage mission from here on; empty.
+    /// The memory for a coverage mission from here on; empty.
     pub fn coverage(&mut self) -> &mut Coverage {
         self.turn(Use::Coverage);
         // SAFETY: as above; all zeros is nothing lent yet.
         unsafe { &mut self.memory.coverage }
     }
 
-    /// For planning a coverage mission from here on; empty.
+    /// The memory for planning a coverage mission from here on; empty.
     pub fn area(&mut self) -> &mut Area {
         self.turn(Use::Area);
         // SAFETY: as above; all zeros is an area without vertices.
@@ -126,21 +125,21 @@ impl Default for Scratch {
     }
 }
 
-/// What a coverage mission is planned with.
+/// Workspaces of a coverage mission's plan.
 pub struct Coverage {
     /// The whole path.
     pub tracks: Tracks<LANES>,
-    /// What is left of it after a loss.
+    /// Lanes that are left after a loss.
     pub left: Tracks<LANES>,
-    /// For making lanes.
+    /// Workspace for making lanes.
     pub build: tracks::Workspace<AREA_VERTICES>,
-    /// For dividing them.
+    /// Workspace for dividing lanes.
     pub powell: powell::Workspace<VEHICLES>,
     /// The routes.
     pub plan: Plan<VEHICLES>,
-    /// What is lost, and what is left of it.
+    /// Workspace for losses, and for the lanes left after them.
     pub losses: losses::Workspace<LANES, VEHICLES>,
-    /// For keeping flights apart.
+    /// Workspace for keeping flights apart.
     pub schedule: ScheduleWorkspace,
 }
 
@@ -228,12 +227,12 @@ impl Builder {
         })
     }
 
-    /// Its nodes.
+    /// Nodes of the built roadmap.
     pub fn nodes(&self) -> &[Point] {
         &self.nodes[..self.node_count]
     }
 
-    /// Its edges.
+    /// Edges of the built roadmap.
     pub fn edges(&self) -> &[Edge] {
         &self.edges[..self.edge_count]
     }

@@ -25,31 +25,32 @@ use crate::planner::Planner;
 
 /// Bytes taken from a UART at once.
 const CHUNK: usize = 256;
-/// Between two looks at a UART, so that bytes come in handfuls: each look costs as much as a hundred bytes.
+/// Time between two polls of a UART, so that bytes come in handfuls: each poll costs as much as a
+/// hundred bytes.
 const GATHER: Duration = Duration::from_millis(1);
-/// A link task that has nothing to do comes by this often all the same, so that one that hangs is known.
+/// Period at which a link task without work checks in, so that a task that hangs is known.
 pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
-/// Errors of a line are reported at once, and then no more often than this.
+/// Least time between two reports of errors of a line; the first is reported at once.
 const TELL_EVERY: Duration = Duration::from_secs(10);
-/// What is said of them: errors that the UART reported, and frames that were damaged or cut.
+/// Reports of a line: errors that the UART reported, and frames that were damaged or cut.
 const LINE_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
-/// What was to be said before a restart has this long to go out.
+/// Time that queued messages have to go out before a restart, milliseconds.
 const FAREWELL_MS: u32 = 200;
 
 type Shared<T> = Signal<CriticalSectionRawMutex, T>;
 
-/// What the tasks share.
+/// State that the tasks share.
 pub struct Shell {
     companion: Mutex<HoldsExecutors, RefCell<Option<&'static mut BoardCompanion>>>,
-    /// Something may be to be sent.
+    /// Signals that a link may have bytes to send.
     sends: [Shared<()>; 2],
     /// The companion's next step may be due earlier than thought.
     steps: Shared<()>,
     /// The companion asks for a plan.
     wants_plan: Shared<Wanted>,
-    /// There may be something to do that takes long.
+    /// Signals that long work may be waiting.
     works: Shared<()>,
     /// When a restart was asked for, milliseconds; 0 if none was.
     restart_ms: AtomicU32,
@@ -90,13 +91,14 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
     ear.loudest()
 }
 
-/// What a board without an autopilot calls itself: files can be uploaded to it. When one is heard it restarts.
+/// System id of a board without an autopilot: files can be uploaded to it. When it hears an
+/// autopilot it restarts.
 pub const NO_AUTOPILOT: u8 = 250;
-/// An autopilot reports its state once a second.
+/// Time within which the first autopilot is heard: an autopilot reports its state once a second.
 const HEAR_WITHIN: Duration = Duration::from_secs(3);
-/// So long after the first, every autopilot on the line has been heard.
+/// Time after the first autopilot within which every other one on the line is heard.
 const COMPARE_FOR: Duration = Duration::from_millis(1100);
-/// Autopilots that are distinguished.
+/// Most autopilots that are distinguished.
 const HEARD: usize = 8;
 
 /// Listens for autopilots.
@@ -119,7 +121,7 @@ impl Ear {
             let beats = frame.message_id == HEARTBEAT;
             match self.heard.iter_mut().find(|(id, ..)| *id == frame.system) {
                 Some((_, frames, beat)) => (*frames, *beat) = (*frames + 1, *beat || beats),
-                // More than these are not distinguished.
+                // More autopilots than these are not distinguished.
                 None => _ = self.heard.push((frame.system, 1, beats)),
             }
         }
@@ -132,8 +134,8 @@ impl Ear {
     }
 }
 
-/// Looking through the flash, checking the roadmap and listening for an autopilot take a board no
-/// longer; the watchdog is fed so long without any task of links or time.
+/// Longest start of a board, milliseconds: the search through the flash, the check of the roadmap
+/// and the wait for an autopilot. The watchdog is fed this long without any task of links or time.
 pub const STARTS_WITHIN_MS: u32 = 20_000;
 
 const HEARTBEAT: u32 = 0;
@@ -195,7 +197,7 @@ impl Shell {
                             companion.say_count(false, "Setpoints: #, at most # ms apart", reported);
                         }
                     }
-                    // Its text says so.
+                    // The event's text is reported already.
                     Event::StateChanged { .. } | Event::WaitsForStart { .. } => {}
                 }
             }
@@ -270,7 +272,7 @@ impl Shell {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
                     self.setpoints.note(now_ms());
                 }
-                // What waited for room to be said may go on.
+                // Work that waited for room for its report may go on.
                 self.works.signal(());
                 if uart.write_all(&frame[..length]).await.is_err() {
                     self.line_errors[link as usize].fetch_add(1, Ordering::Relaxed);
@@ -328,7 +330,7 @@ impl Shell {
             })
         });
         let Some(request) = request else {
-            // It may have something to say of what it was asked.
+            // The companion may have an answer to send.
             self.sends.iter().for_each(|sends| sends.signal(()));
             return false;
         };
@@ -372,8 +374,9 @@ impl Default for Shell {
     }
 }
 
-/// How many setpoints went out in a flight and how far apart, by the board's own time. A stream lasts as long as the companion
-/// says so, not until a pause: else the longest pauses would not be seen.
+/// Number of setpoints in a flight and the gaps between them, by the board's own time. A stream
+/// lasts as long as the companion reports it, not until a pause: else the longest pauses would not
+/// be seen.
 struct Setpoints {
     count: AtomicU32,
     /// The longest time between two, or from the stream's begin to the first or from the last to its end, milliseconds.
@@ -387,7 +390,7 @@ impl Setpoints {
         Self { count: AtomicU32::new(0), gap_ms: AtomicU32::new(0), last_ms: AtomicU32::new(0) }
     }
 
-    /// One goes out.
+    /// Notes a setpoint that goes out.
     fn note(&self, now_ms: u32) {
         self.count.fetch_add(1, Ordering::Relaxed);
         self.mark(now_ms, now_ms.max(1));
@@ -422,7 +425,7 @@ impl Setpoints {
     }
 }
 
-/// What passed since the last, if there was one.
+/// Time since the last setpoint, if there was one.
 fn passed_ms(last_ms: u32, now_ms: u32) -> Option<u32> {
     (last_ms != 0).then(|| now_ms.wrapping_sub(last_ms))
 }

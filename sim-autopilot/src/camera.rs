@@ -21,7 +21,7 @@ const CAMERA_FEEDBACK: u32 = 180;
 const CAMERA_IMAGE_CAPTURED: u32 = 263;
 /// Period at which the trigger distance is checked, microseconds: PX4's, ArduPilot's.
 const LOOK_EVERY_US: [u64; 2] = [50_000, 20_000];
-/// Photos kept for a referee that does not ask.
+/// Most photos kept for a referee that does not fetch them.
 const KEPT: usize = 100_000;
 
 /// A picture as it truly was taken.
@@ -64,7 +64,7 @@ impl Camera {
         self.once |= libm::roundf(command.number5) == 1.0;
     }
 
-    /// What a reboot leaves: what was photographed.
+    /// The state that a reboot leaves: the photos taken.
     pub(super) fn rebooted(&mut self) -> Self {
         Self { photos: core::mem::take(&mut self.photos), ..Self::default() }
     }
@@ -123,7 +123,7 @@ impl Camera {
 }
 
 impl Snapshot {
-    /// What is said about the picture taken in this step.
+    /// Reports of the picture taken in this step.
     pub(super) fn send_camera(&self, id: u32, port: &mut Port) -> bool {
         let (latitude, longitude, altitude_mm) = scaled(&self.geodetic);
         let relative_m = (self.geodetic.alt_m - self.home.0.alt_m) as f32;

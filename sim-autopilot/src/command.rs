@@ -8,7 +8,7 @@ pub const DENIED: u8 = 2;
 pub const UNSUPPORTED: u8 = 3;
 pub const FAILED: u8 = 4;
 
-/// Parameter 2 of COMPONENT_ARM_DISARM that forces it.
+/// Parameter 2 of COMPONENT_ARM_DISARM that forces arming or disarming.
 pub const FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
@@ -35,7 +35,7 @@ pub struct Command {
 }
 
 impl Command {
-    /// From COMMAND_LONG.
+    /// The command of a COMMAND_LONG.
     pub fn long(fields: &Fields<'_>) -> Self {
         let place = [f64::from(fields.f32(16)), f64::from(fields.f32(20))];
         Self {
@@ -48,7 +48,7 @@ impl Command {
         }
     }
 
-    /// From COMMAND_INT.
+    /// The command of a COMMAND_INT.
     pub fn int(fields: &Fields<'_>) -> Self {
         let degrees = |at: usize| match fields.i32(at) {
             i32::MAX => f64::NAN,

@@ -33,7 +33,7 @@ impl AutopilotKind {
     }
 }
 
-/// What a simulated autopilot is made from.
+/// Configuration of a simulated autopilot.
 #[derive(Clone, Debug)]
 pub struct Config {
     /// MAVLink system id, 1 to 255.
@@ -46,11 +46,11 @@ pub struct Config {
     pub ekf_origin: Geodetic,
     /// Home; `None` is where it stands when it arms.
     pub home: Option<Geodetic>,
-    /// Where the centre of its body starts, ENU metres.
+    /// Initial position of the centre of the vehicle's body, ENU metres.
     pub start: Point,
     /// Heading at the start, radians clockwise from north.
     pub heading_rad: f32,
-    /// What the airframe can do.
+    /// Limits of the airframe.
     pub vehicle: VehicleLimits,
     /// Mean wind, ENU m/s.
     pub wind: Point,
@@ -106,13 +106,13 @@ impl Default for Config {
 }
 
 impl Config {
-    /// What everything random about this vehicle is drawn from.
+    /// Seed of all randomness of this vehicle.
     pub(super) fn vehicle_seed(&self) -> u64 {
         self.seed ^ (u64::from(self.system_id) << 32)
     }
 
-    /// What its estimate of the height is wrong by for the whole flight, metres: so much its EKF origin is off as well, if the receiver
-    /// set it.
+    /// Error of the estimated height for the whole flight, metres: the EKF origin is off by as
+    /// much, if the receiver set it.
     pub fn height_error_m(&self) -> f32 {
         Errors::new(self.estimator, self.personality, self.vehicle_seed()).height_m()
     }

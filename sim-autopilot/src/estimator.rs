@@ -20,8 +20,8 @@ use super::noise::{Gaussian, SLOT_S};
 use crate::{AutopilotKind, Estimator};
 
 impl Estimator {
-    /// What ESTIMATOR_STATUS reports, across and in height, metres: recorded PX4s reported 0.02 to 0.29 across
-    /// and 0.07 to 0.3 in height, whatever they had wrong.
+    /// Accuracy that ESTIMATOR_STATUS reports, across and in height, metres: recorded PX4s reported
+    /// 0.02 to 0.29 across and 0.07 to 0.3 in height, whatever their error.
     pub(super) fn accuracy_m(self) -> [f32; 2] {
         match self {
             Self::Perfect | Self::Rtk => [0.02, 0.03],
@@ -97,14 +97,14 @@ impl Errors {
             velocity: Point::zeros(),
             rate: Point::zeros(),
         };
-        // Some time constants later nothing is left of the begin at zero.
+        // After some time constants no trace is left of the begin at zero.
         for _ in 0..(30.0 / SLOT_S) as usize {
             errors.advance();
         }
         errors
     }
 
-    /// What the height is wrong by for the whole flight, metres.
+    /// Error of the height for the whole flight, metres.
     pub fn height_m(&self) -> f32 {
         self.height_m
     }

@@ -9,18 +9,19 @@
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
 
-/// A frame not complete this long after its first byte is given up, microseconds.
+/// Time after its first byte at which an incomplete frame is dropped, microseconds.
 const PARTIAL_US: u64 = 100_000;
-/// The longest frame without a signature: 10 bytes of header, 255 of payload, 2 of CRC.
+/// Longest frame without a signature, bytes: 10 of header, 255 of payload, 2 of CRC.
 pub const FRAME_MAX: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
 const V1_HEADER: usize = 6;
 const V2_HEADER: usize = 10;
-/// Flag of a V2 frame that a signature follows; a frame with any other is none that we can read.
+/// Flag of a V2 frame that a signature follows; a frame with any other flag cannot be read.
 const SIGNED: u8 = 1;
-/// COMPONENT_INFORMATION, the one message whose seed is 0: the crate answers 0 for unknown ids too.
+/// COMPONENT_INFORMATION, the one message whose CRC seed is 0: the crate answers 0 for unknown ids
+/// too.
 const SEED_ZERO: u32 = 395;
 
 /// A frame whose checksum is right.
@@ -45,7 +46,7 @@ impl Frame {
         &self.payload
     }
 
-    /// Of a whole frame's bytes, signature left out.
+    /// The frame of these bytes, signature left out.
     fn read(bytes: &[u8]) -> Self {
         let header = header_len(bytes);
         // Sequence number, system and component stand before the id.
@@ -98,7 +99,7 @@ pub fn write_raw(sender: (u8, u8, u8), message_id: u32, seed: u8, payload: &[u8]
     out.extend(crc.to_le_bytes());
 }
 
-/// What stands at the front of the bytes held.
+/// Kind of the bytes at the front of the buffer.
 enum Front {
     /// The beginning of what may be a frame.
     Partial,

@@ -8,11 +8,12 @@ use nalgebra::{Matrix3, Vector3};
 use planner_core::Point;
 use planner_core::frames::{self, Geodetic, Projection};
 
-/// The linear map is renewed at this distance from its centre, metres.
+/// Distance from the centre of the linear map at which the map is renewed, metres.
 const RENEW_M: f64 = 50.0;
-/// Beyond this distance from the centre conversions are exact, metres.
+/// Distance from the centre beyond which conversions are exact, metres.
 const LINEAR_M: f64 = 100.0;
-/// Half the span the slopes are taken over, metres: a power of two, so that the points are exact in f32.
+/// Half the span over which slopes are taken, metres: a power of two, so that the points are exact
+/// in f32.
 const SPAN_M: f64 = 64.0;
 
 /// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen from.

@@ -64,7 +64,7 @@ impl Autopilot {
         if let Some(name) = name {
             self.firmware.set_param(name, fields.f32(0), fields.u8(22));
         }
-        // What was refused is answered with the value that stands.
+        // A refused value is answered with the value that stands.
         self.send_named_param(port, name);
     }
 
@@ -80,7 +80,7 @@ impl Autopilot {
     pub(super) fn send_param(&mut self, port: usize, index: usize, reported: u16) {
         let params = self.firmware.params();
         let Some((name, value)) = params.get(index) else { return };
-        // By field: value, count, index, name, type.
+        // Encoded field by field: value, count, index, name, type.
         let mut payload = [0; 25];
         payload[..4].copy_from_slice(&params.wire(value).to_le_bytes());
         payload[4..6].copy_from_slice(&(params.len() as u16).to_le_bytes());

@@ -27,10 +27,10 @@ const MISSION_ITEM_REACHED: u32 = 46;
 const REACHED_M: f32 = 2.0;
 /// `NAV_MC_ALT_RAD`, metres.
 const REACHED_UP_M: f32 = 0.8;
-/// `MIS_YAW_ERR` of PX4: 12°. ArduCopter does not wait for its heading.
+/// `MIS_YAW_ERR` of PX4, radians: 12°. ArduCopter does not wait for its heading.
 const YAW_ERROR: f32 = 0.21;
 
-/// What is flown for an item.
+/// Action that is flown for an item.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Leg {
     /// Wait so long, seconds.
@@ -46,7 +46,7 @@ pub(super) enum Leg {
 }
 
 impl Leg {
-    /// Where the leg after this one begins: at its point, or where the vehicle is.
+    /// Begin of the leg after this one: its point, or the place of the vehicle.
     pub(super) fn end(leg: Option<Self>, here: &Point) -> Point {
         match leg {
             Some(Self::To { at, .. }) => at,
@@ -162,7 +162,8 @@ impl Platform {
         Some(leg)
     }
 
-    /// Where an item is; what it leaves is where the vehicle is. A place that is none on earth is home.
+    /// Place of an item; a coordinate that the item leaves out is the vehicle's. A place that is
+    /// none on earth is home.
     fn place(&self, item: &Item) -> Point {
         let base = if matches!(item[34], 3 | 6 | 10 | 11) { self.home.alt_m } else { 0.0 };
         let here = self.frame.geodetic(self.vehicle.position());

@@ -18,6 +18,6 @@ pub enum Estimator {
     Perfect,
     /// A receiver with fixed RTK: at most 0.1 m across and 0.15 m in height.
     Rtk,
-    /// As the recorded flights' were.
+    /// Gusts as those of the recorded flights.
     Recorded,
 }

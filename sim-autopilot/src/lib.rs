@@ -364,7 +364,7 @@ impl Autopilot {
         self.platform.height_error_rate = height_rate;
     }
 
-    /// Where it believes to be and how fast it believes to move, ENU metres and m/s.
+    /// Estimated position and velocity, ENU metres and m/s.
     pub fn estimate(&self) -> [Point; 2] {
         let sensors = self.platform.sensors();
         [sensors.position, sensors.velocity]
@@ -376,7 +376,7 @@ impl Autopilot {
         self.platform.announce_origin();
     }
 
-    /// The same, by ENU metres.
+    /// Moves the EKF origin by ENU metres.
     pub fn move_ekf_origin(&mut self, by: &Point) {
         let origin = frames::enu_to_geodetic(self.platform.frame.ekf_origin(), by);
         self.set_ekf_origin(origin);

@@ -7,9 +7,10 @@ use super::port::Port;
 use super::snapshot::Snapshot;
 use super::vehicle::GRAVITY;
 
-/// What PX4 1.17 announced, without FTP (32), which is not simulated.
+/// Capabilities that PX4 1.17 announced, without FTP (32), which is not simulated.
 const PX4_CAPABILITIES: u64 = 0xE8DF;
-/// What ArduCopter 4.6 announces, without FTP (32), terrain (0x200) and compass calibration (0x1000).
+/// Capabilities that ArduCopter 4.6 announces, without FTP (32), terrain (0x200) and compass
+/// calibration (0x1000).
 const ARDUPILOT_CAPABILITIES: u64 = 0xE9CF;
 /// 1.17.0, release.
 const PX4_VERSION: u32 = 17_891_583;

@@ -24,9 +24,9 @@ const NO_SPACE: u8 = 4;
 const INVALID: u8 = 5;
 const INVALID_SEQUENCE: u8 = 13;
 
-/// Mission, geofence, rally points.
+/// Mission types: mission, geofence, rally points.
 const KINDS: usize = 3;
-/// ArduCopter keeps 724 on small boards; PX4 at least 500.
+/// Most items of a mission: ArduCopter keeps 724 on small boards; PX4 at least 500.
 const MOST: u16 = 724;
 const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
@@ -45,7 +45,7 @@ struct Upload {
     retries: u32,
 }
 
-/// How far a mission is flown.
+/// Progress of a mission.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Progress {
     /// The item under way; the number of items when all are done.
@@ -55,7 +55,7 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// From an item on.
+    /// Progress from an item on.
     pub(super) fn at(current: u16) -> Self {
         Self { current, ..Self::default() }
     }
@@ -66,12 +66,12 @@ impl Progress {
     }
 }
 
-/// What is stored.
+/// The stored mission.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
     stored: [Vec<Item>; KINDS],
     upload: Option<Upload>,
-    /// How far the mission is flown.
+    /// Progress of the mission.
     pub(super) progress: Progress,
     /// A speed that the mission asked for, m/s, until the firmware takes it.
     pub(super) speed: Option<f32>,

@@ -7,9 +7,9 @@
 /// How integers travel in the float.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Encoding {
-    /// Their bytes, as PX4.
+    /// Values travel by their bytes, as PX4's.
     Bytewise,
-    /// Their value, as ArduPilot.
+    /// Values travel as numbers, as ArduPilot's.
     Cast,
 }
 
@@ -90,7 +90,7 @@ impl Params {
         params
     }
 
-    /// How many there are.
+    /// Number of parameters.
     pub fn len(&self) -> usize {
         self.values.len()
     }

@@ -18,12 +18,13 @@ use crate::AutopilotKind;
 const MESSAGE_INTERVAL: u32 = 244;
 const HOME_POSITION: u32 = 242;
 const GPS_GLOBAL_ORIGIN: u32 = 49;
-/// An answer leaves one step after the question: 4 ms, where PX4 was seen to take 1.3 to 16 and ArduCopter 2.5 to 7.
+/// Delay of an answer, microseconds, one step: 4 ms, where PX4 was seen to take 1.3 to 16 and
+/// ArduCopter 2.5 to 7.
 const ANSWER_US: u64 = 4_000;
-/// From the command to reboot until it does.
+/// Time from the command to reboot until the reboot, microseconds.
 const REBOOT_US: u64 = 200_000;
 
-/// What a firmware reads of its sensors and estimator in one step.
+/// Sensors and estimate that a firmware reads in one step.
 #[derive(Clone, Copy, Debug)]
 pub struct SensorReadings {
     /// Microseconds since boot.
@@ -48,25 +49,26 @@ pub struct SensorReadings {
     pub battery: f32,
 }
 
-/// What moves the vehicle in this step.
+/// Control of the vehicle in this step.
 #[derive(Clone, Copy, Debug)]
 pub struct Order {
     /// Motors carry weight.
     pub lift: bool,
-    /// What becomes of the controller's integral.
+    /// Treatment of the controller's integral.
     pub integral: Integral,
-    /// What the mode asks for.
+    /// Demand of the mode.
     pub demand: Demand,
 }
 
-/// What becomes of the velocity controller's integral in a step.
+/// Treatment of the velocity controller's integral in a step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Integral {
-    /// It goes on.
+    /// The integral goes on.
     Keep,
-    /// It is zero, as on the ground.
+    /// The integral is zero, as on the ground.
     Clear,
-    /// It is what was asked of the airframe beyond what that does, as where ArduCopter initialises its controller in flight.
+    /// The integral is the demanded acceleration beyond what the demand itself produces, as where
+    /// ArduCopter initialises its controller in flight.
     Match,
 }
 
@@ -201,7 +203,7 @@ impl Platform {
         self.ports[from.port].later.push((answer_us, ack));
     }
 
-    /// The same without an answer.
+    /// As `control_camera`, without an answer.
     pub(super) fn do_camera(&mut self, command: &Command) {
         if command.id == DO_DIGICAM_CONTROL {
             self.camera.control(command);
@@ -253,7 +255,8 @@ impl Platform {
         self.ports[from.port].later.push((self.time_us + ANSWER_US, ack));
     }
 
-    /// Where DO_REPOSITION asks to go, ENU with NaN for what it leaves; `None` for no place on earth.
+    /// Target of DO_REPOSITION, ENU with NaN for coordinates that it leaves out; `None` for no
+    /// place on earth.
     pub(super) fn reposition_target(&self, command: &Command) -> Option<Point> {
         let here = self.frame.geodetic(self.vehicle.position());
         let [lat_deg, lon_deg] = command.place;

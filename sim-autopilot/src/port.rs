@@ -6,7 +6,8 @@ use super::frame::{self, FRAME_MAX, Frame, Framer};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
-/// Telemetry is dropped while more than this waits to be sent, as PX4 drops it when its buffer is full; bytes.
+/// Most bytes that wait to be sent before telemetry is dropped, as PX4 drops it when its buffer is
+/// full.
 const TELEMETRY_QUEUE: usize = 4096;
 /// Rates of the port for a ground station: message id and interval in µs. A real one asks for about these itself.
 pub const GROUND_STREAMS: [(u32, u32); 11] = [
@@ -22,9 +23,9 @@ pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (242, 2_000_000), // HOME_POSITION
     (245, 500_000),   // EXTENDED_SYS_STATE
 ];
-/// Nothing is queued beyond this, bytes: a port that nobody drains does not grow.
+/// Most bytes that a port queues: a port that is not drained does not grow.
 const QUEUE: usize = 65_536;
-/// Components remembered as reached by a port.
+/// Most components remembered as reached by a port.
 const ROUTES: usize = 64;
 
 /// One telemetry stream.
@@ -49,7 +50,7 @@ pub struct Ack {
     pub to: (u8, u8),
 }
 
-/// Who sent a frame, and through which port.
+/// Sender of a frame, and the port through which it came.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sender {
     pub(crate) port: usize,
@@ -84,7 +85,7 @@ pub struct Port {
     pub param_cursor: Option<usize>,
     /// PING messages sent.
     pub pings: u32,
-    /// Who was heard here: system and component.
+    /// Senders heard here: system and component.
     heard: Vec<(u8, u8)>,
 }
 
@@ -182,7 +183,7 @@ impl Port {
         }
     }
 
-    /// The same for a message the crate does not know, with its CRC seed.
+    /// Sends a message that the crate does not know, with its CRC seed.
     pub fn send_seeded(&mut self, id: u32, seed: u8, payload: &[u8]) {
         if self.has_room() {
             let sender = self.sender();

@@ -7,7 +7,8 @@
 use super::frame::Frame;
 use super::port::{AUTOPILOT_COMPONENT, Port};
 
-/// Where a message names its target system, the component after it: in its payload. Others are for everybody.
+/// Offset at which a message names its target system, the component after it: in its payload. Other
+/// messages are for every system.
 fn target_at(message_id: u32) -> Option<usize> {
     Some(match message_id {
         21 | 43 | 45 => 0,

@@ -9,7 +9,7 @@ pub fn approach(error: f32, gain: f32, limit: f32) -> f32 {
     libm::copysignf(libm::sqrtf(2.0 * limit * (error.abs() - 0.5 * linear)), error)
 }
 
-/// How fast a ramp closes what is left of it at its end, 1/s.
+/// Rate at which a ramp closes the rest of its change at its end, 1/s.
 const EASE_PER_S: f32 = 6.0;
 
 /// A rate that changes within limits, as PX4's `VelocitySmoothing` changes it.
@@ -17,7 +17,7 @@ const EASE_PER_S: f32 = 6.0;
 pub struct Ramp {
     /// m/s.
     pub rate: f32,
-    /// Its change, m/s².
+    /// Rate of change of the ramp's value, m/s².
     pub change: f32,
 }
 

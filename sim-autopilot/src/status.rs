@@ -2,7 +2,7 @@
 
 use crate::AutopilotKind;
 
-/// What telemetry reports of the firmware's state.
+/// State of the firmware that telemetry reports.
 #[derive(Clone, Copy, Debug)]
 pub struct Status {
     /// Which firmware it is.

@@ -56,7 +56,7 @@ impl Snapshot {
             || self.send_camera(id, port)
     }
 
-    /// What it is and what state it is in.
+    /// Sends the autopilot's identity and state.
     fn send_state(&self, id: u32, port: &mut Port) -> bool {
         match id {
             0 => self.send_heartbeat(port),
@@ -144,7 +144,7 @@ impl Snapshot {
         true
     }
 
-    /// Where it is, how it moves and where it is to be.
+    /// Sends position, motion and setpoint.
     fn send_position(&self, id: u32, port: &mut Port) -> bool {
         match id {
             // PX4 sends it only while the estimate is valid.
@@ -162,7 +162,7 @@ impl Snapshot {
                 });
             }
             33 => self.send_global_position(port),
-            // Not before there is one.
+            // Not before there is an origin.
             49 if !self.status.origin_known => {}
             49 => {
                 let (latitude, longitude, altitude) = scaled(&self.ekf_origin);

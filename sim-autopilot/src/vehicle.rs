@@ -12,13 +12,14 @@ use planner_core::Point;
 
 /// Standard gravity, m/s².
 pub const GRAVITY: f32 = 9.806_65;
-/// Below this height over its resting place a vehicle touches the ground, metres.
+/// Height over its resting place below which a vehicle touches the ground, metres.
 const TOUCH_M: f32 = 0.002;
 
-/// Vertical push of wind as a share of the horizontal: rotors meet the air edge-on when it comes from the side.
+/// Vertical push of wind as a share of the horizontal push: rotors meet the air edge-on when it
+/// comes from the side.
 const VERTICAL_PUSH: f32 = 0.2;
 
-/// What the airframe can do.
+/// Limits of the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VehicleLimits {
     /// Radius of the body, metres: it rests with its centre this far above the ground.
@@ -66,7 +67,7 @@ impl Default for VehicleLimits {
     }
 }
 
-/// Where the vehicle truly is and how it moves.
+/// True position and motion of the vehicle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct State {
     /// Centre of the body, ENU metres.
@@ -89,8 +90,8 @@ pub struct State {
     pub battery: f32,
 }
 
-/// What a flight mode asks of the controller, ENU. NaN on an axis asks nothing of it, as in PX4's
-/// `trajectory_setpoint`.
+/// Demand of a flight mode to the controller, ENU. NaN on an axis demands nothing of it, as in
+/// PX4's `trajectory_setpoint`.
 #[derive(Clone, Copy, Debug)]
 pub struct Demand {
     /// Position, metres.
@@ -188,12 +189,12 @@ impl Vehicle {
         &self.limits
     }
 
-    /// Where the acceleration of thrust and gravity points: the tilt of the body, m/s².
+    /// Acceleration of thrust and gravity, m/s²: it points as the tilted body does.
     pub fn specific_force(&self) -> Point {
         Point::new(self.thrust.x, self.thrust.y, self.thrust.z + GRAVITY)
     }
 
-    /// What the autopilot's state machine decided.
+    /// Takes the decision of the autopilot's state machine.
     pub fn set_flags(&mut self, armed: bool, landed: bool) {
         self.state.armed = armed;
         self.state.landed = landed;
@@ -331,7 +332,8 @@ impl Vehicle {
     }
 }
 
-/// The same angle within ±π; exact for one turn too many either way, which is all that adding bounded rates can cause.
+/// The angle within ±π; exact for one turn too many either way, which is all that adding bounded
+/// rates can cause.
 pub fn wrap_pi(angle: f32) -> f32 {
     use core::f32::consts::{PI, TAU};
     if angle > PI {

@@ -91,7 +91,7 @@ fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWor
     }
 }
 
-/// One look at 32 neighbours; the worst of many.
+/// One step of advice among 32 neighbours; the worst of many.
 fn steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);

@@ -16,7 +16,7 @@ use crate::kept::{Kept, TEXT, WORDS, Work};
 #[unsafe(link_section = ".crash")]
 static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
 
-/// What is kept. Interrupts are off: tasks and the end of the program use it.
+/// Reads the kept record. Interrupts are off: tasks and the end of the program use it.
 fn read() -> Option<Kept> {
     // SAFETY: nobody else runs, and any bytes are words.
     Kept::from_words(&unsafe { (&raw const RECORD).cast::<[u32; WORDS]>().read_volatile() })
@@ -37,7 +37,7 @@ fn change<T>(change: impl FnOnce(&mut Kept) -> T) -> T {
     })
 }
 
-/// What the last start left, once; nothing after the power came.
+/// Text that the last start left, once; none after the power came.
 pub fn take(cause: ResetCause) -> Option<String<TEXT>> {
     critical_section::with(|_| {
         let (kept, said) = Kept::start(read(), cause);
@@ -90,7 +90,7 @@ pub fn panicked(info: &PanicInfo<'_>) -> ! {
     let mut text = String::<200>::new();
     if let Some(place) = info.location() {
         let file = place.file().rsplit('/').next().unwrap_or_default();
-        // What does not fit is left out.
+        // Text that does not fit is left out.
         let _ = write!(text, "Restarted: panic at {file}:{}", place.line());
     }
     end(&text)
@@ -102,11 +102,11 @@ pub fn faulted(pc: u32) -> ! {
     let scb = unsafe { &*SCB::PTR };
     let (cfsr, mmfar) = (scb.cfsr.read(), scb.mmfar.read());
     if fault::is_overflow(cfsr, mmfar, &stack::guard()) {
-        // Where it was lies on the stack that was too small.
+        // The place of the overflow lies on the stack that was too small.
         end("Restarted: stack overflow")
     }
     let mut text = String::<TEXT>::new();
-    // It fits.
+    // The text fits.
     let _ = write!(text, "Restarted: fault at {pc:#010x}");
     end(&text)
 }

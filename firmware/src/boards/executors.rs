@@ -12,7 +12,7 @@ pub(super) fn start_links(irq: impl InterruptNumber) -> SendSpawner {
     LINKS.start(irq)
 }
 
-/// The same for plans and flash.
+/// Starts the executor of plans and flash.
 pub(super) fn start_plans(irq: impl InterruptNumber) -> SendSpawner {
     PLANS.start(irq)
 }

@@ -12,14 +12,14 @@ pub struct Parts<R, T, F, W> {
     pub links: SendSpawner,
     /// Runs what takes long, by an interrupt below that.
     pub plans: SendSpawner,
-    /// To the autopilot.
+    /// UART to the autopilot.
     pub autopilot: (R, T),
-    /// To the swarm's radio.
+    /// UART to the swarm's radio.
     pub swarm: (R, T),
-    /// For files and parameters.
+    /// Flash for files and parameters.
     pub flash: F,
     /// Awake.
     pub watchdog: W,
-    /// What a person should know of the board.
+    /// Warnings about the board for a person.
     pub warnings: Vec<&'static str, WARNINGS>,
 }

@@ -18,11 +18,11 @@ use super::Meter;
 use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPOINTS};
 use crate::scratch::Coverage;
 
-/// Changes of the lanes' order that are looked at.
+/// Changes of the lanes' order that are tried.
 pub const LOOKS: u32 = companion::planner::coverage::LOOKS;
 /// Vehicles of the plans that have a limit.
 const FEW: usize = 3;
-/// Packings that POWELL looks at.
+/// Packings that POWELL tries.
 const SEARCH: powell::Config = powell::Config::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
@@ -64,7 +64,7 @@ pub fn run(meter: &mut impl Meter, lent: &mut Coverage) -> u32 {
     let five = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]].map(flat);
     let area = Area::new(&five, &[Ring { end: 5, kind: RingKind::Outer }]).expect("an area");
     plans(meter, area, lent, &mut sum);
-    // As many lanes as there may be, for as many vehicles.
+    // The most lanes, for the most vehicles.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(flat);
     let area = Area::new(&wide, &[Ring { end: 4, kind: RingKind::Outer }]).expect("an area");
     division(meter, area, lent, &mut sum);
@@ -148,13 +148,13 @@ fn flown(plan: &Plan<VEHICLES>, count: u32) -> Vec<Range, VEHICLES> {
     done
 }
 
-/// What is left after a loss, of 512 lanes among 32 vehicles.
+/// The division of the rest after a loss, of 512 lanes among 32 vehicles.
 fn division(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
     let many = vehicles(VEHICLES);
     let Coverage { tracks, left, build, powell, plan, .. } = lent;
     let pack = &mut powell.pack;
-    // Nothing was changed in the order yet, and each look is at all lanes.
+    // The order is unchanged yet, and each step compares all lanes.
     let pattern = pattern(Some(90.0), 5.0);
     meter
         .call("tracks::build, 512 lanes", size_of_val(build), || {
@@ -218,7 +218,7 @@ fn ways_home(meter: &mut impl Meter, transit: &Transit<'_, AREA_CORNERS>, sum: &
             required_clearance_m: 1.2,
             fence: None,
         };
-        // That there is no way is an answer too.
+        // That no path exists is an answer too.
         let found = meter.call("around::plan, 128 things", 0, || {
             around::plan(transit, None, &request, &mut things, &mut own.path)
         });

@@ -52,11 +52,11 @@ pub(super) const SWARM: Swarm<'static> = Swarm {
 };
 /// Height of a path's first point above the pad, metres.
 const CLIMB_M: f32 = 2.0;
-/// From pad to pad, metres.
+/// Distance from pad to pad, metres.
 const PADS_M: f32 = 5.0;
-/// Five vertices, 300 by 150 m.
+/// Area of five vertices, 300 by 150 m.
 const FIVE: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
-/// No-fly zones within them.
+/// No-fly zones within that area.
 const ZONES: [[[f32; 2]; 4]; 2] = [
     [[80.0, 40.0], [110.0, 45.0], [105.0, 80.0], [75.0, 70.0]],
     [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
@@ -137,7 +137,7 @@ fn spacing(lane_m: f32) -> Spacing {
     Spacing { footprint: Footprint { along_m: lane_m, across_m: lane_m }, lane_m, waypoint_m: lane_m }
 }
 
-/// What a board plans from its mission file, before the start and after two losses.
+/// The plans that a board makes from its mission file, before the start and after two losses.
 fn mission(
     meter: &mut impl Meter,
     zones: &[[[f32; 2]; 4]],
@@ -199,7 +199,7 @@ fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights
         };
         divided(meter, &case, names, lent, out, &mut sum);
     }
-    // As many lanes as there may be, for as many vehicles.
+    // The most lanes, for the most vehicles.
     let wide = [[0.0, 0.0], [2559.0, 0.0], [2559.0, 400.0], [0.0, 400.0]].map(|[x, y]| Flat::new(x, y));
     let rings = [Ring { end: 4, kind: RingKind::Outer }];
     let case = Case {

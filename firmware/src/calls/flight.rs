@@ -24,32 +24,36 @@ use crate::cases::{anywhere, below, uniform};
 
 /// Mission and EKF origin of every flight.
 pub const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
-/// What a control step is called in the table where all neighbours speak.
+/// Name of a control step in the table where all neighbours are heard.
 pub const STEP: &str = "Companion::handle_timeout, 32 speak";
-/// The same where most have left the plan or fell silent.
+/// Name of a control step where most neighbours have left the plan or fell silent.
 pub const HARD_STEP: &str = "Companion::handle_timeout, most gone";
-/// The same where all are near and off the plan, and few are on the path: the safety filter looks at all of them.
+/// Name of a control step where all neighbours are near and off the plan, and few are on the path:
+/// the safety filter compares all of them.
 pub const NEAR_STEP: &str = "a control step, 32 near";
-/// One of a coverage mission, in flight or while it divides, beside as many.
+/// Name of a control step of a coverage mission, in flight or while it divides, beside as many
+/// neighbours.
 pub const AREA_STEP: &str = "a control step, coverage, 32 near";
-/// The safety filter alone, which is part of each of them.
+/// Name of the safety filter alone, which is part of each control step.
 pub const FILTER: &str = "Companion::ask_filter, 32 near";
-/// Any other, and what else is due.
+/// Name of any other control step.
 pub const OTHER_STEP: &str = "Companion::handle_timeout, else";
 const SYSTEM: u8 = 1;
-/// Faster than indoors: many corners are within its braking distance of 8 m.
+/// Cruise speed, m/s: faster than indoors, so that many corners are within its braking distance of
+/// 8 m.
 pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
-/// So far away at least is a neighbour that is beside.
+/// Least distance of a neighbour that is beside, metres.
 const BESIDE_M: f32 = 4.0;
 /// Control steps counted in each flight.
 const STEPS: usize = 200;
-/// Most steps of 0.9 s before them, in which silent neighbours grow old. A longer one would be a gap in the position.
+/// Most steps of 0.9 s before the counted ones, in which silent neighbours grow old. A longer step
+/// would be a gap in the position.
 const AGEING: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
 const AGEING_TIME: Duration = Duration::from_millis(900);
-/// Steps of 50 ms within which it is in the air.
+/// Steps of 50 ms within which the vehicle is in the air.
 const TAKE_OFF: usize = 400;
 
 const HEARTBEAT: u32 = 0;
@@ -93,7 +97,8 @@ pub fn is_hard(seed: u64) -> bool {
     seed.is_multiple_of(2)
 }
 
-/// Where a neighbour is from here. In every other hard flight it is beside, so that the path is looked at to its end.
+/// Vector from this vehicle to a neighbour. In every other hard flight the neighbour is beside, so
+/// that the path is checked to its end.
 fn near(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
     let at = anywhere(rng, reach_m);
     if seed.is_multiple_of(4) { at + at * (BESIDE_M / at.norm().max(0.1)) } else { at }
@@ -120,7 +125,7 @@ pub fn fly<M: Meter>(
             3 => EASY[below(&mut rng, EASY.len())],
             _ => HARD[below(&mut rng, HARD.len())],
         };
-        // One always speaks, so that it is not alone.
+        // One neighbour is always heard, so that this vehicle is not alone.
         (other.flags, other.silent) = (flags, silent && i > 0);
         other.place = flight.place + near(seed, &mut rng, if hard { 6.0 } else { 20.0 });
         other.progress_m = uniform(&mut rng, 0.0, 60.0);
@@ -190,7 +195,7 @@ pub fn filter<M: Meter>(
     }
 }
 
-/// Where nobody is in anybody's way.
+/// A place where vehicles do not meet.
 fn far_away() -> Point {
     Point::new(300.0, 0.0, 0.0)
 }
@@ -261,7 +266,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         panic!("it does not take off: {:?}", self.companion.state());
     }
 
-    /// So much time passes: the companion's step, then the autopilot's.
+    /// One step of this length: the companion's, then the autopilot's.
     fn tick(&mut self, name: &'static str, time: Duration) {
         self.now = self.now + time;
         let name = if self.has_area() { AREA_STEP } else { name };
@@ -351,7 +356,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         self.hear(Link::Swarm, (system_id, companion::COMPONENT), GLOBAL_POSITION_INT, &position);
     }
 
-    /// What it knows of all: that they fly.
+    /// The roster that the neighbour reports: all fly.
     fn tell_roster(&mut self, system_id: u8) {
         for first in (0..VEHICLES).step_by(roster::ENTRIES) {
             let known = VEHICLES.min(first + roster::ENTRIES) - first;

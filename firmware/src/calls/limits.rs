@@ -14,7 +14,7 @@ use planner_core::segment::{self, MAX_SNAPPED};
 use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
-/// Numbers that break what does not look at them.
+/// Numbers that break code which does not check them.
 pub(super) const HARD: [f32; 14] = [
     0.0,
     -0.0,
@@ -38,14 +38,14 @@ pub trait Listener {
     fn next(&mut self, name: &'static str);
 }
 
-/// What is reported, and the sum of the answers.
+/// Reported answers, and their sum.
 pub struct Answers<'a, L> {
     listener: &'a mut L,
     sum: u32,
 }
 
 impl<'a, L: Listener> Answers<'a, L> {
-    /// None yet.
+    /// No answers yet.
     pub fn new(listener: &'a mut L) -> Self {
         Self { listener, sum: 0 }
     }
@@ -135,7 +135,7 @@ fn grids(to: &mut Answers<'_, impl Listener>) {
         let (word, mask) = to.call("voxel::GridShape::address", || shape.address([u32::MAX, 7, dims[i / 6]]));
         to.count(word ^ mask as usize);
         let grid = to.call("voxel::VoxelGrid::new", || VoxelGrid::new(shape, Outside::Free, &WORDS));
-        // Of these only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
+        // Of these shapes only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
         assert!(grid.is_err(), "{shape:?}");
     }
     for hard in HARD {

@@ -22,7 +22,7 @@ const GATES: usize = 8;
 
 type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// What the calls are lent.
+/// Memory lent to the calls.
 pub(super) struct Lent {
     area: coverage::Lent,
     losses: losses::Workspace<LANES, VEHICLES>,

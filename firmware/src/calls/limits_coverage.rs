@@ -53,7 +53,7 @@ const SHARES: [f32; VEHICLES] = [1.0; VEHICLES];
 pub(super) type Lanes = Tracks<LANES>;
 pub(super) type Ways<'a> = Transit<'a, CORNERS>;
 
-/// What the calls are lent.
+/// Memory lent to the calls.
 pub(super) struct Lent {
     pub(super) tracks: Lanes,
     left: Lanes,

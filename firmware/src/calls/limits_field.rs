@@ -13,7 +13,8 @@ const NODES: [i16; 6] = [0, i16::MAX, i16::MIN, -1, 100, 7];
 const BYTES: usize = 64;
 
 const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
-/// A path to one of these has tens of thousands of samples: each is tried with one slope.
+/// Coordinates so far that a path to one of them has tens of thousands of samples: each is tried
+/// with one slope.
 const FAR: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
 pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {

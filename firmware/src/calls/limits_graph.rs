@@ -9,7 +9,7 @@ use planner_core::search::{self, SearchError, SearchWorkspace, WithLengths};
 
 use super::limits::{Answers, HARD, Listener, points};
 
-/// Nodes that a workspace holds.
+/// Most nodes that a workspace holds.
 pub(super) const NODES: usize = 8;
 
 const HEADER: RoadmapHeader = RoadmapHeader {
@@ -22,7 +22,7 @@ const HEADER: RoadmapHeader = RoadmapHeader {
     goals: 2,
 };
 
-/// Two starts, two goals opposite, two nodes between.
+/// Places of the nodes: two starts, two goals opposite, two nodes between.
 pub(super) const PLACES: [Point; 6] = [
     Point::new(0.0, 0.0, 2.0),
     Point::new(0.0, 6.0, 2.0),
@@ -67,7 +67,7 @@ pub(super) fn files(
             RoadmapHeader { origin: Geodetic { lat_deg: hard.into(), ..HEADER.origin }, ..HEADER },
         ] {
             let written = to.call("write::write", || roadmap::write(&header, &PLACES, &edges, file));
-            // What was written can be read.
+            // A file that was written can be read.
             let read = written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
             to.is(written.is_ok());
@@ -114,7 +114,7 @@ pub(super) fn files(
     len
 }
 
-/// Indices of nodes: good ones and ones that there are none of.
+/// Indices of nodes: valid ones, and ones of which there is no node.
 pub(super) const INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
 pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>) {

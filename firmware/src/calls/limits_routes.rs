@@ -26,7 +26,7 @@ const GATES: usize = 16;
 type Workspace = PlanWorkspace<NODES, VEHICLES, PIECES>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
-/// What the calls are lent.
+/// Memory lent to the calls.
 pub struct Lent {
     ws: Workspace,
     plan: Plan,

@@ -7,7 +7,8 @@ use core::ops::Range;
 /// which has none.
 const DACCVIOL: u32 = 1 << 1;
 const MSTKERR: u32 = 1 << 4;
-/// The same while the floating-point registers were kept, and: MMFAR holds an address.
+/// The same access while the floating-point registers were saved; and the bit that MMFAR holds an
+/// address.
 const MLSPERR: u32 = 1 << 5;
 const MMARVALID: u32 = 1 << 7;
 /// ARMv8-M alone: the stack pointer went below MSPLIM.

@@ -19,7 +19,7 @@ pub enum Revision {
 }
 
 impl Revision {
-    /// From the register.
+    /// Revision by the register.
     pub const fn of(idc: u32) -> Self {
         if idc >> 16 >= 0x2000 { Self::New } else { Self::Old }
     }
@@ -33,8 +33,8 @@ impl Revision {
         }
     }
 
-    /// What PLL1 makes the processor's clock from: divider before it, factor. Twice that clock is
-    /// halved behind it. What goes in is 8 or 16 MHz, what it makes at most 960 (RM0433, "PLL
+    /// Settings of PLL1 for the processor's clock: divider before it, factor. Twice that clock is
+    /// halved behind it. The input is 8 or 16 MHz, the output at most 960 (RM0433, "PLL
     /// configuration").
     pub const fn pll(self, has_hse: bool) -> (u32, u32) {
         let (source, divider) = if has_hse { (HSE_MHZ, 1) } else { (HSI_MHZ, 4) };
@@ -45,13 +45,13 @@ impl Revision {
 /// Register AXI_TARG7_FN_MOD, and its READ_ISS_OVERRIDE: without it Y may read wrong data from AXI
 /// SRAM (ES0392, "Reading from AXI SRAM may lead to data read corruption").
 pub const AXI_TARG7_FN_MOD: u32 = 0x5100_8108;
-/// The bit.
+/// Bit READ_ISS_OVERRIDE of [`AXI_TARG7_FN_MOD`].
 pub const READ_ISS_OVERRIDE: u32 = 1;
 
 /// RCC_AHB2ENR's clocks of SRAM1, SRAM2 and SRAM3 (RM0433, "RCC AHB2 clock register"): off after a
 /// reset.
 pub const D2_SRAM: u32 = 0b111 << 29;
-/// RCC_AHB2ENR.
+/// Address of RCC_AHB2ENR.
 pub const RCC_AHB2ENR: u32 = 0x5802_44DC;
 
 /// RCC_RSR's bit that clears the others.

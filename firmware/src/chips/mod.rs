@@ -14,7 +14,7 @@ pub enum ResetCause {
     Power,
     /// The supply was too low for a while.
     BrownOut,
-    /// Somebody pressed reset.
+    /// A person pressed reset.
     Key,
     /// The watchdog was not fed.
     Watchdog,

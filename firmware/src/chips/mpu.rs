@@ -1,10 +1,10 @@
 //! Regions of the memory protection unit of a Cortex-M7 (ARMv7-M ARM, B3.5 "Protected Memory System
 //! Architecture"), as values of MPU_RBAR and MPU_RASR.
 
-/// What may be done with a region, and how its data are cached.
+/// Access to a region, and how its data are cached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Access {
-    /// Nothing: any access is a fault, and the processor fetches nothing ahead of time.
+    /// No access: any access is a fault, and the processor fetches nothing ahead of time.
     None,
     /// Data that others write beside the processor, or that may not be readable: no cache.
     Uncached,
@@ -19,7 +19,7 @@ pub struct Region {
     pub base: u32,
     /// Bytes, as a power of two.
     pub len_log2: u32,
-    /// What may be done with it.
+    /// Access to the region.
     pub access: Access,
     /// A bit for each eighth of it to which it does not apply; only from 256 bytes on.
     pub without: u8,

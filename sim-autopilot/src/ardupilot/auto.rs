@@ -12,9 +12,9 @@ use super::{Copter, Mode, ReturnLeg, TakeOff};
 use crate::itinerary::{Leg, on_line};
 use crate::platform::{Platform, SensorReadings};
 
-/// A place is reached to land there within this distance, metres.
+/// A place to land at is reached within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
-/// Nearer than this it does not turn to where it flies, metres.
+/// Distance to the target beyond which the vehicle turns towards it, metres.
 const LOOKS_M: f32 = 2.0;
 
 impl Copter {
@@ -34,7 +34,7 @@ impl Copter {
         starts
     }
 
-    /// It comes down by itself, in AUTO.
+    /// The vehicle comes down by itself, in AUTO.
     pub(super) fn lands_in_auto(&self) -> bool {
         self.mode == Mode::Auto
             && match self.auto.leg {
@@ -86,7 +86,7 @@ impl Copter {
         self.auto.leg = leg;
     }
 
-    /// What the mission asks for now.
+    /// The goal of the mission now.
     pub(super) fn auto_goal(&mut self, sensors: &SensorReadings) -> Goal {
         if self.takeoff.is_some() {
             return self.take_off_goal();

@@ -4,17 +4,17 @@ use planner_core::Point;
 
 use crate::itinerary::Leg;
 
-/// What AUTO is about.
+/// State of AUTO.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Auto {
-    /// It may leave the ground (`auto_armed`).
+    /// The vehicle may leave the ground (`auto_armed`).
     pub may_lift: bool,
-    /// What it flies now.
+    /// Leg that is flown now.
     pub leg: Option<Leg>,
-    /// Where that began.
+    /// Begin of that leg.
     pub from: Point,
-    /// Where it stays when nothing is asked for.
+    /// Place where the vehicle stays without a commanded leg.
     pub stay: Option<Point>,
-    /// Where it looks.
+    /// Commanded heading.
     pub heading: Option<f32>,
 }

@@ -9,19 +9,21 @@ use crate::platform::SensorReadings;
 use crate::shaping::approach;
 use crate::vehicle::Demand;
 
-/// The take-off is done this near its height, metres: landed_state 2 came 9.3 s after the command to 10 m.
+/// The take-off is done within this distance of its height, metres: landed_state 2 came 9.3 s after
+/// the command to 10 m.
 const TAKEN_OFF_M: f32 = 0.12;
-/// How it leaves the ground, as seen: seconds since it lifted, and the acceleration up until then, m/s². First the throttle
-/// creeps past hover; the controllers wind up meanwhile and then kick.
+/// Profile of the lift-off, as seen: seconds since the vehicle lifted, and the acceleration up
+/// until then, m/s². First the throttle creeps past hover; the controllers wind up meanwhile and
+/// then kick.
 const LIFT_OFF: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
 /// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts: the speed decays with
 /// 7.5 / 5 s.
 const BRAKE_MPS2: f32 = 7.5;
-/// A leg of the return is at its end within this distance, metres.
+/// A leg of the return ends within this distance of its target, metres.
 const ARRIVED_M: f32 = 0.5;
 
 impl Copter {
-    /// What the mode asks for now.
+    /// Demand of the mode now.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, dt: f32) -> Demand {
         let mut tuning = self.tuning;
         tuning.speed = self.speed.unwrap_or(tuning.speed);

@@ -38,26 +38,28 @@ use super::vehicle::VehicleLimits;
 use super::wire::Fields;
 use crate::AutopilotKind;
 
-/// From arming until it lifts, where NAV_TAKEOFF comes at once: `MOT` arming delay 2 s, spool-up 0.5 s, and the throttle's
-/// slew to hover.
+/// Time from arming to the lift-off where NAV_TAKEOFF comes at once, seconds: `MOT` arming delay 2
+/// s, spool-up 0.5 s, and the throttle's slew to hover.
 const ARM_TO_LIFT_S: f32 = 3.05;
-/// The same from a later NAV_TAKEOFF.
+/// Time from a later NAV_TAKEOFF to the lift-off, seconds.
 const SPOOL_UP_S: f32 = 2.07;
 /// `LAND_DETECTOR_TRIGGER_SEC` and its filters: 1.68 s seen.
 const LAND_DETECTOR_S: f32 = 1.6;
-/// Landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
+/// Time from landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
 const LAND_DISARM_S: f32 = 0.4;
-/// How much sooner than `DISARM_DELAY` it disarms: 9.94 s of 10 seen.
+/// Time before `DISARM_DELAY` at which the autopilot disarms: 9.94 s of 10 seen.
 const DISARM_EARLY_S: f32 = 0.06;
-/// How much later than `FS_GCS_TIMEOUT` the failsafe acts: 5.1 s of 5 seen.
+/// Delay of the failsafe after `FS_GCS_TIMEOUT`: 5.1 s of 5 seen.
 const GCS_REACTION_S: f32 = 0.1;
-/// Position lost to the EKF failsafe (`EKF_CHECK_ITERATIONS_MAX` and the estimator's own wait).
+/// Time from the loss of the position to the EKF failsafe (`EKF_CHECK_ITERATIONS_MAX` and the
+/// estimator's own wait).
 const ESTIMATOR_REACTION_S: f32 = 1.5;
-/// Boot until the estimator has an attitude: 5.8 s seen.
+/// Time from the boot until the estimator has an attitude: 5.8 s seen.
 const ATTITUDE_S: f32 = 5.8;
-/// Of the time until the estimator has a position, the share after which it has an origin: 20 of 41.6 s seen.
+/// Share of the time until the estimator has a position after which the estimator has an origin: 20
+/// of 41.6 s seen.
 const ORIGIN_SHARE: f32 = 0.48;
-/// Boot until the first STANDBY.
+/// Time from the boot to the first STANDBY.
 const BOOT_S: f32 = 3.0;
 
 /// Streams: message id and interval in µs, 0 off until asked for.
@@ -89,7 +91,7 @@ pub const STREAMS: [(u32, u32); 25] = [
     (245, 0),          // EXTENDED_SYS_STATE
 ];
 
-/// What a failsafe acts on.
+/// Reason for a failsafe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Failsafe {
     GroundStation,
@@ -127,7 +129,7 @@ struct Since {
 pub struct Copter {
     /// The parameter table.
     pub params: Params,
-    /// Those of them that act.
+    /// Parameters that act.
     pub tuning: Tuning,
     ready_us: u64,
     said: [bool; 2],
@@ -152,7 +154,7 @@ pub struct Copter {
 }
 
 impl Copter {
-    /// As ArduCopter boots: disarmed in STABILIZE, without a position until `ready_s`.
+    /// ArduCopter as it boots: disarmed in STABILIZE, without a position until `ready_s`.
     pub fn new(system_id: u8, limits: &VehicleLimits, ready_s: f32) -> Self {
         let params = params::defaults(system_id, limits);
         Self {
@@ -204,7 +206,7 @@ impl Copter {
         self.position_ok && now_us >= self.ready_us
     }
 
-    /// What telemetry reports.
+    /// State that telemetry reports.
     pub fn status(&self, sensors: &SensorReadings) -> Status {
         let now_us = sensors.now_us;
         let known = self.position_known(now_us);
@@ -275,7 +277,7 @@ impl Copter {
         }
         self.gcs_us = Some(platform.time_us);
         if self.failsafe == Some(Failsafe::GroundStation) {
-            // It stays in the mode the failsafe chose.
+            // The vehicle stays in the mode that the failsafe chose.
             self.failsafe = None;
             platform.say(4, "GCS Failsafe Cleared");
         }
@@ -366,7 +368,7 @@ impl Copter {
         possible
     }
 
-    /// One step: timers, failsafes, phases, and what the mode asks for.
+    /// One step: timers, failsafes, phases, and the demand of the mode.
     pub fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings, dt_s: f32) -> Order {
         let now_us = sensors.now_us;
         self.tell_progress(platform, now_us);

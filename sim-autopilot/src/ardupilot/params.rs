@@ -6,7 +6,7 @@ use crate::params::Value::{self, Int, Int8, Int16, Real};
 use crate::params::{Encoding, Params};
 use crate::vehicle::{Demand, Gains, VehicleLimits};
 
-/// Sorted by name.
+/// Default parameters, sorted by name.
 const DEFAULTS: &[(&str, Value)] = &[
     ("ACRO_TRAINER", Int8(2)),
     ("ANGLE_MAX", Int16(3000)),
@@ -130,7 +130,7 @@ impl Tuning {
         }
     }
 
-    /// What acts, looked up once after each change.
+    /// The parameters that act, looked up once after each change.
     pub fn new(params: &Params) -> Self {
         let cm = |name| 0.01 * params.real(name);
         let whole_cm = |name| 0.01 * params.int(name) as f32;

@@ -22,7 +22,7 @@ const MASK_FORCE: u16 = 0x200;
 const MASK_YAW: u16 = 0x400;
 const MASK_YAW_RATE: u16 = 0x800;
 
-/// What Guided flies, in the mission frame.
+/// Target that Guided flies to, in the mission frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Goal {
     /// ENU metres; `None` flies the velocity alone.

@@ -5,13 +5,13 @@ use crate::platform::Platform;
 
 const PARAM_VALUE: u32 = 22;
 const HOME_POSITION: u32 = 242;
-/// It counts its time in STAT_RUNTIME and reports it.
+/// Period at which the autopilot counts its time in STAT_RUNTIME and reports it, microseconds.
 const RUNTIME_EVERY_US: u64 = 30_000_000;
 /// MAV_PARAM_TYPE_INT32.
 const INT32: u8 = 6;
 
 impl Copter {
-    /// What it says when it has booted.
+    /// Messages that the autopilot sends when it has booted.
     pub fn boot(&mut self, platform: &mut Platform) {
         platform.say(6, "ArduPilot Ready");
         platform.announce(1);

@@ -29,20 +29,21 @@ pub struct Px4 {
     pub commander: Commander,
     /// The parameter table.
     pub params: Params,
-    /// Those of them that act.
+    /// Parameters that act.
     pub tuning: Tuning,
     /// A pending DO_SET_MODE: sender, and the requested mode if it is valid.
     pub(super) asked: Option<(Sender, Option<Mode>)>,
 }
 
 impl Px4 {
-    /// As PX4 boots, with the airframe's limits in its parameters.
+    /// PX4 as it boots, with the airframe's limits in its parameters.
     pub fn new(system_id: u8, limits: &VehicleLimits) -> Self {
         let params = params::defaults(system_id, limits);
         Self { commander: Commander::new(), tuning: Tuning::new(&params), params, asked: None }
     }
 
-    /// One step. A mode that was asked for is decided now: a setpoint that came just behind the command counts.
+    /// One step. A requested mode is decided now: a setpoint that came just behind the command
+    /// counts.
     pub(crate) fn update(&mut self, platform: &mut Platform, sensors: &SensorReadings) -> Order {
         self.commander.set_mission_ready(platform.has_mission());
         if let Some((from, mode)) = self.asked.take() {
@@ -58,7 +59,7 @@ impl Px4 {
         order
     }
 
-    /// What the mission asks for, while AUTO.MISSION flies it. Its return is AUTO.RTL.
+    /// Demand of the mission, while AUTO.MISSION flies it. Its return is AUTO.RTL.
     fn fly_mission(&mut self, platform: &mut Platform, sensors: &SensorReadings) {
         if !self.commander.armed() {
             if let Some(leg) = self.commander.mission.leg.take() {
@@ -92,7 +93,7 @@ impl Px4 {
         }
     }
 
-    /// What telemetry reports.
+    /// State that telemetry reports.
     pub fn status(&self, platform: &Platform, sensors: &SensorReadings) -> Status {
         let (system_status, flags) = self.commander.heartbeat(platform.time_us, &self.tuning);
         Status {

@@ -9,20 +9,23 @@ use crate::itinerary::{Leg, on_line};
 use crate::shaping::Ramp;
 use crate::vehicle::Demand;
 
-/// A demand to climb is one that asks for more than this above the present height, metres, or for more than
-/// [`CLIMB_MPS`].
+/// Least height above the present one that a setpoint must command to count as a climb, metres; a
+/// commanded speed of [`CLIMB_MPS`] counts too.
 const CLIMB_M: f32 = 0.15;
+/// Least commanded vertical speed that counts as a climb, m/s.
 const CLIMB_MPS: f32 = 0.05;
-/// An automatic mode is at its target within this distance, metres.
+/// An automatic mode has reached its target within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
-/// Nearer than this it does not turn to where it flies, metres.
+/// Distance to the target beyond which the vehicle turns towards it, metres.
 const LOOKS_M: f32 = 2.0;
-/// Faster than this it was not seen to sink in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its height, which
-/// is also what it controls there; the velocity it reported meanwhile went up to 1.6.
+/// Fastest sink that was seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its
+/// height, which is also what PX4 controls there; the velocity that it reported meanwhile went up
+/// to 1.6.
 const LAND_MPS: f32 = 1.3;
-/// Share of `MPC_LAND_CRWL` that it was seen to crawl at: 0.22 of 0.3 m/s.
+/// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
 const CRAWL_SHARE: f32 = 0.75;
-/// Seconds that the measured distance to the ground is late: it crawls from 0.85 m on, not from `MPC_LAND_ALT3`.
+/// Lag of the measured distance to the ground, seconds: PX4 crawls from 0.85 m on, not from
+/// `MPC_LAND_ALT3`.
 const DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
@@ -52,7 +55,7 @@ impl Commander {
         }
     }
 
-    /// What the mode asks for now.
+    /// Demand of the mode now.
     pub(super) fn demand(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Demand {
         let held = Demand {
             position: self.hold,
@@ -100,7 +103,7 @@ impl Commander {
         }
     }
 
-    /// What is held, approached as the automatic modes approach it across.
+    /// Demand to hold a place, which is approached as the automatic modes approach it across.
     fn glided(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: &Demand) -> Demand {
         self.glide.advance(sensors.now_us, &self.hold, held.speed_max, tuning.auto_jerk);
         let Glide { position, ramps: [east, north], .. } = self.glide;
@@ -113,7 +116,8 @@ impl Commander {
         }
     }
 
-    /// What an item of the mission asks for. Without a heading it looks where it flies (`MPC_YAW_MODE` 0).
+    /// Demand of an item of the mission. Without a heading the vehicle looks where it flies
+    /// (`MPC_YAW_MODE` 0).
     fn mission_demand(&mut self, sensors: &SensorReadings, tuning: &Tuning, held: Demand) -> Demand {
         match self.mission.leg {
             Some(Leg::TakeOff { up }) => {

@@ -4,11 +4,12 @@ use planner_core::Point;
 
 use crate::shaping::Ramp;
 
-/// Acceleration across of the automatic modes, m/s² (`MPC_ACC_HOR`).
+/// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
 const ACCELERATION_MPS2: f32 = 3.0;
-/// What is flown on at full speed before the braking counts, seconds (0.6 of `MPC_JERK_AUTO`, over `MPC_JERK_AUTO`).
+/// Time flown at full speed before the braking counts, seconds (0.6 of `MPC_JERK_AUTO`, over
+/// `MPC_JERK_AUTO`).
 const DELAY_S: f32 = 0.6;
-/// A mode that did not ask for it for longer does not count, seconds.
+/// Longest time since the last step of the mode that counts, seconds.
 const MOST_S: f32 = 0.1;
 
 /// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is. With 1.85 m/s recorded vehicles went 0.9 m in the first
@@ -29,7 +30,7 @@ pub struct Glide {
 }
 
 impl Glide {
-    /// One that begins at this position with this velocity.
+    /// A glide that begins at this position with this velocity.
     pub fn new(now_us: u64, position: &Point, velocity: &Point) -> Self {
         let ramp = |rate| Ramp { rate, change: 0.0 };
         Self { at_us: now_us, position: *position, ramps: [ramp(velocity.x), ramp(velocity.y)] }

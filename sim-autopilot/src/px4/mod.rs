@@ -32,16 +32,18 @@ use super::platform::{Integral, Order, SensorReadings};
 use super::shaping::Ramp;
 use super::vehicle::Demand;
 
-/// How much later than `COM_OF_LOSS_T` the failsafe starts: 1.23 s seen at most, and gaps of 1.25 s trip it.
+/// Delay of the failsafe after `COM_OF_LOSS_T`, seconds: 1.23 s seen at most, and gaps of 1.25 s
+/// trip it.
 const LOSS_REACTION_S: f32 = 0.15;
 /// Share of the ramp of thrust after which the land detector reports a take-off: 0.9 to 1.0 s of 3 s seen, before it lifts.
 const IN_AIR_SHARE: f32 = 0.31;
-/// It lands only while it is to sink at this rate or faster, m/s, whatever flies it: at a demand to stay it reports itself in
-/// the air, on the ground too.
+/// Least commanded sink with which the land detector reports a landing, m/s, whatever flies the
+/// vehicle: at a demand to stay it reports itself in the air, on the ground too.
 const LAND_RATE_MPS: f32 = 0.2;
-/// The land detector's own filters beyond `LNDMC_TRIG_TIME`.
+/// Delay of the land detector's own filters beyond `LNDMC_TRIG_TIME`, seconds.
 const LAND_FILTER_S: f32 = 0.5;
-/// Disarmed 2.2 to 2.4 s after ON_GROUND with `COM_DISARM_LAND` 2.0.
+/// Delay of the automatic disarming beyond `COM_DISARM_LAND`, seconds: 2.2 to 2.4 s after ON_GROUND
+/// with `COM_DISARM_LAND` 2.0.
 const DISARM_REACTION_S: f32 = 0.25;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,14 +61,14 @@ enum ReturnLeg {
     Land,
 }
 
-/// Of AUTO.MISSION.
+/// State of AUTO.MISSION.
 #[derive(Clone, Copy, Debug, Default)]
 struct Mission {
-    /// One is stored.
+    /// A mission is stored.
     ready: bool,
-    /// What it asks for, while it is flown.
+    /// Leg that the mission commands, while it is flown.
     leg: Option<Leg>,
-    /// Where that began.
+    /// Begin of that leg.
     from: Point,
 }
 
@@ -319,7 +321,7 @@ impl Commander {
         self.cruise = (speed > 0.0).then_some(speed);
     }
 
-    /// One step: timers, failsafe, phases, and what the mode asks for.
+    /// One step: timers, failsafe, phases, and the demand of the mode.
     pub fn update(&mut self, sensors: &SensorReadings, tuning: &Tuning) -> Order {
         let now = sensors.now_us;
         if self.armed {

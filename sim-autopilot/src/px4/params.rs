@@ -7,7 +7,7 @@ use crate::params::Params;
 use crate::params::Value::{self, Int, Real};
 use crate::vehicle::{Demand, Gains, VehicleLimits};
 
-/// Sorted by name, as PX4 lists them.
+/// Default parameters, sorted by name, as PX4 lists them.
 const DEFAULTS: &[(&str, Value)] = &[
     ("BAT1_CAPACITY", Real(-1.0)),
     ("BAT1_N_CELLS", Int(4)),
@@ -173,7 +173,7 @@ impl Tuning {
         }
     }
 
-    /// What acts, looked up once after each change.
+    /// The parameters that act, looked up once after each change.
     pub fn new(params: &Params) -> Self {
         Self {
             gains: Gains {

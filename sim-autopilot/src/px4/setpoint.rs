@@ -37,7 +37,7 @@ pub struct Setpoint {
     pub heading_rate: f32,
 }
 
-/// What the frame of a setpoint leans on.
+/// State that the frame of a setpoint refers to.
 pub struct Context<'a> {
     /// The autopilot's local frame.
     pub frame: &'a LocalFrame,

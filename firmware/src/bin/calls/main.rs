@@ -26,7 +26,7 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 
 /// Flights in which the safety filter is counted.
 const FILTERED: u64 = 100;
-/// Most rows.
+/// Most rows of the table.
 const ROWS: usize = 160;
 
 /// Counts instructions, those of asking the clock left out.

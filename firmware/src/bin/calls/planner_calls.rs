@@ -28,8 +28,9 @@ use static_cell::ConstStaticCell;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 type Search = SearchWorkspace<ROADMAP_NODES>;
 
-/// Random cases of a call that takes microseconds, and of one that takes milliseconds.
+/// Random cases of a call that takes microseconds.
 const MANY: usize = 1000;
+/// Random cases of a call that takes milliseconds.
 const SOME: usize = 50;
 /// Longest edge, metres.
 const REACH_M: f32 = 8.0;
@@ -78,7 +79,7 @@ pub fn run(meter: &mut impl Meter) -> [u32; 2] {
     let (head, words) = memory::map();
     let grid = cases::map(&head, words);
     let shape = *grid.shape();
-    // Its shape is good: it was one already.
+    // The shape is sound: it was checked before.
     let _ = meter.call("voxel::VoxelGrid::new", size_of::<VoxelGrid<'_>>(), || {
         VoxelGrid::new(shape, Outside::Blocked, words)
     });
@@ -188,14 +189,14 @@ fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
         let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
         let others = plan.flights.iter().filter(|other| other.id != flight.id);
         let mut own = flight.clone();
-        // That there is no way is an answer too.
+        // That no path exists is an answer too.
         let _ = meter.call("schedule::sipp::route, past 9", bytes, || {
             sipp::route(view, &route, passable, others, &mut ws.sipp, &mut own)
         });
     }
 }
 
-/// As many vehicles as there may be, on shortest paths between random nodes.
+/// The largest swarm, on shortest paths between random nodes.
 fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan: &mut Plan) {
     let mut rng = Pcg32::seed_from_u64(4);
     let cfg = &cases::SCHEDULE;
@@ -257,7 +258,7 @@ fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) 
             required_clearance_m: cases::CLEARANCE_M,
             fence: None,
         };
-        // That there is no way is an answer too.
+        // That no detour exists is an answer too.
         let _ = meter.call("detour::plan, 128 things", bytes, || {
             detour::plan(view, &request, &mut obstacles, search, &mut nodes, &mut own.path)
         });
@@ -372,7 +373,7 @@ fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, besid
         })
         .expect(good);
     let view = RoadmapView::parse(&file[..len]).expect(good);
-    // As many numbers as half-edges.
+    // Cannot fail: as many numbers as half-edges.
     let _ = meter.call("search::WithLengths::new, 300", 4 * view.half_edge_count(), || {
         WithLengths::new(view, lengths)
     });

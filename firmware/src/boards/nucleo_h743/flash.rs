@@ -29,11 +29,11 @@ use super::super::mpu;
 use crate::chips::h743;
 use crate::lent::{Lender, Lent};
 
-/// Where bank 2 begins, from the start of the flash.
+/// Offset of bank 2 from the begin of the flash.
 const BANK2: u32 = 1 << 20;
-/// The same as an address.
+/// Address of bank 2.
 const BANK2_ADDRESS: usize = 0x0810_0000;
-/// What FLASH_KEYR2 takes, one after the other, to unlock FLASH_CR2.
+/// Values that FLASH_KEYR2 takes, one after the other, to unlock FLASH_CR2.
 const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// `CR.PSIZE` of 64 bits.
 const X64: u8 = 3;
@@ -68,7 +68,7 @@ impl Flash {
         Some(lent)
     }
 
-    /// It is not used any more, and nothing of it stays in the cache.
+    /// The lent range is not used any more, and nothing of it stays in the cache.
     pub fn take_back(&mut self, lent: Lent) {
         // SAFETY: a region less; and the cache's maintenance, which nobody else does after the
         // start.

@@ -44,8 +44,8 @@ pub use transmitter::Transmitter;
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
-/// The DMA turns in it: 22 ms of the autopilot's bytes. `memory.x` puts statics of these names
-/// where the DMA reaches them and nothing is cached.
+/// Bytes of the ring in which the DMA turns: 22 ms of the autopilot's bytes. `memory.x` puts
+/// statics of these names where the DMA reaches them and nothing is cached.
 const RING: usize = 2048;
 static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
 static DMA_RADIO_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
@@ -54,9 +54,9 @@ static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::ne
 
 /// Region of the MPU for the roadmap in use: above that of the bank, below the guard's.
 const ROADMAP: u32 = 3;
-/// What is said of option bytes as a chip has them from the factory.
+/// Warning about option bytes as a chip has them from the factory.
 const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
-/// What is said where the ST-LINK gives no clock.
+/// Warning where the ST-LINK gives no clock.
 const NO_HSE: &str = "No 8 MHz from the ST-LINK: own oscillator";
 
 /// Receives by DMA into a ring.
@@ -72,14 +72,14 @@ unsafe fn UART7() {
     unsafe { executors::on_links() }
 }
 
-/// The same for plans and flash.
+/// Interrupt of the executor of plans and flash.
 #[interrupt]
 unsafe fn UART8() {
     // SAFETY: as above.
     unsafe { executors::on_plans() }
 }
 
-/// This board, ready.
+/// The parts of this board, ready.
 pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
@@ -94,7 +94,7 @@ pub fn start() -> Parts {
     let mut warnings = Vec::new();
     let level = h743::brown_out_level(pac::FLASH.optsr_cur().read().0);
     let wrong = [(level < 3, BROWN_OUT_OFF), (!has_hse, NO_HSE)].into_iter().filter(|(is, _)| *is);
-    // There is room for both.
+    // Cannot overflow: there is room for both.
     wrong.for_each(|(_, text)| _ = warnings.push(text));
     interrupt::UART7.set_priority(LINKS_AT);
     interrupt::UART8.set_priority(Priority::P12);

@@ -11,15 +11,15 @@ use super::super::mpu;
 use crate::chips::ResetCause;
 use crate::chips::h743::{self, Revision};
 
-/// Looks for the oscillator's ready flag, a few clocks of 64 MHz each: more than 10 ms, of which it
-/// takes 2 (DS12110).
+/// Most polls of the oscillator's ready flag, a few clocks of 64 MHz each: more than 10 ms, of
+/// which the oscillator takes 2 (DS12110).
 const HSE_LOOKS: u32 = 200_000;
 
 /// Why the chip started, once: the flags are cleared. Switches the memories of domain D2 on too,
 /// and mends reading from AXI SRAM where the silicon is old.
 pub fn reset_cause() -> ResetCause {
     pac::RCC.ahb2enr().modify(|w| w.0 |= h743::D2_SRAM);
-    // By the errata of all peripheral clocks: read it, then the memory is there.
+    // By the errata of all peripheral clocks: read the register, then the memory is there.
     pac::RCC.ahb2enr().read();
     cortex_m::asm::dsb();
     if Revision::of(pac::DBGMCU.idc().read().0) == Revision::Old {
@@ -51,7 +51,7 @@ pub(super) fn try_hse() -> bool {
     (0..HSE_LOOKS).any(|_| pac::RCC.cr().read().hserdy())
 }
 
-/// As fast as the silicon may run, from the board's oscillator or the chip's own.
+/// Clocks as fast as the silicon may run, from the board's oscillator or the chip's own.
 pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config {
     let mut config = embassy_stm32::Config::default();
     config.rcc.hsi = Some(rcc::HSIPrescaler::DIV1);
@@ -81,7 +81,7 @@ pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config
     config
 }
 
-/// What may be cached and touched, then the caches.
+/// Sets which memory may be cached and touched, then starts the caches.
 pub(super) fn guards() {
     // The place of the roadmap, `super::ROADMAP`, is free until there is one.
     let regions = [

@@ -8,7 +8,7 @@ use embedded_io_async::{ErrorType, Write};
 
 /// A whole frame.
 pub type Buffer = [u8; MAX_SENT];
-/// Nothing to send.
+/// A buffer with nothing to send.
 pub const EMPTY: Buffer = [0; MAX_SENT];
 
 /// Transmits by DMA.

@@ -37,19 +37,19 @@ bind_interrupts!(struct Irqs {
 
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
-/// 22 ms of the autopilot's bytes.
+/// Bytes of a UART's ring: 22 ms of the autopilot's bytes.
 const RING: usize = 2048;
 type Rings = [[u8; RING]; 2];
 static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; RING]; 2]);
 static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; RING]; 2]);
 
-/// The whole flash.
+/// Bytes of the whole flash.
 const FLASH: usize = 4 << 20;
-/// Where ours begins, from its start.
+/// Offset of our store from the begin of the flash.
 const STORE: u32 = 1 << 20;
-/// The same as an address.
+/// Address of our store.
 const STORE_ADDRESS: usize = 0x1010_0000;
-/// After the program.
+/// Layout of the store, which lies after the program.
 pub const LAYOUT: Layout = Layout::PICO2;
 
 /// Receives by interrupt into a ring.
@@ -90,7 +90,7 @@ pub fn reset() -> ! {
     }
 }
 
-/// What the watchdog resets; embassy-rp's `start` sets what the RP2040's would.
+/// Sets the parts that the watchdog resets; embassy-rp's `start` sets those of the RP2040.
 fn set_watchdog_resets() {
     pac::PSM.wdsel().write_value(pac::psm::regs::Wdsel(rp2350::WATCHDOG_RESETS));
 }
@@ -102,7 +102,7 @@ fn guard_stack() {
     unsafe { (*cortex_m::peripheral::SCB::PTR).ccr.modify(|ccr| ccr | rp2350::STKOFHFNMIGN) };
 }
 
-/// This board, ready.
+/// The parts of this board, ready.
 pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once, after [`reset_cause`].
@@ -161,7 +161,7 @@ impl Flash {
         self.lender.lend(at, unsafe { core::slice::from_raw_parts(from, len) })
     }
 
-    /// It is not used any more.
+    /// The lent range is not used any more.
     pub fn take_back(&mut self, lent: Lent) {
         self.lender.take_back(lent);
     }

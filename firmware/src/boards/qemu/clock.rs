@@ -27,7 +27,7 @@ const ENABLE: u32 = 1;
 const INTERRUPT: u32 = 8;
 
 struct Clock {
-    /// How often timer 0 has gone round.
+    /// Number of times that timer 0 has gone round.
     rounds: Mutex<Cell<u32>>,
     queue: Mutex<RefCell<Queue>>,
     /// Counts that passed in lock step while the processor slept.
@@ -84,7 +84,7 @@ pub(super) fn alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
     CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US).saturating_mul(COUNTS_US)
 }
 
-/// So many counts pass at once, in lock step.
+/// Makes `counts` pass at once, in lock step.
 pub(super) fn pass(cs: CriticalSection<'_>, counts: u64) {
     let skipped = CLOCK.skipped.borrow(cs);
     skipped.set(skipped.get() + counts);

@@ -8,20 +8,22 @@ use embassy_time::{Duration, Timer};
 use super::memory::Bank2;
 use crate::lent::{Lender, Lent};
 
-/// Where the bank lies.
+/// Address of the bank.
 const BANK: usize = 0x6000_0000;
-/// A byte for each word: what happened to it last. Real flash keeps a checksum there.
+/// Address of the marks, a byte for each word: the state of that word. Real flash keeps a checksum
+/// there.
 const MARKS: usize = 0x6020_0000;
-/// Says that bank and marks were made; memory is zero when the power comes.
+/// Address of the mark that bank and marks were made; memory is zero when the power comes.
 const MADE: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 const LEN: usize = LAYOUT.len() as usize;
 const ERASED: u8 = 0;
 const WHOLE: u8 = 1;
 const TORN: u8 = 2;
-/// What erasing a sector of 128 kB takes, by the data sheet between 1.1 and 4 s at 8 and 64 bit parallelism.
+/// Time to erase a sector of 128 kB, by the data sheet between 1.1 and 4 s at 8 and 64 bit
+/// parallelism.
 const ERASE: Duration = Duration::from_millis(1100);
-/// What programming a word takes, by the same.
+/// Time to program a word, by the data sheet.
 const PROGRAM: Duration = Duration::from_micros(100);
 
 /// The emulated bank is the real one's size.
@@ -53,13 +55,14 @@ impl Flash {
         self.0.lend(at, unsafe { core::slice::from_raw_parts(place, len) })
     }
 
-    /// It is not used any more.
+    /// The lent range is not used any more.
     pub fn take_back(&mut self, lent: Lent) {
         self.0.take_back(lent);
     }
 }
 
-/// Where bytes lie; `None` where they would reach beyond, or a word of them is torn.
+/// Address of these bytes; `None` where they would reach beyond the bank, or a word of them is
+/// torn.
 fn readable(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
     let end = at.checked_add(len).filter(|end| *end <= LEN)?;

@@ -23,7 +23,7 @@ use super::clock::{CLOCK_NOW, COUNTS_US};
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
-/// Where a message lies, and what is sent: beyond all that the program uses.
+/// Addresses of a received message and of sent bytes: beyond all that the program uses.
 const MESSAGE: usize = 0x6060_0000;
 const SENT: usize = 0x6068_0000;
 
@@ -34,7 +34,7 @@ const INTCLR: usize = 12;
 /// Timer control: enabled, periodic, interrupt, 32 bits, one shot.
 const ONE_SHOT: u32 = 0b1110_0011;
 
-/// What joins the board to the desk.
+/// Connection of the board to the desk.
 struct Desk {
     input: File,
     output: File,
@@ -56,7 +56,7 @@ pub fn start(take: fn(u8, &[u8])) {
     let mut line = [MaybeUninit::uninit(); 2 * COMMAND_LINE.len()];
     if sys_get_cmdline_uninit(&mut line).is_ok_and(|line| line == COMMAND_LINE.as_bytes()) {
         let input = File::open(c"/dev/stdin").expect("QEMU has an input");
-        // What is logged goes to the standard output.
+        // The log goes to the standard output.
         let output = File::create(c"/dev/fd/3").expect("QEMU has an output for answers");
         let mut desk = Desk { input, output, length: 0, done: 0, sent: 0, due: 0, take };
         desk.say(FromBoard::Started, &[]);
@@ -78,7 +78,7 @@ pub fn due(cs: CriticalSection<'_>) -> u64 {
     DESK.borrow_ref(cs).as_ref().map_or(u64::MAX, |desk| desk.due)
 }
 
-/// Something is due.
+/// An alarm is due.
 pub fn on_alarm() {
     Register::new(TIMER, INTCLR).write(1);
     critical_section::with(|cs| {
@@ -115,7 +115,7 @@ impl Desk {
             let (due, now) = (due_us * COUNTS_US, CLOCK_NOW(cs));
             if due > now {
                 self.due = due;
-                // What is farther is looked at again.
+                // An alarm that is farther away is set again later.
                 Register::new(TIMER, LOAD).write((due - now).min(u64::from(u32::MAX)) as u32);
                 return;
             }

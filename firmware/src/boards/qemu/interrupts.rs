@@ -29,7 +29,7 @@ pub enum Irq {
     Timer0 = 8,
     /// An alarm is due.
     Timer1 = 9,
-    /// What is due in lock step.
+    /// Alarms in lock step.
     DualTimer = 10,
     /// No device has it: it runs the executor of plans and flash.
     Plans = 30,

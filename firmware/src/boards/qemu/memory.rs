@@ -3,18 +3,20 @@
 
 use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
-/// Where `-device loader` puts a map for measurements: beyond all that the firmware uses.
+/// Address at which `-device loader` puts a map for measurements: beyond all that the firmware
+/// uses.
 const MAP: usize = 0x6080_0000;
-/// Bytes before its words: three dimensions, three coordinates of the minimum corner, the resolution, the number of words.
+/// Bytes before the map's words: three dimensions, three coordinates of the minimum corner, the
+/// resolution, the number of words.
 const MAP_HEAD: usize = 32;
-/// Where nothing lies.
+/// Address at which nothing lies.
 const SPARE: usize = 0x6040_0000;
 /// Bank 2 of the flash.
 const BANK2: usize = 0x6000_0000;
-/// Its length.
+/// Length of bank 2, bytes.
 pub const BANK2_LEN: usize = 1 << 20;
 
-/// What bank 2 is for, for good: it is either read as a whole, or programmed by the flash's driver.
+/// Use of bank 2, for good: it is either read as a whole, or programmed by the flash's driver.
 #[derive(Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub(super) enum Bank2 {

@@ -24,7 +24,7 @@ use heapless::Vec;
 use super::{mpu, parts};
 use crate::chips::ResetCause;
 
-/// This board does not say.
+/// This board does not report a cause.
 pub fn reset_cause() -> ResetCause {
     ResetCause::Unknown
 }
@@ -34,7 +34,7 @@ pub fn reset() -> ! {
     cortex_m::peripheral::SCB::sys_reset()
 }
 
-/// This board, ready.
+/// The parts of this board, ready.
 pub type Parts = parts::Parts<Receiver, Transmitter, Flash, Watchdog>;
 
 /// Starts the board. To be called once.

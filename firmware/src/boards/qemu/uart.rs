@@ -21,11 +21,12 @@ const RX_OVERRUN: u32 = 8;
 const ENABLED: u32 = 0b1111;
 /// The emulated line has no baud rate; the device wants one of at least 16.
 const DIVISOR: u32 = 27;
-/// A quarter of a second at 18 kB/s, which is as fast as this device takes bytes.
+/// Bytes of the receive buffer: a quarter of a second at 18 kB/s, which is as fast as this device
+/// takes bytes.
 const RECEIVED: usize = 4096;
 const SENT: usize = 1024;
 
-/// What a UART counts.
+/// Counters of a UART.
 #[derive(Debug, Default)]
 pub struct Counters {
     /// Bytes lost in the device: it had no room.
@@ -37,12 +38,12 @@ pub struct Counters {
 /// One UART.
 pub struct Uart {
     base: usize,
-    /// As the desk counts them.
+    /// Number of the port, as the desk counts.
     port: u8,
     transmits: Irq,
     received: Pipe<CriticalSectionRawMutex, RECEIVED>,
     sent: Pipe<CriticalSectionRawMutex, SENT>,
-    /// What went wrong so far.
+    /// Errors so far.
     pub counters: Counters,
 }
 

@@ -17,7 +17,7 @@ const CTRL: usize = 8;
 const INTCLR: usize = 12;
 const LOCK: usize = 0xC00;
 const UNLOCK: u32 = 0x1ACC_E551;
-/// Counts down twice at 25 MHz before the reset.
+/// Counts of the timer, which counts down twice at 25 MHz before the reset.
 const COUNTS: u32 = BITES_AFTER_US / 2 * 25;
 /// Interrupt at the first end, reset at the second.
 const ENABLED: u32 = 0b11;
@@ -26,10 +26,11 @@ const ENABLED: u32 = 0b11;
 #[exception]
 unsafe fn NonMaskableInt() {}
 
-/// When it was last fed, counts of the clock.
+/// Time at which the watchdog was last fed, counts of the clock.
 static FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
-/// How far time may be skipped, counts of the clock: the device counts none of it, so what is left is counted here.
+/// Counts by which time may be skipped: the device counts none of them, so the rest is counted
+/// here.
 pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
     let bites = FED.borrow(cs).get() + u64::from(2 * COUNTS);
     if now >= bites {

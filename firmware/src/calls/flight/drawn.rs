@@ -10,11 +10,13 @@ use super::{CRUISE_MPS, MISSION_CRC, ORIGIN, PLAN_CRC, SYSTEM};
 use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{anywhere, below, uniform};
 
-/// A lost vehicle is down after so many seconds.
+/// Time after which a lost vehicle is on the ground, seconds.
 const DOWN_S: f32 = 60.0;
-/// From one picture to the next, metres; how many there are on a lane, and in all.
+/// Distance from one picture to the next, metres.
 const LANE_M: f32 = 1.0;
+/// Pictures on a lane.
 const LANE_PICTURES: u32 = 4;
+/// Pictures of the whole area.
 const PICTURES: u32 = 200;
 
 /// The settings of vehicle 1 of a swarm as large as this board's.
@@ -66,7 +68,7 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     }
 }
 
-/// The same settings for an area that is divided again where a vehicle is lost.
+/// Settings for an area that is divided again where a vehicle is lost.
 pub fn area_config() -> Config<VEHICLES> {
     Config { division: Some(DOWN_S), ..config() }
 }
