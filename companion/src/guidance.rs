@@ -43,7 +43,7 @@ use crate::config::Config;
 use crate::guidance::evade::Search;
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
-use crate::time::Instant;
+use crate::time::{Duration, Instant};
 
 pub use self::scene::Scene;
 pub use self::setpoint::Setpoint;
@@ -63,6 +63,9 @@ const STANDING_SETPOINT_MPS: f32 = 0.05;
 const CLIMBED_M: f32 = 0.12;
 /// A guided descent is done within this distance of its lower end, metres.
 const DESCENDED_M: f32 = 0.2;
+/// Time after which a guided descent that has reached its end hands over to the autopilot's landing,
+/// wherever the vehicle is.
+const LAND_AFTER: Duration = Duration::from_secs(2);
 /// Greatest lead of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed of the estimate of a vehicle on its pad, m/s: up to it the setpoint follows the
@@ -87,7 +90,7 @@ const FENCE_MARGIN_M: f32 = 0.05;
 /// Greatest height over the ground, however wide the margin, at which a guided descent becomes
 /// slow, or at which an autopilot that is not led to the ground takes over the landing, metres.
 const MAX_LAND_HANDOVER_M: f32 = 1.2;
-/// Fastest guided descent near the ground, m/s: PX4 slows to this speed as well.
+/// Fastest guided descent near the ground, m/s: as slow as ArduCopter lands.
 const TOUCHDOWN_MPS: f32 = 0.5;
 /// Shortest leg that is flown, metres.
 const LEG_LEAST_M: f32 = 1e-3;

@@ -145,7 +145,7 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
     }
     let handover_s = if request.vehicles.len() > FEW { HANDOVER_S } else { 0.0 };
     let mut planned = in_order(view, request, handover_s, ws, out);
-    if handover_s > 0.0 && matches!(planned, Err(PlanError::Schedule(..))) {
+    if handover_s > 0.0 && planned.is_err() {
         // Better late than not at all.
         planned = in_order(view, request, 0.0, ws, out);
     }

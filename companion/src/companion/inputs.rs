@@ -140,7 +140,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 && (self.is_linked() || self.neighbours.all_rest()),
             climb_done: self.mission.state() == State::Climb && self.guidance.climb_done(scene),
             // The ground may be higher than where its pad is said to be.
-            path_done: follow && (self.guidance.path_done(scene) || (self.guidance.descends() && on_ground)),
+            path_done: follow
+                && (self.guidance.path_done(scene, now) || (self.guidance.descends() && on_ground)),
             at_goal: self.guidance.at_goal(scene) && !self.detours.home.is_on(),
             near_path: match (beneath, self.mission.state()) {
                 // These interrupted states do not depend on a place on the path.

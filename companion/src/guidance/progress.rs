@@ -4,7 +4,8 @@ use planner_core::flight::{Path, VehiclePlan};
 
 use super::motion::within;
 use super::{
-    ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene, WINDOW_EDGE_M,
+    ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, LAND_AFTER, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene,
+    WINDOW_EDGE_M,
 };
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
@@ -127,17 +128,22 @@ impl Guidance {
     }
 
     /// Whether the path and the guided descent are flown.
-    pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> bool {
+    pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, now: Instant) -> bool {
         if self.is_algorithm2() {
             let stands = self.stands() && scene.telemetry.velocity.norm() < RESTS_MPS;
             return stands && self.on_path && self.waypoints.completed() && !self.aside;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
         let Some(low) = leg.waypoints().last() else { return false };
+        // The ground may be higher than the plan says, or the estimate too high. PX4 reports contact only while the
+        // setpoint sinks, so a setpoint that stands at the planned ground would wait for it forever.
+        let low_m = self.smoother.position().z - low.position.z;
+        let ended = low_m < DESCENDED_M && self.pauses() && now - self.progress_at >= LAND_AFTER;
         self.phase == Phase::Descent
             && !self.up
             && self.leg_done()
             && (scene.telemetry.position.z - low.position.z < DESCENDED_M
+                || ended
                 || self.guided_m(scene, plan.descent_m) == 0.0)
     }
 

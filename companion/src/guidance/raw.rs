@@ -64,9 +64,10 @@ impl Guidance {
         }
         let Some(leg) = &self.leg else { return raw };
         let advice = Advice { speed_scale: self.descent_scale(plan, leg), ..Advice::FREE };
+        let before_m = self.leg_tracker.along_m;
         let reference = track::advance(&self.leg_track, leg, &mut self.leg_tracker, &advice, TICK_S);
         self.lead_m = LEG_LEAD_M;
-        if self.phase == Phase::Descent && self.leg_tracker.speed_mps > 0.0 {
+        if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
             self.progress_at = now;
         }
         if self.phase == Phase::Join && (leg.length_m() < LEG_LEAST_M || self.leg_done()) {
@@ -208,6 +209,7 @@ impl Guidance {
         let most_mps = libm::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );
-        most_mps / self.leg_track.descend_mps
+        // The scale is a share of the leg's speed, which the slower of the two limits.
+        most_mps / libm::fminf(self.leg_track.cruise_mps, self.leg_track.descend_mps)
     }
 }

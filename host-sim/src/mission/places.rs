@@ -175,14 +175,18 @@ pub(super) fn build(
         sampling: settings.sampling,
     };
     let (mut roadmap, mut parts) = roadmap::build(map, &terminals, &config)?;
+    let keep_apart = |roadmap: &mut Roadmap| {
+        if settings.terminals == Terminals::Apart {
+            let is_terminal = |node: u16| usize::from(node) < terminals.len();
+            roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
+        }
+    };
+    keep_apart(&mut roadmap);
     if settings.passages {
         let searching = Instant::now();
         roadmap::add_passages(map, &mut roadmap, &config, &wanted(scenario, goals.len()))?;
+        keep_apart(&mut roadmap);
         parts.passages_s = searching.elapsed().as_secs_f64();
-    }
-    if settings.terminals == Terminals::Apart {
-        let is_terminal = |node: u16| usize::from(node) < terminals.len();
-        roadmap.edges.retain(|edge| !(is_terminal(edge.a) && is_terminal(edge.b)));
     }
     let header =
         roadmap::header(&config, scenario.map.origin, scenario.vehicles.len() as u16, goals.len() as u16);

@@ -6,7 +6,7 @@
 //! clearance, so what is joined is as clear as any edge.
 //!
 //! Cost: a search over the map's cells (A*) for each pair of parts that are not joined; missions whose roadmap joins all of
-//! their starts and goals pay nothing but the look.
+//! their starts and goals pay a tree of boxes and the look.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeSet, BinaryHeap};
@@ -18,8 +18,8 @@ use planner_core::voxel::GridShape;
 
 use crate::map::{BoxTree, VoxelMap};
 
-/// Distance that a path keeps beyond the clearance, metres: more than rounding.
-const SLACK_M: f32 = 2e-4;
+/// What a way keeps beyond the clearance, metres: more than rounding, and than the millimetre that the file rounds down to.
+const SLACK_M: f32 = 1.2e-3;
 /// Most cells of a grid that is searched: the search keeps nine bytes a cell.
 const MOST_CELLS: usize = 1 << 25;
 

@@ -125,3 +125,35 @@ proptest::proptest! {
         }
     }
 }
+
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
+    /// PX4 reports no ground contact while the setpoint stands, and the ground, or the estimate, may be higher than planned: a
+    /// vehicle on the ground must not stay in Follow.
+    #[test]
+    fn a_descent_onto_higher_ground_ends_without_a_report_of_contact(
+        higher_m in 0f32..1.5,
+        (climb_mps, descend_mps) in (0.5f32..3.0, 0.3f32..3.0),
+        margin_m in 0.1f32..3.0,
+    ) {
+        let mut config = config();
+        config.required_clearance_m = config.radius_m + margin_m;
+        (config.climb_mps, config.descend_mps) = (climb_mps, descend_mps);
+        let mut bench = Bench::new(config);
+        bench.until(State::Ready, 6.0);
+        bench.start();
+        bench.until(State::Follow, 60.0);
+        let mut touched = None;
+        while bench.state() == State::Follow {
+            bench.run(0.05);
+            if bench.companion.guidance.descends() && bench.enu.z <= higher_m {
+                bench.enu.z = higher_m;
+                touched = touched.or(Some(bench.now));
+            }
+            let on_ground_s = touched.map_or(0.0, |at| (bench.now - at).secs_f32());
+            proptest::prop_assert!(on_ground_s < 12.0, "still in Follow {on_ground_s} s after it touched the ground");
+        }
+        let landing = matches!(bench.state(), State::Land | State::Disarm);
+        proptest::prop_assert!(landing, "{:?}", bench.state());
+    }
+}

@@ -175,8 +175,8 @@ impl Contact {
     }
 
     /// Whether it is on the ground: as it reports, or after so long a silence.
-    pub(super) fn lies(&self, now: Instant) -> bool {
-        self.tells(GROUNDED) || (!self.tells(OUT) && self.is_dead(now) && !self.heard_within(now, DOWN))
+    pub(super) fn lies(&self, now: Instant, down: Duration) -> bool {
+        self.tells(GROUNDED) || (!self.tells(OUT) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.

@@ -46,7 +46,7 @@ impl<const V: usize> Neighbours<V> {
     pub fn places(&self, now: Instant, [apart_m, lying_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| {
-            let far_m = if c.lies(now) { lying_m } else { apart_m };
+            let far_m = if c.lies(now, self.down) { lying_m } else { apart_m };
             c.obstacles(now, far_m, self.field(), &mut tell);
         });
     }
