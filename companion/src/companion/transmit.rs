@@ -22,7 +22,7 @@ use crate::swarm::neighbours::relay;
 const YAW_IGNORED: u16 = 0x400;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_FRAME_LEN`].
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
         if out.len() < frame::MAX_SENT {
             return 0;
