@@ -107,16 +107,32 @@ impl Mission {
             timing,
             ..Self::new(scenario, map, tasks, schedule, board)
         };
-        let goals: Vec<_> = mission
-            .goals
-            .iter()
-            .zip(&mission.descents_m)
-            .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
-            .collect();
-        mission.mission_file = mission.encode(&Block::Goals(&goals))?;
+        mission.mission_file = mission.goals_file()?;
         mission.timing.roadmap_s = begun.elapsed().as_secs_f64();
         drop(stage);
         Ok(mission)
+    }
+
+    /// The mission file of a mission with goals.
+    fn goals_file(&self) -> anyhow::Result<Vec<u8>> {
+        let goals: Vec<_> = self
+            .goals
+            .iter()
+            .zip(&self.descents_m)
+            .map(|(&position, &descent_m)| MissionGoal { position, descent_m })
+            .collect();
+        self.encode(&Block::Goals(&goals))
+    }
+
+    /// Another separation than the scenario's, in the air and from vehicles that stand, metres. Plans follow from the mission
+    /// file, which is written again.
+    ///
+    /// # Errors
+    /// What a mission file does not hold.
+    pub fn separate(&mut self, separation_m: f32, parked_separation_m: f32) -> anyhow::Result<()> {
+        (self.schedule.separation_m, self.schedule.parked_separation_m) = (separation_m, parked_separation_m);
+        self.mission_file = self.goals_file()?;
+        Ok(())
     }
 
     /// Plans the whole swarm as every companion does.
