@@ -91,7 +91,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
 }
 
 fn planned(mission: &Mission, plan: &SwarmPlan) -> MissionResult {
-    let schedule = &mission.schedule;
+    let schedule = mission.schedule();
     let nominal_s = |f: &planner_core::flight::Flight<WAYPOINTS>| {
         (f.climb_m + f.descent_m) / schedule.vertical_mps + f.path.length_m() / schedule.cruise_mps
     };

@@ -48,8 +48,7 @@ pub struct Mission {
     pub tasks: Vec<VehicleTask>,
     /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
     pub descents_m: Vec<f32>,
-    /// Separation and nominal speeds.
-    pub schedule: ScheduleConfig,
+    pub(super) schedule: ScheduleConfig,
     /// Computing times so far.
     pub timing: Timing,
     /// The board that the files are for; none if they are for the desk.
@@ -99,6 +98,11 @@ impl Mission {
     /// The map's distance field, made when first asked for: only a flight needs it.
     pub fn clearance_field(&self) -> &ClearanceField {
         self.clearance_field.get_or_init(|| ClearanceField::new(&self.map.grid()))
+    }
+
+    /// Separation and nominal speeds that the mission file carries; [`Mission::separate`] changes them.
+    pub fn schedule(&self) -> &ScheduleConfig {
+        &self.schedule
     }
 
     /// One companion's part of the swarm's plan.

@@ -23,7 +23,7 @@ const LOOKS_M: f32 = 2.0;
 /// to 1.6.
 const LAND_MPS: f32 = 1.3;
 /// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
-const CRAWL_SHARE: f32 = 0.75;
+pub(super) const CRAWL_SHARE: f32 = 0.75;
 /// Lag of the measured distance to the ground, seconds: PX4 crawls from 0.85 m on, not from
 /// `MPC_LAND_ALT3`.
 const DISTANCE_LAG_S: f32 = 0.2;

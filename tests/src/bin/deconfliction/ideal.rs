@@ -35,7 +35,7 @@ pub fn landings(mission: &Mission, plan: &SwarmPlan, alone: &SwarmPlan) -> Optio
 
 fn landed_s(mission: &Mission, flight: &Flight<WAYPOINTS>) -> f32 {
     let over_goal_s = flight.path.waypoints().last().map_or(0.0, |w| w.leave_s);
-    flight.depart_s + over_goal_s + flight.descent_m / mission.schedule.vertical_mps
+    flight.depart_s + over_goal_s + flight.descent_m / mission.schedule().vertical_mps
 }
 
 /// The flights of a vehicle: straight, or with a corner where one coordinate of start and goal is that of each.
@@ -53,7 +53,7 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
         }
         let mut path = Path::new();
         corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
-        path.label(flight.climb_m / mission.schedule.vertical_mps, mission.schedule.cruise_mps);
+        path.label(flight.climb_m / mission.schedule().vertical_mps, mission.schedule().cruise_mps);
         all.push(Flight { path, depart_s: 0.0, piece_m: PIECE_M, ..flight.clone() });
     }
     Some(all)
@@ -69,7 +69,7 @@ fn ideal_s(mission: &Mission, plan: &SwarmPlan) -> Option<f32> {
         let mut scheduled: Vec<Flight<WAYPOINTS>> = Vec::new();
         for &i in &order {
             let departs = choices[i].iter().filter_map(|flight| {
-                let cfg = &mission.schedule;
+                let cfg = mission.schedule();
                 let depart_s = earliest_departure(cfg, flight, 0.0, scheduled.iter(), &mut ws).ok()?;
                 Some(Flight { depart_s, ..flight.clone() })
             });

@@ -249,7 +249,7 @@ fn fly_seed(meeting: &Meeting, seed: u64, dir: &Path, only: &str) -> Result<Vec<
             return Ok(rows);
         }
     };
-    let apart = mission.schedule;
+    let apart = *mission.schedule();
     mission.separate(ALONE_M, ALONE_M)?;
     let shortest = mission.plan()?;
     let alone = fly(&mission, &shortest)?.result;
