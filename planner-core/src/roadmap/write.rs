@@ -7,7 +7,6 @@ use super::{
 use crate::Point;
 use crate::file::{CRC32, FileError};
 use crate::search::{SearchWorkspace, shortest_path_tree};
-use crate::sort;
 
 /// An undirected edge to be written.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -221,7 +220,7 @@ fn write_rows(
     offsets[0] = [0; WORD_LEN];
     for node in 0..last as u16 {
         let row = &mut half_edges[get(offsets, node) as usize..get(offsets, node + 1) as usize];
-        sort::by(row, |a, b| target_of(a).cmp(&target_of(b)));
+        row.sort_unstable_by_key(target_of);
         if let Some(pair) = row.windows(2).find(|pair| target_of(&pair[0]) == target_of(&pair[1])) {
             return Err(RoadmapError::Duplicate(node, target_of(&pair[0])));
         }
