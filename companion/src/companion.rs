@@ -267,7 +267,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let in_state = self.mission.in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
         let timeout_s = (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_S.0, GUID_TIMEOUT_S.1);
-        let column_clear = self.guidance.filter.column_clear();
+        let column_clear = self.guidance.filter.column_clear() && !self.guidance.leads();
         Situation {
             now: self.now,
             state: self.mission.state(),

@@ -66,6 +66,8 @@ const DESCENDED_M: f32 = 0.2;
 /// Time after which a guided descent that has reached its end hands over to the autopilot's landing,
 /// wherever the vehicle is.
 const LAND_AFTER: Duration = Duration::from_secs(2);
+/// Time without progress after which the autopilot takes over a landing that guidance leads from the path.
+const LEADS_FOR: Duration = Duration::from_secs(4);
 /// Greatest lead of the setpoint ahead of the vehicle in a climb, a descent or a join, metres.
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed of the estimate of a vehicle on its pad, m/s: up to it the setpoint follows the
@@ -143,6 +145,8 @@ pub struct Guidance {
     pub(crate) turned: bool,
     /// Whether a descent goes back up its column.
     up: bool,
+    /// Whether it leads a landing down from the path, before the autopilot lands.
+    leads: bool,
     /// The path leads out of the geofence from here.
     fenced: bool,
     progress_m: f32,
@@ -205,6 +209,7 @@ impl Guidance {
             hold: Hold::default(),
             turned: false,
             up: false,
+            leads: false,
             fenced: false,
             progress_m: 0.0,
             progress_at: Instant::ZERO,
@@ -353,13 +358,16 @@ impl Guidance {
         }
         let sends = known && state != State::PositionLost;
         if !self.smoother.is_live() || taken {
+            self.leads = false;
             self.sent_acceleration = Point::zeros();
             self.count_unsent(sends);
             return true;
         }
         let up = state == State::Follow && self.phase == Phase::Descent && self.filter.climbs_back(now);
         let turns = self.phase == Phase::Descent && self.leg.is_some() && up != self.up;
-        let goes = known && !turns && matches!(state, State::Climb | State::Follow) && (!urgent || up);
+        let leads = self.leads_down(state, scene, now);
+        let goes =
+            known && !turns && (leads || matches!(state, State::Climb | State::Follow)) && (!urgent || up);
         let mut advice = if state == State::Follow { self.advice } else { Advice::FREE };
         advice.speed_scale = advice.speed_scale.min(self.filter.speed_share(now));
         let path = scene.plan.map(|plan| &plan.path);

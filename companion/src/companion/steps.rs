@@ -209,6 +209,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         use State::*;
         self.timers.set(Timer::Request, self.now);
         let position = self.telemetry.position;
+        // Whom nobody hears is kept off where it may lie: it comes down as straight as it can be led. A landing that waited goes on
+        // as it began.
+        if from == Alone || (from == LandingHeld && self.guidance.leads()) {
+            return self.guidance.lead_down(self.now);
+        }
+        self.guidance.leave_landing();
         match from {
             Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping | Land | Disarm => {
                 self.guidance.brake();

@@ -27,6 +27,7 @@ impl Guidance {
         self.leg = None;
         self.waypoints = Waypoints::default();
         self.aside = false;
+        self.leads = false;
         self.reported_m = f32::NEG_INFINITY;
         self.opened = 0;
         // A hindrance on the other path does not count on this one.
@@ -60,6 +61,22 @@ impl Guidance {
     pub(crate) fn stops_by_m(&self) -> f32 {
         let braking_m = self.smoother.braking_m(false);
         self.tracker.along_m.max(self.setpoint_m + braking_m)
+    }
+
+    /// Leads a landing straight down from where the setpoint stands, as far as the autopilot is led.
+    pub(crate) fn lead_down(&mut self, now: Instant) {
+        self.brake();
+        (self.leads, self.progress_at) = (true, now);
+    }
+
+    /// Whether it leads a landing.
+    pub(crate) fn leads(&self) -> bool {
+        self.leads
+    }
+
+    /// The autopilot lands by itself.
+    pub(crate) fn leave_landing(&mut self) {
+        self.leads = false;
     }
 
     /// Goes on after an interruption, from where the setpoint is, or the vehicle where no place was sent: up its climb, down

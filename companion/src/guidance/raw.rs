@@ -8,7 +8,8 @@ use planner_core::track::{self, Reference, Tracker};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
-    FENCE_MARGIN_M, Guidance, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene, TOUCHDOWN_MPS,
+    DESCENDED_M, FENCE_MARGIN_M, Guidance, LEADS_FOR, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene,
+    TOUCHDOWN_MPS,
 };
 use crate::autopilot::Kind;
 use crate::guidance::evade;
@@ -47,7 +48,9 @@ impl Guidance {
             Phase::Join => path.point_at(self.tracker.along_m),
             Phase::Descent => path.point_at(path.length_m()).map(|end| {
                 let down_m = if self.up { 0.0 } else { self.guided_m(scene, plan.descent_m) };
-                Point::new(raw.x, raw.y, end.z - down_m)
+                let led_m = self.ground_m(plan) + self.low_end_m(scene);
+                let to_m = if self.leads { libm::fminf(led_m, raw.z) } else { end.z - down_m };
+                Point::new(raw.x, raw.y, to_m)
             }),
             Phase::Path if self.is_algorithm2() => {
                 return self.next_to_waypoint(path, &scene.telemetry.position, advice).unwrap_or(raw);
@@ -194,8 +197,36 @@ impl Guidance {
         scene: &Scene<'_, W, G>,
         descent_m: f32,
     ) -> f32 {
-        let low_m = if scene.telemetry.kind == Some(Kind::Px4) { 0.0 } else { self.low_m };
-        libm::fmaxf(descent_m - low_m, 0.0)
+        libm::fmaxf(descent_m - self.low_end_m(scene), 0.0)
+    }
+
+    /// Height over the ground at which a guided descent ends, metres.
+    fn low_end_m<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>) -> f32 {
+        if scene.telemetry.kind == Some(Kind::Px4) { 0.0 } else { self.low_m }
+    }
+
+    /// Whether guidance leads the landing in this step. It begins once the setpoint stands, and ends near the ground, or where
+    /// it makes no progress.
+    pub(super) fn leads_down<const W: usize, const G: usize>(
+        &mut self,
+        state: State,
+        scene: &Scene<'_, W, G>,
+        now: Instant,
+    ) -> bool {
+        if !self.leads || state != State::Land {
+            return false;
+        }
+        if self.phase != Phase::Descent && self.settled {
+            (self.phase, self.leg) = (Phase::Descent, None);
+        }
+        let down = |leg: &Path<2>| {
+            let low = leg.waypoints().last();
+            self.leg_done()
+                && low.is_some_and(|low| scene.telemetry.position.z - low.position.z < DESCENDED_M)
+        };
+        let ended = self.phase == Phase::Descent && self.leg.as_ref().is_some_and(down);
+        self.leads = !ended && now - self.progress_at < LEADS_FOR;
+        self.leads && self.phase == Phase::Descent && self.filter.column_clear()
     }
 
     /// The share of the speed at which this leg is flown: below the margin kept to obstacles the ground may be, and is
@@ -204,8 +235,7 @@ impl Guidance {
         let (true, Some(top)) = (self.phase == Phase::Descent && !self.up, leg.waypoints().first()) else {
             return 1.0;
         };
-        let end_z = plan.path.point_at(plan.path.length_m()).map_or(top.position.z, |end| end.z);
-        let over_m = top.position.z - self.leg_tracker.along_m - (end_z - plan.descent_m + self.low_m);
+        let over_m = top.position.z - self.leg_tracker.along_m - (self.ground_m(plan) + self.low_m);
         let most_mps = libm::sqrtf(
             TOUCHDOWN_MPS * TOUCHDOWN_MPS + 2.0 * self.leg_track.accel_z_mps2 * libm::fmaxf(over_m, 0.0),
         );
