@@ -128,6 +128,50 @@ proptest::proptest! {
 
 proptest::proptest! {
     #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
+    /// Others keep off a narrow strip of its path: it does not leave it before it is low, and no ground holds it up.
+    #[test]
+    fn a_vehicle_that_nobody_hears_is_led_straight_down(
+        (flown_s, end_m) in (0.5f32..4.0, 1.5f32..8.0),
+        (descend_mps, margin_m) in (0.3f32..3.0, 0.1f32..3.0),
+        higher_m in -1f32..1.0,
+    ) {
+        for kind in [Kind::Px4, Kind::ArduPilot] {
+            let mut config = Config { descend_mps, ..two_vehicles() };
+            config.required_clearance_m = config.radius_m + margin_m;
+            let mut bench = if kind == Kind::Px4 { Bench::new(config) } else { Bench::ardupilot(config) };
+            let mut path = Path::new();
+            for at in [START, Point::new(START.x + 2.0, START.y, end_m), Point::new(GOAL.x, GOAL.y, end_m)] {
+                path.push(at, 1.2).unwrap();
+            }
+            bench.answer_plan = Some(Ok(VehiclePlan { path, descent_m: end_m, ..plan() }));
+            bench.neighbour = Some((Point::new(8.0, 60.0, 0.0), crate::link::intent::GROUNDED | crate::link::intent::ON_PLAN, 0.0, 5));
+            bench.until(State::Ready, 6.0);
+            bench.start();
+            bench.until(State::Follow, 60.0);
+            bench.run(flown_s);
+            bench.neighbour = None;
+            bench.until(State::Land, 40.0);
+            let (from, began) = (bench.enu, bench.now);
+            bench.setpoints.clear();
+            let setpoint_mode = bench.mode;
+            while bench.state() == State::Land && bench.mode == setpoint_mode {
+                bench.run(0.05);
+                bench.enu.z = bench.enu.z.max(higher_m);
+                let after_s = (bench.now - began).secs_f32();
+                proptest::prop_assert!(after_s < 12.0 + end_m / descend_mps.min(0.4), "{kind:?}: it never lands");
+            }
+            let low_m = if kind == Kind::Px4 { 0.0 } else { margin_m.min(1.2) };
+            let left_m = bench.enu.z;
+            proptest::prop_assert!(left_m < higher_m.max(low_m.min(from.z)) + 0.4, "{kind:?} left at {left_m} m");
+            for (_, at, _) in &bench.setpoints {
+                proptest::prop_assert!((at - from).xy().norm() < 0.15, "{kind:?} led from {from} to {at}");
+            }
+        }
+    }
+}
+
+proptest::proptest! {
+    #![proptest_config(ProptestConfig::with_cases(if cfg!(debug_assertions) { 30 } else { 300 }))]
     /// PX4 reports no ground contact while the setpoint stands, and the ground, or the estimate, may be higher than planned: a
     /// vehicle on the ground must not stay in Follow.
     #[test]

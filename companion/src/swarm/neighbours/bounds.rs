@@ -62,6 +62,10 @@ pub(super) const FRESHLY: Duration = Duration::from_secs(1);
 pub(super) const LEVEL_M: f32 = 1.0;
 /// Position error of a vehicle whose own knowledge of its place is old, metres.
 pub(super) const VAGUE_M: f32 = 0.5;
+/// Distance beside its path at which a vehicle may come down unheard, beyond the stray that counts beside a vehicle on the
+/// ground, metres: it leads its landing as at its goal, so it is kept off as the schedule keeps others off landed vehicles in
+/// announced gusts of 3 m/s.
+pub(super) const UNHEARD_BESIDE_M: f32 = 0.15;
 /// Stray of two vehicles in the air together, one of which hovers, metres.
 pub(super) const PAIR_SWAY_M: f32 = 0.1;
 /// Time for which an intent of our mission shows that the sender's positions are those of the

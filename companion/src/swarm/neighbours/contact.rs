@@ -323,7 +323,8 @@ impl Contact {
                 });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
-            self.stretch(&mut |at| tell(column(at, nature)));
+            let radius_m = apart_m + UNHEARD_BESIDE_M;
+            self.stretch(&mut |at| tell(KeepOff { radius_m, ..column(at, nature) }));
         } else {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));

@@ -20,8 +20,8 @@ const JOIN_M: f32 = 1.0;
 const ALOFT_M: f32 = 1.0;
 /// A vehicle whose radio fails may come so far along its path unheard, metres.
 const STRETCH_M: f32 = 6.0;
-/// And lie so far beside it, metres.
-const BESIDE_M: f32 = 0.5;
+/// Room that is kept beside that, beyond the safety distance, metres.
+const BESIDE_M: f32 = 0.4;
 /// Spacing of the places that are compared with where it lies, metres.
 const FINE_M: f32 = 0.05;
 /// Spacing of the places where it may lie, metres.
