@@ -323,7 +323,7 @@ impl Contact {
                 });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
-            let radius_m = apart_m + UNHEARD_BESIDE_M;
+            let radius_m = apart_m + if field.is_some() { VAGUE_M } else { UNHEARD_BESIDE_M };
             self.stretch(&mut |at| tell(KeepOff { radius_m, ..column(at, nature) }));
         } else {
             if self.lands(now) {
