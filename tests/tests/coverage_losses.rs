@@ -132,6 +132,10 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
     // By a wrong estimate it lands beside its pad, all of its part flown.
     let whole = ["Done", "no goal", "Aborted: Landed beside its goal"];
     let short = |end: &str| !whole.iter().any(|whole| end.starts_with(whole));
+    // What a vehicle reports that it flew around, the next start flies.
+    let around = |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<u64>().ok();
+    let reported: u64 = log.lines().filter_map(around).sum();
+    let landed_short = vehicles.iter().filter(|v| !struck.contains(&v.id) && short(&v.end)).count();
     // None of them waits to take over: a vehicle without a part takes none.
     let had_none = |v: &VehicleResult| struck.contains(&v.id) || v.end.starts_with("no goal");
     Some(Outcome {
@@ -140,10 +144,11 @@ fn outcome(draw: Draw, seed: u64) -> Option<Outcome> {
         covered: coverage.covered_share,
         left: coverage.left,
         twice: coverage.twice,
-        landed_short: vehicles.iter().filter(|v| !struck.contains(&v.id) && short(&v.end)).count(),
+        landed_short,
         broken: [safety.wall_contacts, safety.violations, safety.deadlocks].map(|count| count as u64),
         explained: covered::EXPLAINED.iter().any(|row| log.contains(row))
             || (draw.radio == Radio::Rough && log.contains(GIVEN_AWAY))
+            || (landed_short == 0 && (1..=reported).contains(&coverage.left))
             || vehicles.iter().all(had_none),
         text: log,
     })
@@ -172,6 +177,44 @@ fn what_two_vehicles_leave_that_are_lost_at_once_is_photographed() {
 #[test]
 fn what_two_vehicles_leave_that_are_lost_at_once_over_a_rough_radio_is_photographed() {
     are_whole(Draw { radio: Radio::Rough, ..TWO });
+}
+
+/// One vehicle is heard no more and flies on as long as its lease allows, while others come down beside it.
+#[test]
+fn who_lands_keeps_off_all_that_an_unheard_vehicle_may_still_fly() {
+    let one = |seed: u64| -> Option<(u64, bool)> {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let count = 3 + (seed % 3) as usize;
+        let mut text = areas::lost(&mut random, count, [0.1, 0.5][(seed % 2) as usize]);
+        let silent = random.next_u32() % count as u32;
+        let at_s = 15 + random.next_u32() % 220;
+        let direction = ["both", "tx"][(random.next_u32() % 2) as usize];
+        text += &format!(
+            "[[faults]]\nat_s = {at_s}.0\nkind = \"radio-cut\"\ndirection = \"{direction}\"\nvehicle = {}\n",
+            1 + silent
+        );
+        let landing = 1 + random.next_u32() % (count as u32 - 1);
+        for k in 1..=landing {
+            let vehicle = 1 + (silent + k) % count as u32;
+            let kind =
+                ["battery-low", "return-order", "pilot-takeover"][(random.next_u32() % 5 / 2) as usize];
+            let at_s = at_s + random.next_u32() % 60;
+            text += &format!("[[faults]]\nat_s = {at_s}.0\nkind = \"{kind}\"\nvehicle = {vehicle}\n");
+        }
+        let (result, log) = covered::fly_text(&text).ok()?;
+        let safety = result.safety;
+        let broken = safety.violations + safety.wall_contacts > 0;
+        if broken {
+            println!("seed {seed}: {safety:?}\n{text}\n{log}");
+        }
+        Some((seed, broken))
+    };
+    let (from, count) = (number("FLOCKMATE_UNHEARD_FROM", 0), number("FLOCKMATE_UNHEARD", 40));
+    let all: Vec<(u64, bool)> = (from..from + count).into_par_iter().filter_map(one).collect();
+    let broken: Vec<u64> = all.iter().filter(|(_, broken)| *broken).map(|(seed, _)| *seed).collect();
+    println!("{} flown, too near in {broken:?}", all.len());
+    assert!(broken.is_empty());
+    assert!(2 * all.len() as u64 > count);
 }
 
 #[test]

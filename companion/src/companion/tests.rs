@@ -8,6 +8,7 @@ mod hostile;
 mod interruptions;
 mod paces;
 mod scenes;
+mod unheard;
 
 use std::vec::Vec;
 

@@ -18,6 +18,9 @@ use crate::mission::State;
 use crate::services;
 use crate::swarm::neighbours::relay;
 
+/// Time for which a vehicle flies on its part of an area after it was last heard, seconds: the lease, the age of what renews it,
+/// a message's delay, and half of the longest stop.
+const UNHEARD_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
 /// Bit of a setpoint's type mask: its heading is ignored.
 const YAW_IGNORED: u16 = 0x400;
 
@@ -238,7 +241,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             );
         let plan = self.mission.plan();
         let along_m = self.guidance.progress_m(self.mission.state(), &self.scene());
-        let (points, column) = self.way_ahead();
+        let (mut points, column) = self.way_ahead();
+        let near = points.len();
+        self.add_unheard(&mut points);
+        let beyond = (points.len() - near) as u8;
         let (clear_m, clear_in_s) = self.clears_m();
         Intent {
             system_id: self.config.system_id,
@@ -253,7 +259,57 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             column,
             echo: self.neighbours.echo(self.links.intents_sent(), self.now),
             points,
+            beyond,
         }
+    }
+
+    /// Adds, over an area, the points that it flies along beyond those if nobody hears it any more: as far as its lease takes
+    /// it, or to the end where it has left and needs none.
+    fn add_unheard(&self, points: &mut heapless::Vec<Point, { intent::POINTS }>) {
+        use State::*;
+        let flies = matches!(
+            self.mission.state(),
+            Streaming
+                | Engaging
+                | Arming
+                | TakeOff
+                | Climb
+                | Follow
+                | Paused
+                | Alone
+                | Blocked
+                | Replanning
+                | Dividing
+        );
+        let descends = self.guidance.along_m() >= 0.0 && self.guidance.descends();
+        let Some(plan) = self.mission.plan().filter(|_| flies && !descends) else { return };
+        // Full after eight: further is not reported.
+        let mut add = |point: Point| _ = points.push(point);
+        let (path, on_path) = (&plan.path, self.guidance.along_m() >= 0.0);
+        let from_m = if on_path { self.guidance.setpoint_m } else { 0.0 };
+        let Some(most_m) = self.unheard_m() else { return };
+        if self.guidance.returning {
+            return path
+                .waypoints()
+                .iter()
+                .rev()
+                .filter(|w| w.along_m < from_m)
+                .for_each(|w| add(w.position));
+        }
+        let stops_m = if on_path { self.guidance.stops_at_m.max(from_m) } else { 0.0 };
+        let stops_m = if self.guidance.hold.is_on() { from_m } else { stops_m };
+        let ahead = path.waypoints().iter().filter(|w| w.along_m > stops_m && w.along_m < most_m);
+        ahead.for_each(|w| add(w.position));
+        path.point_at(most_m).filter(|_| most_m > stops_m).into_iter().for_each(add);
+    }
+
+    /// Place along its path beyond which it does not fly unheard over an area, metres; none elsewhere.
+    fn unheard_m(&self) -> Option<f32> {
+        let (fleet, plan) = (self.neighbours.fleet()?, self.mission.plan()?);
+        let lease_m = UNHEARD_S * self.config.cruise_mps;
+        let from_m = self.guidance.setpoint_m.max(0.0);
+        let most_m = if fleet.takes_part() { from_m + lease_m } else { f32::INFINITY };
+        Some(most_m.min(plan.path.length_m()))
     }
 
     /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
@@ -295,7 +351,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Follow | Paused | Alone | Blocked | Replanning | Dividing | Stopping => {
                 column = false;
                 add(setpoint);
-                let (from_m, to_m) = (self.guidance.setpoint_m, self.guidance.stops_at_m);
+                let (from_m, most_m) = (self.guidance.setpoint_m, self.unheard_m().unwrap_or(f32::INFINITY));
+                let to_m = self.guidance.stops_at_m.min(most_m);
                 let ahead = path.waypoints().iter().filter(|w| w.along_m > from_m && w.along_m < to_m);
                 ahead.for_each(|w| add(w.position));
                 path.point_at(to_m).filter(|_| to_m > from_m).into_iter().for_each(add);

@@ -4,10 +4,10 @@
 //!
 //! | byte | type | field |
 //! |---|---|---|
-//! | 0 | u8 | version, 4 |
+//! | 0 | u8 | version, 5 |
 //! | 1 | u8 | system id |
 //! | 2 | u8 | flags: 1 grounded, 2 flying, 4 landed after the mission, 8 follows the shared plan, 16 out of the plan for good, 32 stands and waits, 64 its path is blocked, 128 flies around |
-//! | 3 | u8 | number of path points, 0…8 |
+//! | 3 | u8 | lower four bits: number of path points, 0…8; upper four: how many of the last of these it flies to only where nobody hears it |
 //! | 4 | u32 | CRC-32 of the mission file |
 //! | 8 | u32 | CRC-32 of the swarm's plan |
 //! | 12 | f32 | progress along the own path, metres; negative while climbing |
@@ -16,7 +16,7 @@
 //! | 24 | f32 | height of the ground below it, as far as it knows, metres up in the mission frame |
 //! | 28 | u8 | 1: it climbs, descends or lands, or somebody else flies it, so that it may come down from where it is; the upper seven bits: seconds until the last of those gates is open for sure |
 //! | 29 | 3 × u8 | echo of another vehicle's last intent: its rank + 1, its sequence number, how long it was held in 10 ms; 0 for none |
-//! | 32 | 12 × n | points that it flies along next, from its setpoint to where it will stop for now: f32 east, north, up in the mission frame; none while somebody else flies it; the setpoint alone while it holds its place |
+//! | 32 | 12 × n | points that it flies along next: f32 east, north, up in the mission frame. First from its setpoint to where it will stop for now; none while somebody else flies it; the setpoint alone while it holds its place. Over an area then corners of its path, as far as it flies on where nobody hears it |
 //!
 //! A receiver refuses another version, NaN, and a system id that is not the sender's.
 
@@ -30,7 +30,7 @@ pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points reported.
 pub const POINTS: usize = 8;
 /// Version of the message's layout.
-pub const VERSION: u8 = 4;
+pub const VERSION: u8 = 5;
 const HEAD: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
@@ -79,8 +79,11 @@ pub struct Intent {
     pub column: bool,
     /// Echo of another vehicle's intent, for that vehicle's measure of the delay.
     pub echo: Option<Echo>,
-    /// Points that it flies along next, as far as it will go for now; none while somebody else flies it.
+    /// Points that it flies along next: as far as it will go for now, then as far as it flies on unheard; none while somebody
+    /// else flies it.
     pub points: Vec<Point, POINTS>,
+    /// Number of the last of those points beyond where it will stop for now.
+    pub beyond: u8,
 }
 
 impl Intent {
@@ -90,7 +93,12 @@ impl Intent {
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEAD..];
-        body[..4].copy_from_slice(&[VERSION, self.system_id, self.flags, self.points.len() as u8]);
+        body[..4].copy_from_slice(&[
+            VERSION,
+            self.system_id,
+            self.flags,
+            self.points.len() as u8 | self.beyond << 4,
+        ]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
         body[12..16].copy_from_slice(&self.progress_m.to_le_bytes());
@@ -119,8 +127,8 @@ impl Intent {
         if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
             return None;
         }
-        let count = usize::from(body[3]);
-        if count > POINTS || len < HEAD + 12 * count {
+        let (count, beyond) = (usize::from(body[3] & 15), body[3] >> 4);
+        if count > POINTS || usize::from(beyond) > count || len < HEAD + 12 * count {
             return None;
         }
         let word = |at: usize| [body[at], body[at + 1], body[at + 2], body[at + 3]];
@@ -143,6 +151,7 @@ impl Intent {
             clear_in_s: body[28] >> 1,
             echo: body[29].checked_sub(1).map(|rank| Echo { rank, sequence: body[30], held: body[31] }),
             points,
+            beyond,
         })
     }
 }
@@ -167,6 +176,7 @@ mod tests {
             clear_in_s: 15 * count as u8,
             echo: (count > 2).then_some(Echo { rank: 254, sequence: 9, held: count as u8 }),
             points,
+            beyond: count as u8 / 2,
         }
     }
 
@@ -184,7 +194,7 @@ mod tests {
             assert_eq!(Intent::decode(&padded(&sample(count)), 9), Some(sample(count)));
         }
         assert_eq!(Intent::decode(&padded(&sample(2)), 8), None, "another sender");
-        for (at, value) in [(0, 0), (4, 31), (5, 2), (8, 9)] {
+        for (at, value) in [(0, 0), (4, 31), (5, 2), (8, 9), (8, 0x32)] {
             let mut bad = padded(&sample(2));
             bad[at] = value;
             assert_eq!(Intent::decode(&bad, 9), None, "byte {at}");

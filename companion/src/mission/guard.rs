@@ -161,7 +161,7 @@ pub enum Guard {
     AsideReached,
     /// Battery charge below half of the configured limit.
     BatteryCritical,
-    /// Battery charge below the configured limit, and no neighbour below.
+    /// Battery charge below the configured limit, no neighbour below, and no place aside to land at sought or flown to.
     BatteryLow,
     /// Outside the configured volume, and no neighbour below.
     OutsideGeofence,
@@ -473,7 +473,7 @@ impl Guard {
             Self::Yielded => i.yielded >= limit && i.sought_home.is_none(),
             Self::Hindered => i.hindered >= limit && i.sought_home.is_none(),
             Self::BatteryCritical => i.battery_critical,
-            Self::BatteryLow => i.battery_low && i.room_below,
+            Self::BatteryLow => i.battery_low && i.room_below && !i.lands_aside,
             Self::OutsideGeofence => i.outside && i.room_below,
             Self::NeighboursSilent => i.neighbour_age > limit,
             Self::WayFree => i.way_free,

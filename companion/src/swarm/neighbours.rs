@@ -154,6 +154,8 @@ impl<const V: usize> Neighbours<V> {
             late: Lateness::default(),
             belongs_at: None,
             points: Vec::new(),
+            beyond: 0,
+            leased: false,
             joint: Joint::Unknown,
             extent_m: 0.0,
             column: false,
@@ -298,9 +300,11 @@ impl<const V: usize> Neighbours<V> {
         }
         contact.hears = intent.heard;
         contact.points.clone_from(&intent.points);
+        let most = intent.points.len().saturating_sub(1) as u8;
+        (contact.beyond, contact.leased) = (intent.beyond.min(most), self.fleet.is_some());
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
-        contact.extent_m = libm::sqrtf(intent.points.iter().fold(0.0, most));
+        contact.extent_m = libm::sqrtf(contact.near().iter().fold(0.0, most));
         contact.join();
         (contact.column, contact.floor_m) = (intent.column, intent.floor_m);
         contact.clear_m = if shared { intent.clear_m } else { f32::NEG_INFINITY };

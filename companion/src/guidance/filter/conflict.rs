@@ -81,7 +81,9 @@ impl Guidance {
         let lands = matches!(state, State::Land | State::LandingHeld);
         let hears_nobody = neighbours.is_deaf(now);
         let deaf = lands && hears_nobody;
-        let floor_m = scene.plan.filter(|_| lands).map(|plan| self.lands_at_m(state, scene, plan));
+        // Led down over an area it looks as in a landing for who lies there unheard.
+        let comes_down = lands || (self.descends() && neighbours.fleet().is_some());
+        let floor_m = scene.plan.filter(|_| comes_down).map(|plan| self.lands_at_m(state, scene, plan));
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m()))
@@ -93,7 +95,7 @@ impl Guidance {
             ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
             on_plan,
             deaf: hears_nobody,
-            lands,
+            lands: comes_down,
         };
         let mut next = 0;
         while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
@@ -118,6 +120,9 @@ impl Guidance {
                 // A landing does not wait for a vehicle that is silent: only where it may have stopped counts.
                 (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
                 met.heard.rests_within_m = 0.0;
+            }
+            if !(lands || by_gates || met.lost || hears_nobody) {
+                contact.follow_unheard(&mut met.heard, bounds);
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
             let held = self.filter.held_for(now);
@@ -145,7 +150,11 @@ impl Guidance {
                 safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m())
             };
             let may_lie_below = |floor_m| neighbours.may_lie_below(i, &place, floor_m, apart_m);
-            if lands && silent && !deaf && !met.stranger && floor_m.is_some_and(may_lie_below) {
+            let below = || {
+                floor_m.is_some_and(may_lie_below)
+                    || (comes_down && contact.comes_home(now, &place, safety_m))
+            };
+            if silent && !hears_nobody && !met.stranger && below() {
                 return Some(Found { id: met.id, yields: true, stranger: false, rests: met.lost });
             }
             let reach_m = own_reach_m + apart_m + met.heard.reach_m(bounds, ahead_s);

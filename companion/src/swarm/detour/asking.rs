@@ -62,7 +62,8 @@ impl Detours {
             view.neighbours.landing_columns(view.now, apart_m + evade::BESIDE_M, &mut tell);
         }
         if self.lands {
-            view.neighbours.lands_on(apart_m + MARGIN_M, tell);
+            let height_m = plan.path.point_at(along_m)?.z;
+            view.neighbours.lands_on(view.now, [apart_m + MARGIN_M, height_m], tell);
         }
         let (goal, descent_m) = match view.config.division {
             Some(_) => match self.beside.back_m() {

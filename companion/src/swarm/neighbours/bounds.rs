@@ -37,12 +37,20 @@ pub(super) const DOWN: Duration = Duration::from_secs(75);
 /// again: the vehicle is down by then, whatever it flew there.
 pub(super) const COLUMN_KEPT: Duration = Duration::from_secs(600);
 /// Stretch of its path that an unheard vehicle may have flown, metres: the vehicle notices after
-/// [`LATELY`] and 1 s, and stops.
+/// [`LATELY`] and 1 s, and stops. Over an area it flies on as long as its lease allows.
 pub(super) const STRETCH_M: f32 = 6.0;
 /// Growth of [`STRETCH_M`] for each second that messages are late, m/s.
 pub(super) const STRETCH_MPS: f32 = 2.0;
 /// Spacing of the places on the unheard stretch below which the vehicle may lie, metres.
 pub(super) const STRETCH_STEP_M: f32 = 1.0;
+/// Silence after which an unheard vehicle may come down further than [`STRETCH_M`] on over an area: its lease, and what row
+/// `Alone` waits. Nobody leaves the plan for that before.
+pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
+/// Rounding of the length of a way of eight legs, metres.
+pub(super) const ROUNDING_M: f32 = 0.01;
+/// Most spacings of the places on the unheard stretch over an area, where it is as long as the lease allows: with eight corners
+/// a neighbour makes 17 keep-out zones.
+pub(super) const STRETCH_PLACES: f32 = 8.0;
 /// Height of the column below a vehicle that lies somewhere below, metres; the planner shortens the
 /// column where it knows the ground.
 pub(super) const COLUMN_M: f32 = 60.0;

@@ -49,6 +49,10 @@ pub(crate) struct Contact {
     /// When an intent of our mission was last heard from it.
     pub(super) belongs_at: Option<Instant>,
     pub(super) points: Vec<Point, POINTS>,
+    /// Number of the last of them that the vehicle flies to only where nobody hears it.
+    pub(super) beyond: u8,
+    /// Whether it flies to the last of its points unheard: over an area, where it reports as many as its lease allows.
+    pub(super) leased: bool,
     /// Place of the vehicle on its reported points.
     pub(super) joint: Joint,
     /// Distance to which the points lead from the first of them, metres.
@@ -85,7 +89,12 @@ pub(crate) struct Contact {
 impl Contact {
     /// Notes where its position is on its points: to be called when either was heard, so that no step has to look for it.
     pub(super) fn join(&mut self) {
-        self.joint = Joint::find(&self.state.position, &self.points);
+        self.joint = Joint::find(&self.state.position, self.near());
+    }
+
+    /// Its points as far as it will go for now.
+    pub(super) fn near(&self) -> &[Point] {
+        &self.points[..self.points.len().saturating_sub(usize::from(self.beyond))]
     }
 
     pub(super) fn heard_within(&self, now: Instant, span: Duration) -> bool {
@@ -191,7 +200,7 @@ impl Contact {
         self.tells(DETOURS)
             && !self.tells(GROUNDED)
             && self.column
-            && self.points.last().is_some_and(|low| low.z < self.state.position.z)
+            && self.near().last().is_some_and(|low| low.z < self.state.position.z)
             && self.state.velocity.xy().norm_squared() < STANDING_MPS * STANDING_MPS
             && self.heard_within(now, LATELY)
     }
@@ -213,16 +222,20 @@ impl Contact {
             && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
     }
 
-    /// The columns it may come down in.
-    pub(super) fn columns(&self, now: Instant, apart_m: f32, tell: &mut dyn FnMut(KeepOff)) {
+    /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m` along its points.
+    pub(super) fn columns(&self, now: Instant, [apart_m, upto_m]: [f32; 2], tell: &mut dyn FnMut(KeepOff)) {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
+        if !self.heard_within(now, SILENT) {
+            return self.stretch(upto_m, &mut |place, wider_m| {
+                let radius_m = libm::hypotf(apart_m, wider_m);
+                let (from, to) = (place + up(LEVEL_M), place - up(self.deep_m(&place)));
+                tell(KeepOff { from, to, radius_m, nature: Nature::Landing });
+            });
+        }
         let mut column = |from: Point, below_m: f32, nature: Nature| {
             tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
         };
-        if !self.heard_within(now, SILENT) {
-            return self.stretch(&mut |place| column(place, COLUMN_M, Nature::Landing));
-        }
         let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
         let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
         if age_s < OLD_S {
@@ -234,38 +247,82 @@ impl Contact {
         }
     }
 
+    /// Depth of the column below a place on its path, metres: over an area at least to the ground.
+    pub(super) fn deep_m(&self, place: &Point) -> f32 {
+        // NaN counts as none.
+        if self.leased { libm::fmaxf(COLUMN_M, place.z - self.floor_m) } else { COLUMN_M }
+    }
+
     /// Height of the top of its climb, if it climbs or is about to.
     pub(super) fn climbs_to(&self) -> Option<f32> {
-        let (top, here) = (self.points.last()?, self.state.position);
+        let (top, here) = (self.near().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
         let climbs = self.column && !self.tells(LANDED | OUT) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
         (climbs && top.z > here.z + TOP_M).then_some(top.z)
     }
 
-    /// Stretch of its path that the vehicle may fly unheard, metres: further where messages are
-    /// late, its own and those by which it learns that no vehicle hears it.
+    /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its points lead; elsewhere further
+    /// where messages are late, its own and those by which it learns that no vehicle hears it.
+    #[inline(never)]
     pub(super) fn stretch_m(&self) -> f32 {
+        let (mut at, mut way_m) = (self.state.position, 0.0);
+        for next in self.points.iter().filter(|_| self.leased) {
+            way_m += libm::sqrtf((next - core::mem::replace(&mut at, *next)).norm_squared());
+        }
+        // Rounding does not take away the last corner.
+        libm::fmaxf(way_m + ROUNDING_M, self.stops_m())
+    }
+
+    /// The stretch of a vehicle that stops where it notices that nobody hears it, metres.
+    pub(super) fn stops_m(&self) -> f32 {
         STRETCH_M + STRETCH_MPS * 2.0 * self.late.delay_s
     }
 
-    /// Places along its path as far as it may come unheard.
-    pub(super) fn stretch(&self, tell: &mut dyn FnMut(Point)) {
-        let (mut at, mut left_m) = (self.state.position, self.stretch_m());
-        tell(at);
+    /// Whether it is in the air, or about to be, as it reported last.
+    pub(super) fn is_under_way(&self) -> bool {
+        !self.tells(GROUNDED | LANDED) || self.beyond > 0
+    }
+
+    /// Whether it is silent, and goes on over an area as long as its lease allows, or as its autopilot takes it.
+    pub(super) fn may_fly_on(&self, now: Instant) -> bool {
+        self.leased && self.is_under_way() && !self.tells(OUT) && !self.heard_within(now, SILENT)
+    }
+
+    /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a place. No pads are as near to each other.
+    pub(crate) fn comes_home(&self, now: Instant, place: &Point, apart_m: f32) -> bool {
+        let near = |pad: Point| (pad - place).xy().norm_squared() < apart_m * apart_m;
+        self.may_fly_on(now) && self.pad.is_some_and(near)
+    }
+
+    /// Legs of its path for `left_m`, as far as it may come unheard, each with its length and the part that counts, metres; the first is the
+    /// place where it was heard.
+    pub(super) fn legs(&self, mut left_m: f32, tell: &mut dyn FnMut([Point; 2], [f32; 2])) {
+        let mut at = self.state.position;
+        tell([at; 2], [0.0; 2]);
         for next in &self.points {
             let leg_m = (next - at).norm();
-            let steps = (leg_m.min(left_m) / STRETCH_STEP_M) as u32;
-            for step in 1..=steps {
-                let along_m = step as f32 * STRETCH_STEP_M;
-                tell(at + (next - at) * (along_m / leg_m));
-            }
-            if leg_m >= left_m {
-                break;
+            if leg_m > left_m {
+                return tell([at, *next], [leg_m, left_m]);
             }
             left_m -= leg_m;
-            at = *next;
-            tell(at);
+            tell([core::mem::replace(&mut at, *next), *next], [leg_m; 2]);
         }
+    }
+
+    /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than from one of them it may be from the
+    /// nearest of them.
+    pub(super) fn stretch(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
+        let step_m = if upto_m > self.stops_m() { upto_m / STRETCH_PLACES } else { STRETCH_STEP_M };
+        let wider_m = if step_m > STRETCH_STEP_M { 0.5 * step_m } else { 0.0 };
+        self.legs(upto_m, &mut |[at, next], [leg_m, flown_m]| {
+            for step in 1..=(flown_m / step_m) as u32 {
+                let along_m = step as f32 * step_m;
+                tell(at + (next - at) * (along_m / leg_m), wider_m);
+            }
+            if flown_m >= leg_m {
+                tell(next, wider_m);
+            }
+        });
     }
 
     /// How high it lies at most, once it came down from a place: on the ground that it reported, which away from pads is the
@@ -281,12 +338,12 @@ impl Contact {
         libm::fmaxf(self.floor_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
-    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it. Over
-    /// a field it lies on the ground that it reported.
+    /// Keep-out zones of the places where the vehicle may be from now on, `apart_m` around it, which unheard has come as far as
+    /// `upto_m` along its points. Over a field it lies on the ground that it reported.
     pub(super) fn obstacles(
         &self,
         now: Instant,
-        apart_m: f32,
+        [apart_m, upto_m]: [f32; 2],
         field: Option<Field>,
         tell: &mut dyn FnMut(KeepOff),
     ) {
@@ -295,7 +352,7 @@ impl Contact {
         let wide_m = apart_m + field.map_or(0.0, |field| field.stray_m);
         let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
         let column = |from: Point, nature: Nature| {
-            let to = from - Point::new(0.0, 0.0, COLUMN_M);
+            let to = from - Point::new(0.0, 0.0, self.deep_m(&from));
             KeepOff { from, to, radius_m: apart_m + VAGUE_M, nature }
         };
         if self.tells(GROUNDED) && self.tells(OUT) && self.is_vague() {
@@ -316,15 +373,24 @@ impl Contact {
             }
             let down = !self.heard_within(now, field.map_or(DOWN, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.floor_m.is_nan()) {
+                // No lane and no layer comes as low: as thin as it lies, and below that at corners alone.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
-                return self.stretch(&mut |at| {
-                    let from = low(at, self.lies_at_most_m(field, &at));
-                    tell(KeepOff { from, to: low(at, self.floor_m), ..place(apart_m + VAGUE_M) });
+                let high = |at: Point| low(at, self.lies_at_most_m(field, &at));
+                return self.legs(upto_m, &mut |[at, next], [leg_m, flown_m]| {
+                    let next = if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
+                    let (from, lies) = (high(next), place(apart_m + VAGUE_M));
+                    tell(KeepOff { from, to: high(at), ..lies });
+                    if from.z > self.floor_m {
+                        tell(KeepOff { from, to: low(next, self.floor_m), ..lies });
+                    }
                 });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
-            let radius_m = apart_m + if field.is_some() { VAGUE_M } else { UNHEARD_BESIDE_M };
-            self.stretch(&mut |at| tell(KeepOff { radius_m, ..column(at, nature) }));
+            let beside_m = if field.is_some() { VAGUE_M } else { UNHEARD_BESIDE_M };
+            self.stretch(upto_m, &mut |at, wider_m| {
+                let radius_m = libm::hypotf(apart_m + beside_m, wider_m);
+                tell(KeepOff { radius_m, ..column(at, nature) });
+            });
         } else {
             if self.lands(now) {
                 tell(column(here, Nature::Solid));

@@ -62,7 +62,7 @@ impl Contact {
             speed_mps: self.speed_mps,
             age_s: 0.0,
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.late.delay_s },
-            points: &self.points,
+            points: self.near(),
             joint: self.joint,
             extent_m: self.extent_m,
             rests_within_m: 0.0,
@@ -100,7 +100,8 @@ impl Contact {
             let age_s = if reach.deaf { silent_s } else { age.secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
-        if reach.lands || (dead && !lies) {
+        let flies_on = self.leased && !(reach.on_plan && self.on_plan());
+        if reach.lands || (dead && !lies) || (flies_on && !dead) {
             reaches(self.stretch_m() + self.joint.more_m() + OFF_M);
         }
         if reach.lands || self.climbs_to().is_some() {
@@ -110,10 +111,24 @@ impl Contact {
         let told = self.belongs_at.is_some_and(|at| now - at <= FRESHLY);
         if let Some(first) = self.points.first().filter(|_| told) {
             away_sq = away_sq.min((first - reach.place).xy().norm_squared());
-            reaches(self.extent_m);
+            reaches(if self.leased { self.stretch_m() } else { self.extent_m });
         }
         most_m += reach.within_m;
         away_sq >= most_m * most_m
+    }
+
+    /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its points, and is no ball.
+    pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut Heard<'a>, bounds: &Bounds) {
+        let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
+        let follows = self.leased && !heard.points.is_empty() && matches!(self.joint, Joint::On { .. });
+        if !follows || heard.age_s <= stopped_s || heard.grounded {
+            return;
+        }
+        let fastest_mps = libm::fmaxf(bounds.speed_max_mps, heard.speed_mps);
+        let flown_m = fastest_mps * (heard.age_s + heard.delay_s) + bounds.braking.stop_m(fastest_mps);
+        (heard.age_s, heard.delay_s, heard.speed_mps) = (0.0, 0.0, 0.0);
+        (heard.points, heard.joint, heard.extent_m) = (&self.points, self.joint, f32::INFINITY);
+        heard.rests_within_m = libm::fminf(flown_m, self.stretch_m());
     }
 
     /// Greatest distance of the vehicle from where it stopped unheard, metres.
@@ -205,9 +220,13 @@ impl<const V: usize> Neighbours<V> {
                 (true, _) => 0.0,
                 _ => contact.late.delay_s,
             },
-            points: if top.is_some() || lies { &[] } else { &contact.points },
+            points: match dead {
+                _ if top.is_some() || lies => &[],
+                true => &contact.points,
+                false => contact.near(),
+            },
             joint: if moved { Joint::Unknown } else { contact.joint },
-            extent_m: contact.extent_m,
+            extent_m: if dead && contact.leased { contact.stretch_m() } else { contact.extent_m },
             rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
             column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),

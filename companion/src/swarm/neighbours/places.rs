@@ -4,8 +4,7 @@ use planner_core::Point;
 use planner_core::detour::{KeepOff, Nature};
 
 use super::contact::{Contact, Field};
-use super::{Neighbours, SKY_M, VAGUE_M};
-use crate::link::intent::{GROUNDED, LANDED};
+use super::{LANDS_UNHEARD, Neighbours, SKY_M, STRETCH_STEP_M, VAGUE_M};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -20,13 +19,21 @@ impl<const V: usize> Neighbours<V> {
         self.fleet.is_some().then_some(Field { ground: self.ground, down: self.down, stray_m: self.stray_m })
     }
 
+    /// Distance along its points that a contact may have come unheard, metres. A vehicle that hears nobody has lost its own radio
+    /// rather: the others fly on, nobody knows where.
+    fn upto_m(&self, contact: &Contact, now: Instant) -> f32 {
+        let lands = !contact.heard_within(now, LANDS_UNHEARD);
+        let far = lands && contact.may_fly_on(now) && !self.is_deaf(now);
+        if far { contact.stretch_m() } else { contact.stops_m() }
+    }
+
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
     pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
-            contact.obstacles(now, apart_m, self.field(), &mut tell);
+            contact.obstacles(now, [apart_m, self.upto_m(contact, now)], self.field(), &mut tell);
         }
     }
 
@@ -47,7 +54,7 @@ impl<const V: usize> Neighbours<V> {
         let placed = self.contacts[..self.roster].iter().filter(|c| c.position_at.is_some());
         placed.for_each(|c| {
             let far_m = if c.lies(now, self.down) { lying_m } else { apart_m };
-            c.obstacles(now, far_m, self.field(), &mut tell);
+            c.obstacles(now, [far_m, self.upto_m(c, now)], self.field(), &mut tell);
         });
     }
 
@@ -60,17 +67,27 @@ impl<const V: usize> Neighbours<V> {
     pub fn landing_column(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         let landing = |c: &&Contact| c.position_at.is_some() && c.comes_down(now);
         if let Some(contact) = self.contacts.get(i).filter(landing) {
-            contact.columns(now, apart_m, &mut tell);
+            contact.columns(now, [apart_m, self.upto_m(contact, now)], &mut tell);
         }
     }
 
     /// Zones in which a landing would end within `apart_m` of a vehicle that is there: a path may
-    /// lead over them, and not end there.
-    pub fn lands_on(&self, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
+    /// lead over them, and not end there. Over an area a silent one may come down anywhere on its way, or at
+    /// its pad: that bars places at `height_m`.
+    pub fn lands_on(&self, now: Instant, [apart_m, height_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
+            let mut zone = |from: Point, to: Point, radius_m: f32| {
+                tell(KeepOff { from, to, radius_m, nature: Nature::Landing })
+            };
             let from = contact.state.position;
-            let to = from + Point::new(0.0, 0.0, SKY_M);
-            tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Landing });
+            zone(from, from + Point::new(0.0, 0.0, SKY_M), apart_m);
+            if contact.may_fly_on(now) {
+                // A place to land at is sought at one height, and as far away as the landing keeps.
+                let level = |at: Point| Point::new(at.x, at.y, height_m);
+                let mut bar = |a: Point, b: Point| zone(level(a), level(b), apart_m + self.stray_m);
+                contact.legs(contact.stretch_m(), &mut |[at, next], _| bar(at, next));
+                contact.pad.into_iter().for_each(|pad| bar(pad, pad));
+            }
         }
     }
 
@@ -87,17 +104,19 @@ impl<const V: usize> Neighbours<V> {
     /// Whether contact `i`, unheard in flight, may have come down within `apart_m` of the column from `place` down to the
     /// ground at `floor_m`: from where it may have come along its path it comes down, never up.
     pub(crate) fn may_lie_below(&self, i: usize, place: &Point, floor_m: f32, apart_m: f32) -> bool {
-        let Some(contact) = self.contacts.get(i).filter(|c| !c.tells(GROUNDED | LANDED)) else {
-            return false;
-        };
-        let (mut below, mut from) = (false, contact.state.position);
+        let Some(contact) = self.contacts.get(i).filter(|c| c.is_under_way()) else { return false };
+        let mut below = false;
         let mut near = |a: Point, b: Point| {
             let (leg, away) = ((b - a).xy(), (place - a).xy());
             let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
             let high_m = libm::fmaxf(a.z, b.z);
             below |= (away - leg * share).norm_squared() < apart_m * apart_m && high_m > floor_m - apart_m;
         };
-        contact.stretch(&mut |at| near(core::mem::replace(&mut from, at), at));
+        contact.legs(contact.stretch_m(), &mut |[at, next], [leg_m, flown_m]| {
+            // Elsewhere than over an area to the last of the places that a reroute keeps off.
+            let share = libm::floorf(flown_m / STRETCH_STEP_M) * STRETCH_STEP_M / leg_m;
+            near(at, if flown_m < leg_m { at + (next - at) * share } else { next });
+        });
         below
     }
 
@@ -107,3 +126,6 @@ impl<const V: usize> Neighbours<V> {
         self.contacts.iter().any(|c| c.position_at.is_some() && under(&c.state.position))
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -6,14 +6,14 @@ use rand_pcg::Pcg32;
 
 use super::*;
 
-const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 600.0 };
+pub(super) const ORIGIN: Geodetic = Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 600.0 };
 
 fn table() -> Neighbours<4> {
     let entry = |system_id| RosterEntry { system_id, start: Point::zeros() };
     Neighbours::new(&[entry(3), entry(5), entry(9)], 5, 2.0)
 }
 
-fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
+pub(super) fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
     GLOBAL_POSITION_INT_DATA {
         time_boot_ms: boot_ms,
         lat: 400_000_000 + north_1e7,
@@ -26,7 +26,7 @@ fn place(boot_ms: u32, north_1e7: i32) -> GLOBAL_POSITION_INT_DATA {
     }
 }
 
-fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
+pub(super) fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
     Intent {
         system_id: 9,
         flags,
@@ -40,7 +40,7 @@ fn intent(flags: u8, mission_crc: u32, plan_crc: u32) -> Intent {
 }
 
 /// The same with vehicles 3 and 9 heard of mission 1 at `at_ms`.
-fn joined(at_ms: u64) -> Neighbours<4> {
+pub(super) fn joined(at_ms: u64) -> Neighbours<4> {
     let mut table = table();
     for system_id in [3, 9] {
         let told = Intent { system_id, heard: 0, ..intent(0, 1, 2) };
@@ -269,7 +269,7 @@ fn deaf_is_who_hears_none_of_those_there_are() {
 }
 
 /// A number from low to high.
-fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
+pub(super) fn uniform(rng: &mut Pcg32, low: f32, high: f32) -> f32 {
     low + (high - low) * (rng.next_u32() >> 8) as f32 / 16_777_216.0
 }
 
@@ -296,9 +296,14 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
         let from = contact.state.position + near(rng, beside_m);
         contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
+        contact.leased = rng.next_u32().is_multiple_of(2);
+        contact.beyond = (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
         let first = contact.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
-        contact.extent_m = contact.points.iter().map(extent_m).fold(0.0, f32::max);
+        contact.extent_m = contact.near().iter().map(extent_m).fold(0.0, f32::max);
+        if contact.leased {
+            contact.join();
+        }
         let now = Instant::from_millis(200_000);
         let ages_ms = [100, 900, 1500, 5000, 46_000, 80_000];
         let age = |rng: &mut Pcg32| {
@@ -334,6 +339,10 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         if lands && silent {
             (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
             met.heard.rests_within_m = 0.0;
+        }
+        let by_gates = met.on_plan && reach.on_plan;
+        if !(lands || by_gates || met.lost || reach.deaf) {
+            table.contacts[1].follow_unheard(&mut met.heard, &bounds);
         }
         let ahead_s = if met.stands { 0.0 } else { reach.ahead_s };
         let reach_m = reach.within_m + met.heard.reach_m(&bounds, ahead_s);

@@ -1,0 +1,46 @@
+//! A vehicle that nobody hears any more over an area is found where it last said that it may be.
+
+use super::State::*;
+use super::divisions::over_a_field;
+use super::*;
+use crate::link::intent::Intent;
+
+/// Distance of a place from the way that an intent reports, seen from above, metres.
+fn beside_m(intent: &Intent, from: &Point, place: &Point) -> f32 {
+    let legs = core::iter::once(from).chain(&intent.points).zip(&intent.points);
+    legs.fold((from - place).xy().norm(), |least, (a, b)| {
+        let (leg, away) = ((b - a).xy(), (place - a).xy());
+        let share = (away.dot(&leg) / leg.norm_squared().max(1e-6)).clamp(0.0, 1.0);
+        least.min((away - leg * share).norm())
+    })
+}
+
+/// Whenever its radio fails, in its climb too, it is on the way of its last intent until it stands, and that is no longer than it flies.
+#[test]
+fn an_unheard_vehicle_stays_on_the_way_that_it_reported_last() {
+    let (mut furthest_m, mut beyond) = (0.0_f32, 0);
+    for px4 in [true, false] {
+        for tenths in (2..280).step_by(13) {
+            let mut bench = over_a_field(px4);
+            bench.start();
+            while !matches!(bench.state(), TakeOff | Climb | Follow) {
+                bench.run(0.1);
+            }
+            bench.run(tenths as f32 * 0.1);
+            let told = bench.swarm.iter().rev().find_map(|f| Intent::decode(f.padded(), SYSTEM));
+            let (told, from) = (told.expect("five a second"), bench.enu);
+            bench.neighbour = None;
+            beyond += usize::from(told.beyond > 0);
+            for _ in 0..500 {
+                bench.run(0.1);
+                if !matches!(bench.state(), TakeOff | Climb | Follow) {
+                    break;
+                }
+                let off_m = beside_m(&told, &from, &bench.enu);
+                assert!(off_m < 1.0, "{off_m} m off, {tenths}: {told:?} from {from:?}, {:?}", bench.enu);
+                furthest_m = furthest_m.max((bench.enu - from).norm());
+            }
+        }
+    }
+    assert!(furthest_m > 8.0 && beyond > 4, "{furthest_m} m, {beyond}");
+}

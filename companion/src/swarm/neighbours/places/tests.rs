@@ -1,0 +1,66 @@
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::super::tests::{ORIGIN, intent, joined, place, uniform};
+use super::*;
+use crate::link::intent::{Intent, POINTS};
+
+/// Whatever way a vehicle reports over an area: wherever on it it is after it fell silent, nobody lands below, and no place below
+/// is taken for free.
+#[test]
+fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
+    let mut rng = Pcg32::seed_from_u64(14);
+    let apart_m = 2.0;
+    let (mut far, mut near) = (0, 0);
+    for _ in 0..2000 {
+        let mut table = joined(0);
+        table.form_fleet(90.0, None, 1.0);
+        // The other one, by which the own vehicle knows that it hears.
+        let heard = Intent { system_id: 3, ..intent(0, 1, 2) };
+        table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 40_000));
+        let from = table.contacts[1].state.position;
+        let mut at = from;
+        let count = 2 + rng.next_u32() % 7;
+        let points: heapless::Vec<Point, POINTS> = (0..count)
+            .map(|_| {
+                at += Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
+                at
+            })
+            .collect();
+        let beyond = (rng.next_u32() % count) as u8;
+        let told = Intent { points: points.clone(), beyond, floor_m: 0.0, ..intent(0, 1, 2) };
+        table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
+        let leg = rng.next_u32() as usize % points.len();
+        let before = if leg == 0 { from } else { points[leg - 1] };
+        let truly = before + (points[leg] - before) * uniform(&mut rng, 0.0, 1.0);
+        let silent_s = uniform(&mut rng, 3.1, 60.0);
+        let now = Instant::from_millis((1000.0 * silent_s) as u64);
+        table.handle_intent(now, 1, &heard, 1, Some(2));
+        let beside = Point::new(uniform(&mut rng, -1.0, 1.0), uniform(&mut rng, -1.0, 1.0), 0.0);
+        let here = truly + beside.normalize() * (0.95 * apart_m);
+        assert!(table.may_lie_below(1, &here, 0.0, apart_m), "{points:?}, {here:?}");
+        for up_m in [-10.0, 10.0] {
+            let (mut ends, mut columns) = (false, false);
+            let place = here + Point::new(0.0, 0.0, up_m);
+            table.lands_on(now, [apart_m, place.z], |off| ends |= off.holds(&place));
+            let low = place - Point::new(0.0, 0.0, 20.0);
+            table.landing_column(1, now, apart_m, |off| columns |= off.holds(&low));
+            table.obstacle(1, now, apart_m, |off| columns |= off.holds(&low));
+            assert!(
+                ends && (columns || silent_s < 40.0),
+                "{silent_s} s, {points:?}, {here:?}: {ends} {columns}"
+            );
+        }
+        // What is far from all of the way is free.
+        let aside = from + Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
+        let legs = core::iter::once(&from).chain(&points).zip(&points);
+        let away_m = legs.fold(f32::INFINITY, |least, (a, b)| {
+            let share = ((aside - a).dot(&(b - a)) / (b - a).norm_squared()).clamp(0.0, 1.0);
+            least.min((a + (b - a) * share - aside).norm())
+        });
+        let free = !table.may_lie_below(1, &aside, 0.0, apart_m);
+        assert_eq!(free, away_m >= apart_m, "{away_m}");
+        *(if free { &mut far } else { &mut near }) += 1;
+    }
+    assert!(far > 1000 && near > 10, "{far} {near}");
+}
