@@ -40,6 +40,11 @@ pub enum Event {
         /// Whether the row is a warning: the mission leaves its usual course.
         warning: bool,
     },
+    /// It is back on its path over a field, and leaves out so many waypoints that it flew around: the next start flies them.
+    FlownAround {
+        /// Number of waypoints.
+        left: u32,
+    },
     /// The mission waits for a vehicle that has not started.
     WaitsForStart {
         /// The command's MAVLink system id.

@@ -198,7 +198,7 @@ impl Shell {
                         }
                     }
                     // The event's text is reported already.
-                    Event::StateChanged { .. } | Event::WaitsForStart { .. } => {}
+                    Event::StateChanged { .. } | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
                 }
             }
             if companion.streams() {

@@ -120,3 +120,47 @@ fn what_an_interrupted_mission_left_is_photographed_after_the_next_start() {
     );
     assert_eq!(all.iter().filter(wrong).count(), 0);
 }
+
+/// A pilot takes a vehicle, which hovers, and others fly around it: whether they left waypoints out, and what is wrong after the
+/// next start, which is to fly those and no more.
+fn around(seed: u64) -> (bool, Option<String>) {
+    let mut random = Pcg32::seed_from_u64(seed);
+    let count = [3, 5][(seed % 2) as usize];
+    // By a good estimate: what is left out is judged by true places.
+    let text = areas::lost(&mut random, count, 0.1).replace("\"recorded\"", "\"rtk\"");
+    let (vehicle, at_s) = (1 + random.next_u32() % count as u32, 60 + random.next_u32() % 150);
+    let struck =
+        format!("{text}[[faults]]\nat_s = {at_s}.0\nkind = \"pilot-takeover\"\nvehicle = {vehicle}\n");
+    let dir = tempfile::tempdir().expect("a directory");
+    let mut pictures = Vec::new();
+    let Ok((result, log)) = fly(&struck, dir.path(), &mut pictures) else { return (false, None) };
+    let left = result.coverage.expect("it has an area").left;
+    let around = |line: &str| line.split_once("Flown around: ")?.1.split(' ').next()?.parse::<usize>().ok();
+    let reported: usize = log.lines().filter_map(around).sum();
+    if left == 0 || !log.contains("Replanning → Follow: Flying around") {
+        return (false, None);
+    }
+    let first = pictures.len();
+    let (result, then) = fly(&text, dir.path(), &mut pictures).expect("it was flown before");
+    let (coverage, second) = (result.coverage.expect("it has an area"), pictures.len() - first);
+    // A new start of an area that counts as whole would fly all of it.
+    let wrong = coverage.covered_share < 1.0 || second < reported || 2 * second > first;
+    let said = || {
+        let after = format!("{left} left, then {} of {:.2} %", coverage.left, 100.0 * coverage.covered_share);
+        format!(
+            "seed {seed}: {first} pictures, {reported} reported, {after}, {second} pictures\n{log}\n{then}"
+        )
+    };
+    (true, wrong.then(said))
+}
+
+#[test]
+fn what_was_flown_around_is_photographed_after_the_next_start() {
+    let (from, count) = (number("FLOCKMATE_RESUMED_FROM", 0), number("FLOCKMATE_AROUND", 12));
+    let all: Vec<_> = (from..from + count).into_par_iter().map(around).collect();
+    let left = all.iter().filter(|(left, _)| *left).count();
+    let wrong: Vec<_> = all.iter().filter_map(|(_, wrong)| wrong.as_ref()).collect();
+    wrong.iter().for_each(|wrong| println!("{wrong}"));
+    println!("{left} of {count} left waypoints out that they flew around, {} wrong", wrong.len());
+    assert!(wrong.is_empty() && left > 0, "{left} of {count}");
+}

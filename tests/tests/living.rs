@@ -108,7 +108,7 @@ impl Pair {
         }
         while let Some(event) = self.companion.poll_event() {
             match event {
-                Event::RestartRequested | Event::WaitsForStart { .. } => {}
+                Event::RestartRequested | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
                 Event::PlanRequested(wanted) => self.companion.handle_plan(self.now(), wanted, Ok(&plan())),
                 Event::StateChanged { to, .. } => self.states.push((self.now_us, to)),
             }

@@ -206,7 +206,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let back = plan.path.point_at(back_m);
         let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).norm() < THERE_M);
         if meets {
-            self.mission.take_up(plan);
+            let left = self.mission.take_up(plan, self.detours.left_at_m(), back_m);
+            if left > 0 {
+                self.links.say_count(true, "Flown around: # waypoints are left", [left, 0]);
+                // Full only if the shell does not drain.
+                let _ = self.events.push_back(Event::FlownAround { left });
+            }
             self.neighbours.forget_avoided();
             self.guidance.begin_path_at(back_m, self.now);
         }

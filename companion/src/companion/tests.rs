@@ -31,7 +31,10 @@ pub(super) fn assert_no_gap(bench: &Bench) {
 fn states(bench: &Bench) -> Vec<State> {
     let to = |e: &Event| match e {
         Event::StateChanged { to, .. } => Some(*to),
-        Event::PlanRequested(_) | Event::RestartRequested | Event::WaitsForStart { .. } => None,
+        Event::PlanRequested(_)
+        | Event::RestartRequested
+        | Event::WaitsForStart { .. }
+        | Event::FlownAround { .. } => None,
     };
     bench.events.iter().filter_map(to).collect()
 }

@@ -2,7 +2,7 @@
 
 use planner_core::Point;
 use planner_core::detour::Goal;
-use planner_core::flight::{Path, Task, VehiclePlan};
+use planner_core::flight::{Path, Range, Task, VehiclePlan};
 
 use crate::autopilot::telemetry::Ack;
 use crate::config::PlanFailure;
@@ -16,6 +16,9 @@ use crate::time::{Duration, Instant};
 
 /// Greatest distance between the begin of a path and the vehicle, metres.
 const BEGINS_M: f32 = 0.1;
+/// A picture no further than this before the place where the vehicle comes back to its path is
+/// taken there, metres.
+const TAKEN_M: f32 = 0.05;
 
 /// One vehicle's mission: at most `W` waypoints and `G` gates.
 #[derive(Clone, Debug)]
@@ -35,6 +38,8 @@ pub(crate) struct Mission<const W: usize, const G: usize> {
     plan: Option<VehiclePlan<W, G>>,
     /// Whether all pictures of its part were taken before it left the path of its plan, if it has.
     left_with_all: Option<bool>,
+    /// Pictures of its path up to where it last came back from a way around: those taken before that were noted when it left.
+    flown_around: u32,
     /// Place where the plan ends, the height in which the plan leads there, and the descent,
     /// metres.
     home: (Point, f32, f32),
@@ -66,6 +71,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
             start,
             plan: None,
             left_with_all: None,
+            flown_around: 0,
             home: (start, start.z, 0.0),
             failure: None,
             vague_since: None,
@@ -219,7 +225,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
 
     fn fly(&mut self, plan: &VehiclePlan<W, G>) {
         self.plan = Some(plan.clone());
-        self.left_with_all = None;
+        (self.left_with_all, self.flown_around) = (None, 0);
         if let [.., down, over] = plan.path.waypoints() {
             self.home = (over.position, down.position.z, plan.descent_m);
         }
@@ -312,8 +318,9 @@ impl<const W: usize, const G: usize> Mission<W, G> {
     pub(crate) fn note_photographed(&mut self, along_m: f32) {
         let Some(plan) = &self.plan else { return };
         if let Task::Photograph(photographs) = &plan.task {
-            let count = photographs.passed_by(&plan.path, along_m);
-            self.photographed.note(photographs, &plan.path, count);
+            let end = photographs.passed_by(&plan.path, along_m);
+            let pictures = Range { first: self.flown_around, end };
+            self.photographed.note(photographs, &plan.path, pictures);
         }
     }
 
@@ -368,9 +375,15 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         }
     }
 
-    /// Flies along its own path again, as it was planned.
-    pub(crate) fn take_up(&mut self, plan: &VehiclePlan<W, G>) {
+    /// Flies along its own path again, as it was planned, from `back_m` metres along it; it left that at `left_m`. Returns the
+    /// number of pictures between, which do not count as taken: they show another place.
+    pub(crate) fn take_up(&mut self, plan: &VehiclePlan<W, G>, left_m: f32, back_m: f32) -> u32 {
         self.fly(plan);
+        let Task::Photograph(photographs) = &plan.task else { return 0 };
+        let taken = |along_m: f32| photographs.taken_by(&plan.path, along_m);
+        // The one at the very place is taken.
+        self.flown_around = taken(back_m - TAKEN_M);
+        self.flown_around.saturating_sub(taken(left_m))
     }
 
     /// Flies back, as `turn` makes the path, from `along_m` metres along it. Off the shared plan: neighbours keep clear of it as of a

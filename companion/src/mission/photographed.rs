@@ -121,10 +121,15 @@ impl Photographed {
         self.known.clear();
     }
 
-    /// Notes the first `count` pictures of the path.
-    pub(crate) fn note<const W: usize>(&mut self, photographs: &Photographs, path: &Path<W>, count: u32) {
+    /// Notes these pictures of the path.
+    pub(crate) fn note<const W: usize>(
+        &mut self,
+        photographs: &Photographs,
+        path: &Path<W>,
+        pictures: Range,
+    ) {
         // A waypoint that does not fit is photographed again.
-        photographs.first(path, count).for_each(|range| _ = self.known.insert(range));
+        photographs.shown(path, pictures).for_each(|range| _ = self.known.insert(range));
     }
 
     /// Takes in what another one knows. `waits`: this one stands on the ground, and is to plan as others do.

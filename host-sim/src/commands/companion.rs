@@ -111,6 +111,9 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 Event::WaitsForStart { id } => {
                     say!("{:9.3} s  waiting for vehicle {id}: not started", began.elapsed().as_secs_f32());
                 }
+                Event::FlownAround { left } => {
+                    say!("{:9.3} s  flown around: {left} waypoints are left", began.elapsed().as_secs_f32());
+                }
                 Event::PlanRequested(wanted) => {
                     let mut own = mission.answer(&plan, index, wanted, &companion);
                     if let (Ok(own), None) = (&mut own, &args.swarm) {

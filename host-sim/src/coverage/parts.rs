@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use companion::swarm::fleet::Lot;
 use planner_core::Point;
-use planner_core::flight::{Flight as PathFlight, Task};
+use planner_core::flight::{Flight as PathFlight, Range, Task};
 
 use super::Flight;
 use super::Planned;
@@ -115,7 +115,7 @@ fn owners(flights: &[PathFlight<WAYPOINTS>]) -> Owners {
     let mut owners = Owners::new();
     for flight in flights {
         let Task::Photograph(photographs) = &flight.task else { continue };
-        for range in photographs.first(&flight.path, u32::MAX) {
+        for range in photographs.shown(&flight.path, Range { first: 0, end: u32::MAX }) {
             owners.extend((range.first..range.end).map(|number| (number, flight.id)));
         }
     }

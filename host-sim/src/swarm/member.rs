@@ -299,6 +299,11 @@ impl Member {
                 Event::RestartRequested => restarts = true,
                 // The companion also sends it as STATUSTEXT.
                 Event::WaitsForStart { .. } => {}
+                Event::FlownAround { left } => {
+                    let text = format!("Flown around: {left} waypoints are left");
+                    let (t_s, vehicle) = ((now_us as f64 * 1e-6) as f32, Some(self.system_id()));
+                    log.push(report::Event { t_s, vehicle, level: Level::Info, text });
+                }
                 Event::StateChanged { from, to, text, warning } => {
                     self.note(from, to, text, warning);
                     log.push(self.entry(now_us, from, to, text));

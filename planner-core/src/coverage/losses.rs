@@ -185,7 +185,7 @@ fn note_done<const L: usize, const K: usize, const V: usize, const W: usize>(
         let taken = photographs.taken_by(&flight.path, fate.along_m);
         let sure = fate.lives || fate.along_m.is_infinite();
         let count = if sure { taken } else { taken.saturating_sub(1) };
-        for range in photographs.first(&flight.path, count) {
+        for range in photographs.shown(&flight.path, Range { first: 0, end: count }) {
             ws.done.insert(range).map_err(|_| CoverageError::LanesFull)?;
         }
     }

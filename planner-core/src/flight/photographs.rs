@@ -225,15 +225,16 @@ impl Photographs {
         self.stretches(path).filter_map(last).last()
     }
 
-    /// The waypoints of the area that the first `count` pictures show.
-    pub fn first<const W: usize>(&self, path: &Path<W>, count: u32) -> impl Iterator<Item = Range> {
-        let (mut left, backward) = (count, self.backward);
-        self.stretches(path).zip(self.numbers).map_while(move |(shots, number)| {
-            let taken = shots.count.min(left);
-            left -= taken;
-            let number = u32::from(number);
-            let first = if backward { number.saturating_add(shots.count - taken) } else { number };
-            (taken > 0).then(|| Range { first, end: first.saturating_add(taken) })
+    /// The waypoints of the area that these pictures show, counted along the path.
+    pub fn shown<const W: usize>(&self, path: &Path<W>, pictures: Range) -> impl Iterator<Item = Range> {
+        let (mut before, backward) = (0u32, self.backward);
+        self.stretches(path).zip(self.numbers).filter_map(move |(shots, number)| {
+            let within = |picture: u32| picture.saturating_sub(before).min(shots.count);
+            let (from, to) = (within(pictures.first), within(pictures.end));
+            before = before.saturating_add(shots.count);
+            let skipped = if backward { shots.count - to } else { from };
+            let first = u32::from(number).saturating_add(skipped);
+            (from < to).then(|| Range { first, end: first.saturating_add(to - from) })
         })
     }
 
@@ -318,14 +319,24 @@ mod tests {
             let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance).of_area(50, backward);
             mark_three(&mut photographs);
             let path = path();
-            let numbers = |count| -> std::vec::Vec<_> {
-                photographs.first(&path, count).map(|range| (range.first, range.end)).collect()
+            let shown = |first, end| -> std::vec::Vec<_> {
+                let pictures = Range { first, end };
+                photographs.shown(&path, pictures).map(|range| (range.first, range.end)).collect()
             };
+            let numbers = |count| shown(0, count);
             assert_eq!(numbers(0), []);
             assert_eq!(numbers(5), [(7, 12)]);
             assert_eq!(numbers(8), [(7, 12), part]);
             assert_eq!(numbers(11), [(7, 12), whole, (40, 41)]);
             assert_eq!(numbers(99), numbers(11));
+            // Whatever pictures are asked for, they show what fewer of them do not, each waypoint once.
+            for (first, end) in (0..13).flat_map(|first| (0..13).map(move |end| (first, end))) {
+                let all = |ranges: std::vec::Vec<(u32, u32)>| -> std::collections::BTreeSet<u32> {
+                    ranges.into_iter().flat_map(|(first, end)| first..end).collect()
+                };
+                let (upto, before) = (all(numbers(end)), all(numbers(first)));
+                assert_eq!(all(shown(first, end)), &upto - &before, "{first}..{end}");
+            }
         }
     }
 

@@ -252,7 +252,7 @@ impl<'a> World<'a> {
                     self.members[i].blocked += u32::from((from, to) == (State::Follow, State::Blocked));
                     self.say(i, &format!("{from:?} → {to:?} {text}"));
                 }
-                Event::RestartRequested | Event::WaitsForStart { .. } => {}
+                Event::RestartRequested | Event::WaitsForStart { .. } | Event::FlownAround { .. } => {}
             }
         }
     }

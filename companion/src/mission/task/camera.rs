@@ -66,6 +66,8 @@ pub(super) struct Camera {
     picture: u32,
     /// Beside its path: where the next one is taken, metres along that way.
     beside_m: f32,
+    /// Whether it is beside its path.
+    beside: bool,
     /// Whether the autopilot was commanded to trigger by distance.
     on: bool,
     orders: Deque<Order, ORDERS>,
@@ -87,11 +89,14 @@ impl Camera {
         links: &mut Links,
     ) {
         if photographs.trigger != Trigger::None {
-            if along.place != Place::Beside {
+            let beside = along.place == Place::Beside;
+            if core::mem::replace(&mut self.beside, beside) != beside {
+                // Pictures begin again where it leaves its path, and where it comes back: neither place may lie between two.
                 self.beside_m = 0.0;
+                self.switch_off();
             }
             match photographs.stretches(path).nth(self.stretch) {
-                _ if along.place == Place::Beside => self.go_around(photographs, along.progress_m),
+                _ if beside => self.go_around(photographs, along.progress_m),
                 Some(shots) if along.place == Place::OnPath => {
                     self.photograph(photographs.trigger, &shots, along.progress_m);
                 }

@@ -77,7 +77,7 @@ impl<const V: usize> Neighbours<V> {
     pub fn lands_on(&self, now: Instant, [apart_m, height_m]: [f32; 2], mut tell: impl FnMut(KeepOff)) {
         for contact in self.contacts.iter().filter(|c| c.position_at.is_some()) {
             let mut zone = |from: Point, to: Point, radius_m: f32| {
-                tell(KeepOff { from, to, radius_m, nature: Nature::Landing })
+                tell(KeepOff { from, to, radius_m, nature: Nature::Landing });
             };
             let from = contact.state.position;
             zone(from, from + Point::new(0.0, 0.0, SKY_M), apart_m);
