@@ -47,7 +47,7 @@ pub(super) const STRETCH_STEP_M: f32 = 1.0;
 /// `Alone` waits. Nobody leaves the plan for that before.
 pub(super) const LANDS_UNHEARD: Duration = Duration::from_secs(40);
 /// Rounding of the length of a way of eight legs, metres.
-pub(super) const ROUNDING_M: f32 = 0.01;
+pub(super) const LEGS_ROUNDING_M: f32 = 0.01;
 /// Most spacings of the places on the unheard stretch over an area, where it is as long as the lease allows: with eight corners
 /// a neighbour makes 17 keep-out zones.
 pub(super) const STRETCH_PLACES: f32 = 8.0;

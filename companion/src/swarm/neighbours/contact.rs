@@ -270,7 +270,7 @@ impl Contact {
             way_m += libm::sqrtf((next - core::mem::replace(&mut at, *next)).norm_squared());
         }
         // Rounding does not take away the last corner.
-        libm::fmaxf(way_m + ROUNDING_M, self.stops_m())
+        libm::fmaxf(way_m + LEGS_ROUNDING_M, self.stops_m())
     }
 
     /// The stretch of a vehicle that stops where it notices that nobody hears it, metres.

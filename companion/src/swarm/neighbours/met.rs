@@ -117,6 +117,15 @@ impl Contact {
         away_sq >= most_m * most_m
     }
 
+    /// Points that it may have flown along, all of them once it is dead, and no less than the distance to which they lead, metres.
+    fn leads(&self, dead: bool) -> (&[Point], f32) {
+        match dead {
+            true if self.leased => (&self.points, self.stretch_m()),
+            true => (&self.points, self.extent_m),
+            false => (self.near(), self.extent_m),
+        }
+    }
+
     /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its points, and is no ball.
     pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut Heard<'a>, bounds: &Bounds) {
         let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
@@ -220,13 +229,9 @@ impl<const V: usize> Neighbours<V> {
                 (true, _) => 0.0,
                 _ => contact.late.delay_s,
             },
-            points: match dead {
-                _ if top.is_some() || lies => &[],
-                true => &contact.points,
-                false => contact.near(),
-            },
+            points: if top.is_some() || lies { &[] } else { contact.leads(dead).0 },
             joint: if moved { Joint::Unknown } else { contact.joint },
-            extent_m: if dead && contact.leased { contact.stretch_m() } else { contact.extent_m },
+            extent_m: contact.leads(dead).1,
             rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
             column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
