@@ -6,12 +6,12 @@ use std::{env, fs};
 
 /// Checks that the linker makes last, when all is placed. The guard is `GUARD_LEN` of
 /// `boards/mod.rs`; emulated UARTs have 10 kB in `.data`.
-const CHECKS: &str = r#"
+const LINKER_CHECKS: &str = r#"
 ASSERT(__e_shell <= _stack_end - 4K, "the companion reaches into the stack's guard");
 ASSERT(SIZEOF(.data) <= 16K, "what is large has a first value that is not all zeros");
 "#;
 /// Linker sections of the firmware for the chip, which is one program.
-const PARTS: &str = r#"
+const CHIP_SECTIONS: &str = r#"
 ASSERT(SIZEOF(.shell) > 0 && SIZEOF(.swarm_plan) > 0 && SIZEOF(.own_plan) > 0 && SIZEOF(.mission) > 0 && SIZEOF(.dma) > 0,
   "a part has lost its name, or its first value is not all zeros");
 "#;
@@ -24,11 +24,11 @@ fn main() {
     let manifest = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it"));
     let boards = manifest.join("src/boards");
     if chosen("QEMU") {
-        link(&boards.join("qemu/memory.x"), &[CHECKS]);
+        link(&boards.join("qemu/memory.x"), &[LINKER_CHECKS]);
         // Its interrupts are all in its own table; the chips' crates bring theirs.
         write("device.x", b"");
     } else if chosen("NUCLEO_H743") {
-        link(&manifest.join("../memory.x"), &[CHECKS, PARTS]);
+        link(&manifest.join("../memory.x"), &[LINKER_CHECKS, CHIP_SECTIONS]);
     } else if chosen("PICO2") {
         link(&boards.join("pico2/memory.x"), &[]);
     }

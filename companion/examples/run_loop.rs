@@ -6,8 +6,8 @@
 //! `cargo run -p companion --example run_loop`
 
 use companion::config::PlanFailure;
-use companion::link::frame::{self, Header, MAX_SENT};
-use companion::{AUTOPILOT, Companion, Config, Event, Instant, Link, State};
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
+use companion::{AUTOPILOT_COMPONENT, Companion, Config, Event, Instant, Link, State};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot};
 use planner_core::Point;
 use planner_core::frames::Geodetic;
@@ -48,7 +48,7 @@ fn drain(companion: &mut Small, now: Instant) -> usize {
             companion.handle_plan(now, wanted, Err(PlanFailure::NoRoadmap));
         }
     }
-    let (mut sent, mut buffer) = (0, [0; MAX_SENT]);
+    let (mut sent, mut buffer) = (0, [0; MAX_FRAME_LEN]);
     for link in [Link::Autopilot, Link::Swarm] {
         while let length @ 1.. = companion.poll_transmit(link, &mut buffer) {
             // Here a shell writes `buffer[..length]` to the port.
@@ -61,8 +61,8 @@ fn drain(companion: &mut Small, now: Instant) -> usize {
 /// What the autopilot's port has received by this step: once a second the HEARTBEAT of a PX4.
 fn received(step: u64) -> Option<Vec<u8>> {
     let heartbeat = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
-    let header = Header { system: 1, component: AUTOPILOT, sequence: (step / 100) as u8 };
-    let mut bytes = vec![0; MAX_SENT];
+    let header = Header { system: 1, component: AUTOPILOT_COMPONENT, sequence: (step / 100) as u8 };
+    let mut bytes = vec![0; MAX_FRAME_LEN];
     let length = frame::encode(header, &heartbeat, &mut bytes);
     bytes.truncate(length);
     step.is_multiple_of(100).then_some(bytes)

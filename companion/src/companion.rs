@@ -36,21 +36,21 @@ const SETPOINT_EVERY: Duration = Duration::from_millis(50);
 /// Least time between two reports of a setpoint that is held, or of an EKF origin that is not used.
 const REPORT_EVERY: Duration = Duration::from_secs(5);
 /// Period of a step of the mission table on the ground.
-const IDLE_EVERY: Duration = Duration::from_millis(200);
+const IDLE_STEP_EVERY: Duration = Duration::from_millis(200);
 /// Period of the roster message of a coverage mission.
 const ROSTER_EVERY: Duration = Duration::from_millis(500);
 /// Period of the roster message while a division is under way.
-const ROSTER_DIVIDING: Duration = Duration::from_millis(200);
+const ROSTER_EVERY_DIVIDING: Duration = Duration::from_millis(200);
 /// Period of HEARTBEAT.
 pub(crate) const HEARTBEAT_EVERY: Duration = Duration::from_millis(1000);
 /// Range of the time without setpoints after which Guided stops (`GUID_TIMEOUT`), seconds: within
 /// it, the time in which cruise speed flies the margin. ArduCopter's own 3 s would fly the last
 /// velocity on through walls while a link stalls; the shortest are four setpoints.
-const GUID_TIMEOUT_S: (f32, f32) = (0.2, 0.5);
+const GUID_TIMEOUT_RANGE_S: (f32, f32) = (0.2, 0.5);
 /// Most rows of the mission table taken in one step; more would be a cycle in the table.
-const ROWS_AT_ONCE: usize = 4;
+const MAX_ROWS_PER_STEP: usize = 4;
 /// Most events that wait for the shell.
-const EVENTS: usize = 16;
+const MAX_EVENTS: usize = 16;
 
 /// The companion of one UAV: at most `V` vehicles in the swarm, `W` waypoints and `G` gates in its plan.
 #[derive(Clone, Debug)]
@@ -66,7 +66,7 @@ pub struct Companion<const V: usize, const W: usize, const G: usize> {
     pub(crate) mission: Mission<W, G>,
     pub(crate) guidance: Guidance,
     pub(crate) services: Services,
-    pub(crate) events: Deque<Event, EVENTS>,
+    pub(crate) events: Deque<Event, MAX_EVENTS>,
 }
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
@@ -215,7 +215,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.links.set_due(Link::Swarm, Fresh::Position, self.telemetry.position_at.is_some());
             self.links.set_due(Link::Swarm, Fresh::Intent, true);
             if let Some(fleet) = self.neighbours.fleet() {
-                let every = if fleet.is_dividing() { ROSTER_DIVIDING } else { ROSTER_EVERY };
+                let every = if fleet.is_dividing() { ROSTER_EVERY_DIVIDING } else { ROSTER_EVERY };
                 let due = self.timers.take(Timer::Roster, now, every);
                 self.links.set_due(Link::Swarm, Fresh::Roster, due);
             }
@@ -266,7 +266,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn situation(&self) -> Situation {
         let in_state = self.mission.in_state(self.now);
         let margin_m = self.config.required_clearance_m - self.config.radius_m;
-        let timeout_s = (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_S.0, GUID_TIMEOUT_S.1);
+        let timeout_s =
+            (margin_m / self.config.cruise_mps).clamp(GUID_TIMEOUT_RANGE_S.0, GUID_TIMEOUT_RANGE_S.1);
         let column_clear = self.guidance.filter.column_clear() && !self.guidance.leads();
         Situation {
             now: self.now,

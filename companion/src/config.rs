@@ -132,7 +132,7 @@ impl<const V: usize> Config<V> {
             required_clearance_m: 0.8,
             safety_distance_m: SAFETY_DISTANCE_M,
             method: Method::Priority,
-            estimate_m: margins::ESTIMATE_M,
+            estimate_m: margins::MIN_ESTIMATE_ERROR_M,
             radio_range_m: REACHES_ALL_M,
             start_tolerance_m: 2.0,
             battery_low_percent: 15,

@@ -56,7 +56,7 @@ const ARRIVED_M: f32 = 0.35;
 /// of a gate.
 const REPORTED_SHORT_M: f32 = planner_core::flight::PROGRESS_ERROR_M - 0.05;
 /// A vehicle slower than this stands at the end of the path, m/s.
-const RESTS_MPS: f32 = 0.5;
+const AT_REST_MPS: f32 = 0.5;
 /// A setpoint slower than this stands, m/s.
 const STANDING_SETPOINT_MPS: f32 = 0.05;
 /// A climb is done within this distance of its top, metres.
@@ -72,7 +72,7 @@ const LEADS_FOR: Duration = Duration::from_secs(4);
 const LEG_LEAD_M: f32 = 1.5;
 /// Greatest speed of the estimate of a vehicle on its pad, m/s: up to it the setpoint follows the
 /// estimate before the take-off.
-const DRIFT_MPS: f32 = 0.2;
+const MAX_PAD_DRIFT_MPS: f32 = 0.2;
 /// Stretch of the path searched for the nearest point after the pilot, metres to either side.
 pub const REJOIN_WINDOW_M: f32 = 5.0;
 /// Stretch of the path searched after the position was lost, metres to either side: the vehicle
@@ -85,7 +85,7 @@ const SETTLE_WINDOW_M: f32 = 3.0;
 /// A nearest point this near the end of the searched stretch lies beyond the stretch, metres.
 const WINDOW_EDGE_M: f32 = 0.01;
 /// Least movement along the path that counts as progress, metres.
-const PROGRESS_M: f32 = 0.25;
+const MIN_PROGRESS_M: f32 = 0.25;
 /// Distance that the raw point keeps from the geofence, metres: the setpoint may stray by this much
 /// from the path.
 const FENCE_MARGIN_M: f32 = 0.05;
@@ -95,10 +95,10 @@ const MAX_LAND_HANDOVER_M: f32 = 1.2;
 /// Fastest guided descent near the ground, m/s: as slow as ArduCopter lands.
 const TOUCHDOWN_MPS: f32 = 0.5;
 /// Shortest leg that is flown, metres.
-const LEG_LEAST_M: f32 = 1e-3;
+const MIN_LEG_M: f32 = 1e-3;
 
 /// Advice before the neighbours were looked at: wait.
-const NOT_ASKED: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
+const NO_ADVICE_YET: Advice = Advice { speed_scale: 0.0, stop_within_m: 0.0, waiting_for: 0 };
 
 /// The raw point's course, and the smoother that makes setpoints of it.
 #[derive(Clone, Debug)]
@@ -199,7 +199,7 @@ impl Guidance {
             lost: false,
             taken: false,
             unsent_s: 0.0,
-            advice: NOT_ASKED,
+            advice: NO_ADVICE_YET,
             opened: 0,
             on_path: false,
             lead_m: LEG_LEAD_M,
@@ -247,7 +247,7 @@ impl Guidance {
         self.returning = false;
         self.aside = false;
         self.reported_m = f32::NEG_INFINITY;
-        self.advice = NOT_ASKED;
+        self.advice = NO_ADVICE_YET;
         self.opened = 0;
         self.filter.reset();
     }
@@ -421,7 +421,7 @@ impl Guidance {
                 }
                 _ if matches!(state, State::Streaming | State::Engaging | State::Arming) && known => {
                     let away = position - self.smoother.raw();
-                    let most = DRIFT_MPS * TICK_S;
+                    let most = MAX_PAD_DRIFT_MPS * TICK_S;
                     let share = most / away.norm().max(most);
                     self.smoother.raw() + away * share
                 }
@@ -440,7 +440,7 @@ impl Guidance {
         let change = self.smoother.acceleration() + correction - self.sent_acceleration;
         let most = self.smoother.jerk_mps3(urgent) * dt_s;
         self.sent_acceleration += change * (most / change.norm().max(most).max(1e-6));
-        if self.tracker.along_m > self.progress_m + PROGRESS_M {
+        if self.tracker.along_m > self.progress_m + MIN_PROGRESS_M {
             self.progress_m = self.tracker.along_m;
             self.progress_at = now;
         }

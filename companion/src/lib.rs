@@ -35,7 +35,7 @@
 //! `examples/run_loop.rs` is a whole run loop.
 //!
 //! Setpoints, heartbeats, positions and intents are made when polled, from the newest state; a link that is not polled
-//! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`link::outbox::DEPTH`]; when it is full
+//! loses old ones instead of queueing them. Commands, acks and texts wait in a queue of [`link::outbox::QUEUE_DEPTH`]; when it is full
 //! the newest is dropped and counted ([`Companion::dropped`]).
 //!
 //! The mission is the table of [`mission`], the same for every autopilot. The numbers of each are in [`autopilot::px4`] and
@@ -64,10 +64,10 @@ pub use companion::Companion;
 pub use config::{Config, ConfigError, PlanFailure, RosterEntry};
 pub use events::{Event, Link, Wanted};
 pub use mission::State;
-pub use mission::photographed::DONE;
+pub use mission::photographed::MAX_DONE_RANGES;
 pub use time::{Duration, Instant};
 
 /// Our component id, `MAV_COMP_ID_ONBOARD_COMPUTER`.
-pub const COMPONENT: u8 = 191;
+pub const COMPANION_COMPONENT: u8 = 191;
 /// The autopilot's component id, `MAV_COMP_ID_AUTOPILOT1`.
-pub const AUTOPILOT: u8 = 1;
+pub const AUTOPILOT_COMPONENT: u8 = 1;

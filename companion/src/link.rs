@@ -25,7 +25,7 @@ const KEPT_FREE: usize = 8;
 /// Further entries that are left free for answers to a ground station: a list of all parameters,
 /// and two more.
 const KEPT_FOR_GROUND: usize = 12;
-const BOTH: [Link; 2] = [Link::Autopilot, Link::Swarm];
+const BOTH_LINKS: [Link; 2] = [Link::Autopilot, Link::Swarm];
 
 /// A message that is made from the newest state when its link is polled, instead of waiting in a
 /// queue.
@@ -135,7 +135,7 @@ impl Links {
         text: &'static str,
         numbers: [u32; 3],
     ) {
-        for link in BOTH {
+        for link in BOTH_LINKS {
             self.answer(now, link, sender, Kind::Text, Outgoing::Count { warning, text, numbers });
         }
     }

@@ -5,13 +5,13 @@
 //! | hull | mission file | m | radius of the vehicle |
 //! | clearance | mission file | m | radius and safety margin: what every edge of the roadmap was tested at |
 //! | tracking, at cruise | [`TRACKING_M`] | m | how far beside its path the vehicle flies, by its own estimate |
-//! | tracking, at a crawl | [`CRAWL_M`] | m | the same of a vehicle that flies so slowly that it could as well hover |
+//! | tracking, at a crawl | [`CRAWL_TRACKING_M`] | m | the same of a vehicle that flies so slowly that it could as well hover |
 //! | estimate | [`ACCURACY_FACTOR`] × the reported accuracy, at least `FLK_EST_M` | m | how far the estimate is from the truth |
-//! | accuracy's age | [`ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
+//! | accuracy's age | [`MAX_ACCURACY_AGE`] | s | three reports of a stream at 1 Hz |
 //! | gust | scenario | m | the desk adds what a gust is announced to push ([`room_m`]'s caller); on board it is part of the margin |
 //!
 //! What is left for the estimate is compared with its bound. A bound worse than what is left at cruise refuses the start and
-//! slows the vehicle in flight; one worse than what is left at a crawl stops it. A bound of at most [`ESTIMATE_M`] refuses
+//! slows the vehicle in flight; one worse than what is left at a crawl stops it. A bound of at most [`MIN_ESTIMATE_ERROR_M`] refuses
 //! nothing: no receiver does better, and the operator chose the margin. A margin below that flies at the operator's risk.
 //!
 //! **What this cannot see.** The bound is only as honest as the estimator. In the recorded flights PX4's SIH reported 0.25 m while
@@ -24,14 +24,14 @@ use crate::time::Duration;
 /// Lateral tracking error at cruise speed, by the vehicle's own estimate, metres.
 pub const TRACKING_M: f32 = 0.25;
 /// Lateral tracking error at a crawl, metres.
-pub const CRAWL_M: f32 = 0.1;
+pub const CRAWL_TRACKING_M: f32 = 0.1;
 /// Least bound of the position estimate's error, unless `FLK_EST_M` says otherwise: a receiver with
 /// fixed RTK, metres.
-pub const ESTIMATE_M: f32 = 0.1;
+pub const MIN_ESTIMATE_ERROR_M: f32 = 0.1;
 /// Bound of the estimate's error over the reported accuracy, which is one standard deviation.
 pub const ACCURACY_FACTOR: f32 = 3.0;
 /// Age from which a reported accuracy counts as unknown.
-pub const ACCURACY_AGE: Duration = Duration::from_secs(3);
+pub const MAX_ACCURACY_AGE: Duration = Duration::from_secs(3);
 
 /// Distance by which two vehicles over an area may be nearer than they believe, metres: the part of
 /// the clearance left to each for its estimate. Both are kept apart by this beside the safety
@@ -55,7 +55,7 @@ pub fn fits(bound_m: f32, room_m: f32) -> bool {
 /// does not even fit at a crawl.
 pub fn pace(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
     let (cruise_m, crawl_m) =
-        (room_m(clearance_m, radius_m, TRACKING_M), room_m(clearance_m, radius_m, CRAWL_M));
+        (room_m(clearance_m, radius_m, TRACKING_M), room_m(clearance_m, radius_m, CRAWL_TRACKING_M));
     if fits(bound_m, cruise_m) {
         return 1.0;
     }
@@ -64,11 +64,11 @@ pub fn pace(bound_m: f32, clearance_m: f32, radius_m: f32) -> f32 {
         return 0.0;
     }
     // At the end of it the vehicle still moves, so that it comes to where the estimate is better.
-    ((crawl_m - bound_m) / (crawl_m - cruise_m)).clamp(SLOWEST, 1.0)
+    ((crawl_m - bound_m) / (crawl_m - cruise_m)).clamp(MIN_SPEED_SHARE, 1.0)
 }
 
 /// Least share of the cruise speed that still moves the vehicle.
-const SLOWEST: f32 = 0.1;
+const MIN_SPEED_SHARE: f32 = 0.1;
 
 #[cfg(test)]
 mod tests {
@@ -78,7 +78,7 @@ mod tests {
     fn a_vehicle_slows_as_its_estimate_gets_worse_and_stops() {
         let of = |bound_m| pace(bound_m, 0.8, 0.3);
         assert_eq!((of(0.1), of(0.25), of(0.41), of(f32::INFINITY), of(f32::NAN)), (1.0, 1.0, 0.0, 0.0, 0.0));
-        assert!(of(0.3) < 1.0 && of(0.35) < of(0.3) && of(0.4) >= SLOWEST);
+        assert!(of(0.3) < 1.0 && of(0.35) < of(0.3) && of(0.4) >= MIN_SPEED_SHARE);
     }
 
     proptest::proptest! {
@@ -88,7 +88,7 @@ mod tests {
             let [fast, slow] = [good, bad].map(|bound_m| pace(bound_m, clearance_m, radius_m));
             proptest::prop_assert!(fast >= slow && (0.0..=1.0).contains(&fast));
             // A moving vehicle keeps its hull inside the clearance.
-            let tracking_m = |pace: f32| if pace == 1.0 { TRACKING_M } else { CRAWL_M };
+            let tracking_m = |pace: f32| if pace == 1.0 { TRACKING_M } else { CRAWL_TRACKING_M };
             for (pace, bound_m) in [(fast, good), (slow, bad)] {
                 proptest::prop_assert!(pace == 0.0 || radius_m + tracking_m(pace) + bound_m <= clearance_m + 1e-3);
             }

@@ -15,7 +15,7 @@ pub(crate) mod waits;
 
 use self::table::TABLE;
 
-pub(crate) use self::guard::FRESH;
+pub(crate) use self::guard::MAX_POSITION_AGE;
 pub use self::guard::{Guard, Inputs};
 use self::row::bits;
 pub use self::row::{Action, Row};

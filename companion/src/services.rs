@@ -23,7 +23,7 @@ use crate::storage::store::{self, Erasing, Fault, FlashRequest, Store};
 use crate::time::Instant;
 
 /// `MAV_PARAM_TYPE_REAL32`.
-const REAL32: u8 = 9;
+const PARAM_TYPE_REAL32: u8 = 9;
 
 /// A frame, from which link and sender it came, and when.
 #[derive(Clone, Copy, Debug)]
@@ -127,7 +127,7 @@ impl Services {
 
     /// Serves a frame, if it is one for the services; whether it was.
     pub(crate) fn serve(&mut self, heard: &Heard<'_>, links: &mut Links) -> bool {
-        let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPONENT));
+        let (p, own) = (heard.frame.padded(), (heard.own, crate::COMPANION_COMPONENT));
         if heard.from() == own {
             return false;
         }
@@ -143,7 +143,7 @@ impl Services {
                 }
             }
             PARAM_REQUEST_LIST_DATA::ID if for_us(0) => {
-                (0..parameters::COUNT).for_each(|index| self.tell_parameter(heard, index, links));
+                (0..parameters::PARAMETER_COUNT).for_each(|index| self.tell_parameter(heard, index, links));
             }
             PARAM_REQUEST_READ_DATA::ID if for_us(2) => self.read_parameter(heard, links),
             PARAM_SET_DATA::ID if for_us(4) => self.set_parameter(heard, links),
@@ -161,12 +161,12 @@ impl Services {
         let p = heard.frame.padded();
         let index = i16::from_le_bytes([p[0], p[1]]);
         let found = match usize::try_from(index) {
-            Ok(index) => Some(index).filter(|index| *index < parameters::COUNT),
+            Ok(index) => Some(index).filter(|index| *index < parameters::PARAMETER_COUNT),
             Err(_) => Parameters::index_of(name(&p[4..20])),
         };
         match found {
             Some(index) => self.tell_parameter(heard, index, links),
-            None if p[3] == crate::COMPONENT => {
+            None if p[3] == crate::COMPANION_COMPONENT => {
                 let why = MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST;
                 refuse_parameter(heard, index, &p[4..20], why, links);
             }
@@ -176,7 +176,7 @@ impl Services {
 
     fn tell_parameter(&self, heard: &Heard<'_>, index: usize, links: &mut Links) {
         if let Some((name, value)) = self.parameters().get(index) {
-            let count = parameters::COUNT as u16;
+            let count = parameters::PARAMETER_COUNT as u16;
             let answer = Outgoing::ParameterValue { index, count, name, value };
             heard.answer(links, Kind::Parameter, answer);
         }
@@ -199,7 +199,7 @@ impl Services {
             Some(_) if heard.sender != Sender::GroundStation => {
                 Err(MavParamError::MAV_PARAM_ERROR_PERMISSION_DENIED)
             }
-            Some(_) if kind != REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
+            Some(_) if kind != PARAM_TYPE_REAL32 => Err(MavParamError::MAV_PARAM_ERROR_TYPE_MISMATCH),
             Some(index) => self.set(index, value).map_err(|why| match why {
                 Refused::Unknown => MavParamError::MAV_PARAM_ERROR_DOES_NOT_EXIST,
                 Refused::Range => MavParamError::MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE,
@@ -214,7 +214,7 @@ impl Services {
             self.tell_parameter(heard, index, links);
         }
         if let Err(why) = result
-            && p[5] == crate::COMPONENT
+            && p[5] == crate::COMPANION_COMPONENT
         {
             refuse_parameter(heard, -1, &p[6..22], why, links);
         }
@@ -231,7 +231,7 @@ fn refuse_parameter(heard: &Heard<'_>, index: i16, name: &[u8], why: MavParamErr
 /// TIMESYNC: bytes 16 and 17 name an addressee, 0 for all.
 fn answer_time(heard: &Heard<'_>, links: &mut Links) {
     let p = heard.frame.padded();
-    let to_us = (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPONENT);
+    let to_us = (p[16] == 0 || p[16] == heard.own) && (p[17] == 0 || p[17] == crate::COMPANION_COMPONENT);
     let request = heard.frame.decode::<TIMESYNC_DATA>().filter(|request| request.tc1 == 0 && to_us);
     if let Some(request) = request {
         let tc1 = heard.now.micros() as i64 * 1000;

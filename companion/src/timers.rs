@@ -34,14 +34,14 @@ pub(crate) enum Timer {
     OriginReport,
 }
 
-const TIMERS: usize = 12;
+const TIMER_COUNT: usize = 12;
 /// Timers that wake the shell.
-const WAKE: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
+const WAKING_TIMERS: [Timer; 3] = [Timer::Step, Timer::Heartbeat, Timer::Swarm];
 
 /// When each is due; at the start all are.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Timers {
-    due_at: [Instant; TIMERS],
+    due_at: [Instant; TIMER_COUNT],
     stepped_at: Instant,
 }
 
@@ -84,7 +84,8 @@ impl Timers {
 
     /// When the shell is to call again.
     pub(crate) fn next(&self) -> Instant {
-        WAKE.iter()
+        WAKING_TIMERS
+            .iter()
             .fold(self.due_at[Timer::Step as usize], |next, timer| next.min(self.due_at[*timer as usize]))
     }
 }

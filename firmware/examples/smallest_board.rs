@@ -9,9 +9,9 @@
 use std::sync::OnceLock;
 use std::task::Waker;
 
-use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::storage::store::{Fault, Layout, ReadFlash, Store};
-use companion::{AUTOPILOT, Config, Link};
+use companion::{AUTOPILOT_COMPONENT, Config, Link};
 use embassy_futures::block_on;
 use embassy_futures::join::{join, join5};
 use embassy_futures::select::select;
@@ -111,10 +111,10 @@ async fn board() {
 /// The far end of the autopilot's line: a HEARTBEAT each second, and what the board sends is counted.
 async fn autopilot() -> usize {
     let heartbeat = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
-    let (mut heard, mut bytes) = (0, [0; MAX_SENT]);
+    let (mut heard, mut bytes) = (0, [0; MAX_FRAME_LEN]);
     for sequence in 0..50 {
         if sequence % 10 == 0 {
-            let header = Header { system: 7, component: AUTOPILOT, sequence };
+            let header = Header { system: 7, component: AUTOPILOT_COMPONENT, sequence };
             let length = frame::encode(header, &heartbeat, &mut bytes);
             FROM_AUTOPILOT.write_all(&bytes[..length]).await;
         }

@@ -20,7 +20,7 @@ pub const WAYPOINTS: usize = 64;
 /// Gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 128;
 /// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
-pub const PIECES: usize = share(2048);
+pub const TIMED_SEGMENTS: usize = share(2048);
 /// Lanes of a coverage mission: 72 bytes each in scratch, in all and in what is left of them.
 pub const LANES: usize = share(512);
 /// Vertices of a coverage mission's area: 36 bytes each in scratch.

@@ -20,13 +20,13 @@ use rand_pcg::Pcg32;
 use crate::capacity::{GATES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
 
 /// Cases of [`PlanCase`] in which board and desk are compared.
-pub const PLANS: u64 = 200;
+pub const PLAN_CASES: u64 = 200;
 /// Cases of [`StepCase`] of which the worst counts.
-pub const STEPS: usize = 10_000;
+pub const STEP_CASES: usize = 10_000;
 /// Most vehicles of a [`PlanCase`].
-const SWARM: usize = 10;
+const MAX_SWARM: usize = 10;
 /// Places along each path of a [`PlanCase`] at which the neighbours' advice is computed.
-const LOOKS: usize = 4;
+const ADVICE_PER_PATH: usize = 4;
 const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 
 /// Schedule of every swarm of these cases.
@@ -35,7 +35,7 @@ pub const SCHEDULE: ScheduleConfig =
 /// Radius and safety margin of every vehicle of these cases, metres.
 pub const CLEARANCE_M: f32 = 0.8;
 /// Assignment of goals in the cases of whole swarms.
-pub const MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
+pub const ASSIGNMENT_MODE: Mode = Mode::Unlabelled(Objective::TotalDistance);
 
 /// A swarm for the terminals of a roadmap: one vehicle a start.
 pub fn tasks(view: &RoadmapView<'_>) -> Vec<VehicleTask, VEHICLES> {
@@ -56,7 +56,7 @@ pub fn descents(view: &RoadmapView<'_>) -> Vec<f32, VEHICLES> {
 
 /// The plan request for that swarm.
 pub fn request<'a>(vehicles: &'a [VehicleTask], descents_m: &'a [f32]) -> PlanRequest<'a> {
-    PlanRequest { vehicles, descents_m, mode: MODE, schedule: SCHEDULE, gates_most: GATES }
+    PlanRequest { vehicles, descents_m, mode: ASSIGNMENT_MODE, schedule: SCHEDULE, gates_most: GATES }
 }
 
 /// Scratch of [`plan_case`].
@@ -95,9 +95,9 @@ pub struct PlanCase {
 pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> PlanCase {
     let mut rng = Pcg32::seed_from_u64(number);
     let nodes = view.node_count();
-    let swarm = 1 + below(&mut rng, SWARM);
+    let swarm = 1 + below(&mut rng, MAX_SWARM);
     let draw =
-        |rng: &mut Pcg32| -> Vec<u16, SWARM> { (0..swarm).map(|_| below(rng, nodes) as u16).collect() };
+        |rng: &mut Pcg32| -> Vec<u16, MAX_SWARM> { (0..swarm).map(|_| below(rng, nodes) as u16).collect() };
     let (starts, goals) = (draw(&mut rng), draw(&mut rng));
     let required_m = uniform(&mut rng, 0.1, 1.0);
     let blocked = below(&mut rng, nodes) as u16;
@@ -106,12 +106,12 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
     };
     let mut case = [CRC32.digest(), CRC32.digest(), CRC32.digest(), CRC32.digest()];
     let [costs_crc, assignment_crc, paths_crc, scales_crc] = &mut case;
-    let mut costs = [0.0; SWARM * SWARM];
+    let mut costs = [0.0; MAX_SWARM * MAX_SWARM];
     let costs = &mut costs[..swarm * swarm];
     let found = search::cost_matrix(view, &starts, &goals, passable, &mut ws.search, costs);
     costs_crc.update(&[u8::from(found.is_ok())]);
     costs.iter().for_each(|cost| costs_crc.update(&cost.to_bits().to_le_bytes()));
-    let mut assigned = [None; SWARM];
+    let mut assigned = [None; MAX_SWARM];
     let assigned = &mut assigned[..swarm];
     if let Ok(assignment) = assignment::assign(costs, swarm, swarm, &mut ws.assignment, assigned) {
         assignment_crc.update(&assignment.total.to_bits().to_le_bytes());
@@ -133,7 +133,7 @@ pub fn plan_case(view: &RoadmapView<'_>, number: u64, ws: &mut Workspace) -> Pla
             let numbers = waypoint.position.iter().chain([&waypoint.along_m, &waypoint.clearance_m]);
             numbers.for_each(|number| paths_crc.update(&number.to_bits().to_le_bytes()));
         }
-        (0..LOOKS).for_each(|_| look(&mut rng, &path, scales_crc));
+        (0..ADVICE_PER_PATH).for_each(|_| look(&mut rng, &path, scales_crc));
     }
     let [costs, assignment, paths, scales] = case.map(finished);
     PlanCase { costs, assignment, paths, scales }
@@ -246,7 +246,7 @@ pub fn anywhere(rng: &mut Pcg32, reach_m: f32) -> Point {
 }
 
 /// Configuration of the roadmap built on board: P3D's building with 2300 nodes.
-pub const BUILT: Config = Config {
+pub const ROADMAP_CONFIG: Config = Config {
     nodes: 2300,
     edge_min_m: 0.5,
     edge_max_m: 8.0,

@@ -12,20 +12,20 @@ use crate::chips::ResetCause;
 /// Longest text of a STATUSTEXT.
 pub const TEXT: usize = 50;
 /// Words of the kept record: its contents, then the checksum.
-pub const WORDS: usize = 25;
+pub const RECORD_WORDS: usize = 25;
 /// Words of the text.
 const TEXT_WORDS: usize = TEXT.div_ceil(4);
 /// Words before the text.
-const HEAD: usize = 5 + 2 * WORKS;
+const HEADER_WORDS: usize = 5 + 2 * WORK_KINDS;
 /// Kinds of work.
-const WORKS: usize = 3;
+const WORK_KINDS: usize = 3;
 /// Crashed starts in a row after which files are set aside.
-const PATIENCE: u32 = 3;
+const MAX_CRASHED_STARTS: u32 = 3;
 /// Report of a restart whose cause neither the program nor the chip knows better.
-const UNANNOUNCED: &str = "Restarted: watchdog, reset key or brown-out";
+const UNKNOWN_RESTART: &str = "Restarted: watchdog, reset key or brown-out";
 
 /// Checksum of the kept record: a few bytes at a start and at an end need no table.
-static CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
+static RECORD_CRC: Crc<u32, NoTable> = Crc::<u32, NoTable>::new(&CRC_32_ISO_HDLC);
 
 /// How a start ended.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub struct Kept {
     /// Under way.
     task: Task,
     /// For each kind of work: the files with which it brought starts down, and how many in a row.
-    failed: [(u32, u32); WORKS],
+    failed: [(u32, u32); WORK_KINDS],
     /// A bit for each kind that came to its end in this start, with those files.
     done: u32,
 }
@@ -85,7 +85,7 @@ impl Kept {
             (_, ResetCause::BrownOut) => "Restarted: brown-out",
             (End::Runs, ResetCause::Key) => "Restarted: reset key",
             (End::Runs, ResetCause::Request) => "Restarted: debugger",
-            (End::Runs, ResetCause::Unknown) => UNANNOUNCED,
+            (End::Runs, ResetCause::Unknown) => UNKNOWN_RESTART,
             _ => "",
         };
         let said = String::try_from(said).ok().filter(|said| !said.is_empty());
@@ -127,7 +127,7 @@ impl Kept {
     /// Whether work with files may begin: it did not bring three starts in a row down.
     pub fn may_begin(&self, work: Work, files: u32) -> bool {
         let failed = (work as usize).checked_sub(1).map(|i| self.failed[i]);
-        failed.is_none_or(|(of, times)| of != files || times < PATIENCE)
+        failed.is_none_or(|(of, times)| of != files || times < MAX_CRASHED_STARTS)
     }
 
     /// Begins work with files; false, and nothing begins, if it may not.
@@ -150,24 +150,24 @@ impl Kept {
     }
 
     /// The record as words of memory.
-    pub fn to_words(&self) -> [u32; WORDS] {
+    pub fn to_words(&self) -> [u32; RECORD_WORDS] {
         let mut text = [0; 4 * TEXT_WORDS];
         text[..self.text.len()].copy_from_slice(self.text.as_bytes());
-        let mut words = [0; WORDS];
+        let mut words = [0; RECORD_WORDS];
         let head = [self.end as u32, self.text.len() as u32, self.task.0 as u32, self.task.1, self.done];
         let failed = self.failed.iter().flat_map(|(files, times)| [*files, *times]);
         let text = text.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]));
         let all = head.into_iter().chain(failed).chain(text);
         words.iter_mut().zip(all).for_each(|(word, value)| *word = value);
-        words[WORDS - 1] = sum(&words);
+        words[RECORD_WORDS - 1] = sum(&words);
         words
     }
 
     /// The record from words of memory; `None` where the checksum is wrong.
-    pub fn from_words(words: &[u32; WORDS]) -> Option<Self> {
+    pub fn from_words(words: &[u32; RECORD_WORDS]) -> Option<Self> {
         let end =
             [End::None, End::Runs, End::Crashed, End::Asked].into_iter().find(|e| *e as u32 == words[0])?;
-        if sum(words) != words[WORDS - 1] {
+        if sum(words) != words[RECORD_WORDS - 1] {
             return None;
         }
         let work = |word: u32| {
@@ -175,7 +175,7 @@ impl Kept {
             all.into_iter().find(|work| *work as u32 == word)
         };
         let mut bytes = [0; 4 * TEXT_WORDS];
-        for (to, word) in bytes.chunks_exact_mut(4).zip(&words[HEAD..]) {
+        for (to, word) in bytes.chunks_exact_mut(4).zip(&words[HEADER_WORDS..]) {
             to.copy_from_slice(&word.to_le_bytes());
         }
         let text = str::from_utf8(bytes.get(..words[1] as usize)?).ok()?;
@@ -190,13 +190,13 @@ impl Kept {
 }
 
 /// The checksum of all words but the last.
-fn sum(words: &[u32; WORDS]) -> u32 {
-    let mut digest = CRC.digest();
-    words[..WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));
+fn sum(words: &[u32; RECORD_WORDS]) -> u32 {
+    let mut digest = RECORD_CRC.digest();
+    words[..RECORD_WORDS - 1].iter().for_each(|word| digest.update(&word.to_le_bytes()));
     digest.finalize()
 }
 
-const _: () = assert!(HEAD + TEXT_WORDS + 1 == WORDS, "the text has room");
+const _: () = assert!(HEADER_WORDS + TEXT_WORDS + 1 == RECORD_WORDS, "the text has room");
 
 #[cfg(test)]
 mod tests {
@@ -216,13 +216,13 @@ mod tests {
         kept.begin(Work::Plan, 7);
         kept.crash("Restarted: panic at machine.rs:123");
         let words = kept.to_words();
-        for bit in 0..32 * WORDS {
+        for bit in 0..32 * RECORD_WORDS {
             let mut flipped = words;
             flipped[bit / 32] ^= 1 << (bit % 32);
             assert_eq!(Kept::from_words(&flipped), None, "bit {bit}");
         }
         for word in [0, u32::MAX, 0xAAAA_AAAA, 0xcccc_cccc] {
-            assert_eq!(Kept::from_words(&[word; WORDS]), None);
+            assert_eq!(Kept::from_words(&[word; RECORD_WORDS]), None);
         }
     }
 
@@ -237,7 +237,7 @@ mod tests {
             (ResetCause::Key, Some("Restarted: reset key")),
             (ResetCause::Watchdog, Some("Restarted: watchdog")),
             (ResetCause::Request, Some("Restarted: debugger")),
-            (ResetCause::Unknown, Some(UNANNOUNCED)),
+            (ResetCause::Unknown, Some(UNKNOWN_RESTART)),
         ];
         for (cause, said) in rows {
             assert_eq!(says(&fresh, cause).as_deref(), said, "{cause:?}");

@@ -15,14 +15,14 @@ use cortex_m_rt::{ExceptionFrame, entry, exception};
 use embassy_executor::{SendSpawner, task};
 use embassy_time::Timer;
 use firmware::boards::chosen::{self, Flash, LAYOUT, Parts, Receiver, Transmitter, Watchdog};
-use firmware::boards::parts::WARNINGS;
+use firmware::boards::parts::MAX_WARNINGS;
 use firmware::boards::{crash, sleep};
 use firmware::capacity::{BoardCompanion, VEHICLES, WAYPOINTS};
 use firmware::kept::Work;
 use firmware::lent::Lent;
 use firmware::planner::{Memory, Own, Planner};
 use firmware::scratch::Scratch;
-use firmware::shell::{ALIVE_EVERY, NO_AUTOPILOT, Shell, hear_system_id};
+use firmware::shell::{CHECK_IN_EVERY, ID_WITHOUT_AUTOPILOT, Shell, hear_system_id};
 use heapless::{String, Vec};
 use planner_core::Point;
 use planner_core::field::FieldView;
@@ -32,15 +32,15 @@ use planner_core::roadmap::RoadmapView;
 use static_cell::{ConstStaticCell, StaticCell};
 
 /// Longest mission file, bytes.
-const MISSION: usize = mission_file::MOST_BYTES;
+const MISSION_LEN: usize = mission_file::MAX_BYTES;
 /// Place of a board without a mission.
-const NOWHERE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
+const UNKNOWN_PLACE: Geodetic = Geodetic { lat_deg: 0.0, lon_deg: 0.0, alt_m: 0.0 };
 /// Report of a board whose mission does not name its system id.
-const STRANGER: &str = "This system id is not in the mission: no plan";
+const NOT_IN_MISSION: &str = "This system id is not in the mission: no plan";
 
 /// Reports of files that are not used any more.
-const ROADMAP_ASIDE: &str = "Roadmap set aside: it crashed 3 starts in a row";
-const MISSION_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
+const ROADMAP_SET_ASIDE: &str = "Roadmap set aside: it crashed 3 starts in a row";
+const MISSION_SET_ASIDE: &str = "Mission set aside: it crashed 3 starts in a row";
 
 // `memory.x` names these: each lies where it says. Their first values are all zeros.
 static SHELL: StaticCell<Shell> = StaticCell::new();
@@ -48,7 +48,7 @@ static COMPANION: StaticCell<BoardCompanion> = StaticCell::new();
 static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
 static SWARM_PLAN: ConstStaticCell<SwarmPlan<VEHICLES, WAYPOINTS>> = ConstStaticCell::new(SwarmPlan::new());
 static OWN_PLAN: ConstStaticCell<Own> = ConstStaticCell::new(Own::new());
-static MISSION_BYTES: ConstStaticCell<[u8; MISSION]> = ConstStaticCell::new([0; MISSION]);
+static MISSION_BYTES: ConstStaticCell<[u8; MISSION_LEN]> = ConstStaticCell::new([0; MISSION_LEN]);
 static CRASH: StaticCell<String<50>> = StaticCell::new();
 static REFUSED: StaticCell<String<50>> = StaticCell::new();
 
@@ -90,7 +90,7 @@ type Ends = (Receiver, Transmitter);
 /// Reports of the start.
 struct Said {
     crashed: Option<String<50>>,
-    warnings: Vec<&'static str, WARNINGS>,
+    warnings: Vec<&'static str, MAX_WARNINGS>,
 }
 
 /// Brings the companion up, then plans and keeps the flash.
@@ -114,20 +114,21 @@ async fn work(
         Some(id) => Some(id),
         None => hear_system_id(&mut autopilot.0).await,
     };
-    let system_id = known.unwrap_or(NO_AUTOPILOT);
+    let system_id = known.unwrap_or(ID_WITHOUT_AUTOPILOT);
     defmt::info!(
         "system {=u8}, roadmap {=bool}, mission {=bool}",
         system_id,
         roadmap.is_some(),
         mission.is_some()
     );
-    let aside = [(roadmap_aside, ROADMAP_ASIDE), (mission_aside, MISSION_ASIDE)];
+    let aside = [(roadmap_aside, ROADMAP_SET_ASIDE), (mission_aside, MISSION_SET_ASIDE)];
     let aside = aside.into_iter().filter_map(|(is, text)| is.then_some(text));
     let own = mission.as_ref().map(|mission| mission.config(system_id));
     let is_stranger = known.is_some() && matches!(own, Some(Err(MissionError::NotInRoster(_))));
     let unfit = own.as_ref().and_then(|own| own.as_ref().err().copied());
     let refused = refused.or(unfit.filter(|error| !matches!(error, MissionError::NotInRoster(_))));
-    let config = own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), NOWHERE));
+    let config =
+        own.and_then(Result::ok).unwrap_or_else(|| Config::new(system_id, Point::zeros(), UNKNOWN_PLACE));
     // Neither the stack nor the task's own memory has room for another.
     // `expect` would print the error, and printing one that has a name in it takes 3 kB of flash.
     let Ok(settings) = config.checked() else { panic!("every setting was checked") };
@@ -138,7 +139,7 @@ async fn work(
     }
     said.warnings.iter().copied().chain(aside).for_each(|text| companion.say(true, text));
     if is_stranger {
-        companion.say(true, STRANGER);
+        companion.say(true, NOT_IN_MISSION);
     }
     if let Some(error) = refused {
         let mut text = String::new();
@@ -244,7 +245,7 @@ async fn keep_time(shell: &'static Shell) {
 #[task]
 async fn watch(shell: &'static Shell, mut watchdog: Watchdog) {
     loop {
-        Timer::after(ALIVE_EVERY).await;
+        Timer::after(CHECK_IN_EVERY).await;
         if shell.wants_restart() {
             crash::restart();
         }

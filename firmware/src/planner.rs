@@ -4,8 +4,8 @@
 use companion::planner::coverage::Request;
 use companion::storage::mission_file::coverage::CoverageView;
 use companion::storage::mission_file::{Kind, MissionView};
-use companion::swarm::fleet::{DIVISIONS, Lots};
-use companion::{DONE, PlanFailure, Wanted, planner};
+use companion::swarm::fleet::{Lots, MAX_DIVISIONS};
+use companion::{MAX_DONE_RANGES, PlanFailure, Wanted, planner};
 use heapless::Vec;
 use planner_core::detour::{self, DetourRequest, KeepOff};
 use planner_core::field::FieldView;
@@ -22,7 +22,7 @@ use crate::scratch::Scratch;
 /// Most keep-out zones of a detour. A vehicle that fell silent may lie below a dozen places, any
 /// other makes one zone or two; with more zones than these there is no detour, not one past a zone
 /// that was left out.
-const OBSTACLES: usize = 4 * VEHICLES;
+const MAX_ZONES: usize = 4 * VEHICLES;
 
 /// Memory for planning beside roadmap and mission: pieces that lie in memories of their own.
 pub struct Memory<'a> {
@@ -37,11 +37,11 @@ pub struct Memory<'a> {
 /// A vehicle's plan, and what it is made from beside the swarm's.
 pub struct Own {
     plan: VehiclePlan<WAYPOINTS, GATES>,
-    obstacles: Vec<KeepOff, OBSTACLES>,
+    obstacles: Vec<KeepOff, MAX_ZONES>,
     /// Whether there were more.
     crowded: bool,
-    done: Vec<Range, DONE>,
-    losses: Vec<Lots<VEHICLES>, DIVISIONS>,
+    done: Vec<Range, MAX_DONE_RANGES>,
+    losses: Vec<Lots<VEHICLES>, MAX_DIVISIONS>,
     nodes: Vec<u16, WAYPOINTS>,
 }
 

@@ -17,10 +17,12 @@ use planner_core::roadmap::Edge;
 use planner_core::schedule::ScheduleWorkspace;
 use planner_core::voxel::VoxelGrid;
 
-use crate::capacity::{AREA_VERTICES, HALF_EDGES, LANES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES};
+use crate::capacity::{
+    AREA_VERTICES, HALF_EDGES, LANES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES,
+};
 
 /// Scratch of planning a swarm.
-pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
+pub type Planner = PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Scratch of planning a coverage mission.
 pub struct Area {
@@ -66,7 +68,7 @@ union Memory {
 
 /// Zero values of each use: the compiler refuses a constant that is no value of its type.
 #[expect(dead_code, reason = "made by the compiler alone")]
-const ZEROS: (Planner, Builder, Coverage, Area) = {
+const ALL_ZEROS: (Planner, Builder, Coverage, Area) = {
     // SAFETY: the compiler checks it.
     unsafe {
         let zeroed =

@@ -7,8 +7,8 @@
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
-use companion::link::frame::{Framer, MAX_SENT};
-use companion::storage::store::{FlashRequest, READ};
+use companion::link::frame::{Framer, MAX_FRAME_LEN};
+use companion::storage::store::{FlashRequest, MAX_READ};
 use companion::{Event, Link, PlanFailure, State, Wanted};
 use embassy_futures::select::select;
 use embassy_sync::blocking_mutex::Mutex;
@@ -24,20 +24,20 @@ use crate::flash::Flash;
 use crate::planner::Planner;
 
 /// Bytes taken from a UART at once.
-const CHUNK: usize = 256;
+const UART_CHUNK: usize = 256;
 /// Time between two polls of a UART, so that bytes come in handfuls: each poll costs as much as a
 /// hundred bytes.
-const GATHER: Duration = Duration::from_millis(1);
+const UART_POLL_EVERY: Duration = Duration::from_millis(1);
 /// Period at which a link task without work checks in, so that a task that hangs is known.
-pub const ALIVE_EVERY: Duration = Duration::from_millis(100);
+pub const CHECK_IN_EVERY: Duration = Duration::from_millis(100);
 /// Least time between two reports of errors of a line; the first is reported at once.
-const TELL_EVERY: Duration = Duration::from_secs(10);
+const LINE_REPORT_EVERY: Duration = Duration::from_secs(10);
 /// Reports of a line: errors that the UART reported, and frames that were damaged or cut.
 const LINE_TEXTS: [&str; 2] =
     ["Autopilot line: # errors, # damaged frames", "Radio line: # errors, # damaged frames"];
 
 /// Time that queued messages have to go out before a restart, milliseconds.
-const FAREWELL_MS: u32 = 200;
+const FLUSH_BEFORE_RESTART_MS: u32 = 200;
 
 type Shared<T> = Signal<CriticalSectionRawMutex, T>;
 
@@ -57,7 +57,7 @@ pub struct Shell {
     /// Whether the flash is at work.
     writes: AtomicBool,
     /// When each task last came by, milliseconds: receiving and transmitting of both links, and time.
-    seen_ms: [AtomicU32; TASKS],
+    seen_ms: [AtomicU32; TASK_COUNT],
     /// Whether there is a companion.
     started: AtomicBool,
     setpoints: Setpoints,
@@ -76,8 +76,8 @@ enum Request {
 /// heard, since an autopilot may pass on those of others. `None` where none comes in time.
 pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
     let mut ear = Ear::new();
-    let mut until = Instant::now() + HEAR_WITHIN;
-    let mut chunk = [0; CHUNK];
+    let mut until = Instant::now() + FIRST_AUTOPILOT_WITHIN;
+    let mut chunk = [0; UART_CHUNK];
     while let Ok(received) =
         with_timeout(until.saturating_duration_since(Instant::now()), uart.read(&mut chunk)).await
     {
@@ -85,7 +85,7 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
         // A line error loses bytes, no more.
         ear.hear(&chunk[..received.unwrap_or_default()]);
         if !known && ear.loudest().is_some() {
-            until = Instant::now() + COMPARE_FOR;
+            until = Instant::now() + OTHER_AUTOPILOTS_WITHIN;
         }
     }
     ear.loudest()
@@ -93,19 +93,19 @@ pub async fn hear_system_id(uart: &mut impl Read) -> Option<u8> {
 
 /// System id of a board without an autopilot: files can be uploaded to it. When it hears an
 /// autopilot it restarts.
-pub const NO_AUTOPILOT: u8 = 250;
+pub const ID_WITHOUT_AUTOPILOT: u8 = 250;
 /// Time within which the first autopilot is heard: an autopilot reports its state once a second.
-const HEAR_WITHIN: Duration = Duration::from_secs(3);
+const FIRST_AUTOPILOT_WITHIN: Duration = Duration::from_secs(3);
 /// Time after the first autopilot within which every other one on the line is heard.
-const COMPARE_FOR: Duration = Duration::from_millis(1100);
+const OTHER_AUTOPILOTS_WITHIN: Duration = Duration::from_millis(1100);
 /// Most autopilots that are distinguished.
-const HEARD: usize = 8;
+const MAX_AUTOPILOTS: usize = 8;
 
 /// Listens for autopilots.
 struct Ear {
     framer: Framer,
     /// System id, frames, and whether a heartbeat was among them.
-    heard: Vec<(u8, u32, bool), HEARD>,
+    heard: Vec<(u8, u32, bool), MAX_AUTOPILOTS>,
 }
 
 impl Ear {
@@ -115,7 +115,7 @@ impl Ear {
 
     fn hear(&mut self, mut input: &[u8]) {
         while let Some(frame) = self.framer.next(now(), &mut input) {
-            if frame.component != companion::AUTOPILOT || frame.system == 0 {
+            if frame.component != companion::AUTOPILOT_COMPONENT || frame.system == 0 {
                 continue;
             }
             let beats = frame.message_id == HEARTBEAT;
@@ -136,11 +136,11 @@ impl Ear {
 
 /// Longest start of a board, milliseconds: the search through the flash, the check of the roadmap
 /// and the wait for an autopilot. The watchdog is fed this long without any task of links or time.
-pub const STARTS_WITHIN_MS: u32 = 20_000;
+pub const START_TIMEOUT_MS: u32 = 20_000;
 
 const HEARTBEAT: u32 = 0;
-const TASKS: usize = 5;
-const TIME: usize = 4;
+const TASK_COUNT: usize = 5;
+const TIME_TASK: usize = 4;
 
 /// Now, as the companion counts time.
 pub fn now() -> companion::Instant {
@@ -162,7 +162,7 @@ impl Shell {
             works: Signal::new(),
             restart_ms: AtomicU32::new(0),
             writes: AtomicBool::new(false),
-            seen_ms: [const { AtomicU32::new(0) }; TASKS],
+            seen_ms: [const { AtomicU32::new(0) }; TASK_COUNT],
             started: AtomicBool::new(false),
             setpoints: Setpoints::new(),
             line_errors: [const { AtomicU32::new(0) }; 2],
@@ -170,10 +170,10 @@ impl Shell {
     }
 
     /// Puts the companion in, before any task of links or time starts. Until then the board is
-    /// alive for no longer than [`STARTS_WITHIN_MS`].
+    /// alive for no longer than [`START_TIMEOUT_MS`].
     pub fn start(&self, companion: &'static mut BoardCompanion) {
         self.companion.lock(|held| *held.borrow_mut() = Some(companion));
-        (0..TASKS).for_each(|task| self.seen(task));
+        (0..TASK_COUNT).for_each(|task| self.seen(task));
         self.started.store(true, Ordering::Relaxed);
     }
 
@@ -227,12 +227,12 @@ impl Shell {
     ///
     /// A board without an autopilot restarts when it hears one, if `for_autopilot`.
     pub async fn receive(&'static self, link: Link, mut uart: impl Read, for_autopilot: bool) -> ! {
-        let mut chunk = [0; CHUNK];
+        let mut chunk = [0; UART_CHUNK];
         let mut ear = for_autopilot.then(Ear::new);
         let errors = &self.line_errors[link as usize];
         let (mut reported, mut tells_at) = (0, Instant::MIN);
         loop {
-            match with_timeout(ALIVE_EVERY, uart.read(&mut chunk)).await {
+            match with_timeout(CHECK_IN_EVERY, uart.read(&mut chunk)).await {
                 Ok(Ok(length)) => {
                     self.with(|companion, now| companion.handle_bytes(link, now, &chunk[..length]));
                     if let Some(ear) = &mut ear {
@@ -248,7 +248,7 @@ impl Shell {
             }
             let count = errors.load(Ordering::Relaxed);
             if count != reported && Instant::now() >= tells_at {
-                (reported, tells_at) = (count, Instant::now() + TELL_EVERY);
+                (reported, tells_at) = (count, Instant::now() + LINE_REPORT_EVERY);
                 self.with(|companion, _| {
                     let counters = companion.counters(link);
                     let damaged = counters.bad_crc.wrapping_add(counters.expired);
@@ -256,18 +256,18 @@ impl Shell {
                 });
             }
             self.seen(link as usize);
-            Timer::after(GATHER).await;
+            Timer::after(UART_POLL_EVERY).await;
         }
     }
 
     /// Takes what the companion has for a link to its UART.
     pub async fn transmit(&'static self, link: Link, mut uart: impl Write) -> ! {
-        let mut frame = [0; MAX_SENT];
+        let mut frame = [0; MAX_FRAME_LEN];
         loop {
             let length = self.hold(|companion| companion.poll_transmit(link, &mut frame));
             if length == 0 {
                 // Late or not, it comes by.
-                let _ = with_timeout(ALIVE_EVERY, self.sends[link as usize].wait()).await;
+                let _ = with_timeout(CHECK_IN_EVERY, self.sends[link as usize].wait()).await;
             } else {
                 if link == Link::Autopilot && is_setpoint(&frame[..length]) {
                     self.setpoints.note(now_ms());
@@ -287,13 +287,13 @@ impl Shell {
         loop {
             let now = now();
             let due = self.hold(|companion| companion.poll_timeout());
-            let due = due.unwrap_or(now + companion::Duration::from_micros(ALIVE_EVERY.as_micros()));
+            let due = due.unwrap_or(now + companion::Duration::from_micros(CHECK_IN_EVERY.as_micros()));
             if due <= now {
                 self.with(BoardCompanion::handle_timeout);
             } else {
                 select(Timer::at(Instant::from_micros(due.micros())), self.steps.wait()).await;
             }
-            self.seen(TIME);
+            self.seen(TIME_TASK);
         }
     }
 
@@ -318,7 +318,7 @@ impl Shell {
         if self.restart_ms.load(Ordering::Relaxed) != 0 {
             return false;
         }
-        let mut bytes = [0; READ];
+        let mut bytes = [0; MAX_READ];
         let request = self.hold(|companion| {
             Some(match companion.poll_flash()? {
                 FlashRequest::Erase { at } => Request::Erase(at),
@@ -349,7 +349,9 @@ impl Shell {
     /// Whether a restart was asked for, what was to be said before has had time to go out, and the flash is at rest.
     pub fn wants_restart(&self) -> bool {
         let asked = self.restart_ms.load(Ordering::Relaxed);
-        asked != 0 && now_ms().wrapping_sub(asked) > FAREWELL_MS && !self.writes.load(Ordering::Relaxed)
+        asked != 0
+            && now_ms().wrapping_sub(asked) > FLUSH_BEFORE_RESTART_MS
+            && !self.writes.load(Ordering::Relaxed)
     }
 
     /// Whether every task of the links and of time came by lately, and so did the last setpoint where they are to flow: else the
@@ -360,9 +362,9 @@ impl Shell {
 
     fn is_alive_at(&self, now_ms: u32) -> bool {
         if !self.started.load(Ordering::Relaxed) {
-            return now_ms < STARTS_WITHIN_MS;
+            return now_ms < START_TIMEOUT_MS;
         }
-        let limit = 4 * ALIVE_EVERY.as_millis() as u32;
+        let limit = 4 * CHECK_IN_EVERY.as_millis() as u32;
         self.seen_ms.iter().all(|seen| now_ms.wrapping_sub(seen.load(Ordering::Relaxed)) < limit)
             && self.setpoints.since(now_ms).is_none_or(|passed| passed < limit)
     }
@@ -469,7 +471,7 @@ mod tests {
         assert!(!shell.is_alive_at(5400), "the first setpoint is late");
         shell.setpoints.note(5400);
         assert!(shell.is_alive_at(5400));
-        shell.seen_ms[TIME].store(4000, Ordering::Relaxed);
+        shell.seen_ms[TIME_TASK].store(4000, Ordering::Relaxed);
         assert!(!shell.is_alive_at(5400), "one task hangs");
     }
 }

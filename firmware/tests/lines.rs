@@ -70,7 +70,7 @@ impl Write for End<'_> {
 /// An autopilot's heartbeat.
 fn beat() -> Vec<u8> {
     let data = HEARTBEAT_DATA { autopilot: MavAutopilot::MAV_AUTOPILOT_PX4, ..HEARTBEAT_DATA::DEFAULT };
-    let mut out = [0; frame::MAX_SENT];
+    let mut out = [0; frame::MAX_FRAME_LEN];
     let length = frame::encode(Header { system: 1, component: 1, sequence: 0 }, &data, &mut out);
     out[..length].to_vec()
 }

@@ -2,7 +2,7 @@
 
 use companion::storage::mission_file::MissionView;
 use companion::storage::store::Layout;
-use companion::storage::store::area::DATA_AT;
+use companion::storage::store::area::DATA_OFFSET;
 use companion::{Companion, Config};
 use planner_core::roadmap::RoadmapView;
 
@@ -17,7 +17,7 @@ pub const WAYPOINTS: usize = 64;
 /// Gates of one vehicle: 12 bytes each.
 pub const GATES: usize = 2048;
 /// Timed segments of flights among which a vehicle steps aside: 44 bytes each.
-pub const PIECES: usize = 32_768;
+pub const TIMED_SEGMENTS: usize = 32_768;
 
 /// A companion with the desk's capacities.
 pub type DeskCompanion = Companion<VEHICLES, WAYPOINTS, GATES>;
@@ -59,7 +59,7 @@ pub struct Board {
 pub const BOARD_CORNERS: usize = 32;
 
 const fn roadmap_bytes(layout: &Layout) -> usize {
-    (layout.slot_len - DATA_AT) as usize
+    (layout.slot_len - DATA_OFFSET) as usize
 }
 
 /// The default board.

@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use companion::storage::store::{Fault, FlashRequest, Layout, READ, ReadFlash};
+use companion::storage::store::{Fault, FlashRequest, Layout, MAX_READ, ReadFlash};
 
 use crate::files;
 use crate::quote::quoted_path;
@@ -49,7 +49,7 @@ impl DeskFlash {
     pub fn obey<'a>(
         &mut self,
         request: FlashRequest<'_>,
-        read: &'a mut [u8; READ],
+        read: &'a mut [u8; MAX_READ],
     ) -> Result<&'a [u8], Fault> {
         match request {
             FlashRequest::Read { at, len } => {

@@ -6,11 +6,11 @@
 //! | separation of paths | safety distance + 2 (tracking + estimate) | both vehicles err towards each other |
 //! | separation from one that stands | safety distance + tracking + estimate + gust | it stands where the referee sees it, but its path ended where it believed to be |
 //! | tracking | [`companion::margins::TRACKING_M`] | beside the path by the own estimate |
-//! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`STRAY_M`] are measured with it |
+//! | estimate, `rtk` | part of the tracking | at most 0.1 m; the default margin and [`PAIR_STRAY_M`] are measured with it |
 //! | estimate, `recorded`, PX4 | 0.65 m | three times the 0.2 m it reports, and a reserve; errors were up to 0.75 m across and 1.1 m in height, seldom and not beside an error of tracking |
 //! | estimate, `recorded`, ArduPilot | 0.12 m | the greatest recorded error |
 //! | touchdown, PX4 | 0.5 m, and [`STRAY_PER_GUST_S`] × `gust_mps` | pads: up to 0.7 m beside them without wind, 1.1 m in gusts of 3 m/s, seldom two towards each other |
-//! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_S`] at cruise is along the lanes | the camera is not where the waypoint is |
+//! | part of a picture that counts | what it shows less twice the margin, and what [`TRIGGER_DELAY_S`] at cruise is along the lanes | the camera is not where the waypoint is |
 //! | height, `recorded` | PX4 1.1 m, ArduPilot 0.3 m | a lower camera shows less |
 //! | gust | [`STRAY_PER_GUST_S`] × `gust_mps` | what a vehicle gives way to gusts that blow it |
 
@@ -21,10 +21,10 @@ use sim_autopilot::{AutopilotKind, Estimator};
 use crate::scenario::{Simulation, Vehicle};
 
 /// Stray of two vehicles from their paths, together, beyond the safety distance, metres.
-pub const STRAY_M: f32 = 0.5;
+pub const PAIR_STRAY_M: f32 = 0.5;
 /// Stray of two vehicles together over fields, where there is room, and receivers without RTK,
 /// metres.
-pub const STRAY_OVER_FIELDS_M: f32 = 2.4;
+pub const PAIR_STRAY_OVER_FIELDS_M: f32 = 2.4;
 /// Stray of one vehicle beside another that stands on the ground, metres.
 pub const STRAY_BESIDE_PARKED_M: f32 = 0.25;
 /// Further stray of one vehicle in gusts, for each m/s of their peak, seconds. Two vehicles are not
@@ -63,7 +63,7 @@ pub fn needed(simulation: &Simulation, safety_distance_m: f32, vehicles: &[Vehic
 
 /// Delay from passing a waypoint to its picture, seconds: a step of the companion, a command, and a
 /// check of the autopilot's.
-pub const TRIGGER_S: f32 = 0.15;
+pub const TRIGGER_DELAY_S: f32 = 0.15;
 
 /// Least distance between pads, metres: a vehicle comes down beside one that came down, and both
 /// err.
@@ -107,7 +107,7 @@ pub fn usable(
     let stray_m = needed(simulation, 0.0, vehicles).margin_m;
     let lower_m = vehicles.iter().map(|v| lower_m(simulation.estimator, v.personality)).fold(0.0, f32::max);
     let share = (1.0 - lower_m / height_m).max(0.0);
-    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_S * cruise_mps);
+    let along_m = spacing.footprint.along_m * share - 2.0 * (stray_m + TRIGGER_DELAY_S * cruise_mps);
     let across_m = spacing.footprint.across_m * share - 2.0 * stray_m;
     let footprint =
         Footprint { along_m: along_m.max(spacing.waypoint_m), across_m: across_m.max(spacing.lane_m) };

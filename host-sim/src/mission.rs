@@ -20,8 +20,10 @@ use planner_core::schedule::ScheduleError;
 use planner_core::search::SearchWorkspace;
 
 use self::ready::schedule_config;
-pub use self::ready::{ACCEL_MPS2, Mission, OwnPlan, SwarmPlan, VERTICAL_MPS};
-use crate::capacity::{Board, DeskCompanion, GATES, PIECES, ROADMAP_NODES, VEHICLES, WAYPOINTS, on_heap};
+pub use self::ready::{Mission, OwnPlan, PLANNED_ACCEL_MPS2, SwarmPlan, VERTICAL_MPS};
+use crate::capacity::{
+    Board, DeskCompanion, GATES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS, on_heap,
+};
 use crate::coverage::check_ground;
 use crate::map::{self, VoxelMap};
 use crate::progress::Progress;
@@ -29,7 +31,7 @@ use crate::result::{Left, Timing};
 use crate::roadmap::{self};
 use crate::scenario::Scenario;
 
-type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, PIECES>;
+type PlanWorkspace = plan::PlanWorkspace<ROADMAP_NODES, VEHICLES, TIMED_SEGMENTS>;
 
 /// Height of each goal over where a vehicle of the largest radius stands below it, metres.
 fn descents_m(scenario: &Scenario, map: &VoxelMap, goals: &[Point]) -> anyhow::Result<Vec<f32>> {
@@ -182,7 +184,7 @@ impl Mission {
             }
             PlanError::Schedule(id, ScheduleError::PiecesFull) => {
                 anyhow!(
-                    "vehicle {id} meets too many others: {path}: the swarm has at most {PIECES} timed segments"
+                    "vehicle {id} meets too many others: {path}: the swarm has at most {TIMED_SEGMENTS} timed segments"
                 )
             }
             PlanError::Path(id, PathError::PathFull) => {

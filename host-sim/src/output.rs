@@ -87,9 +87,9 @@ pub fn flown_page(mission: &Mission, plan: &SwarmPlan, flight: &Flight) -> anyho
 }
 
 /// Files that every command with a result writes.
-pub const NAMES: [&str; 3] = ["result.json", "timing.json", "report.html"];
+pub const RESULT_FILES: [&str; 3] = ["result.json", "timing.json", "report.html"];
 
-/// Adds the files of [`NAMES`].
+/// Adds the files of [`RESULT_FILES`].
 ///
 /// # Errors
 /// One cannot be written.
@@ -99,10 +99,10 @@ pub fn add(
     timing: &Timing,
     mut page: ReportData,
 ) -> anyhow::Result<()> {
-    results.add(NAMES[0], result::json(result)?.as_bytes())?;
-    results.add(NAMES[1], result::json(timing)?.as_bytes())?;
+    results.add(RESULT_FILES[0], result::json(result)?.as_bytes())?;
+    results.add(RESULT_FILES[1], result::json(timing)?.as_bytes())?;
     page.timing = Some(serde_json::to_value(timing)?);
-    results.add(NAMES[2], report::page(&page)?.as_bytes())
+    results.add(RESULT_FILES[2], report::page(&page)?.as_bytes())
 }
 
 /// One `x y z` a line, metres, for other programs to be given the same work.

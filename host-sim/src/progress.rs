@@ -69,13 +69,13 @@ impl Drop for Stage {
 }
 
 /// Error with which standard output last refused a line.
-static UNPRINTED: Mutex<Option<std::io::Error>> = Mutex::new(None);
+static STDOUT_ERROR: Mutex<Option<std::io::Error>> = Mutex::new(None);
 
 /// Prints a line: what [`say!`](crate::say) calls.
 pub fn print_line(line: std::fmt::Arguments<'_>) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = out.write_fmt(line).and_then(|()| out.write_all(b"\n")).and_then(|()| out.flush()) {
-        *UNPRINTED.lock().expect("nobody panics with it") = Some(error);
+        *STDOUT_ERROR.lock().expect("nobody panics with it") = Some(error);
     }
 }
 
@@ -84,7 +84,7 @@ pub fn print_line(line: std::fmt::Arguments<'_>) {
 /// # Errors
 /// Standard output did not take a line: its reader has gone away, or a disk is full.
 pub fn printed() -> anyhow::Result<()> {
-    match UNPRINTED.lock().expect("nobody panics with it").take() {
+    match STDOUT_ERROR.lock().expect("nobody panics with it").take() {
         Some(error) => Err(error).context("cannot print: standard output"),
         None => Ok(()),
     }

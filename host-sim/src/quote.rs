@@ -3,9 +3,9 @@
 use std::path::Path;
 
 /// Longest quotation, characters.
-pub const MOST: usize = 200;
+pub const MAX_QUOTE_CHARS: usize = 200;
 /// Longest line of an error, characters: the words around two quotations.
-const LINE: usize = 600;
+const MAX_ERROR_CHARS: usize = 600;
 
 /// A character that changes how a terminal shows what stands around it.
 fn is_code(c: char) -> bool {
@@ -13,10 +13,10 @@ fn is_code(c: char) -> bool {
         || matches!(c, '\u{200B}'..='\u{200F}' | '\u{2028}'..='\u{202E}' | '\u{2060}'..='\u{206F}' | '\u{FEFF}')
 }
 
-/// The text with its codes escaped; where it is longer than [`MOST`] characters, its beginning and its end.
+/// The text with its codes escaped; where it is longer than [`MAX_QUOTE_CHARS`] characters, its beginning and its end.
 pub fn quoted(text: &str) -> String {
     // No more than could be shown is looked at, from either end.
-    shortened(&escaped(&shortened(text, 2 * MOST)), MOST)
+    shortened(&escaped(&shortened(text, 2 * MAX_QUOTE_CHARS)), MAX_QUOTE_CHARS)
 }
 
 /// As `quoted`, for a path.
@@ -48,7 +48,7 @@ fn shortened(text: &str, most: usize) -> String {
 
 /// A whole message as it is printed: nothing in it is a code but its ends of line, and no line is endless.
 pub fn message(text: &str) -> String {
-    let lines: Vec<String> = text.lines().map(|line| shortened(&escaped(line), LINE)).collect();
+    let lines: Vec<String> = text.lines().map(|line| shortened(&escaped(line), MAX_ERROR_CHARS)).collect();
     lines.join("\n")
 }
 
@@ -73,7 +73,7 @@ mod tests {
 
     #[test]
     fn short_plain_text_stays_as_it_is() {
-        for text in ["", "a/b.toml", "größer ≤ 3 m", &"x".repeat(MOST)] {
+        for text in ["", "a/b.toml", "größer ≤ 3 m", &"x".repeat(MAX_QUOTE_CHARS)] {
             assert_eq!(quoted(text), text);
         }
         assert_eq!(quoted("\x1b[31mred\n"), "\\u{1b}[31mred\\n");
@@ -95,8 +95,8 @@ mod tests {
         #[test]
         fn whatever_is_quoted_is_short_and_without_codes(text in "(?s).{0,700}") {
             let short = quoted(&text);
-            prop_assert!(short.chars().count() <= MOST && !short.chars().any(is_code), "{short:?}");
-            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= LINE && !l.chars().any(is_code)));
+            prop_assert!(short.chars().count() <= MAX_QUOTE_CHARS && !short.chars().any(is_code), "{short:?}");
+            prop_assert!(message(&text).lines().all(|l| l.chars().count() <= MAX_ERROR_CHARS && !l.chars().any(is_code)));
         }
     }
 }

@@ -25,14 +25,14 @@ use crate::capacity::{Board, ROADMAP_CUBES, ROADMAP_NODES, on_heap};
 use crate::map::{BoxTree, VoxelMap};
 
 /// Greatest clearance stored with an edge, metres: no vehicle of ours is any wider.
-pub const CLEARANCE_MAX_M: f32 = 6.0;
+pub const MAX_STORED_CLEARANCE_M: f32 = 6.0;
 /// Nodes whose edges are one job of a thread: a fifth of a millisecond.
-const NODES_A_PIECE: usize = 32;
+const NODES_PER_JOB: usize = 32;
 /// Numbers that a file stores for each node beside its place: distances to the landmarks, height
 /// over the ground.
-const COLUMNS: usize = LANDMARKS + 1;
+const NODE_COLUMNS: usize = LANDMARKS + 1;
 /// Two clearances that differ by less than this are one, metres: the file keeps millimetres.
-const ALIKE_M: f32 = 2e-4;
+const SAME_CLEARANCE_M: f32 = 2e-4;
 
 /// Nodes and edges, not yet encoded.
 #[derive(Clone, Debug)]
@@ -146,7 +146,7 @@ pub fn connect<const NODES: usize, const CUBES: usize>(
     })
 }
 
-/// The edges, each with its distance to the nearest obstacle, at most [`CLEARANCE_MAX_M`].
+/// The edges, each with its distance to the nearest obstacle, at most [`MAX_STORED_CLEARANCE_M`].
 /// `tree` is over `grid`: it gives the distances, and with them which segments are clear; only an
 /// edge that keeps almost exactly the clearance is checked by cells.
 pub fn join<const NODES: usize, const CUBES: usize>(
@@ -159,7 +159,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
     workspace.index(nodes, config)?;
     // No edge is farther from obstacles than its ends; most are just as far as the nearer of them.
     let around: Vec<f32> =
-        nodes.par_iter().map(|node| tree.clearance_m(node, node, CLEARANCE_MAX_M, 0.0)).collect();
+        nodes.par_iter().map(|node| tree.clearance_m(node, node, MAX_STORED_CLEARANCE_M, 0.0)).collect();
     let ends = |edge: prm::Edge| (usize::from(edge.a), usize::from(edge.b));
     let most_m = |edge: prm::Edge| {
         let (a, b) = ends(edge);
@@ -181,7 +181,7 @@ pub fn join<const NODES: usize, const CUBES: usize>(
         prm::connect_range_with(grid, workspace, config, range, hint, |edge, room_m| {
             let clearance_m = match known.take() {
                 Some(nearest_m) if room_m == 0.0 => nearest_m,
-                _ if room_m + ALIKE_M >= most_m(edge) => most_m(edge),
+                _ if room_m + SAME_CLEARANCE_M >= most_m(edge) => most_m(edge),
                 _ => clearance_m(edge, 0.0),
             };
             edges.push(Edge { a: edge.a, b: edge.b, clearance_m });
@@ -195,11 +195,11 @@ fn in_pieces<T: Copy + Send>(
     nodes: usize,
     work: impl Fn(Range<usize>, &mut Vec<T>) -> Result<(), PrmError> + Sync,
 ) -> Result<Vec<T>, PrmError> {
-    let pieces: Vec<Vec<T>> = (0..nodes.div_ceil(NODES_A_PIECE))
+    let pieces: Vec<Vec<T>> = (0..nodes.div_ceil(NODES_PER_JOB))
         .into_par_iter()
         .map(|piece| {
-            let mut found = Vec::with_capacity(NODES_A_PIECE * 64);
-            work(piece * NODES_A_PIECE..(piece + 1) * NODES_A_PIECE, &mut found)?;
+            let mut found = Vec::with_capacity(NODES_PER_JOB * 64);
+            work(piece * NODES_PER_JOB..(piece + 1) * NODES_PER_JOB, &mut found)?;
             Ok(found)
         })
         .collect::<Result<_, PrmError>>()?;
@@ -227,7 +227,7 @@ impl Roadmap {
                 board.nodes
             );
         }
-        let bare = roadmap::encoded_len(nodes, 0, COLUMNS).unwrap_or(usize::MAX);
+        let bare = roadmap::encoded_len(nodes, 0, NODE_COLUMNS).unwrap_or(usize::MAX);
         let an_edge = 2 * size_of::<u32>();
         let most = (board.half_edges / 2).min(board.roadmap_bytes.saturating_sub(bare) / an_edge);
         let edges = cap::cap(&self.nodes, &self.edges, most)
@@ -243,7 +243,7 @@ pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> Roa
         edge_min_m: config.edge_min_m,
         edge_max_m: config.edge_max_m,
         tested_clearance_m: config.clearance_m,
-        max_clearance_m: CLEARANCE_MAX_M,
+        max_clearance_m: MAX_STORED_CLEARANCE_M,
         starts,
         goals,
     }
@@ -253,7 +253,7 @@ pub fn header(config: &Config, origin: Geodetic, starts: u16, goals: u16) -> Roa
 pub fn encode(roadmap: &Roadmap, header: &RoadmapHeader) -> anyhow::Result<Vec<u8>> {
     let too_large = || anyhow!("{} edges do not fit a roadmap file", roadmap.edges.len());
     let Roadmap { nodes, edges, heights_m } = roadmap;
-    let length = roadmap::encoded_len(nodes.len(), edges.len(), COLUMNS).ok_or_else(too_large)?;
+    let length = roadmap::encoded_len(nodes.len(), edges.len(), NODE_COLUMNS).ok_or_else(too_large)?;
     let mut bytes = vec![0; length];
     let mut workspace = on_heap(SearchWorkspace::<ROADMAP_NODES>::new);
     roadmap::write_with_landmarks(header, nodes, edges, heights_m, &mut workspace, &mut bytes)

@@ -15,11 +15,11 @@ use crate::map::VoxelMap;
 use crate::mission::{Mission, SwarmPlan};
 
 /// Two widths that differ by less than this are the same, metres.
-const STEP_M: f32 = 0.05;
+const SAME_WIDTH_M: f32 = 0.05;
 /// Most cells of a grid that is flooded: the list of cells takes 4 bytes each.
-const MOST_CELLS: usize = 1 << 25;
+const MAX_FLOODED_CELLS: usize = 1 << 25;
 /// Most lines about goals; further goals are counted.
-const MOST_LINES: usize = 8;
+const MAX_GOAL_LINES: usize = 8;
 
 /// One line for each goal that is left and each vehicle without one, with its place and what would help.
 pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
@@ -30,12 +30,12 @@ pub fn lines(mission: &Mission, plan: &SwarmPlan) -> Vec<String> {
     }
     let mut asked = Asked { mission, reach: Reach::new(mission), widths: BTreeMap::new() };
     let mut lines = Vec::new();
-    for &goal in left.goals.iter().take(MOST_LINES) {
+    for &goal in left.goals.iter().take(MAX_GOAL_LINES) {
         lines.push(goal_line(&mut asked, usize::from(goal)));
     }
     // Where goals are left, the remedy stands with them.
     let asks = left.goals.is_empty();
-    for &id in left.vehicles.iter().take(MOST_LINES.max(lines.len()) - lines.len()) {
+    for &id in left.vehicles.iter().take(MAX_GOAL_LINES.max(lines.len()) - lines.len()) {
         lines.push(vehicle_line(&mut asked, id, asks));
     }
     if all > lines.len() {
@@ -188,18 +188,18 @@ fn widths_m(
     most_m: f32,
 ) -> Option<Vec<f32>> {
     let (shape, grid) = (&map.shape, map.grid());
-    let steps = (most_m / STEP_M).ceil() as usize;
+    let steps = (most_m / SAME_WIDTH_M).ceil() as usize;
     let [nx, ny, nz] = shape.dims.map(|d| d as usize);
     let cells = nx.checked_mul(ny)?.checked_mul(nz)?;
-    if cells > MOST_CELLS {
+    if cells > MAX_FLOODED_CELLS {
         return None;
     }
     let steps_at = |place: &Point| {
-        let most_m = STEP_M * steps as f32;
+        let most_m = SAME_WIDTH_M * steps as f32;
         if at_least_m(place) >= most_m {
             return steps;
         }
-        ((point_clearance(&grid, place, most_m) / STEP_M + 1e-3) as usize).min(steps)
+        ((point_clearance(&grid, place, most_m) / SAME_WIDTH_M + 1e-3) as usize).min(steps)
     };
     // A start or goal may be nearer to an obstacle than the centre of its cell, and above all to the ground.
     let (at_start, at_goals) = (steps_at(from), goals.iter().map(steps_at).collect::<Vec<_>>());
@@ -223,7 +223,7 @@ fn widths_m(
             continue;
         };
         for goal in (0..goals.len()).filter(|&goal| goals[goal] == Some(cell)) {
-            widths[goal] = width.min(at_goals[goal]) as f32 * STEP_M;
+            widths[goal] = width.min(at_goals[goal]) as f32 * SAME_WIDTH_M;
             missing -= 1;
         }
         for axis in 0..3 {

@@ -10,22 +10,22 @@ use std::time::{Duration, Instant as Clock};
 
 use anyhow::{Context, bail};
 use companion::link::frame::{self, Frame, Framer, Header};
-use companion::services::ftp::{DATA, MESSAGE, PAYLOAD_LEN};
+use companion::services::ftp::{MAX_DATA, MESSAGE, PAYLOAD_LEN};
 use companion::storage::store::File;
-use companion::{COMPONENT, Instant};
+use companion::{COMPANION_COMPONENT, Instant};
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, MavAutopilot, MavType};
 
 use self::retransmission::Retransmission;
 use crate::link::Link;
 
 /// System id of the ground station, unless another one is chosen.
-const USUAL_SYSTEM: u8 = 255;
+const DEFAULT_SYSTEM_ID: u8 = 255;
 /// Component id of the ground station.
 const COMPONENT_ID: u8 = 190;
 /// Longest wait for an answer: the companion may have to erase its flash first, eight sectors of
 /// two seconds each.
-const PATIENCE: Duration = Duration::from_secs(30);
-const BEAT: Duration = Duration::from_secs(1);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(30);
+const HEARTBEAT_EVERY: Duration = Duration::from_secs(1);
 
 const TERMINATE: u8 = 1;
 const RESET: u8 = 2;
@@ -79,7 +79,7 @@ impl Client {
             began: now,
             beat_at: now,
             frames: 0,
-            own_system: USUAL_SYSTEM,
+            own_system: DEFAULT_SYSTEM_ID,
             system,
             sequence,
             session: 0,
@@ -105,14 +105,14 @@ impl Client {
     /// The next frame from a companion, if there is one; beats once a second, so that autopilots pass things on to us.
     fn hear(&mut self) -> anyhow::Result<Vec<Frame>> {
         if self.link.now() >= self.beat_at {
-            self.beat_at += BEAT;
+            self.beat_at += HEARTBEAT_EVERY;
             let beat = HEARTBEAT_DATA {
                 mavtype: MavType::MAV_TYPE_GCS,
                 autopilot: MavAutopilot::MAV_AUTOPILOT_INVALID,
                 mavlink_version: 3,
                 ..HEARTBEAT_DATA::DEFAULT
             };
-            let mut out = [0; frame::MAX_SENT];
+            let mut out = [0; frame::MAX_FRAME_LEN];
             let length = frame::encode(self.header(), &beat, &mut out);
             self.send(&out[..length])?;
         }
@@ -126,7 +126,7 @@ impl Client {
         let mut frames = Vec::new();
         while let Some(frame) = self.framer.next(now, &mut input) {
             let ours = self.system.is_none_or(|system| system == frame.system);
-            frames.extend((ours && frame.component == COMPONENT).then_some(frame));
+            frames.extend((ours && frame.component == COMPANION_COMPONENT).then_some(frame));
         }
         Ok(frames)
     }
@@ -137,23 +137,23 @@ impl Client {
     /// None is heard.
     pub fn find(&mut self) -> anyhow::Result<u8> {
         let began = self.link.now();
-        while self.link.now().duration_since(began) < PATIENCE {
+        while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
             if let Some(frame) = self.hear()?.first() {
                 self.system = Some(frame.system);
                 return Ok(frame.system);
             }
         }
         bail!(
-            "no companion heard: component {COMPONENT}{} said nothing for {} s\nhint: between two of its ports PX4 passes \
+            "no companion heard: component {COMPANION_COMPONENT}{} said nothing for {} s\nhint: between two of its ports PX4 passes \
              messages on where MAV_x_FORWARD is set for both",
             self.system.map_or(String::new(), |system| format!(" of system {system}")),
-            PATIENCE.as_secs()
+            ANSWER_TIMEOUT.as_secs()
         )
     }
 
     fn request(&mut self, opcode: u8, offset: u32, data: &[u8]) -> [u8; PAYLOAD_LEN] {
         let mut payload = [0; PAYLOAD_LEN];
-        (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPONENT);
+        (payload[1], payload[2]) = (self.system.unwrap_or(0), COMPANION_COMPONENT);
         payload[3..5].copy_from_slice(&self.sequence.to_le_bytes());
         payload[5..8].copy_from_slice(&[self.session, opcode, data.len() as u8]);
         payload[11..15].copy_from_slice(&offset.to_le_bytes());
@@ -163,7 +163,7 @@ impl Client {
     }
 
     fn ask(&mut self, payload: &[u8; PAYLOAD_LEN]) -> anyhow::Result<()> {
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let extra = frame::extra_crc(MESSAGE).context("the dialect has FTP")?;
         let length = frame::encode_raw(self.header(), MESSAGE, extra, payload, &mut out);
         self.send(&out[..length])
@@ -181,7 +181,7 @@ impl Client {
             session: p[5],
             yes: p[6] == ACK,
             answers: p[8],
-            data: p[15..15 + usize::from(p[7]).min(DATA)].to_vec(),
+            data: p[15..15 + usize::from(p[7]).min(MAX_DATA)].to_vec(),
         };
         Ok(for_us.map(|(p, _)| read(p)).collect())
     }
@@ -192,7 +192,7 @@ impl Client {
         let began = self.link.now();
         let mut asked_at = began;
         self.ask(&request)?;
-        while self.link.now().duration_since(began) < PATIENCE {
+        while self.link.now().duration_since(began) < ANSWER_TIMEOUT {
             if self.retransmission.is_over(asked_at, self.link.now()) {
                 self.ask(&request)?;
                 asked_at = self.link.now();
@@ -218,14 +218,14 @@ impl Client {
         self.session = self.done(CREATE, file.name().as_bytes()).context("cannot begin")?.session;
         // The time for erasing its flash says nothing about the link.
         self.retransmission = Retransmission::new(self.link.now());
-        let mut pieces = bytes.chunks(DATA).enumerate();
+        let mut pieces = bytes.chunks(MAX_DATA).enumerate();
         let mut under_way: BTreeMap<u16, Piece> = BTreeMap::new();
         let (mut arrived, mut heard_at) = (0, self.link.now());
         loop {
             while under_way.len() < self.retransmission.window()
                 && let Some((i, piece)) = pieces.next()
             {
-                let request = self.request(WRITE, (i * DATA) as u32, piece);
+                let request = self.request(WRITE, (i * MAX_DATA) as u32, piece);
                 self.ask(&request)?;
                 let piece = Piece { request, length: piece.len(), sent_at: self.link.now(), repeated: false };
                 under_way.insert(self.sequence, piece);
@@ -251,7 +251,7 @@ impl Client {
                     progress(arrived as u64);
                 }
             }
-            if self.link.now().duration_since(heard_at) > PATIENCE {
+            if self.link.now().duration_since(heard_at) > ANSWER_TIMEOUT {
                 bail!("the companion does not answer any more, after {arrived} bytes");
             }
             for piece in under_way.values_mut() {

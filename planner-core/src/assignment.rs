@@ -21,7 +21,7 @@ use libm::fmaxf;
 
 pub use self::costs::AssignmentError;
 use self::costs::Costs;
-use self::state::{NONE, Paths, State};
+use self::state::{Paths, State, UNASSIGNED};
 
 /// Result of an assignment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,7 +52,7 @@ pub struct AssignmentWorkspace<const N: usize> {
 impl<const N: usize> AssignmentWorkspace<N> {
     /// All zeros.
     pub const fn new() -> Self {
-        assert!(N < NONE as usize, "indices are 16 bits");
+        assert!(N < UNASSIGNED as usize, "indices are 16 bits");
         Self {
             price: [0.0; N],
             distance: [0.0; N],
@@ -162,7 +162,7 @@ fn solve<const N: usize>(costs: &Costs<'_>, ws: &mut AssignmentWorkspace<N>) {
 fn report(costs: &Costs<'_>, col_of: &[u16], out: &mut [Option<u16>]) -> Assignment {
     out.fill(None);
     let mut result = Assignment { pairs: 0, total: 0.0, largest: f32::NEG_INFINITY };
-    for (row, &col) in col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != NONE) {
+    for (row, &col) in col_of[..costs.rows].iter().enumerate().filter(|(_, col)| **col != UNASSIGNED) {
         let cost = costs.at(row as u16, col);
         let (from, to) = if costs.transposed { (usize::from(col), row as u16) } else { (row, col) };
         out[from] = Some(to);

@@ -101,24 +101,24 @@ impl Advice {
 
 /// Most samples of the own path that are compared with a neighbour without a known plan: four
 /// seconds of flight at the nominal speed.
-const LOOKS: usize = 16;
+const MAX_PATH_SAMPLES: usize = 16;
 /// Time of flight from one sample of the path to the next, seconds.
-const LOOK_EVERY_S: f32 = 0.25;
+const PATH_SAMPLE_S: f32 = 0.25;
 
 /// Two distances that differ by less than this are the same, metres.
-const ROUNDING_M: f32 = 0.05;
+const DISTANCE_ROUNDING_M: f32 = 0.05;
 /// A reference this little beyond a gate still stands at the gate, metres: a small overshoot of the
 /// stop must not carry the vehicle through.
-const AT_GATE_M: f32 = 0.1;
+const GATE_OVERSHOOT_M: f32 = 0.1;
 /// Overshoot of a braking vehicle beyond its reference, as seconds of flight at the cruise speed
-/// above [`LEADS_ABOVE_MPS`]: 0.5 m were seen from 5.8 m/s.
-const LEADS_S: f32 = 0.2;
+/// above [`BRAKING_OVERSHOOT_ABOVE_MPS`]: 0.5 m were seen from 5.8 m/s.
+const BRAKING_OVERSHOOT_S: f32 = 0.2;
 /// At a cruise speed up to this a braking vehicle does not overshoot its reference, m/s.
-const LEADS_ABOVE_MPS: f32 = 3.0;
+const BRAKING_OVERSHOOT_ABOVE_MPS: f32 = 3.0;
 
 /// The advice to `own`; `gates` are sorted along the path. Work: the gates, a search through the
 /// neighbours for each gate within reach, and for each neighbour without a plan 16 points
-/// (`LOOKS`) of the own path.
+/// (`MAX_PATH_SAMPLES`) of the own path.
 pub fn advise<const W: usize>(
     cfg: &DeconflictConfig,
     own: &Own<'_, W>,
@@ -161,8 +161,8 @@ fn priority<const W: usize>(
     };
     // A gate beyond twice the braking distance asks for nothing yet.
     let horizon_m =
-        own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * LOOK_EVERY_S;
-    let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - AT_GATE_M)..];
+        own.along_m + cfg.cruise_mps * cfg.cruise_mps / cfg.accel_mps2 + cfg.cruise_mps * PATH_SAMPLE_S;
+    let ahead = &gates[gates.partition_point(|gate| gate.at_m < own.along_m - GATE_OVERSHOOT_M)..];
     for gate in ahead.iter().take_while(|gate| gate.at_m <= horizon_m) {
         let passed = by_id(neighbours, gate.id)
             .is_some_and(|n| n.out || n.progress_m.is_some_and(|progress_m| progress_m >= gate.until_m));
@@ -191,14 +191,14 @@ fn by_id(neighbours: &[Neighbour], id: u8) -> Option<&Neighbour> {
 
 /// The own path ahead, as far as it is looked at: the points where this vehicle will be, one after each look.
 struct Ahead {
-    points: Vec<Point, LOOKS>,
+    points: Vec<Point, MAX_PATH_SAMPLES>,
     step_m: f32,
 }
 
 impl Ahead {
     fn new<const W: usize>(cfg: &DeconflictConfig, own: &Own<'_, W>) -> Self {
-        let step_m = cfg.cruise_mps * LOOK_EVERY_S;
-        let points = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(LOOKS);
+        let step_m = cfg.cruise_mps * PATH_SAMPLE_S;
+        let points = own.path.points_from(fmaxf(own.along_m, 0.0) + step_m, step_m).take(MAX_PATH_SAMPLES);
         Self { points: points.collect(), step_m }
     }
 
@@ -212,20 +212,21 @@ impl Ahead {
         n: &Neighbour,
     ) -> Option<f32> {
         let away = |looks: usize, own: &Point| {
-            n.position + n.velocity * (n.age_s + looks as f32 * LOOK_EVERY_S) - own
+            n.position + n.velocity * (n.age_s + looks as f32 * PATH_SAMPLE_S) - own
         };
         let now = away(0, &own.position);
-        let apart_m = cfg.safety_distance_m + LEADS_S * fmaxf(cfg.cruise_mps - LEADS_ABOVE_MPS, 0.0);
+        let apart_m = cfg.safety_distance_m
+            + BRAKING_OVERSHOOT_S * fmaxf(cfg.cruise_mps - BRAKING_OVERSHOOT_ABOVE_MPS, 0.0);
         let near = fminf(apart_m * apart_m, now.norm_squared());
         // No more than this do both fly from one look to the next.
         let fastest_mps = n.velocity.x.abs() + n.velocity.y.abs() + n.velocity.z.abs();
-        let look_m = self.step_m + LOOK_EVERY_S * fastest_mps;
+        let look_m = self.step_m + PATH_SAMPLE_S * fastest_mps;
         let looks_a_metre = 1.0 / look_m;
         let (mut i, mut last) = (0, (0, now));
         while let Some(there) = self.points.get(i) {
             let to = away(i + 1, there);
             let least_m = to.x.abs().max(to.y.abs()).max(to.z.abs());
-            let room_m = least_m - apart_m - ROUNDING_M;
+            let room_m = least_m - apart_m - DISTANCE_ROUNDING_M;
             let comes_near = || {
                 let from = if last.0 == i { last.1 } else { away(i, &self.points[i - 1]) };
                 least_square_between(&from, &to).is_some_and(|square| square < near)

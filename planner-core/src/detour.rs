@@ -24,7 +24,7 @@ use crate::{ConfigError, Point};
 const HOVER_SWAY_M: f32 = 0.05;
 /// Rounding of a planned path, metres: an approach by less than this is not counted as one. The
 /// safety filter allows no more.
-const WAY_NEARER_M: f32 = 0.002;
+const PATH_APPROACH_ROUNDING_M: f32 = 0.002;
 
 /// A stretch to stay away from.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -278,7 +278,7 @@ pub enum DetourError {
 }
 
 /// Greatest length of a path to a landing place aside, and greatest distance of that place, metres.
-const ASIDE_M: f32 = 20.0;
+const MAX_SIDESTEP_M: f32 = 20.0;
 
 /// The shortest path to the goal, or aside, that keeps off all `obstacles`, written to `out`. Of an obstacle that is nearer
 /// already the distance is shortened; `nodes` is scratch.
@@ -309,7 +309,7 @@ pub fn plan<const N: usize, const W: usize>(
     }
     let passable = |from: u16, edge: &HalfEdge| {
         let to = view.node(edge.target);
-        let near = !request.aside || (to - here).norm() < ASIDE_M;
+        let near = !request.aside || (to - here).norm() < MAX_SIDESTEP_M;
         near && view.clears(edge, request.required_clearance_m) && clear(&view.node(from), &to)
     };
     let mut search = |entry: u16, nodes: &mut Vec<u16, W>| {
@@ -318,7 +318,7 @@ pub fn plan<const N: usize, const W: usize>(
         }
         search::dijkstra_all(view, entry, passable, ws)?;
         let rest = |node: &u16| !obstacles.iter().any(|obstacle| obstacle.holds(&view.node(*node)));
-        let reached = (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < ASIDE_M);
+        let reached = (0..view.node_count() as u16).filter(|&node| ws.distance_m(node) < MAX_SIDESTEP_M);
         let nearest = reached.filter(rest).min_by(|&a, &b| ws.distance_m(a).total_cmp(&ws.distance_m(b)));
         let nearest = nearest.ok_or(SearchError::NoPath)?;
         ws.path_to(nearest, nodes)?;
@@ -349,7 +349,7 @@ pub fn plan<const N: usize, const W: usize>(
 /// A zone that is nearer already than it should be keeps no more distance than there is.
 pub(crate) fn shorten(obstacles: &mut [KeepOff], here: &Point) {
     for obstacle in obstacles.iter_mut().filter(|obstacle| obstacle.nature != Nature::Landing) {
-        *obstacle = obstacle.seen_from(here, WAY_NEARER_M);
+        *obstacle = obstacle.seen_from(here, PATH_APPROACH_ROUNDING_M);
     }
 }
 

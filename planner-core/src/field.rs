@@ -22,7 +22,7 @@ pub const HEADER_LEN: usize = 28;
 /// Most nodes: their bytes fit where a roadmap does.
 pub const MAX_NODES: usize = 1 << 16;
 /// Unit in which a node's height is stored, metres.
-pub const STEP_M: f32 = 0.1;
+pub const HEIGHT_STEP_M: f32 = 0.1;
 const CRC_LEN: usize = 4;
 
 /// Places of the nodes.
@@ -109,7 +109,7 @@ impl<'a> FieldView<'a> {
 
     /// The highest node, metres.
     pub fn highest_m(&self) -> f32 {
-        f32::from(self.highest_dm) * STEP_M
+        f32::from(self.highest_dm) * HEIGHT_STEP_M
     }
 
     /// The height at a place, metres.
@@ -127,7 +127,7 @@ impl<'a> FieldView<'a> {
             self.nodes.get(index).map_or(0.0, |node| f32::from(i16::from_le_bytes(*node)))
         };
         let across = |row: usize| node(column, row) * (1.0 - east) + node(column + 1, row) * east;
-        (across(row) * (1.0 - north) + across(row + 1) * north) * STEP_M
+        (across(row) * (1.0 - north) + across(row + 1) * north) * HEIGHT_STEP_M
     }
 }
 

@@ -36,7 +36,7 @@ pub enum PathError {
     /// A coordinate, a clearance or the length is NaN or infinite.
     NotFinite,
     /// The path is longer than vehicles can report to each other:
-    /// [`crate::coverage::flights::FURTHEST_M`].
+    /// [`crate::coverage::flights::MAX_PATH_LENGTH_M`].
     TooLong,
 }
 
@@ -234,7 +234,7 @@ pub struct Flight<const W: usize> {
     pub descent_m: f32,
     /// Scheduled take-off, seconds after the start at nominal speeds.
     pub depart_s: f32,
-    /// Longest timed segment of this flight, metres: [`crate::schedule::PIECE_M`], or more on a flight that is long.
+    /// Longest timed segment of this flight, metres: [`crate::schedule::MAX_TIMED_SEGMENT_M`], or more on a flight that is long.
     pub piece_m: f32,
 }
 

@@ -7,7 +7,7 @@
 //!
 //! Cost: one search per vehicle, one assignment, then at most (vehicles + 1) rounds of one to three A*, up to a dozen searches
 //! of the schedule (one for each departure looked at) and one pass over all scheduled pieces per vehicle; twice that for more than
-//! `FEW` vehicles that cannot be planned with a handover.
+//! `MAX_VEHICLES_WITHOUT_HANDOVER` vehicles that cannot be planned with a handover.
 
 mod departures;
 mod order;
@@ -22,7 +22,7 @@ use crate::assignment;
 use crate::file::CRC32;
 use crate::flight::{Flight, Path, VehiclePlan};
 use crate::roadmap::{HalfEdge, RoadmapView};
-use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::search;
 
 /// Plans the whole swarm: [`costs`], then [`assign`], then [`schedule()`]. Vehicles and goals that cannot be served are
@@ -138,12 +138,19 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
             None => 0.0,
         };
         let (id, climb_m) = (vehicle.id, vehicle.climb_m);
-        let flight =
-            Flight { id, task: goal.into(), path, climb_m, descent_m, depart_s: 0.0, piece_m: PIECE_M };
+        let flight = Flight {
+            id,
+            task: goal.into(),
+            path,
+            climb_m,
+            descent_m,
+            depart_s: 0.0,
+            piece_m: MAX_TIMED_SEGMENT_M,
+        };
         // Cannot overflow: as many as goals.
         out.flights.push(flight).map_err(|_| PlanError::SwarmFull)?;
     }
-    let handover_s = if request.vehicles.len() > FEW { HANDOVER_S } else { 0.0 };
+    let handover_s = if request.vehicles.len() > MAX_VEHICLES_WITHOUT_HANDOVER { HANDOVER_S } else { 0.0 };
     let mut planned = in_order(view, request, handover_s, ws, out);
     if handover_s > 0.0 && planned.is_err() {
         // Better late than not at all.
@@ -161,7 +168,7 @@ pub fn schedule<const N: usize, const V: usize, const W: usize, const P: usize>(
 const HANDOVER_S: f32 = 2.0;
 /// Swarms of up to this many vehicles are planned without [`HANDOVER_S`]: no vehicle of theirs
 /// waits for many that wait themselves, and all land earlier.
-const FEW: usize = 12;
+const MAX_VEHICLES_WITHOUT_HANDOVER: usize = 12;
 
 /// The paths, their order, and whether each vehicle has room for its gates. A place is free `handover_s` after its vehicle has left it.
 #[inline(never)]

@@ -33,7 +33,7 @@ pub const MAGIC: [u8; 8] = *b"FLKROAD\n";
 /// Version of a roadmap file that says how high each node is over the ground.
 pub const VERSION: u16 = 2;
 /// Version of a roadmap file without heights; this version is written and read as well.
-const WITHOUT_HEIGHTS: u16 = 1;
+const VERSION_WITHOUT_HEIGHTS: u16 = 1;
 /// Bytes before the first node.
 pub const HEADER_LEN: usize = 72;
 /// Most nodes an index of 16 bits can name; index 65535 stays free to mean "none".
@@ -44,7 +44,7 @@ pub const MAX_COORDINATE_M: f32 = 16_384.0;
 pub const MAX_EDGE_M: f32 = 100.0;
 /// Longest path from a node to a landmark, metres: up to this length a sum of edges is right to 4
 /// mm an edge.
-pub const MAX_WAY_M: f32 = 4.0 * MAX_COORDINATE_M;
+pub const MAX_LANDMARK_DISTANCE_M: f32 = 4.0 * MAX_COORDINATE_M;
 /// Largest clearance a half-edge can carry, metres.
 pub const MAX_CLEARANCE_M: f32 = 65.535;
 
@@ -75,9 +75,9 @@ pub enum RoadmapError {
     EdgeLength(u16),
     /// An edge of this node has less clearance than the header says that it was tested at, or more than can be stored.
     EdgeClearance(u16),
-    /// A way from this node to a landmark is beyond [`MAX_WAY_M`], or is not the one that a search over all edges finds.
+    /// A way from this node to a landmark is beyond [`MAX_LANDMARK_DISTANCE_M`], or is not the one that a search over all edges finds.
     Landmark(u16),
-    /// The height of this node over the ground is NaN, negative or beyond [`MAX_WAY_M`], or this node has none and others do.
+    /// The height of this node over the ground is NaN, negative or beyond [`MAX_LANDMARK_DISTANCE_M`], or this node has none and others do.
     Height(u16),
     /// The roadmap has more nodes than the workspace the landmarks are searched in.
     WorkspaceTooSmall,
@@ -379,7 +379,7 @@ pub fn declared_len(head: &[u8; HEADER_LEN]) -> Result<usize, RoadmapError> {
         return Err(FileError::Magic.into());
     }
     let heights = match u16_at(head, 8) {
-        WITHOUT_HEIGHTS => 0,
+        VERSION_WITHOUT_HEIGHTS => 0,
         VERSION => 1,
         other => return Err(FileError::Version(other).into()),
     };

@@ -24,15 +24,15 @@ use crate::{ConfigError, Point, all_positive};
 pub const REACTION_S: f32 = 0.1;
 /// Greatest lag of a vehicle behind its reference, as seconds of flight: the vehicle flies on that
 /// far.
-pub const LAG_S: f32 = 0.25;
+pub const MAX_LAG_S: f32 = 0.25;
 /// A neighbour heard within this time counts as heard, seconds.
 pub const FRESH_S: f32 = 1.0;
 /// A vehicle further than this from the path points that it reports does not fly along them,
 /// metres: real vehicles lag by up to 0.5 m and stray by 0.4 m.
-pub const OFF_M: f32 = 0.9;
+pub const OFF_REPORTED_PATH_M: f32 = 0.9;
 /// Most points of the set that a vehicle may occupy: its place and the eight path points that it
 /// reports.
-const POINTS: usize = 9;
+const MAX_SET_POINTS: usize = 9;
 
 /// How a vehicle stops.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +56,7 @@ impl Braking {
 /// how much wider than a line both are.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Set {
-    points: Vec<Point, POINTS>,
+    points: Vec<Point, MAX_SET_POINTS>,
     /// Lower end of the column.
     foot: Option<Point>,
     /// Distance beside the line up to which the vehicle can be, metres.
@@ -174,7 +174,7 @@ pub enum Joint {
     /// The place was not sought yet.
     #[default]
     Unknown,
-    /// The vehicle is further than [`OFF_M`] beside its points.
+    /// The vehicle is further than [`OFF_REPORTED_PATH_M`] beside its points.
     Beside,
     /// On them.
     On {
@@ -187,7 +187,7 @@ pub enum Joint {
 }
 
 /// A path that comes nearer again by less than this does not come back, metres.
-const BACK_M: f32 = 0.05;
+const RETURN_TOLERANCE_M: f32 = 0.05;
 
 impl Joint {
     /// Looks for the places on the points at which it may be: the first one, and how far from there the last one is.
@@ -198,19 +198,19 @@ impl Joint {
         let away_m = |place: &Point| sqrtf((position - place).norm_squared());
         // Distance of the first place and, from there along the points, of the leg; whether the
         // points have led away since.
-        let (mut least_m, mut along_m, mut left) = (OFF_M, 0.0, false);
+        let (mut least_m, mut along_m, mut left) = (OFF_REPORTED_PATH_M, 0.0, false);
         let mut start_m = away_m(from);
         for (i, to) in points.iter().enumerate() {
             let place = nearest(position, from, to);
             let (apart_m, upto_m) = (away_m(&place), sqrtf((place - from).norm_squared()));
             if !left && apart_m < least_m {
                 (found, least_m, along_m) = (Some(i as u8), apart_m, -upto_m);
-            } else if left && apart_m < OFF_M && apart_m + BACK_M < start_m {
+            } else if left && apart_m < OFF_REPORTED_PATH_M && apart_m + RETURN_TOLERANCE_M < start_m {
                 more_m = along_m + upto_m;
             }
             along_m += sqrtf((to - from).norm_squared());
             start_m = away_m(to);
-            left |= found.is_some() && start_m > least_m + BACK_M;
+            left |= found.is_some() && start_m > least_m + RETURN_TOLERANCE_M;
             from = to;
         }
         // The cast saturates.
@@ -284,11 +284,11 @@ impl Heard<'_> {
         let first_m = away.x + away.y + away.z;
         // Where the place on the points was not sought yet only their extent is known.
         let more_m = if self.joint == Joint::Unknown { 2.0 * self.extent_m } else { self.joint.more_m() };
-        if first_m < OFF_M {
+        if first_m < OFF_REPORTED_PATH_M {
             // On its points, and no further than those lead.
-            return (along_m + more_m + OFF_M).min(first_m + self.extent_m);
+            return (along_m + more_m + OFF_REPORTED_PATH_M).min(first_m + self.extent_m);
         }
-        along_m + more_m + self.wider_m(bounds) + OFF_M
+        along_m + more_m + self.wider_m(bounds) + OFF_REPORTED_PATH_M
     }
 
     /// How old what it says is, seconds.
@@ -314,7 +314,7 @@ impl Heard<'_> {
         let most_mps = self.speed_mps.max(bounds.speed_max_mps);
         let speed_mps = (self.speed_mps + gained_mps).min(most_mps).min(2.0 * bounds.speed_max_mps);
         let stop_m = bounds.braking.stop_m(speed_mps);
-        speed_mps * (self.old_s() + REACTION_S + LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
+        speed_mps * (self.old_s() + REACTION_S + MAX_LAG_S) + stop_m + ahead_s * bounds.speed_max_mps
     }
 
     #[inline]

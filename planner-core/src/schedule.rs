@@ -1,6 +1,6 @@
 //! Conflict-free schedules: which vehicle passes first where two paths come close.
 //!
-//! A flight is cut into timed segments of at most [`PIECE_M`] metres, from the pad over the path to the ground below the goal.
+//! A flight is cut into timed segments of at most [`MAX_TIMED_SEGMENT_M`] metres, from the pad over the path to the ground below the goal.
 //! Vehicles are scheduled one after the other (prioritised planning, Erdmann and Lozano-Pérez 1987); each waits on its pad
 //! for the smallest delay that keeps its segments out of reach of those already scheduled at that time. Waiting on
 //! the pad always suffices when each path avoids the pads and landing places of the others (a "well-formed" problem,
@@ -25,24 +25,24 @@ pub(crate) mod tests;
 use heapless::Vec;
 use libm::{fmaxf, fminf};
 
-use self::blocks::{BLOCK, BLOCKS, Bits, Blocks, ones, pieces_of};
+use self::blocks::{Bits, Blocks, MAX_BLOCKS, SEGMENTS_PER_BLOCK, ones, pieces_of};
 pub use self::config::{ScheduleConfig, ScheduleError};
-pub use self::pieces::{PIECE_M, PIECES};
+pub use self::pieces::{MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS};
 use self::pieces::{Piece, conflict, cut};
 use crate::flight::{Flight, Gate, PROGRESS_ERROR_M};
 use crate::sort;
 
 /// Most forbidden intervals kept apart while a delay is sought; more of them are merged, which only
 /// forbids more.
-const INTERVALS: usize = 128;
+const MAX_INTERVALS: usize = 128;
 /// Least height above its pad at which a vehicle has left the pad, metres.
 const OFF_PAD_M: f32 = 0.02;
 
 /// Scratch of [`earliest_departure`] and [`gates`].
 #[derive(Debug, Default)]
 pub struct ScheduleWorkspace {
-    own: Vec<Piece, PIECES>,
-    other: Vec<Piece, PIECES>,
+    own: Vec<Piece, MAX_TIMED_SEGMENTS>,
+    other: Vec<Piece, MAX_TIMED_SEGMENTS>,
     /// Blocks of `own`.
     blocks: Blocks,
     forbidden: Forbidden,
@@ -56,7 +56,7 @@ impl ScheduleWorkspace {
 }
 
 /// Intervals of time that do not overlap.
-type Forbidden = Vec<(f32, f32), INTERVALS>;
+type Forbidden = Vec<(f32, f32), MAX_INTERVALS>;
 
 fn forbid(forbidden: &mut Forbidden, mut low: f32, mut high: f32) {
     // Swallow what overlaps; when full, swallow the nearest as well.
@@ -102,7 +102,7 @@ pub(crate) fn departure_with_handover<'a, const W: usize>(
             continue;
         }
         cut(cfg, other, &mut ws.other)?;
-        for block in ws.other.chunks(BLOCK) {
+        for block in ws.other.chunks(SEGMENTS_PER_BLOCK) {
             let near = ws.blocks.near(cfg, block);
             if near == 0 {
                 continue;
@@ -188,7 +188,7 @@ fn left_at_m<const W: usize>(q: &Piece, flight: &Flight<W>) -> f32 {
 /// Where flight `index` waits for the others, in the order along its path. A gate that an earlier one for the same vehicle
 /// implies is left out.
 ///
-/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it (`MERGED_M`), or for
+/// More than `G` are made fewer: a gate then stands for those that follow within 4, 8 or 16 m of it (`GATE_MERGE_M`), or for
 /// all behind it. Only gates are merged that the schedule has open by the time of the first, so the order of labels stays as it is.
 pub fn gates<const W: usize, const G: usize>(
     cfg: &ScheduleConfig,
@@ -215,7 +215,7 @@ pub(crate) fn merged_m<const W: usize>(
 ) -> Result<f32, ScheduleError> {
     cut(cfg, flights.get(index).ok_or(ScheduleError::BadIndex)?, &mut ws.own)?;
     ws.blocks.of(&ws.own);
-    for merged_m in MERGED_M {
+    for merged_m in GATE_MERGE_M {
         let mut count = 0;
         each_gate(cfg, flights, index, merged_m, ws, |_| count += 1)?;
         if count <= most {
@@ -227,15 +227,15 @@ pub(crate) fn merged_m<const W: usize>(
 
 /// Distances along the path within which gates for one vehicle are merged, metres: the first
 /// distance that leaves few enough gates is taken.
-const MERGED_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
+const GATE_MERGE_M: [f32; 5] = [0.0, 4.0, 8.0, 16.0, f32::INFINITY];
 
 /// For each block of `ws.own` the blocks of `ws.other` that may come too near; `None` where none
 /// does.
 #[inline(never)]
-fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; BLOCKS]> {
-    let mut near = [0; BLOCKS];
+fn near_blocks(cfg: &ScheduleConfig, ws: &ScheduleWorkspace) -> Option<[Bits; MAX_BLOCKS]> {
+    let mut near = [0; MAX_BLOCKS];
     let mut some = false;
-    for (bit, block) in ws.other.chunks(BLOCK).enumerate() {
+    for (bit, block) in ws.other.chunks(SEGMENTS_PER_BLOCK).enumerate() {
         for own in ones(ws.blocks.near(cfg, block)) {
             near[own] |= 1 << bit;
             some = true;
@@ -265,7 +265,7 @@ fn each_gate<const W: usize>(
         // The gate found last, and when it is passed.
         let mut last: Option<(Gate, f32)> = None;
         let mut highest = f32::NEG_INFINITY;
-        let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / BLOCK], p));
+        let own = ws.own.iter().enumerate().map(|(i, p)| (near[i / SEGMENTS_PER_BLOCK], p));
         for (near, p) in own.filter(|(near, p)| *near != 0 && moves(p)) {
             let start_s = flight.depart_s + p.from_s;
             let earlier =

@@ -18,12 +18,12 @@ pub(crate) mod heap;
 use heap::{Heap, SETTLED};
 
 /// Half-edges compared together; a node seldom has more.
-const CHUNK: usize = 64;
+const HALF_EDGE_CHUNK: usize = 64;
 /// Places in a chunk; as long as a `u8` can count, so that no index needs a check.
 type Gains = [u8; 256];
 
 /// Most targets for which the search is guided (A*) to each target in turn: a board's 32 vehicles.
-const FEW_TARGETS: usize = 32;
+const MAX_GUIDED_TARGETS: usize = 32;
 
 /// Why a search gave no answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -137,13 +137,13 @@ impl Graph for RoadmapView<'_> {
         // A little more room than there is, so that rounding never hides a gain: the exact comparison comes later. 1e-6
         // is eight times the rounding of the three products.
         /// Factor by which rounding may raise a lower bound of the distance to the target.
-        const SLACK: f32 = 1.0 + 1e-6;
+        const BOUND_ROUNDING: f32 = 1.0 + 1e-6;
         let mut count = 0_u8;
         for (place, half_edge) in half_edges.iter().enumerate() {
             let room = distance[target_index::<N>(half_edge)] - reached;
             let squared = (self.node(target_of(half_edge)) - here).norm_squared();
             out[usize::from(count)] = place as u8;
-            count = count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * SLACK));
+            count = count.wrapping_add(u8::from(squared <= room * libm::fabsf(room) * BOUND_ROUNDING));
         }
         usize::from(count)
     }
@@ -350,7 +350,7 @@ fn search<const N: usize>(
     }
     begin(view, from, ws)?;
     let mut gains = [0; 256];
-    let informed = targets.len() <= FEW_TARGETS;
+    let informed = targets.len() <= MAX_GUIDED_TARGETS;
     for &target in targets {
         let (goal, [goal_a, goal_b]) = (view.node(target), view.ways_to_landmarks_m(target));
         let heuristic = |node: u16| {
@@ -407,8 +407,8 @@ fn relax<const N: usize>(
     let distance = &mut ws.distance;
     let (here, reached) = (view.node(node), distance[usize::from(node)]);
     let (first, row) = view.row(node);
-    for (chunk, half_edges) in row.chunks(CHUNK).enumerate() {
-        let first = first + chunk * CHUNK;
+    for (chunk, half_edges) in row.chunks(HALF_EDGE_CHUNK).enumerate() {
+        let first = first + chunk * HALF_EDGE_CHUNK;
         let count = graph.gains(first, half_edges, &here, reached, distance, gains);
         for &place in gains.iter().take(count) {
             let (k, target) = (first + usize::from(place), target_of(&half_edges[usize::from(place)]));

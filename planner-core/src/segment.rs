@@ -39,7 +39,7 @@ use crate::Point;
 use crate::voxel::VoxelGrid;
 
 /// A clearance as wide as this, in cells, is not kept by what is touched, whatever the rounding.
-pub(crate) const WIDE_CELLS: f32 = 0.25;
+pub(crate) const MIN_MISSED_CELLS: f32 = 0.25;
 
 /// Whether the segment from `a` to `b` stays strictly farther than `clearance_m` from every obstacle.
 ///
@@ -55,7 +55,8 @@ pub fn segment_is_clear(grid: &VoxelGrid<'_>, a: &Point, b: &Point, clearance_m:
     if !(clearance_m > 0.0 && clearance_m.is_finite()) {
         return false;
     }
-    if clearance_m < WIDE_CELLS * grid.shape().resolution_m && snapped_segment_touches(grid, &from, &to) {
+    if clearance_m < MIN_MISSED_CELLS * grid.shape().resolution_m && snapped_segment_touches(grid, &from, &to)
+    {
         return false;
     }
     is_farther_than(grid, a, b, 0.0, clearance_m)

@@ -106,14 +106,14 @@ pub struct Reference {
 
 /// Least lead of the reference ahead of the vehicle, metres: the distance by which an autopilot
 /// lags at walking speed.
-const LEAD_LEAST_M: f32 = 0.4;
-/// Further lead in the open for speed above [`WALKS_MPS`], as seconds of flight: the time by which
+const MIN_LEAD_M: f32 = 0.4;
+/// Further lead in the open for speed above [`WALKING_SPEED_MPS`], as seconds of flight: the time by which
 /// setpoint, response and report are late, and twice that before the reference slows.
 const LEAD_S: f32 = 0.8;
-/// Walking speed, m/s: at this speed [`LEAD_LEAST_M`] covers an autopilot's lag.
-const WALKS_MPS: f32 = 2.0;
+/// Walking speed, m/s: at this speed [`MIN_LEAD_M`] covers an autopilot's lag.
+const WALKING_SPEED_MPS: f32 = 2.0;
 /// A path is flown once the reference is this near its end, metres.
-const END_M: f32 = 0.01;
+const PATH_END_M: f32 = 0.01;
 
 /// Half of the clearance a leg leaves beyond the body, within the configured bounds.
 fn deviation(cfg: &TrackConfig, clearance_m: f32) -> f32 {
@@ -235,10 +235,10 @@ pub fn advance<const W: usize>(
     let most = fminf(top_mps, braking_speed(accel, braking_sq, dt_s));
     let change = accel * dt_s;
     tracker.speed_mps = fmaxf(fminf(most, speed_before + change), speed_before - change);
-    let crawls = most < CRAWLS_MPS && tracker.speed_mps >= 0.0;
+    let crawls = most < ABOUT_TO_STOP_MPS && tracker.speed_mps >= 0.0;
     tracker.along_m = fminf(fmaxf(tracker.along_m + tracker.speed_mps * dt_s, 0.0), length_m);
     // The last centimetres of braking take many steps; within one the end counts as reached.
-    if crawls && length_m - tracker.along_m < END_M && stop_m >= length_m - tracker.along_m {
+    if crawls && length_m - tracker.along_m < PATH_END_M && stop_m >= length_m - tracker.along_m {
         tracker.along_m = length_m;
         tracker.speed_mps = 0.0;
     }
@@ -255,14 +255,14 @@ pub fn advance<const W: usize>(
 /// reference, metres.
 fn lead_m(cfg: &TrackConfig, clearance_m: f32, speed_mps: f32) -> f32 {
     let deviation_m = deviation(cfg, clearance_m);
-    let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, LEAD_LEAST_M));
+    let lead_m = fminf(cfg.lead_max_m, fmaxf(4.0 * deviation_m, MIN_LEAD_M));
     // Between walls a vehicle that lags may cut a corner, however fast it is.
     let open = deviation_m >= cfg.deviation_max_m;
-    if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKS_MPS, 0.0) } else { lead_m }
+    if open { lead_m + LEAD_S * fmaxf(fabsf(speed_mps) - WALKING_SPEED_MPS, 0.0) } else { lead_m }
 }
 
 /// A reference slower than this is about to stop, m/s.
-const CRAWLS_MPS: f32 = 0.05;
+const ABOUT_TO_STOP_MPS: f32 = 0.05;
 
 fn fmaxi(a: usize, b: usize) -> usize {
     if a > b { a } else { b }

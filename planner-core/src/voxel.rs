@@ -84,14 +84,14 @@ impl GridShape {
     /// Whether no bit beyond the cells is set: it would be an obstacle that no cell has.
     fn padding_is_clear(&self, words: &[u64]) -> bool {
         /// Masks of a brick's first cell layer, first two and first three, along each axis.
-        const LAYERS: [[u64; 3]; 3] = [
+        const BRICK_LAYER_MASKS: [[u64; 3]; 3] = [
             [0x1111_1111_1111_1111, 0x3333_3333_3333_3333, 0x7777_7777_7777_7777],
             [0x000f_000f_000f_000f, 0x00ff_00ff_00ff_00ff, 0x0fff_0fff_0fff_0fff],
             [0xffff, 0xffff_ffff, 0xffff_ffff_ffff],
         ];
         let bricks = self.bricks();
         (0..3).filter(|&axis| !self.dims[axis].is_multiple_of(BRICK_CELLS)).all(|axis| {
-            let padding = !LAYERS[axis][(self.dims[axis] % BRICK_CELLS) as usize - 1];
+            let padding = !BRICK_LAYER_MASKS[axis][(self.dims[axis] % BRICK_CELLS) as usize - 1];
             let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
             (0..bricks[u]).all(|at_u| {
                 (0..bricks[v]).all(|at_v| {

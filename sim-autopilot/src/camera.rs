@@ -20,9 +20,9 @@ use crate::AutopilotKind;
 const CAMERA_FEEDBACK: u32 = 180;
 const CAMERA_IMAGE_CAPTURED: u32 = 263;
 /// Period at which the trigger distance is checked, microseconds: PX4's, ArduPilot's.
-const LOOK_EVERY_US: [u64; 2] = [50_000, 20_000];
+const TRIGGER_CHECK_EVERY_US: [u64; 2] = [50_000, 20_000];
 /// Most photos kept for a referee that does not fetch them.
-const KEPT: usize = 100_000;
+const MAX_KEPT_PHOTOS: usize = 100_000;
 
 /// A picture as it truly was taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -94,7 +94,7 @@ impl Camera {
         let px4 = personality == AutopilotKind::Px4;
         let looks = truth.time_us >= self.look_us;
         if looks {
-            self.look_us += LOOK_EVERY_US[usize::from(!px4)];
+            self.look_us += TRIGGER_CHECK_EVERY_US[usize::from(!px4)];
         }
         let mut shoot = (looks || !px4) && core::mem::take(&mut self.once);
         if shoot {
@@ -115,7 +115,7 @@ impl Camera {
             return None;
         }
         self.taken += 1;
-        if self.photos.len() < KEPT {
+        if self.photos.len() < MAX_KEPT_PHOTOS {
             self.photos.push(truth);
         }
         Some(if px4 { CAMERA_IMAGE_CAPTURED } else { CAMERA_FEEDBACK })

@@ -9,7 +9,7 @@ pub const UNSUPPORTED: u8 = 3;
 pub const FAILED: u8 = 4;
 
 /// Parameter 2 of COMPONENT_ARM_DISARM that forces arming or disarming.
-pub const FORCE: f32 = 21_196.0;
+pub const ARM_FORCE: f32 = 21_196.0;
 /// MAV_MODE_FLAG_CUSTOM_MODE_ENABLED.
 pub const CUSTOM_MODE: u8 = 1;
 pub const DO_SET_MODE: u16 = 176;

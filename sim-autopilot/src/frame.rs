@@ -4,22 +4,22 @@
 //! reader wants a stream that it may wait for, and bytes here come whenever the simulation has some.
 //!
 //! Of candidates that overlap, the first with the right checksum is the frame; a wrong one costs its start byte. A frame that
-//! is not complete [`PARTIAL_US`] after its first byte is given up.
+//! is not complete [`PARTIAL_LIFETIME_US`] after its first byte is given up.
 
 use mavlink::dialects::ardupilotmega::MavMessage;
 use mavlink::{MavlinkVersion, Message, MessageData, calculate_crc};
 
 /// Time after its first byte at which an incomplete frame is dropped, microseconds.
-const PARTIAL_US: u64 = 100_000;
+const PARTIAL_LIFETIME_US: u64 = 100_000;
 /// Longest frame without a signature, bytes: 10 of header, 255 of payload, 2 of CRC.
-pub const FRAME_MAX: usize = 267;
+pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
 const V1_HEADER: usize = 6;
 const V2_HEADER: usize = 10;
 /// Flag of a V2 frame that a signature follows; a frame with any other flag cannot be read.
-const SIGNED: u8 = 1;
+const FLAG_SIGNED: u8 = 1;
 /// COMPONENT_INFORMATION, the one message whose CRC seed is 0: the crate answers 0 for unknown ids
 /// too.
 const SEED_ZERO: u32 = 395;
@@ -133,7 +133,7 @@ impl Framer {
                     self.drop_first(total);
                     return Some(frame);
                 }
-                Front::Partial if now_us <= first_us + PARTIAL_US => return None,
+                Front::Partial if now_us <= first_us + PARTIAL_LIFETIME_US => return None,
                 Front::Partial | Front::Noise => self.drop_first(1),
             }
         }
@@ -147,7 +147,7 @@ impl Framer {
 
 fn front(bytes: &[u8]) -> Front {
     let header = header_len(bytes);
-    if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !SIGNED != 0) {
+    if header == V2_HEADER && bytes.get(2).is_some_and(|flags| flags & !FLAG_SIGNED != 0) {
         return Front::Noise;
     }
     if bytes.len() < header {

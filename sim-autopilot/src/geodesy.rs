@@ -9,12 +9,12 @@ use planner_core::Point;
 use planner_core::frames::{self, Geodetic, Projection};
 
 /// Distance from the centre of the linear map at which the map is renewed, metres.
-const RENEW_M: f64 = 50.0;
+const RENEW_MAP_M: f64 = 50.0;
 /// Distance from the centre beyond which conversions are exact, metres.
-const LINEAR_M: f64 = 100.0;
+const LINEAR_WITHIN_M: f64 = 100.0;
 /// Half the span over which slopes are taken, metres: a power of two, so that the points are exact
 /// in f32.
-const SPAN_M: f64 = 64.0;
+const SLOPE_HALF_SPAN_M: f64 = 64.0;
 
 /// One autopilot's local frame: its EKF origin, its projection, and the mission frame it is seen from.
 #[derive(Clone, Debug)]
@@ -67,7 +67,7 @@ impl LocalFrame {
 
     /// Keeps the linear map near the vehicle; cheap when it is.
     pub fn follow(&mut self, enu: &Vector3<f64>) {
-        if (enu - self.centre).norm_squared() > RENEW_M * RENEW_M {
+        if (enu - self.centre).norm_squared() > RENEW_MAP_M * RENEW_MAP_M {
             self.linearise(*enu);
         }
     }
@@ -75,7 +75,7 @@ impl LocalFrame {
     /// NED about the EKF origin of an ENU point.
     pub fn ned(&self, enu: &Vector3<f64>) -> Vector3<f64> {
         let d = enu - self.centre;
-        if d.norm_squared() < LINEAR_M * LINEAR_M {
+        if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return self.centre_ned + self.ned_slope * d;
         }
         self.exact_ned(enu)
@@ -84,7 +84,7 @@ impl LocalFrame {
     /// ENU of NED about the EKF origin.
     pub fn enu(&self, ned: &Vector3<f64>) -> Vector3<f64> {
         let d = ned - self.centre_ned;
-        if d.norm_squared() < LINEAR_M * LINEAR_M {
+        if d.norm_squared() < LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return self.centre + self.enu_slope * d;
         }
         self.enu_of_geodetic(&frames::ned_to_geodetic(self.projection, &self.ekf_origin, ned))
@@ -103,7 +103,7 @@ impl LocalFrame {
     /// Latitude, longitude and altitude of an ENU point.
     pub fn geodetic(&self, enu: &Vector3<f64>) -> Geodetic {
         let d = enu - self.centre;
-        if d.norm_squared() >= LINEAR_M * LINEAR_M {
+        if d.norm_squared() >= LINEAR_WITHIN_M * LINEAR_WITHIN_M {
             return frames::enu_to_geodetic(&self.world_origin, &enu.cast::<f32>());
         }
         let step = self.geodetic_slope * d;
@@ -131,14 +131,16 @@ impl LocalFrame {
         self.centre_geodetic = frames::enu_to_geodetic(&self.world_origin, &self.centre.cast::<f32>());
         for axis in 0..3 {
             let mut offset = Vector3::zeros();
-            offset[axis] = SPAN_M;
+            offset[axis] = SLOPE_HALF_SPAN_M;
             let (ahead, behind) = (self.centre + offset, self.centre - offset);
-            self.ned_slope
-                .set_column(axis, &((self.exact_ned(&ahead) - self.exact_ned(&behind)) / (2.0 * SPAN_M)));
+            self.ned_slope.set_column(
+                axis,
+                &((self.exact_ned(&ahead) - self.exact_ned(&behind)) / (2.0 * SLOPE_HALF_SPAN_M)),
+            );
             let a = frames::enu_to_geodetic(&self.world_origin, &ahead.cast::<f32>());
             let b = frames::enu_to_geodetic(&self.world_origin, &behind.cast::<f32>());
             let slope = Vector3::new(a.lat_deg - b.lat_deg, a.lon_deg - b.lon_deg, a.alt_m - b.alt_m);
-            self.geodetic_slope.set_column(axis, &(slope / (2.0 * SPAN_M)));
+            self.geodetic_slope.set_column(axis, &(slope / (2.0 * SLOPE_HALF_SPAN_M)));
         }
         // The map is a rotation by far less than a degree and a scale near 1: it has an inverse wherever it is finite.
         self.enu_slope = self.ned_slope.try_inverse().unwrap_or_else(Matrix3::identity);

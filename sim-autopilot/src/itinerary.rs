@@ -26,9 +26,9 @@ const MISSION_ITEM_REACHED: u32 = 46;
 /// `NAV_ACC_RAD` of PX4's multicopters and `WPNAV_RADIUS`, metres.
 const REACHED_M: f32 = 2.0;
 /// `NAV_MC_ALT_RAD`, metres.
-const REACHED_UP_M: f32 = 0.8;
+const REACHED_HEIGHT_M: f32 = 0.8;
 /// `MIS_YAW_ERR` of PX4, radians: 12°. ArduCopter does not wait for its heading.
-const YAW_ERROR: f32 = 0.21;
+const MAX_YAW_ERROR_RAD: f32 = 0.21;
 
 /// Action that is flown for an item.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -201,14 +201,14 @@ impl Platform {
             |us: Option<u64>| sensors.now_us.saturating_sub(us.unwrap_or(sensors.now_us)) as f32 * 1e-6;
         match *leg {
             Leg::Wait(s) => since(progress.since_us) >= s,
-            Leg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_UP_M,
+            Leg::TakeOff { up } => !landed && sensors.position.z > up - REACHED_HEIGHT_M,
             Leg::To { at, heading, stay_s, reached_m } => {
                 let off = at - sensors.position;
                 // NaN is no heading to wait for.
-                let turned = wrap_pi(heading - sensors.heading).abs() < YAW_ERROR;
+                let turned = wrap_pi(heading - sensors.heading).abs() < MAX_YAW_ERROR_RAD;
                 let turned =
                     turned || heading.is_nan() || self.config.personality == AutopilotKind::Ardupilot;
-                if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_UP_M && turned {
+                if libm::hypotf(off.x, off.y) <= reached_m && off.z.abs() <= REACHED_HEIGHT_M && turned {
                     progress.inside_us.get_or_insert(sensors.now_us);
                 }
                 let stayed = progress.inside_us.is_some() && since(progress.inside_us) >= stay_s;

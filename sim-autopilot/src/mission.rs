@@ -25,9 +25,9 @@ const INVALID: u8 = 5;
 const INVALID_SEQUENCE: u8 = 13;
 
 /// Mission types: mission, geofence, rally points.
-const KINDS: usize = 3;
+const MISSION_TYPES: usize = 3;
 /// Most items of a mission: ArduCopter keeps 724 on small boards; PX4 at least 500.
-const MOST: u16 = 724;
+const MAX_ITEMS: u16 = 724;
 const RETRY_US: u64 = 250_000;
 const RETRIES: u32 = 20;
 
@@ -69,7 +69,7 @@ impl Progress {
 /// The stored mission.
 #[derive(Clone, Debug, Default)]
 pub struct Missions {
-    stored: [Vec<Item>; KINDS],
+    stored: [Vec<Item>; MISSION_TYPES],
     upload: Option<Upload>,
     /// Progress of the mission.
     pub(super) progress: Progress,
@@ -126,7 +126,7 @@ impl Missions {
         };
         let kind = fields.u8(kind_at);
         let slot = usize::from(kind);
-        if slot >= KINDS && !(id == CLEAR_ALL && kind == u8::MAX) {
+        if slot >= MISSION_TYPES && !(id == CLEAR_ALL && kind == u8::MAX) {
             return answer(port, from, UNSUPPORTED, kind);
         }
         match id {
@@ -144,7 +144,7 @@ impl Missions {
                 }
                 None => answer(port, from, INVALID_SEQUENCE, kind),
             },
-            COUNT if fields.u16(0) > MOST => answer(port, from, NO_SPACE, kind),
+            COUNT if fields.u16(0) > MAX_ITEMS => answer(port, from, NO_SPACE, kind),
             COUNT if fields.u16(0) == 0 => {
                 self.stored[slot].clear();
                 answer(port, from, ACCEPTED, kind);

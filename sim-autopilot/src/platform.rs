@@ -20,9 +20,9 @@ const HOME_POSITION: u32 = 242;
 const GPS_GLOBAL_ORIGIN: u32 = 49;
 /// Delay of an answer, microseconds, one step: 4 ms, where PX4 was seen to take 1.3 to 16 and
 /// ArduCopter 2.5 to 7.
-const ANSWER_US: u64 = 4_000;
+const ANSWER_DELAY_US: u64 = 4_000;
 /// Time from the command to reboot until the reboot, microseconds.
-const REBOOT_US: u64 = 200_000;
+const REBOOT_DELAY_US: u64 = 200_000;
 
 /// Sensors and estimate that a firmware reads in one step.
 #[derive(Clone, Copy, Debug)]
@@ -194,7 +194,7 @@ impl Platform {
     /// DO_SET_CAM_TRIGG_DIST and DO_DIGICAM_CONTROL. PX4 answers when its camera's driver has looked.
     pub(super) fn control_camera(&mut self, from: Sender, command: &Command) {
         self.do_camera(command);
-        let soon_us = self.time_us + ANSWER_US;
+        let soon_us = self.time_us + ANSWER_DELAY_US;
         let answer_us = match self.config.personality {
             AutopilotKind::Px4 => self.camera.looks_us().max(soon_us),
             AutopilotKind::Ardupilot => soon_us,
@@ -224,7 +224,7 @@ impl Platform {
 
     /// Reboots when the answer is out.
     pub(super) fn reboot_soon(&mut self) {
-        self.reboot_us = Some(self.time_us + REBOOT_US);
+        self.reboot_us = Some(self.time_us + REBOOT_DELAY_US);
     }
 
     pub(super) fn announce_origin(&mut self) {
@@ -252,7 +252,7 @@ impl Platform {
 
     pub(super) fn acknowledge(&mut self, from: Sender, command: u16, result: u8) {
         let ack = Ack { command, result, to: from.id() };
-        self.ports[from.port].later.push((self.time_us + ANSWER_US, ack));
+        self.ports[from.port].later.push((self.time_us + ANSWER_DELAY_US, ack));
     }
 
     /// Target of DO_REPOSITION, ENU with NaN for coordinates that it leaves out; `None` for no

@@ -2,13 +2,13 @@
 
 use mavlink::MessageData;
 
-use super::frame::{self, FRAME_MAX, Frame, Framer};
+use super::frame::{self, Frame, Framer, MAX_FRAME_LEN};
 
 /// Component id of an autopilot (MAV_COMP_ID_AUTOPILOT1).
 pub const AUTOPILOT_COMPONENT: u8 = 1;
 /// Most bytes that wait to be sent before telemetry is dropped, as PX4 drops it when its buffer is
 /// full.
-const TELEMETRY_QUEUE: usize = 4096;
+const MAX_QUEUED_TELEMETRY: usize = 4096;
 /// Rates of the port for a ground station: message id and interval in µs. A real one asks for about these itself.
 pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (0, 1_000_000),   // HEARTBEAT
@@ -24,9 +24,9 @@ pub const GROUND_STREAMS: [(u32, u32); 11] = [
     (245, 500_000),   // EXTENDED_SYS_STATE
 ];
 /// Most bytes that a port queues: a port that is not drained does not grow.
-const QUEUE: usize = 65_536;
+const MAX_QUEUED_BYTES: usize = 65_536;
 /// Most components remembered as reached by a port.
-const ROUTES: usize = 64;
+const MAX_ROUTES: usize = 64;
 
 /// One telemetry stream.
 #[derive(Clone, Copy, Debug)]
@@ -143,14 +143,14 @@ impl Port {
             self.queue.clear();
             self.sent = 0;
         }
-        let room = self.queue.len() - self.sent <= QUEUE - FRAME_MAX;
+        let room = self.queue.len() - self.sent <= MAX_QUEUED_BYTES - MAX_FRAME_LEN;
         self.dropped += u64::from(!room);
         room
     }
 
     /// Remembers that a component is reached here.
     pub fn learn(&mut self, sender: (u8, u8)) {
-        if !self.heard.contains(&sender) && self.heard.len() < ROUTES {
+        if !self.heard.contains(&sender) && self.heard.len() < MAX_ROUTES {
             self.heard.push(sender);
         }
     }
@@ -221,7 +221,7 @@ impl Port {
 
     /// Whether telemetry would be dropped now.
     pub fn is_congested(&self) -> bool {
-        self.queue.len() - self.sent > TELEMETRY_QUEUE
+        self.queue.len() - self.sent > MAX_QUEUED_TELEMETRY
     }
 
     /// Whether any stream is due.

@@ -10,7 +10,7 @@ pub fn approach(error: f32, gain: f32, limit: f32) -> f32 {
 }
 
 /// Rate at which a ramp closes the rest of its change at its end, 1/s.
-const EASE_PER_S: f32 = 6.0;
+const RAMP_END_RATE_PER_S: f32 = 6.0;
 
 /// A rate that changes within limits, as PX4's `VelocitySmoothing` changes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +24,7 @@ pub struct Ramp {
 impl Ramp {
     /// One step of `dt` seconds towards `rate`, with at most `change` m/s² and `jerk` m/s³.
     pub fn advance(&mut self, rate: f32, change: f32, jerk: f32, dt: f32) {
-        let wanted = approach(rate - self.rate, EASE_PER_S, jerk).clamp(-change, change);
+        let wanted = approach(rate - self.rate, RAMP_END_RATE_PER_S, jerk).clamp(-change, change);
         self.change += (wanted - self.change).clamp(-jerk * dt, jerk * dt);
         self.rate += self.change * dt;
     }

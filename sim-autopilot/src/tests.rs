@@ -52,7 +52,7 @@ impl Bench {
     fn send(&mut self, id: u32, payload: &[u8]) {
         let header = Header { system: 1, component: 191, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let len = frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
         self.autopilot.handle_bytes(&out[..len]);
         self.collect();

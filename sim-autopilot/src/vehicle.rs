@@ -13,11 +13,11 @@ use planner_core::Point;
 /// Standard gravity, m/s².
 pub const GRAVITY: f32 = 9.806_65;
 /// Height over its resting place below which a vehicle touches the ground, metres.
-const TOUCH_M: f32 = 0.002;
+const GROUND_CONTACT_M: f32 = 0.002;
 
 /// Vertical push of wind as a share of the horizontal push: rotors meet the air edge-on when it
 /// comes from the side.
-const VERTICAL_PUSH: f32 = 0.2;
+const VERTICAL_WIND_SHARE: f32 = 0.2;
 
 /// Limits of the airframe.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -301,9 +301,9 @@ impl Vehicle {
         let norm = step.norm_squared();
         self.thrust += if lift && norm > most * most { step * (most / libm::sqrtf(norm)) } else { step };
 
-        let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_PUSH)) * self.limits.wind_per_s;
+        let push = wind.component_mul(&Point::new(1.0, 1.0, VERTICAL_WIND_SHARE)) * self.limits.wind_per_s;
         let mut acceleration = self.thrust + push - self.state.velocity * self.limits.drag_per_s;
-        if clearance <= TOUCH_M && acceleration.z <= 0.0 {
+        if clearance <= GROUND_CONTACT_M && acceleration.z <= 0.0 {
             // The ground carries what thrust does not, and friction holds the feet.
             acceleration = Point::zeros();
             self.state.velocity = Point::zeros();

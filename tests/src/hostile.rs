@@ -7,9 +7,9 @@
 use core::ops::Range;
 
 use companion::autopilot::Kind;
-use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State};
+use companion::{COMPANION_COMPONENT, Companion, Config, Duration, Event, Instant, Link, RosterEntry, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use planner_core::Point;
@@ -173,10 +173,10 @@ impl Flight {
             command,
             param1,
             target_system: ID,
-            target_component: COMPONENT,
+            target_component: COMPANION_COMPONENT,
             ..Default::default()
         };
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: self.commands };
         self.commands = self.commands.wrapping_add(1);
         let length = frame::encode(header, &data, &mut out);
@@ -236,8 +236,9 @@ impl Flight {
             alt: (geodetic.alt_m * 1e3) as i32,
             ..Default::default()
         };
-        let mut header = Header { system: NEIGHBOUR, component: COMPONENT, sequence: self.sequence };
-        let mut out = [0; MAX_SENT];
+        let mut header =
+            Header { system: NEIGHBOUR, component: COMPANION_COMPONENT, sequence: self.sequence };
+        let mut out = [0; MAX_FRAME_LEN];
         let length = frame::encode(header, &data, &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..length]);
         header.sequence = header.sequence.wrapping_add(1);
@@ -257,7 +258,7 @@ impl Flight {
     }
 
     fn drain(&mut self) {
-        let mut buffer = [0; MAX_SENT];
+        let mut buffer = [0; MAX_FRAME_LEN];
         for link in [Link::Autopilot, Link::Swarm] {
             loop {
                 let length = self.companion.poll_transmit(link, &mut buffer);

@@ -24,7 +24,7 @@ pub fn parts<const V: usize>(whole: &[u32], fleet: &Fleet<V>, count: usize) -> (
         let mut done = Vec::new();
         for (rank, lot) in lots.iter().enumerate() {
             let taken = usize::from(lot.along_dm / WAYPOINT_DM).min(parts[rank].len());
-            let sure = lot.lives || lot.along_dm == Lot::WHOLE;
+            let sure = lot.lives || lot.along_dm == Lot::WHOLE_PATH;
             done.extend(&parts[rank][..if sure { taken } else { taken.saturating_sub(1) }]);
             living[rank] = lot.lives;
             hash = hash.wrapping_mul(31).wrapping_add(u32::from(lot.along_dm) * 2 + u32::from(lot.lives));

@@ -19,7 +19,7 @@ use planner_core::roadmap::{
     write_with_landmarks,
 };
 use planner_core::schedule::sipp::{self, Route, SippWorkspace};
-use planner_core::schedule::{PIECE_M, ScheduleConfig};
+use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleConfig};
 use planner_core::search::{SearchError, SearchWorkspace, astar, cost_matrix, dijkstra_all, dijkstra_row};
 
 use crate::hostile::{Bytes, Entropy};
@@ -129,7 +129,7 @@ impl Forger {
             climb_m: 1.5,
             descent_m: 1.5,
             depart_s: 0.0,
-            piece_m: PIECE_M,
+            piece_m: MAX_TIMED_SEGMENT_M,
         };
         let asked = Cell::new(0);
         let any = |_: u16, _: &HalfEdge| {

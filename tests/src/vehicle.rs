@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use companion::Link as Port;
 use companion::link::frame::{self, Frame, Framer, Header};
-use companion::{COMPONENT, Instant, State};
+use companion::{COMPANION_COMPONENT, Instant, State};
 use host_sim::boards::{self, Emulated, Piece};
 use host_sim::mission::Mission;
 use host_sim::progress::Progress;
@@ -182,7 +182,7 @@ impl Vehicle {
             command,
             param1,
             target_system: 1,
-            target_component: COMPONENT,
+            target_component: COMPANION_COMPONENT,
             ..COMMAND_LONG_DATA::DEFAULT
         };
         self.tell(&data);
@@ -190,7 +190,7 @@ impl Vehicle {
 
     /// Sends the companion a message by its radio.
     pub fn tell(&mut self, data: &impl MessageData) {
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let length = frame::encode(header, data, &mut out);

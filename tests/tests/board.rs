@@ -33,7 +33,7 @@ fn the_board_computes_what_the_desk_computes() {
 
     let view = mission.view();
     let mut ws = Box::new(Workspace::new());
-    for number in 0..cases::PLANS {
+    for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, &mut ws);
         let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
         let line = format!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
@@ -41,7 +41,7 @@ fn the_board_computes_what_the_desk_computes() {
     }
     assert!(lines.contains(&format!("plan {:08x}", swarm_crc(&mission))), "{}", lines.join("\n"));
     for (name, clearance_m) in [("build", 0.0), ("build-with-clearance", cases::CLEARANCE_M)] {
-        let config = Config { clearance_m, ..cases::BUILT };
+        let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
         let line = format!("{name} {}", built(&map.grid(), &config));
         assert!(lines.contains(&line), "the desk has {line:?}, the board\n{}", lines.join("\n"));
     }

@@ -53,7 +53,7 @@ const SEAL: usize = 2;
 const DATA: usize = 8;
 /// A board runs on for less than this between two looks, microseconds.
 const MOVE_US: u32 = 150;
-/// As `ALONE_AFTER` of the companion's services.
+/// As `NO_AUTOPILOT_AFTER` of the companion's services.
 const ALONE_AFTER_US: u64 = 10_000_000;
 /// Erasing begins within this time after it.
 const ERASES_WITHIN_US: u64 = 5_000_000;
@@ -118,7 +118,7 @@ impl Line {
             mavlink_version: 3,
             ..HEARTBEAT_DATA::DEFAULT
         };
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let length = frame::encode(Header { system: 1, component: 1, sequence: 0 }, &beat, &mut out);
         self.put(&out[..length]);
     }

@@ -193,7 +193,7 @@ fn mavproxy_uses_the_companions_files_and_parameters_through_the_autopilot() {
         println!("skipped: no MAVProxy beside {python}");
         return;
     }
-    let count = parameters::COUNT.to_string();
+    let count = parameters::PARAMETER_COUNT.to_string();
     onboard("onboard_mavproxy.py", "udp-listen:127.0.0.1:0", &[&count], |at| format!("udpout:{at}"));
 }
 

@@ -41,7 +41,7 @@ struct Client {
 impl Client {
     fn send(&mut self, id: u32, payload: &[u8]) {
         let header = Header { system: 255, component: 190, sequence: 0 };
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let seed = frame::extra_crc(id).expect("a known message");
         let len = frame::encode_raw(header, id, seed, payload, &mut out);
         self.autopilot.handle_bytes(&out[..len]);

@@ -2,7 +2,7 @@
 
 use flockmate_tests::areas::{self, Shape};
 use host_sim::coverage::check::{Findings, check_plan};
-use host_sim::coverage::sorties::{SWAP_S, Sortie, USABLE_CHARGE};
+use host_sim::coverage::sorties::{BATTERY_SWAP_S, Sortie, USABLE_CHARGE};
 use host_sim::coverage::{Flight, Planned, export, flight};
 use host_sim::scenario::coverage::Method;
 use host_sim::scenario::{self, Scenario};
@@ -122,7 +122,7 @@ fn judge_rounds(planned: &Planned<'_>) {
     for round in rounds {
         assert!(round.iter().all(|sortie| sortie.begin_s == begin_s), "{round:?}");
         assert!(round.iter().any(|sortie| sortie.depart_s == 0.0), "{round:?}");
-        begin_s = round.iter().map(Sortie::end_s).fold(0.0, f32::max) + SWAP_S;
+        begin_s = round.iter().map(Sortie::end_s).fold(0.0, f32::max) + BATTERY_SWAP_S;
     }
 }
 

@@ -145,7 +145,7 @@ impl Pair {
     fn ground(&mut self, component: u8, id: u32, payload: &[u8]) {
         let header = Header { system: 255, component: 190, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let length = frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
         if component == 1 {
             self.autopilot.handle_bytes(&out[..length]);

@@ -318,7 +318,7 @@ fn forged_payloads_are_survived() {
             }
             let header = Header { system, component, sequence: sequence as u8 };
             let extra = frame::extra_crc(frame.message_id).expect("the framer knew it");
-            let mut out = [0; frame::MAX_SENT];
+            let mut out = [0; frame::MAX_FRAME_LEN];
             let length = frame::encode_raw(header, frame.message_id, extra, &payload[..used], &mut out);
             victims.hear(&out[..length], Duration::from_millis(4));
         }

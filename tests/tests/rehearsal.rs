@@ -85,7 +85,7 @@ impl Ground {
     fn send(&mut self, id: u32, payload: &[u8]) {
         let header = Header { sequence: self.sequence, ..GROUND_STATION };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let length = frame::encode_raw(header, id, frame::extra_crc(id).unwrap(), payload, &mut out);
         self.link.send(&out[..length]).unwrap();
     }

@@ -2,7 +2,7 @@
 
 use flockmate_tests::shared_data;
 use host_sim::map::{self, BoxTree, Unknown, VoxelMap};
-use host_sim::roadmap::{self, CLEARANCE_MAX_M};
+use host_sim::roadmap::{self, MAX_STORED_CLEARANCE_M};
 use planner_core::prm::{self, Config, Sampling, Workspace};
 
 const SEEDS: u64 = 20;
@@ -38,7 +38,7 @@ fn same_edges(name: &str, map: &VoxelMap, nodes: usize, clearance_m: f32) {
             for edge in &joined {
                 let ends = prm::Edge { a: edge.a, b: edge.b };
                 let by_cells_m =
-                    prm::edge_clearance(&grid, &nodes, ends, CLEARANCE_MAX_M).expect("they are nodes");
+                    prm::edge_clearance(&grid, &nodes, ends, MAX_STORED_CLEARANCE_M).expect("they are nodes");
                 let apart_m = (by_cells_m - edge.clearance_m).abs();
                 assert!(apart_m < 0.001, "{name}: {edge:?} has a clearance of {by_cells_m} m");
             }

@@ -41,22 +41,22 @@ pub fn mode_params(custom_mode: u32) -> (f32, f32) {
 }
 
 /// EKF_STATUS_REPORT: horizontal position known, relative and absolute.
-const POSITION_KNOWN: u16 = 0x18;
+const EKF_POSITION_KNOWN: u16 = 0x18;
 /// EKF_STATUS_REPORT: never initialised.
-const UNINITIALISED: u16 = 0x400;
+const EKF_UNINITIALISED: u16 = 0x400;
 
 /// Whether the estimator's flags let it arm and fly Guided.
 pub fn estimator_ready(flags: u16) -> bool {
-    flags & POSITION_KNOWN == POSITION_KNOWN && flags & UNINITIALISED == 0
+    flags & EKF_POSITION_KNOWN == EKF_POSITION_KNOWN && flags & EKF_UNINITIALISED == 0
 }
 
 /// Variance ratio from which an estimate counts as unsound: EKF_STATUS_REPORT gives innovations as
 /// a share of the largest that the filter accepts, and `FS_EKF_THRESH` is 0.8.
-const RATIO_MOST: f32 = 0.8;
+const MAX_VARIANCE_RATIO: f32 = 0.8;
 
 /// Whether a variance ratio is sound; NaN is not.
 pub(crate) fn ratio_is_sound(ratio: f32) -> bool {
-    ratio < RATIO_MOST
+    ratio < MAX_VARIANCE_RATIO
 }
 
 /// Streams to ask for: message id and interval in microseconds. Unasked it sends HEARTBEAT alone.

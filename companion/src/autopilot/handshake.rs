@@ -5,13 +5,13 @@ use crate::mission::State;
 use crate::time::{Duration, Instant};
 
 /// Time after which a denied arming is requested again.
-const RETRY_EVERY: Duration = Duration::from_millis(1000);
+const ARMING_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Longest time from the ack of arming to the first HEARTBEAT (1 Hz) with the armed bit.
 const ARMED_TIMEOUT: Duration = Duration::from_millis(2500);
 /// Arming requests that may stay without an answer; after them arming has failed.
-const ARMING_TRIES: u8 = 2;
+const MAX_ARMING_TRIES: u8 = 2;
 /// Most different refusals reported in one state.
-const REFUSALS: usize = 4;
+const MAX_REFUSALS: usize = 4;
 
 const NAV_TAKEOFF: u16 = 22;
 const DO_SET_MODE: u16 = 176;
@@ -41,13 +41,13 @@ pub(crate) struct Handshake {
     /// The landing detector said air since arming was requested.
     flown: bool,
     /// Refusals reported in this state: command and result.
-    reported: [Option<(u16, u8)>; REFUSALS],
+    reported: [Option<(u16, u8)>; MAX_REFUSALS],
 }
 
 impl Handshake {
     /// Forgets what belongs to the state left.
     pub(crate) fn state_changed(&mut self, from: State, to: State) {
-        self.reported = [None; REFUSALS];
+        self.reported = [None; MAX_REFUSALS];
         self.disarm_refused = false;
         if to == State::Arming {
             *self = Self { ours: true, ..Self::default() };
@@ -79,15 +79,15 @@ impl Handshake {
     pub(crate) fn is_unanswered(&self, now: Instant) -> bool {
         let waited = self.asked_at.is_some_and(|at| now - at >= ARMED_TIMEOUT);
         let silent = !self.denied && self.accepted_at.is_none();
-        waited && silent && (self.unanswered >= ARMING_TRIES || self.gap)
+        waited && silent && (self.unanswered >= MAX_ARMING_TRIES || self.gap)
     }
 
     /// Whether arming is to be requested now; notes that it is.
     pub(crate) fn asks_to_arm(&mut self, now: Instant, armed: bool) -> bool {
         let due = match self.asked_at {
             None => true,
-            Some(at) if self.denied => now - at >= RETRY_EVERY,
-            Some(at) => now - at >= ARMED_TIMEOUT && self.unanswered < ARMING_TRIES && !self.gap,
+            Some(at) if self.denied => now - at >= ARMING_RETRY_EVERY,
+            Some(at) => now - at >= ARMED_TIMEOUT && self.unanswered < MAX_ARMING_TRIES && !self.gap,
         };
         let asks = due && !armed && self.accepted_at.is_none();
         if asks {

@@ -25,7 +25,7 @@ pub enum Limit {
 }
 
 /// Number of kinds of limits.
-const LIMITS: usize = 8;
+const LIMIT_KINDS: usize = 8;
 
 impl Limit {
     /// The values that a vehicle may have, least and greatest: a value outside is no limit but a
@@ -55,13 +55,13 @@ pub struct LimitParameter {
 /// The limits that the autopilot's parameters set.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AutopilotLimits {
-    values: [f32; LIMITS],
+    values: [f32; LIMIT_KINDS],
 }
 
 impl AutopilotLimits {
     /// The defaults of parameters.
     pub(crate) fn of(parameters: &[LimitParameter]) -> Self {
-        let mut limits = Self { values: [f32::INFINITY; LIMITS] };
+        let mut limits = Self { values: [f32::INFINITY; LIMIT_KINDS] };
         for parameter in parameters {
             limits.values[parameter.limit as usize] = parameter.default * parameter.unit;
         }

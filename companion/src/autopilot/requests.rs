@@ -16,37 +16,37 @@ use crate::time::{Duration, Instant};
 use crate::timers::{Timer, Timers};
 
 /// Time between two requests for the EKF origin while another origin is in doubt.
-pub(crate) const ORIGIN_AGAIN: Duration = Duration::from_millis(200);
+pub(crate) const ORIGIN_RETRY_EVERY: Duration = Duration::from_millis(200);
 /// Time from entering the state to the request to disarm, and between two such requests.
-pub(crate) const DISARM_AFTER: Duration = Duration::from_millis(4000);
+pub(crate) const DISARM_EVERY: Duration = Duration::from_millis(4000);
 /// Time for which the safety filter watches the column below before a landing is requested: two
 /// steps.
-const LOOKS_DOWN: Duration = Duration::from_millis(100);
-const RETRY_EVERY: Duration = Duration::from_millis(1000);
+const LAND_REQUEST_AFTER: Duration = Duration::from_millis(100);
+const REQUEST_RETRY_EVERY: Duration = Duration::from_millis(1000);
 /// Time after which the take-off is requested again: longer than ArduCopter takes to spin up and
 /// lift off (2.3 s).
-const TAKE_OFF_AFTER: Duration = Duration::from_millis(4000);
+const TAKE_OFF_RETRY_EVERY: Duration = Duration::from_millis(4000);
 /// Gap in the positions, while HEARTBEAT is heard, after which the autopilot has rebooted and
 /// forgotten its streams.
-const STREAMS_LOST: Duration = Duration::from_millis(1500);
+const ALL_STREAMS_LOST_AFTER: Duration = Duration::from_millis(1500);
 /// Least time between two requests for all streams.
-const STREAMS_EVERY: Duration = Duration::from_millis(2000);
+const STREAMS_RETRY_EVERY: Duration = Duration::from_millis(2000);
 /// Age up to which HEARTBEAT counts as heard: HEARTBEAT comes at 1 Hz, and one late is not yet
 /// silence.
-const HEARD: Duration = Duration::from_millis(1500);
+const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 /// Streams that are requested in each step while connecting.
-const SETUP_BURST: usize = 5;
+const STREAM_REQUESTS_PER_STEP: usize = 5;
 const GPS_GLOBAL_ORIGIN: u16 = 49;
 /// Most requests for the autopilot's limit parameters, all together.
-const LIMIT_TRIES: u8 = 80;
+const MAX_LIMIT_REQUESTS: u8 = 80;
 /// Time between two requests for limit parameters.
-const LIMIT_EVERY: Duration = Duration::from_millis(150);
+const LIMIT_REQUEST_EVERY: Duration = Duration::from_millis(150);
 /// `MAV_PARAM_TYPE_REAL32`.
-const REAL32: u8 = 9;
+const PARAM_TYPE_REAL32: u8 = 9;
 /// Age after which a stream is requested again: SYS_STATUS comes each second.
-const STREAM_LOST: Duration = Duration::from_millis(4000);
+const STREAM_LOST_AFTER: Duration = Duration::from_millis(4000);
 /// Greatest age of the reported charge with which a vehicle takes off.
-const BATTERY_LOST: Duration = Duration::from_millis(5000);
+const MAX_BATTERY_AGE: Duration = Duration::from_millis(5000);
 
 /// The situation that requests follow from.
 #[derive(Clone, Copy, Debug)]
@@ -117,10 +117,10 @@ impl Requests {
         let reads = !s.state.streams_setpoints() && !telemetry.armed;
         if reads {
             self.limits = telemetry.kind().default_limits();
-            (self.read, self.tries) = (0, LIMIT_TRIES);
+            (self.read, self.tries) = (0, MAX_LIMIT_REQUESTS);
             timers.set(Timer::Limit, s.now);
         }
-        timers.set(Timer::Streams, s.now + STREAMS_EVERY);
+        timers.set(Timer::Streams, s.now + STREAMS_RETRY_EVERY);
         if telemetry.kind() == Kind::ArduPilot {
             links.push(Link::Autopilot, Outgoing::Parameter("GUID_TIMEOUT", s.guided_timeout_s));
         }
@@ -141,7 +141,7 @@ impl Requests {
             return;
         };
         self.tries -= 1;
-        timers.set(Timer::Limit, now + LIMIT_EVERY);
+        timers.set(Timer::Limit, now + LIMIT_REQUEST_EVERY);
         links.push(Link::Autopilot, Outgoing::ReadParameter(limit.name));
     }
 
@@ -154,7 +154,7 @@ impl Requests {
         let name = p[ID].split(|b| *b == 0).next().unwrap_or_default();
         let mut changed = false;
         for (i, limit) in telemetry.kind().limits().iter().enumerate() {
-            if limit.name.as_bytes() == name && p[24] == REAL32 && !telemetry.armed {
+            if limit.name.as_bytes() == name && p[24] == PARAM_TYPE_REAL32 && !telemetry.armed {
                 self.read |= 1 << i;
                 changed |= self.limits.set(limit, value);
             }
@@ -172,18 +172,18 @@ impl Requests {
     ) -> bool {
         let (now, kind) = (s.now, telemetry.kind());
         let heard = telemetry.heartbeat_at.is_some();
-        let silent = telemetry.heartbeat_age(now) > HEARD;
+        let silent = telemetry.heartbeat_age(now) > MAX_HEARTBEAT_AGE;
         if heard {
             self.repeat_limits(kind, now, timers, links);
         }
-        let lost = !silent && telemetry.position_age(now) > STREAMS_LOST;
+        let lost = !silent && telemetry.position_age(now) > ALL_STREAMS_LOST_AFTER;
         let tunes = lost && timers.is_due(Timer::Streams, now) && self.begin(telemetry, s, timers, links);
         let doubts = telemetry.doubts_origin();
         if heard && (doubts || telemetry.ekf_origin.is_none()) && timers.is_due(Timer::Origin, now) {
-            timers.set(Timer::Origin, now + if doubts { ORIGIN_AGAIN } else { RETRY_EVERY });
+            timers.set(Timer::Origin, now + if doubts { ORIGIN_RETRY_EVERY } else { REQUEST_RETRY_EVERY });
             links.push(Link::Autopilot, Outgoing::Request(GPS_GLOBAL_ORIGIN));
         }
-        for _ in 0..SETUP_BURST {
+        for _ in 0..STREAM_REQUESTS_PER_STEP {
             if let Some(&(id, interval_us)) = kind.streams().get(self.stream) {
                 links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
                 self.stream += 1;
@@ -208,7 +208,7 @@ impl Requests {
     /// Requests what the state waits for.
     fn repeat_state(&self, telemetry: &Telemetry, s: &Situation, timers: &mut Timers, links: &mut Links) {
         let looks = s.state == State::Land && !s.may_land;
-        if looks || !timers.take(Timer::Request, s.now, RETRY_EVERY) {
+        if looks || !timers.take(Timer::Request, s.now, REQUEST_RETRY_EVERY) {
             return;
         }
         let (kind, mode) = (telemetry.kind(), telemetry.custom_mode);
@@ -220,17 +220,17 @@ impl Requests {
         match s.state {
             State::Engaging => push(change_to(kind.setpoint_mode())),
             // HEARTBEAT may not show the mode yet in which a landing was requested.
-            State::LandingHeld if s.in_state < HEARD || mode != kind.setpoint_mode() => {
+            State::LandingHeld if s.in_state < MAX_HEARTBEAT_AGE || mode != kind.setpoint_mode() => {
                 push(change_to(kind.setpoint_mode()));
             }
             State::CancelStart => push(Outgoing::Arm(false)),
             State::TakeOff => {
-                timers.set(Timer::Request, s.now + TAKE_OFF_AFTER);
+                timers.set(Timer::Request, s.now + TAKE_OFF_RETRY_EVERY);
                 push(Outgoing::TakeOff(telemetry.above_home_m + s.climb_m));
             }
             State::Land if mode != kind.land_mode() => push(change_to(kind.land_mode())),
             State::Disarm => {
-                timers.set(Timer::Request, s.now + DISARM_AFTER);
+                timers.set(Timer::Request, s.now + DISARM_EVERY);
                 push(Outgoing::Arm(false));
                 if mode != kind.land_mode() {
                     push(change_to(kind.land_mode()));
@@ -253,8 +253,8 @@ impl Requests {
             return;
         }
         for &(id, interval_us) in streams.iter().filter(|(_, interval_us)| *interval_us > 0.0) {
-            if telemetry.stream_age(u32::from(id), now) > STREAM_LOST {
-                timers.set(Timer::Streams, now + STREAMS_EVERY);
+            if telemetry.stream_age(u32::from(id), now) > STREAM_LOST_AFTER {
+                timers.set(Timer::Streams, now + STREAMS_RETRY_EVERY);
                 links.push(Link::Autopilot, Outgoing::Interval(id, interval_us));
             }
         }
@@ -262,7 +262,7 @@ impl Requests {
 
     /// Takes the autopilot's answer to a request, and reports what it refused; `own` is this vehicle's system id.
     pub(crate) fn handle_ack(&mut self, ack: &Ack, own: u8, state: State, now: Instant, links: &mut Links) {
-        if ack.to != (0, 0) && ack.to != (own, crate::COMPONENT) {
+        if ack.to != (0, 0) && ack.to != (own, crate::COMPANION_COMPONENT) {
             return;
         }
         if let Some((text, numbers)) = self.handshake.take(state, ack, now) {
@@ -274,11 +274,11 @@ impl Requests {
 impl Situation {
     /// Whether a landing may be requested: once the safety filter has looked down and the column is clear, or whatever is below.
     pub(crate) fn may_land(in_state: Duration, column_clear: bool, must_land: bool) -> bool {
-        must_land || (in_state >= LOOKS_DOWN && column_clear)
+        must_land || (in_state >= LAND_REQUEST_AFTER && column_clear)
     }
 }
 
 /// Whether the battery's charge was reported lately, or does not count (`low_percent` not above zero).
 pub(crate) fn battery_reported(telemetry: &Telemetry, low_percent: i8, now: Instant) -> bool {
-    low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= BATTERY_LOST
+    low_percent <= 0 || telemetry.stream_age(SYS_STATUS_DATA::ID, now) <= MAX_BATTERY_AGE
 }

@@ -3,11 +3,11 @@
 //! Only component 1 of the own system is listened to. Frames that repeat or come out of order are dropped by their
 //! sequence number, positions also by their time. A position that jumps further than a vehicle flies means that the
 //! EKF origin moved or that the estimate was wrong, before or now: the position counts as lost until the origin is heard
-//! again and [`SETTLE`] has passed without another jump.
+//! again and [`POSITION_SETTLE_TIME`] has passed without another jump.
 //!
 //! While the motors are armed the EKF origin that setpoints are computed with does not change, whatever is heard: a GPS_GLOBAL_ORIGIN
 //! that an autopilot forwards from its radio looks like its own. Another origin is in doubt until the autopilot, asked again, has
-//! named no other for 0.8 s (`DOUBT`); then it has moved, and the mission lands. An origin further than 30 km (`ORIGIN_MOST_M`)
+//! named no other for 0.8 s (`ORIGIN_DOUBT_TIME`); then it has moved, and the mission lands. An origin further than 30 km (`MAX_ORIGIN_DISTANCE_M`)
 //! from the mission's counts as none.
 
 use mavlink::MessageData;
@@ -27,31 +27,31 @@ use crate::time::{Duration, Instant};
 
 const HEARTBEAT: u32 = 0;
 const EXTENDED_SYS_STATE: u32 = 245;
-const ARMED: u8 = 0x80;
-const CRITICAL: u8 = 5;
-const ON_GROUND: u8 = 1;
+const FLAG_ARMED: u8 = 0x80;
+const STATE_CRITICAL: u8 = 5;
+const LANDED_STATE_ON_GROUND: u8 = 1;
 /// Least jump, metres: the distance of a position from the one that the last position and velocity
-/// lead to, beyond [`JUMP_MPS`] × time.
-const JUMP_M: f32 = 1.0;
+/// lead to, beyond [`POSITION_JUMP_MPS`] × time.
+const POSITION_JUMP_M: f32 = 1.0;
 /// Change of velocity between two positions that no vehicle flown so far exceeded, m/s.
-const JUMP_MPS: f32 = 5.0;
+const POSITION_JUMP_MPS: f32 = 5.0;
 /// Greatest distance of the EKF origin from the mission's origin, metres: the autopilot's frame is
 /// f32, and rounds a setpoint by up to 1.4 mm at this distance, by metres on the other side of the
 /// earth.
-const ORIGIN_MOST_M: f32 = 30_000.0;
+const MAX_ORIGIN_DISTANCE_M: f32 = 30_000.0;
 /// Longest gap between two positions, seconds: the mission waits for its autopilot no longer.
-const GAP_MOST_S: f32 = 60.0;
+const MAX_GAP_S: f32 = 60.0;
 /// Time for which the position is not used after a jump, or after an equally long gap; another jump
 /// starts the time again. The first messages after a silence may have waited on the way.
-pub const SETTLE: Duration = Duration::from_millis(1000);
+pub const POSITION_SETTLE_TIME: Duration = Duration::from_millis(1000);
 /// Time without a report of the known EKF origin after which a different one is accepted; the
 /// origin is requested several times meanwhile.
-const DOUBT: Duration = Duration::from_millis(800);
+const ORIGIN_DOUBT_TIME: Duration = Duration::from_millis(800);
 /// Gap after which the frames' sequence numbers start afresh.
 const SEQUENCE_LIFETIME: Duration = Duration::from_millis(1000);
 
 /// Streams whose age is kept: more than any autopilot is asked for.
-const STREAMS: usize = 8;
+const MAX_STREAMS: usize = 8;
 
 /// Drops frames that repeat or come late: up to 64 behind the newest of the last second.
 #[derive(Clone, Copy, Debug, Default)]
@@ -141,7 +141,7 @@ pub struct Telemetry {
     /// The last answer to a command, until it is taken.
     pub(crate) ack: Option<Ack>,
     /// When each stream of [`Kind::streams`] that is on was last heard, in that order; `Instant::ZERO`: never.
-    streams: [Instant; STREAMS],
+    streams: [Instant; MAX_STREAMS],
     boot_ms: u32,
     /// Time of the last position used, by the autopilot's clock, milliseconds.
     read_boot_ms: u32,
@@ -167,7 +167,7 @@ impl Telemetry {
 
     /// `MAV_STATE_CRITICAL` or worse: a failsafe acts.
     pub fn is_critical(&self) -> bool {
-        self.system_status >= CRITICAL
+        self.system_status >= STATE_CRITICAL
     }
 
     /// Whether the battery is known to hold less than so many percent.
@@ -189,7 +189,7 @@ impl Telemetry {
     /// operator vouches for (`FLK_EST_M`); infinite while the error is not known.
     pub(crate) fn estimate_bound_m(&self, now: Instant, vouched_m: f32) -> f32 {
         match self.accuracy {
-            Some((accuracy_m, at)) if now - at <= margins::ACCURACY_AGE => {
+            Some((accuracy_m, at)) if now - at <= margins::MAX_ACCURACY_AGE => {
                 libm::fmaxf(margins::ACCURACY_FACTOR * accuracy_m, vouched_m)
             }
             _ => f32::INFINITY,
@@ -231,7 +231,7 @@ impl Telemetry {
                     return Change::None;
                 }
                 self.custom_mode = u32::from_le_bytes([p[0], p[1], p[2], p[3]]);
-                self.armed = p[6] & ARMED != 0;
+                self.armed = p[6] & FLAG_ARMED != 0;
                 self.watch_origin();
                 self.system_status = p[7];
                 self.heartbeat_at = Some(now);
@@ -240,7 +240,7 @@ impl Telemetry {
             EXTENDED_SYS_STATE => {
                 let landed = frame.padded()[1];
                 if landed != 0 {
-                    self.on_ground = Some(landed == ON_GROUND);
+                    self.on_ground = Some(landed == LANDED_STATE_ON_GROUND);
                 }
                 Change::Updated
             }
@@ -337,20 +337,20 @@ impl Telemetry {
         {
             if flown != origin {
                 let since = *self.doubted_at.get_or_insert(now);
-                self.origin_moved |= now - since >= DOUBT;
+                self.origin_moved |= now - since >= ORIGIN_DOUBT_TIME;
                 return Change::OriginDoubted;
             }
             self.doubted_at = None;
         }
         let away_m = frames::geodetic_to_enu(mission_origin, &origin).norm();
-        if away_m > ORIGIN_MOST_M && !self.anywhere {
+        if away_m > MAX_ORIGIN_DISTANCE_M && !self.anywhere {
             (self.ekf_origin, self.position_at, self.read_at) = (None, None, None);
-            self.settled_at = now + SETTLE;
+            self.settled_at = now + POSITION_SETTLE_TIME;
             return Change::OriginFar((away_m * 1e-3) as u32);
         }
         if self.ekf_origin.is_some_and(|known| known != origin) {
             // A position on its way may still be about the old one.
-            self.settled_at = now + SETTLE;
+            self.settled_at = now + POSITION_SETTLE_TIME;
         }
         if self.ekf_origin != Some(origin) {
             self.ekf_origin = Some(origin);
@@ -401,12 +401,12 @@ impl Telemetry {
             // Time by the autopilot's clock since the last position that was used: positions that
             // waited on the way come all at once.
             let passed_s = d.time_boot_ms.wrapping_sub(self.read_boot_ms) as f32 * 1e-3;
-            let dt_s = passed_s.min(GAP_MOST_S);
-            if now - at > SETTLE {
-                self.counts_from = now + SETTLE;
+            let dt_s = passed_s.min(MAX_GAP_S);
+            if now - at > POSITION_SETTLE_TIME {
+                self.counts_from = now + POSITION_SETTLE_TIME;
             }
             let led_to = self.position + self.velocity * dt_s;
-            if (position - led_to).norm() > JUMP_M + JUMP_MPS * dt_s {
+            if (position - led_to).norm() > POSITION_JUMP_M + POSITION_JUMP_MPS * dt_s {
                 return self.lose_position(now);
             }
         }
@@ -424,7 +424,7 @@ impl Telemetry {
         self.ekf_origin = None;
         self.position_at = None;
         self.read_at = None;
-        self.settled_at = now + SETTLE;
+        self.settled_at = now + POSITION_SETTLE_TIME;
         Change::OriginLost
     }
 

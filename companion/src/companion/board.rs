@@ -8,7 +8,7 @@ use crate::storage::store::{Erasing, Fault, FlashRequest, Store};
 use crate::time::{Duration, Instant};
 
 /// Time after the start at which a board that has heard no autopilot has none that could be armed.
-const ALONE_AFTER: Duration = Duration::from_secs(10);
+const NO_AUTOPILOT_AFTER: Duration = Duration::from_secs(10);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Gives it a flash to keep its files and parameters in, and uses those; without one there are no files, and parameters are
@@ -45,7 +45,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             self.mission.state(),
             State::WaitAutopilot | State::WaitPosition | State::Ready | State::Done | State::Aborted
         );
-        let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > ALONE_AFTER;
+        let known = self.telemetry.kind.is_some() || self.now - Instant::ZERO > NO_AUTOPILOT_AFTER;
         match self.mission.state() {
             _ if self.telemetry.armed => Erasing::Forbidden,
             _ if idle && known => Erasing::Allowed,

@@ -7,22 +7,22 @@ use crate::config::PlanFailure;
 use crate::events::{Event, Wanted};
 use crate::link::roster::Standing;
 use crate::mission::State;
-use crate::swarm::fleet::{Fleet, Lot, Own, PROMISE_S};
+use crate::swarm::fleet::{COMMITMENT_S, Fleet, Lot, Own};
 use crate::time::Duration;
 
 /// Margin added to the stopping distance when a vehicle commits itself to a hold, metres.
-const SPARE_M: f32 = 0.3;
+const EXTRA_STOPPING_MARGIN_M: f32 = 0.3;
 /// A vehicle within this distance of the place where it promised to hold has reached it, metres.
-const THERE_M: f32 = 0.2;
+const AT_HOLD_M: f32 = 0.2;
 /// Silence of another vehicle after which a vehicle waits above its own pad: the silent vehicle's
 /// share may yet be given to it.
-const MISSED: Duration = Duration::from_secs(3);
+const MISSED_AFTER: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which a vehicle has left the mission.
-const WITH_PILOT: Duration = Duration::from_secs(20);
+const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Reported in place of a plan CRC where the rest of the area cannot be divided.
 const UNDIVIDED: u32 = u32::MAX;
 /// Time after which a shell that has not answered is asked again.
-const ASK_AGAIN: Duration = Duration::from_secs(30);
+const REQUEST_RETRY: Duration = Duration::from_secs(30);
 
 fn dm(along_m: f32) -> Option<u16> {
     let dm = libm::ceilf(along_m * 10.0);
@@ -47,10 +47,10 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(fleet) = self.neighbours.fleet() else { return };
         let home_m = self.home_m();
         // A vehicle that has left the mission is on its way to the ground.
-        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.misses_one(now, MISSED));
+        let waits = fleet.takes_part() && (fleet.is_dividing() || fleet.misses_one(now, MISSED_AFTER));
         let halt_m = match self.holds_at_m() {
             Some(holds_at_m) => holds_at_m,
-            None if waits && self.guidance.along_m() <= home_m + THERE_M => home_m,
+            None if waits && self.guidance.along_m() <= home_m + AT_HOLD_M => home_m,
             None => f32::INFINITY,
         };
         let behind = fleet.division() > self.mission.division();
@@ -58,7 +58,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             fleet.wants_hash() || ((behind || self.detours.beside.flies()) && self.may_take_division());
         let fingerprint = fleet.fingerprint();
         self.guidance.halt_at(halt_m);
-        if wants && self.mission.should_request_division(fingerprint, now, ASK_AGAIN) {
+        if wants && self.mission.should_request_division(fingerprint, now, REQUEST_RETRY) {
             // Full only if the shell does not drain; then it is asked again.
             let _ = self.events.push_back(Event::PlanRequested(Wanted::Division));
         }
@@ -77,14 +77,14 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let beside = self.detours.beside.flies();
         let ends = match state {
             Stopping | Land | LandingHeld | Disarm | Failsafe | Done | Aborted => true,
-            PilotControl | PilotReturned => self.mission.with_pilot(self.now) >= WITH_PILOT,
+            PilotControl | PilotReturned => self.mission.with_pilot(self.now) >= PILOT_KEEPS_AFTER,
             _ => off_plan && !beside,
         };
         let along_m = self.guidance.progress_m(state, &self.scene());
         let flies = self.guidance.along_m() >= 0.0 && !off_plan;
         // A vehicle that holds, or waits, may have come a little further than where its descent
         // begins.
-        let descends = self.guidance.along_m() > self.home_m() + THERE_M;
+        let descends = self.guidance.along_m() > self.home_m() + AT_HOLD_M;
         let nearly_down = flies && descends && self.holds_at_m().is_none();
         let standing = match ends || nearly_down {
             true if self.mission.has_all_pictures(along_m) => Standing::Finished,
@@ -107,7 +107,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     fn asks_division(&self) -> bool {
         let Some(plan) = self.mission.plan() else { return false };
         let Task::Photograph(photographs) = &plan.task else { return false };
-        let soon_m = self.guidance.along_m() + PROMISE_S * self.config.cruise_mps;
+        let soon_m = self.guidance.along_m() + COMMITMENT_S * self.config.cruise_mps;
         photographs.goes_on && photographs.end_m(&plan.path).is_some_and(|end_m| soon_m >= end_m)
     }
 
@@ -157,11 +157,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Task::Photograph(photographs) = &plan.task else { return None };
         let along_m = self.guidance.along_m();
         // A vehicle whose path is blocked comes no further.
-        let promise_s = if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { PROMISE_S };
+        let promise_s = if matches!(self.mission.state(), Blocked | Replanning) { 0.0 } else { COMMITMENT_S };
         let ahead_m = along_m + promise_s * self.config.cruise_mps;
         let clear_m = self.guidance.clear_m(&self.scene());
         let most_m = ahead_m.min(clear_m).min(self.home_m()).max(along_m);
-        let stop_m = (self.guidance.stops_by_m() + SPARE_M).min(most_m);
+        let stop_m = (self.guidance.stops_by_m() + EXTRA_STOPPING_MARGIN_M).min(most_m);
         let picture_m = photographs.last_by(&plan.path, most_m).filter(|at_m| *at_m >= stop_m);
         dm(picture_m.unwrap_or(stop_m)).map(|promise_dm| promise_dm.max(1))
     }
@@ -179,7 +179,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Whether it stands there.
     pub(super) fn holds_to_divide(&self) -> bool {
         self.holds_at_m()
-            .is_some_and(|at_m| self.guidance.along_m() >= at_m - THERE_M && self.guidance.stands())
+            .is_some_and(|at_m| self.guidance.along_m() >= at_m - AT_HOLD_M && self.guidance.stands())
     }
 
     /// Whether no division is under way or to be flown.
@@ -204,7 +204,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let Some(back_m) = self.detours.beside.back_m() else { return };
         let ends = self.mission.plan().and_then(|around| around.path.point_at(around.path.length_m()));
         let back = plan.path.point_at(back_m);
-        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).norm() < THERE_M);
+        let meets = ends.zip(back).is_some_and(|(end, back)| (end - back).norm() < AT_HOLD_M);
         if meets {
             let left = self.mission.take_up(plan, self.detours.left_at_m(), back_m);
             if left > 0 {

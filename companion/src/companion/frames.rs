@@ -7,7 +7,7 @@ use mavlink::dialects::ardupilotmega::{
 };
 
 use super::{Companion, REPORT_EVERY};
-use crate::autopilot::requests::ORIGIN_AGAIN;
+use crate::autopilot::requests::ORIGIN_RETRY_EVERY;
 use crate::autopilot::telemetry::Change;
 use crate::events::Link;
 use crate::link::answer_limits::{Kind as AnswerKind, Sender};
@@ -53,7 +53,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         match link {
             Link::Autopilot => {
-                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT {
+                if frame.system != self.config.system_id || frame.component != crate::AUTOPILOT_COMPONENT {
                     return false;
                 }
                 if frame.message_id == PARAM_VALUE_DATA::ID {
@@ -70,7 +70,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
                 }
                 self.requests.watch(self.mission.state(), &self.telemetry);
                 if change == Change::OriginDoubted {
-                    self.timers.hasten(Timer::Origin, self.now + ORIGIN_AGAIN);
+                    self.timers.hasten(Timer::Origin, self.now + ORIGIN_RETRY_EVERY);
                     return self.telemetry.origin_moved;
                 }
                 if let Change::OriginFar(km) = change {
@@ -100,7 +100,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     pub(super) fn handle_neighbour(&mut self, frame: &Frame) {
         let relevant = matches!(frame.message_id, TUNNEL_DATA::ID | GLOBAL_POSITION_INT_DATA::ID);
         let id = frame.system;
-        if !relevant || id == self.config.system_id || id == 0 || frame.component != crate::COMPONENT {
+        if !relevant
+            || id == self.config.system_id
+            || id == 0
+            || frame.component != crate::COMPANION_COMPONENT
+        {
             return;
         }
         // The frame's sequence number counts only if the frame decodes.
@@ -204,7 +208,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             return DENIED;
         }
         if link == Link::Swarm {
-            self.links.spend(rate_limit::POSITION);
+            self.links.spend(rate_limit::POSITION_BYTES);
         }
         ACCEPTED
     }

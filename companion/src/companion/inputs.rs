@@ -6,8 +6,8 @@ use super::{Companion, HEARTBEAT_EVERY};
 use crate::autopilot::requests::battery_reported;
 use crate::config::{PlanFailure, REACHES_ALL_M};
 use crate::guidance::{LOST_WINDOW_M, REJOIN_WINDOW_M};
-use crate::mission::{FRESH, Inputs, State};
-use crate::swarm::neighbours::STANDING_MPS;
+use crate::mission::{Inputs, MAX_POSITION_AGE, State};
+use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::time::Duration;
 
 /// Distance of a landing from where it was commanded: the stopping distance from cruise, metres.
@@ -16,14 +16,14 @@ const LANDING_DRIFT_M: f32 = 1.0;
 const STANDING_DRIFT_M: f32 = 0.3;
 /// Greatest height difference between estimate and pad with which a vehicle takes off, metres: real
 /// estimates on the ground were seen up to 1.1 m off.
-const START_HEIGHT_M: f32 = 1.5;
+const MAX_START_HEIGHT_ERROR_M: f32 = 1.5;
 /// Silence a second before the lease ends: the row `NeighboursSilent` stops a vehicle a second
 /// after this.
-const LEASE_ENDS: Duration = Duration::from_secs(19);
+const UNHEARD_STOP_AFTER: Duration = Duration::from_secs(19);
 /// A gate nearer ahead than this leaves no path to fly on, metres.
-const FLIES_ON_M: f32 = 0.2;
+const MIN_GATE_AHEAD_M: f32 = 0.2;
 /// Greatest vertical speed of a vehicle that rests on the ground, m/s.
-const RESTING_MPS: f32 = 0.5;
+const MAX_RESTING_CLIMB_MPS: f32 = 0.5;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// A snapshot.
@@ -44,12 +44,12 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         };
         let climb_m = self.mission.climb_m();
         let away = t.position - (self.mission.start() - Point::new(0.0, 0.0, climb_m));
-        let height_tolerance_m = self.config.start_tolerance_m.min(START_HEIGHT_M);
+        let height_tolerance_m = self.config.start_tolerance_m.min(MAX_START_HEIGHT_ERROR_M);
         let beneath = self.mission.beneath();
         let follow = self.mission.state() == State::Follow;
         let on_ground = t.on_ground == Some(true);
         let fence = self.config.geofence;
-        let standing = self.guidance.stands() && t.velocity.norm() < STANDING_MPS;
+        let standing = self.guidance.stands() && t.velocity.norm() < MAX_HOVER_MPS;
         let drift_m = if standing { STANDING_DRIFT_M } else { LANDING_DRIFT_M };
         let inside =
             |(low, high): (Point, Point)| (0..3).all(|a| t.position[a] >= low[a] && t.position[a] <= high[a]);
@@ -73,7 +73,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // On its way back, or aside to land, it is already on its way to the ground: it does not stop for want of
             // being heard.
             neighbour_age: if let Some(fleet) = self.neighbours.fleet() {
-                fleet.unheard_for(now).beyond(LEASE_ENDS)
+                fleet.unheard_for(now).beyond(UNHEARD_STOP_AFTER)
             } else {
                 match self.guidance.returning || self.detours.lands() || self.flies_on() {
                     true => Duration::default(),
@@ -126,7 +126,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             critical: t.is_critical(),
             on_ground,
             flown: handshake.has_flown(),
-            vertical: t.position_age(now) < FRESH && t.velocity.z.abs() > RESTING_MPS,
+            vertical: t.position_age(now) < MAX_POSITION_AGE && t.velocity.z.abs() > MAX_RESTING_CLIMB_MPS,
             airborne: t.armed && t.on_ground == Some(false),
             lifted_off: !kind.takes_off_by_command() || t.on_ground == Some(false),
             gates_open: self.guidance.advice.stop_within_m > 0.05
@@ -209,7 +209,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let clear_m = self.guidance.clear_m(&self.view().scene);
         self.follows_plan()
             && self.neighbours.all_beyond()
-            && (clear_m > self.guidance.along_m() + FLIES_ON_M || clear_m >= length_m)
+            && (clear_m > self.guidance.along_m() + MIN_GATE_AHEAD_M || clear_m >= length_m)
     }
 
     /// Distance that this vehicle flies on its plan while it is unheard, metres along its path, and
@@ -227,6 +227,6 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let t = &self.telemetry;
         t.charge_below(self.config.battery_low_percent / 2)
             || t.origin_moved
-            || t.position_age(self.now) >= FRESH
+            || t.position_age(self.now) >= MAX_POSITION_AGE
     }
 }

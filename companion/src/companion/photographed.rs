@@ -12,10 +12,10 @@ use crate::time::Duration;
 use crate::timers::Timer;
 
 /// Period at which photographed waypoints are noted and their number is sent.
-const NOTED_EVERY: Duration = Duration::from_millis(1000);
+const NOTE_EVERY: Duration = Duration::from_millis(1000);
 /// Time within which others on the ground report what they know: they report each second, and half
 /// of the messages are lost.
-const OTHERS_SAY: Duration = Duration::from_secs(5);
+const OTHERS_REPORT_WITHIN: Duration = Duration::from_secs(5);
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     /// Waypoints of the area that the plan asked for by [`crate::events::Wanted::Mission`] leaves out, those asked for later too.
@@ -40,7 +40,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Notes what it has photographed, where it is on its plan.
     pub(super) fn step_photographed(&mut self, off_plan: bool) {
-        if !self.photographs() || !self.timers.take(Timer::Done, self.now, NOTED_EVERY) {
+        if !self.photographs() || !self.timers.take(Timer::Done, self.now, NOTE_EVERY) {
             return;
         }
         let flies = self.may_photograph();
@@ -55,7 +55,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         [Link::Autopilot, Link::Swarm]
             .into_iter()
             .for_each(|link| self.links.set_due(link, Fresh::DoneCount, true));
-        let every = if flies { done::EVERY_IN_FLIGHT } else { done::EVERY };
+        let every = if flies { done::PERIOD_IN_FLIGHT } else { done::PERIOD_ON_GROUND };
         if self.timers.take(Timer::DoneReport, self.now, every) {
             self.links.set_due(Link::Swarm, Fresh::Done, true);
         }
@@ -90,7 +90,8 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Whether it has stood ready for as long as others take to say what they know, and all that are heard have its plan.
     pub(super) fn plans_as_others(&self) -> bool {
-        !self.photographs() || (self.mission.in_state(self.now) >= OTHERS_SAY && !self.hears_another_plan())
+        !self.photographs()
+            || (self.mission.in_state(self.now) >= OTHERS_REPORT_WITHIN && !self.hears_another_plan())
     }
 
     /// Whether a vehicle that follows another plan of this mission was heard lately: their gates do not fit.

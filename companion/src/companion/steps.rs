@@ -1,7 +1,7 @@
 //! The step that is due, and what the rows of the table have done.
 
-use super::{Companion, IDLE_EVERY, REPORT_EVERY, ROWS_AT_ONCE, SETPOINT_EVERY};
-use crate::autopilot::requests::DISARM_AFTER;
+use super::{Companion, IDLE_STEP_EVERY, MAX_ROWS_PER_STEP, REPORT_EVERY, SETPOINT_EVERY};
+use crate::autopilot::requests::DISARM_EVERY;
 use crate::config::PlanFailure;
 use crate::events::{Event, Link, Wanted};
 use crate::guidance::Scene;
@@ -48,7 +48,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         }
         let flows = self.mission.state().streams_setpoints();
         self.links.set_due(Link::Autopilot, Fresh::Setpoint, flows);
-        let every = if flows { SETPOINT_EVERY } else { IDLE_EVERY };
+        let every = if flows { SETPOINT_EVERY } else { IDLE_STEP_EVERY };
         self.timers.repeat(Timer::Step, now, every);
     }
 
@@ -86,7 +86,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let (now, config) = (self.now, &self.config);
         let bound_m = self.telemetry.estimate_bound_m(now, config.estimate_m);
         // The best that a receiver can do was weighed when the margin was chosen.
-        let pace = match bound_m <= margins::ESTIMATE_M {
+        let pace = match bound_m <= margins::MIN_ESTIMATE_ERROR_M {
             true => 1.0,
             false => margins::pace(bound_m, config.required_clearance_m, config.radius_m),
         };
@@ -110,7 +110,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     pub(super) fn run_table(&mut self) {
-        for _ in 0..ROWS_AT_ONCE {
+        for _ in 0..MAX_ROWS_PER_STEP {
             let inputs = self.inputs();
             let Some(row) = mission::update(self.mission.state(), &inputs) else { return };
             self.take(row);
@@ -164,7 +164,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             Action::HoldOver => self.timers.set(Timer::Request, now),
             Action::AskOffboard | Action::AskArm | Action::AskTakeOff => self.timers.set(Timer::Request, now),
             Action::AskLand => self.ask_land(from),
-            Action::AskDisarm if to == State::Disarm => self.timers.set(Timer::Request, now + DISARM_AFTER),
+            Action::AskDisarm if to == State::Disarm => self.timers.set(Timer::Request, now + DISARM_EVERY),
             Action::AskDisarm | Action::CancelStart => self.timers.set(Timer::Request, now),
             Action::BeginClimb => self.guidance.begin_climb(&position),
             Action::RunPath => self.guidance.run(now),

@@ -125,7 +125,7 @@ fn a_pilot_is_never_fought() {
     bench.mode = px4::OFFBOARD;
     bench.run(3.0);
     assert_eq!(bench.state(), State::PilotReturned);
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.state(), State::Follow);
     bench.until(State::Done, 60.0);
     assert_no_gap(&bench);
@@ -142,7 +142,7 @@ fn far_from_the_path_it_lands_instead_of_cutting_through_walls() {
     }
     bench.mode = px4::OFFBOARD;
     bench.run(2.0);
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.state(), State::Land);
     bench.until(State::Aborted, 30.0);
 }
@@ -157,7 +157,8 @@ fn a_jump_of_five_metres_is_not_flown_after() {
         bench.until(State::Land, 2.0);
         let lasted = bench.now - jumped_at;
         assert!(
-            lasted >= crate::autopilot::telemetry::SETTLE && lasted < Duration::from_millis(1300),
+            lasted >= crate::autopilot::telemetry::POSITION_SETTLE_TIME
+                && lasted < Duration::from_millis(1300),
             "{lasted:?}"
         );
         // The first setpoint after the jump may still be made before the position is heard, the last is to land.
@@ -207,13 +208,13 @@ fn pause_brakes_on_the_path_and_resume_goes_on() {
 #[test]
 fn land_and_return_are_obeyed() {
     let mut bench = Bench::following(config());
-    bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     bench.until(State::Aborted, 30.0);
     assert!(bench.enu.x > 8.5 && bench.enu.x < 15.0);
     assert_no_gap(&bench);
     let mut bench = Bench::following(config());
     bench.run(2.0);
-    bench.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     bench.until(State::Aborted, 60.0);
     assert!((bench.enu - Point::new(START.x, START.y, 0.0)).norm() < 0.3, "{:?}", bench.enu);
     assert_no_gap(&bench);
@@ -223,19 +224,19 @@ fn land_and_return_are_obeyed() {
 fn unknown_commands_are_told_so_and_foreign_ones_left_alone() {
     let mut bench = Bench::new(config());
     bench.until(State::Ready, 6.0);
-    bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((179, 3, 255, 190)));
-    for (system, component) in [(SYSTEM, 0), (SYSTEM, 1), (0, 0), (SYSTEM + 1, crate::COMPONENT)] {
+    for (system, component) in [(SYSTEM, 0), (SYSTEM, 1), (0, 0), (SYSTEM + 1, crate::COMPANION_COMPONENT)] {
         bench.command(MavCmd::MAV_CMD_DO_SET_HOME, 0.0, system, component);
     }
     bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, 1);
-    bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM + 1, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM + 1, crate::COMPANION_COMPONENT);
     assert_eq!((bench.acks.len(), bench.state()), (0, State::Ready));
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((193, 1, 255, 190)), "not now");
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 7.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 7.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((193, 2, 255, 190)));
-    bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 148.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 148.0, SYSTEM, crate::COMPANION_COMPONENT);
     assert_eq!(bench.acks.pop(), Some((512, 0, 255, 190)));
     assert!(bench.swarm.iter().any(|f| f.message_id == 148));
 }

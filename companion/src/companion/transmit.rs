@@ -22,12 +22,12 @@ use crate::swarm::neighbours::relay;
 /// a message's delay, and half of the longest stop.
 const UNHEARD_S: f32 = 20.0 + 1.8 + 2.0 + 2.5;
 /// Bit of a setpoint's type mask: its heading is ignored.
-const YAW_IGNORED: u16 = 0x400;
+const MASK_YAW_IGNORED: u16 = 0x400;
 
 impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
-    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_SENT`].
+    /// Writes the next frame for a link; 0 when there is none, or `out` is shorter than [`frame::MAX_FRAME_LEN`].
     pub fn poll_transmit(&mut self, link: Link, out: &mut [u8]) -> usize {
-        if out.len() < frame::MAX_SENT {
+        if out.len() < frame::MAX_FRAME_LEN {
             return 0;
         }
         let system = self.config.system_id;
@@ -58,13 +58,13 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             && let Some(mut roster) = self.neighbours.roster()
         {
             (roster.system_id, roster.mission_crc) = (system, self.config.mission_crc);
-            let mut payload = [0; roster::LENGTH];
+            let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
             let header = self.links.header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
         }
         if link == Link::Swarm && self.links.take_due(link, Fresh::Done) {
-            let mut payload = [0; done::LENGTH];
+            let mut payload = [0; done::MAX_LEN];
             let len = self.done_report().encode(&mut payload);
             let header = self.links.header(link, system);
             return frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out);
@@ -96,7 +96,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         if relay.is_empty() {
             return 0;
         }
-        let mut payload = [0; relay::LENGTH];
+        let mut payload = [0; relay::MAX_LEN];
         let len = relay.encode(self.config.system_id, &mut payload);
         let header = self.links.header(Link::Swarm, self.config.system_id);
         frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], out)
@@ -157,11 +157,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
             // Clockwise from north.
             yaw: heading.map_or(0.0, |heading| core::f32::consts::FRAC_PI_2 - heading),
             type_mask: PositionTargetTypemask::from_bits_truncate(match heading {
-                Some(_) => mask & !YAW_IGNORED,
+                Some(_) => mask & !MASK_YAW_IGNORED,
                 None => mask,
             }),
             target_system: self.config.system_id,
-            target_component: crate::AUTOPILOT,
+            target_component: crate::AUTOPILOT_COMPONENT,
             coordinate_frame: MavFrame::MAV_FRAME_LOCAL_NED,
             ..SET_POSITION_TARGET_LOCAL_NED_DATA::default()
         })
@@ -232,11 +232,11 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
         let flags = if grounded { intent::GROUNDED } else { intent::FLYING }
             | flag(intent::LANDED, self.mission.state() == Done)
             | flag(intent::ON_PLAN, on_plan && self.mission.plan().is_some())
-            | flag(intent::OUT, out)
+            | flag(intent::OUT_OF_PLAN, out)
             | flag(intent::WAITING, self.detours.waits(&self.view()))
             | flag(intent::BLOCKED, self.detours.is_blocked())
             | flag(
-                intent::DETOURS,
+                intent::ON_DETOUR,
                 self.detours.is_flying() || self.detours.has_left() || self.guidance.evading,
             );
         let plan = self.mission.plan();
@@ -265,7 +265,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
 
     /// Adds, over an area, the points that it flies along beyond those if nobody hears it any more: as far as its lease takes
     /// it, or to the end where it has left and needs none.
-    fn add_unheard(&self, points: &mut heapless::Vec<Point, { intent::POINTS }>) {
+    fn add_unheard(&self, points: &mut heapless::Vec<Point, { intent::MAX_POINTS }>) {
         use State::*;
         let flies = matches!(
             self.mission.state(),
@@ -313,7 +313,7 @@ impl<const V: usize, const W: usize, const G: usize> Companion<V, W, G> {
     }
 
     /// The points that it flies along next, as far as it will go for now, and whether it may come down from where it is.
-    fn way_ahead(&self) -> (heapless::Vec<Point, { intent::POINTS }>, bool) {
+    fn way_ahead(&self) -> (heapless::Vec<Point, { intent::MAX_POINTS }>, bool) {
         use State::*;
         let mut points = heapless::Vec::new();
         let here = self.telemetry.position;

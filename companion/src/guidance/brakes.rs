@@ -10,12 +10,12 @@ use crate::swarm::neighbours::Neighbours;
 use crate::time::{Duration, Instant};
 
 /// Distance ahead within which a stop is a place to wait at, metres.
-const WAITS_WITHIN_M: f32 = 8.0;
+const WAIT_WITHIN_M: f32 = 8.0;
 /// Age within which a report that a vehicle hears us shows that it is linked.
-const LINKED: Duration = Duration::from_millis(800);
+const LINKED_WITHIN: Duration = Duration::from_millis(800);
 /// Drift in gusts of a vehicle that its autopilot lands from a standstill, with some reserve,
 /// metres.
-const ALONE_BESIDE_M: f32 = 0.5;
+const UNHEARD_LANDING_DRIFT_M: f32 = 0.5;
 
 impl Guidance {
     /// Stops the setpoint where it is: the state that follows does not go.
@@ -36,8 +36,8 @@ impl Guidance {
     ) {
         let safety_m = self.deconflict.safety_distance_m;
         let along_m = self.tracker.along_m;
-        if neighbours.linked_within(now, LINKED) {
-            self.linked_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED.secs_f32();
+        if neighbours.linked_within(now, LINKED_WITHIN) {
+            self.linked_m = along_m - self.tracker.speed_mps.max(0.0) * LINKED_WITHIN.secs_f32();
         }
         let alone = state == State::Alone;
         // On its way down it goes on, and on its way aside.
@@ -47,12 +47,12 @@ impl Guidance {
         ) && matches!(self.phase, Phase::Path | Phase::Join)
             && !(self.aside && state == State::Follow);
         let wait_m = along_m + advice.stop_within_m.max(0.0);
-        let beside_m = safety_m + evade::BESIDE_M;
-        let waits_there = waits && advice.stop_within_m < WAITS_WITHIN_M;
+        let beside_m = safety_m + evade::EVADE_MARGIN_M;
+        let waits_there = waits && advice.stop_within_m < WAIT_WITHIN_M;
         if waits_there {
             self.evade_search.go_on(path, wait_m, neighbours.len(), |i, tell| {
                 if alone {
-                    neighbours.above(i, safety_m + ALONE_BESIDE_M, tell);
+                    neighbours.above(i, safety_m + UNHEARD_LANDING_DRIFT_M, tell);
                 } else {
                     neighbours.landing_column(i, now, beside_m, tell);
                 }

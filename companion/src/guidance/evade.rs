@@ -1,11 +1,11 @@
 //! Out from under a vehicle that comes down: one that waits below it flies back along its path until it is beside the column.
 //!
 //! A vehicle that left the plan and is still in the air will land, by its autopilot and without looking. Nobody waits within
-//! [`BESIDE_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
+//! [`EVADE_MARGIN_M`] beyond the safety distance of the column it may come down in (`neighbours.rs`): a place to wait that is there
 //! is exchanged for the nearest one before it on the path. Back is where this vehicle came from, so the way is free of walls;
-//! a vehicle behind is not come nearer to than [`FOLLOWER_M`] beyond the safety distance.
+//! a vehicle behind is not come nearer to than [`FOLLOWER_STRAY_M`] beyond the safety distance.
 //!
-//! ENU metres. Cost: [`BUDGET`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
+//! ENU metres. Cost: [`MAX_SEARCH_COST`] a step, so a search among many columns takes several steps: one for the column of one neighbour, a
 //! dozen among the most columns there can be; in theory six for each place, if each is held by a column of its own.
 
 use planner_core::Point;
@@ -17,25 +17,25 @@ use planner_core::track::Tracker;
 use crate::swarm::sweep::Sweep;
 
 /// Drift of the vehicle that descends and sway of the one below, together, metres.
-pub const BESIDE_M: f32 = 0.6;
+pub const EVADE_MARGIN_M: f32 = 0.6;
 /// Stray of two vehicles from their paths, together, metres.
-const FOLLOWER_M: f32 = 0.6;
+const FOLLOWER_STRAY_M: f32 = 0.6;
 /// Spacing of the places along the path that are compared, metres.
 const PLACE_STEP_M: f32 = 0.25;
 /// Most places along the path that one search compares.
 const MAX_PLACES: u16 = 48;
 /// Greatest cost of a search in one step: neighbours, columns, and [`PLACE_COST`] for each place.
-const BUDGET: u16 = 96;
+const MAX_SEARCH_COST: u16 = 96;
 const PLACE_COST: u16 = 4;
 /// Fastest on a straight leg, m/s.
-const FAST_MPS: f32 = 1.5;
+const MAX_LEG_MPS: f32 = 1.5;
 /// Fastest through the ends of a leg, m/s: at this speed the vehicle strays from a right angle by
 /// 0.47 m.
-const CORNER_MPS: f32 = 0.6;
+const MAX_CORNER_MPS: f32 = 0.6;
 /// Acceleration of a vehicle that evades, m/s².
 const EVADE_MPS2: f32 = 1.0;
 /// Braking of a vehicle that flies on, m/s².
-const BRAKES_MPS2: f32 = 1.5;
+const BRAKING_MPS2: f32 = 1.5;
 
 /// Place to wait at.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -77,7 +77,7 @@ impl Search {
             wait_m
         });
         self.from_m = Some(from_m);
-        let mut budget = BUDGET;
+        let mut budget = MAX_SEARCH_COST;
         let found = loop {
             let along_m = from_m - f32::from(self.held) * PLACE_STEP_M;
             let place = path.point_at(along_m).filter(|_| self.held == 0 || along_m >= 0.0);
@@ -112,22 +112,24 @@ pub fn step<const W: usize>(
     let back = path.point_at(tracker.along_m - PLACE_STEP_M)?;
     if tracker.speed_mps > 0.0 {
         // The vehicle flies on, and brakes first.
-        tracker.speed_mps = (tracker.speed_mps - BRAKES_MPS2 * dt_s).max(0.0);
+        tracker.speed_mps = (tracker.speed_mps - BRAKING_MPS2 * dt_s).max(0.0);
         tracker.along_m = (tracker.along_m + tracker.speed_mps * dt_s).min(path.length_m());
         return at(path, tracker);
     }
     let follows = |n: &&Neighbour| {
         let apart = |p: &Point| (n.position - p).norm();
-        !n.grounded && n.progress_m.is_some() && apart(&back) < (safety_m + FOLLOWER_M).min(apart(&here))
+        !n.grounded
+            && n.progress_m.is_some()
+            && apart(&back) < (safety_m + FOLLOWER_STRAY_M).min(apart(&here))
     };
     if neighbours.iter().find(follows).is_some() {
         return None;
     }
     let corner_m = path.waypoints().iter().rev().map(|w| tracker.along_m - w.along_m).find(|m| *m > 0.0);
     let allowed = |end: f32, left_m: f32| libm::sqrtf(end * end + 2.0 * EVADE_MPS2 * left_m);
-    let ahead = allowed(CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
+    let ahead = allowed(MAX_CORNER_MPS, corner_m.unwrap_or(0.0)).min(allowed(0.0, tracker.along_m - to_m));
     // The tracker's speed is that of flying on; back is below zero.
-    let speed = ahead.min(FAST_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
+    let speed = ahead.min(MAX_LEG_MPS).min(EVADE_MPS2 * dt_s - tracker.speed_mps.min(0.0));
     tracker.speed_mps = -speed;
     tracker.along_m = (tracker.along_m - speed * dt_s).max(to_m);
     at(path, tracker)
@@ -220,7 +222,7 @@ mod tests {
         while tracker.along_m > 4.0 && steps < 400 {
             step(&path, &mut tracker, 4.0, &[follower], 1.5, 0.05).unwrap();
             let corner_m = (tracker.along_m - 6.0).abs();
-            assert!(corner_m > 0.05 || tracker.speed_mps.abs() < CORNER_MPS + 0.15, "{tracker:?}");
+            assert!(corner_m > 0.05 || tracker.speed_mps.abs() < MAX_CORNER_MPS + 0.15, "{tracker:?}");
             steps += 1;
         }
         assert!(tracker.along_m < 4.05 && steps < 200, "{tracker:?} after {steps}");

@@ -19,14 +19,14 @@ use super::motion::{Motion, shortened};
 const FRAME_ROUNDING_M: f32 = 2e-3;
 /// Distance before the fence at which the follower turns, metres: steps of finite length overshoot
 /// by millimetres.
-const TURNS_BEFORE_M: f32 = 0.02;
+const TURN_BEFORE_FENCE_M: f32 = 0.02;
 /// Part of the jerk that an axis may take to brake, and that its stops are planned with.
 const JERK_SHARES: [f32; 2] = [0.577, 0.48];
 /// Part of the acceleration that an axis may take to brake, and that its stops are planned with,
 /// across and upwards.
 const ACCEL_SHARES: [[f32; 2]; 2] = [[0.7, 0.65], [1.0, 0.9]];
 /// Halvings of the interval between a step that is safe and one that is not.
-const HALVINGS: usize = 8;
+const STEP_HALVINGS: usize = 8;
 
 /// A box that setpoints do not leave.
 #[derive(Clone, Copy, Debug)]
@@ -129,7 +129,7 @@ impl Fence {
     /// moves no nearer to the wall.
     fn walls(&self, axis: usize, place: f32, brake: Brake) -> Walls {
         let (low, high) = (self.low[axis], self.high[axis]);
-        let before_m = fminf(TURNS_BEFORE_M, 0.25 * (high - low));
+        let before_m = fminf(TURN_BEFORE_FENCE_M, 0.25 * (high - low));
         Walls { low: fminf(low + before_m, place), high: fmaxf(high - before_m, place), brake }
     }
 }
@@ -162,7 +162,7 @@ fn brake(limits: &Limits, axis: usize) -> Brake {
 /// The number nearest to `wanted` that is safe, between it and `safe`.
 fn nearest(wanted: f32, safe: f32, is_safe: impl Fn(f32) -> bool) -> f32 {
     let (mut good, mut bad) = (safe, wanted);
-    for _ in 0..HALVINGS {
+    for _ in 0..STEP_HALVINGS {
         let middle = 0.5 * (good + bad);
         if is_safe(middle) {
             good = middle;

@@ -14,27 +14,27 @@ mod look;
 use crate::time::{Duration, Instant};
 
 /// Length of the path ahead that has to be free before a stopped vehicle goes on, metres.
-const RESUME_M: f32 = 1.0;
+const RESUME_CLEAR_M: f32 = 1.0;
 /// Time for which the path ahead has to be free before a stopped vehicle goes on.
-const CLEAR: Duration = Duration::from_millis(300);
+const RESUME_CLEAR_FOR: Duration = Duration::from_millis(300);
 /// Depth of the ground between pad and goal below the lower of both, metres: less than a storey.
-const LOWER_M: f32 = 2.0;
+const GROUND_BELOW_PAD_M: f32 = 2.0;
 /// Longest standstill for a vehicle that the roster does not name; after it this vehicle goes on
 /// slowly.
 const MAX_STOP_FOR_STRANGER: Duration = Duration::from_secs(10);
 /// Share of its speed at which a vehicle goes on after [`MAX_STOP_FOR_STRANGER`].
-const SLOW_SHARE: f32 = 0.15;
+const PAST_STRANGER_SHARE: f32 = 0.15;
 /// Fastest setpoint that may reverse along the path, m/s.
-const TURNS_MPS: f32 = 0.05;
+const MAX_TURNING_SETPOINT_MPS: f32 = 0.05;
 /// Greatest distance between setpoint and reference at which the setpoint may reverse, metres.
-const TURNS_M: f32 = 0.03;
+const MAX_TURNING_SETPOINT_M: f32 = 0.03;
 /// A stop ahead nearer than this is a standstill, metres: a little more than the distance that
 /// advice looks ahead.
-const WAITS_M: f32 = 0.6;
+const STANDSTILL_WITHIN_M: f32 = 0.6;
 /// Time for which whatever kept the vehicle from going on still does.
-const LATELY: Duration = Duration::from_millis(500);
+const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time of unhindered flight after which a vehicle was not kept from going on.
-const FREE: Duration = Duration::from_secs(5);
+const FREE_AFTER: Duration = Duration::from_secs(5);
 /// Standstill after which a vehicle that yields in its descent climbs back up its column.
 const CLIMB_BACK_AFTER: Duration = Duration::from_secs(1);
 
@@ -171,7 +171,7 @@ impl Filter {
     /// Time for which the filter has kept the vehicle from going on, stops and short flights
     /// between them together.
     pub(crate) fn hindered_for(&self, now: Instant) -> Duration {
-        let since = self.hindered_since.filter(|_| now - self.hindered_at < LATELY);
+        let since = self.hindered_since.filter(|_| now - self.hindered_at < HINDERED_WITHIN);
         since.map_or(Duration::default(), |at| now - at)
     }
 
@@ -191,7 +191,7 @@ impl Filter {
 
     /// Share of the nominal speed that it leaves.
     pub(super) fn speed_share(&self, now: Instant) -> f32 {
-        if self.passes_stranger(now) { SLOW_SHARE } else { 1.0 }
+        if self.passes_stranger(now) { PAST_STRANGER_SHARE } else { 1.0 }
     }
 
     fn passes_stranger(&self, now: Instant) -> bool {
@@ -206,7 +206,7 @@ impl Filter {
 
 impl Filter {
     fn hinder(&mut self, yields: bool, now: Instant) {
-        if now - self.hindered_at > FREE {
+        if now - self.hindered_at > FREE_AFTER {
             self.hindered_since = None;
         }
         self.hindered_since.get_or_insert(now);

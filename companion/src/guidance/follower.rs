@@ -6,7 +6,7 @@
 //! set of accelerations (a disc across, an interval upwards), by no more than the jerk allows: it cannot leave that set.
 //!
 //! Wanted is the curve's acceleration, and what leads back to its place and velocity: a critically damped loop. Its rate
-//! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`RATE_SHARE`]): the
+//! is such that a velocity is taken on from the greatest acceleration without more jerk than allowed ([`LOOP_RATE_SHARE`]): the
 //! limits do not make it swing. Where what it strays from the curve would lead out of the geofence, it brakes
 //! before, by the same limits ([`super::fence`]).
 //!
@@ -20,7 +20,7 @@ use super::motion::{Motion, shortened};
 
 /// Rate of the follower's loop, as a share of jerk over acceleration: a change of velocity dies
 /// away at twice this rate.
-const RATE_SHARE: f32 = 0.45;
+const LOOP_RATE_SHARE: f32 = 0.45;
 
 impl Motion {
     /// Moves on by `dt_s` towards where the curve is then, and stops before the fence.
@@ -36,7 +36,7 @@ impl Motion {
         // Place that the follower reaches if it takes on the curve's acceleration.
         let place = self.position + velocity * dt_s + (before * 2.0 + to.acceleration) * (dt_s * dt_s / 6.0);
         let speed = velocity + (before + to.acceleration) * (0.5 * dt_s);
-        let rate = RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);
+        let rate = LOOP_RATE_SHARE * jerk_mps3 / fmaxf(limits.accel_mps2, limits.accel_z_mps2);
         let back = to.velocity + (to.position - place) * (0.5 * rate);
         let wanted = to.acceleration + (shortened(back, limits.fastest_mps()) - speed) * (2.0 * rate);
         let change = limits.within(&wanted) - before;

@@ -2,8 +2,8 @@
 //!
 //! Of a vehicle that was heard to stand half a second ago others must assume that it has begun to fly since. Two that stopped
 //! for one another would therefore never go on. So a vehicle that was stopped reports no way ahead of its setpoint, and does
-//! not move before the others have heard of a way again: [`SPAN`] after it last reported none, and the time that its messages
-//! take. The vehicle that yields reports so at once, the other one only when it has stood for a while ([`PATIENCE`]), so that
+//! not move before the others have heard of a way again: [`HOLD_REPORT_LIFETIME`] after it last reported none, and the time that its messages
+//! take. The vehicle that yields reports so at once, the other one only when it has stood for a while ([`FIRST_STANDSTILL`]), so that
 //! it goes first.
 //!
 //! ENU metres.
@@ -11,12 +11,12 @@
 use crate::time::{Duration, Instant};
 
 /// Time for which a reported hold counts: longer than three reports in a row are lost.
-const SPAN: Duration = Duration::from_millis(1000);
+const HOLD_REPORT_LIFETIME: Duration = Duration::from_millis(1000);
 /// Standstill after which a vehicle that yields reports that it holds.
-const SOON: Duration = Duration::from_millis(300);
+const YIELDING_STANDSTILL: Duration = Duration::from_millis(300);
 /// Standstill after which a vehicle that goes first reports that it holds: the others have this
 /// long to stand.
-const PATIENCE: Duration = Duration::from_secs(4);
+const FIRST_STANDSTILL: Duration = Duration::from_secs(4);
 
 /// Whether a vehicle holds its place.
 #[derive(Clone, Copy, Debug, Default)]
@@ -36,7 +36,7 @@ impl Hold {
             self.late = Duration::from_micros((late_s * 1e6) as u64);
         }
         self.since = self.since.or(Some(now)).filter(|_| stands);
-        let patience = if yields { SOON } else { PATIENCE };
+        let patience = if yields { YIELDING_STANDSTILL } else { FIRST_STANDSTILL };
         let on = self.since.is_some_and(|since| now - since >= patience || self.on);
         core::mem::replace(&mut self.on, on) != on
     }
@@ -53,6 +53,6 @@ impl Hold {
 
     /// Whether others may still count on it.
     pub(super) fn binds(&self, now: Instant) -> bool {
-        self.told_at.is_some_and(|at| now < (at + SPAN) + self.late)
+        self.told_at.is_some_and(|at| now < (at + HOLD_REPORT_LIFETIME) + self.late)
     }
 }

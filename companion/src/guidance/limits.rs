@@ -10,18 +10,18 @@ use crate::autopilot::limits::{AutopilotLimits, Limit};
 use crate::config::Config;
 
 /// Greatest jerk of a setpoint, m/s³; autopilots with a lower limit get their own limit.
-pub const JERK_MPS3: f32 = 4.0;
+pub const MAX_JERK_MPS3: f32 = 4.0;
 /// Greatest jerk of a setpoint while the safety filter stops a vehicle, m/s³.
-pub const URGENT_JERK_MPS3: f32 = 8.0;
+pub const MAX_URGENT_JERK_MPS3: f32 = 8.0;
 /// Greatest acceleration of a setpoint over the nominal one, where the autopilot flies it.
-const CORNER_SHARE: f32 = 1.5;
+const MAX_CORNER_ACCEL_SHARE: f32 = 1.5;
 
 /// Longest time over which the smoother smooths, seconds: lower limits of jerk lower the
 /// acceleration.
-pub(crate) const SMOOTH_MOST_S: f32 = 1.2;
+pub(crate) const MAX_SMOOTHING_S: f32 = 1.2;
 /// Time within which an unheard vehicle has stopped, seconds: the vehicle notices after 1.8 s and
 /// brakes.
-const SILENT_S: f32 = 3.0;
+const UNHEARD_STOPPED_S: f32 = 3.0;
 /// Speed of the join to the path, m/s.
 pub(crate) const JOIN_MPS: f32 = 1.0;
 
@@ -49,9 +49,9 @@ impl Limits {
     /// The mission's limits, lowered to what the autopilot flies.
     pub(crate) fn new<const V: usize>(config: &Config<V>, autopilot: &AutopilotLimits) -> Self {
         let least = |of: &[Limit]| of.iter().fold(f32::INFINITY, |least, l| fminf(least, autopilot.get(*l)));
-        let jerk_mps3 = fminf(JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
+        let jerk_mps3 = fminf(MAX_JERK_MPS3, least(&[Limit::Jerk, Limit::JerkZ]));
         // Acceleration that the smoother's longest average smooths to that jerk.
-        let smooth_mps2 = 0.5 * jerk_mps3 * SMOOTH_MOST_S;
+        let smooth_mps2 = 0.5 * jerk_mps3 * MAX_SMOOTHING_S;
         let accel_mps2 = fminf(config.accel_mps2, smooth_mps2);
         let (across_mps2, vertical_mps2) =
             (least(&[Limit::Accel]), least(&[Limit::AccelUp, Limit::AccelDown]));
@@ -61,14 +61,15 @@ impl Limits {
             descend_mps: fminf(config.descend_mps, least(&[Limit::Descend])),
             accel_mps2: fminf(accel_mps2, across_mps2),
             accel_z_mps2: fminf(accel_mps2, vertical_mps2),
-            most_mps2: [across_mps2, vertical_mps2].map(|most| fminf(CORNER_SHARE * accel_mps2, most)),
+            most_mps2: [across_mps2, vertical_mps2]
+                .map(|most| fminf(MAX_CORNER_ACCEL_SHARE * accel_mps2, most)),
             jerk_mps3,
         }
     }
 
     /// Greatest jerk, m/s³.
     pub(crate) fn jerk(&self, urgent: bool) -> f32 {
-        if urgent { fminf(URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
+        if urgent { fminf(MAX_URGENT_JERK_MPS3, 2.0 * self.jerk_mps3) } else { self.jerk_mps3 }
     }
 
     /// Greatest acceleration along a direction (a unit vector, or nearly none), m/s².
@@ -143,8 +144,8 @@ impl Settings {
 
 /// Bounds expected of vehicles that fly as this one does.
 pub(crate) fn bounds(track: &TrackConfig) -> Bounds {
-    let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: URGENT_JERK_MPS3 };
-    Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: SILENT_S }
+    let braking = Braking { accel_mps2: track.accel_mps2, jerk_mps3: MAX_URGENT_JERK_MPS3 };
+    Bounds { braking, speed_max_mps: track.cruise_mps, silent_s: UNHEARD_STOPPED_S }
 }
 
 #[cfg(test)]

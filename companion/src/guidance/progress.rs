@@ -4,7 +4,7 @@ use planner_core::flight::{Path, VehiclePlan};
 
 use super::motion::within;
 use super::{
-    ARRIVED_M, CLIMBED_M, DESCENDED_M, Guidance, LAND_AFTER, Phase, REPORTED_SHORT_M, RESTS_MPS, Scene,
+    ARRIVED_M, AT_REST_MPS, CLIMBED_M, DESCENDED_M, Guidance, LAND_AFTER, Phase, REPORTED_SHORT_M, Scene,
     WINDOW_EDGE_M,
 };
 use crate::mission::State;
@@ -13,11 +13,11 @@ use crate::time::Instant;
 
 /// Longest time until a gate opens for which an unheard vehicle waits, seconds: less than the row
 /// `Alone` waits.
-const OPENS_IN_S: f32 = 14.0;
+const UNHEARD_GATE_WAIT_S: f32 = 14.0;
 
 impl Guidance {
     /// Place along the plan's path up to which every gate is open, or will be within
-    /// [`OPENS_IN_S`], metres, and the seconds after which that is sure.
+    /// [`UNHEARD_GATE_WAIT_S`], metres, and the seconds after which that is sure.
     pub(crate) fn clears_m<const V: usize, const W: usize, const G: usize>(
         &self,
         scene: &Scene<'_, W, G>,
@@ -27,7 +27,7 @@ impl Guidance {
         let mut in_s = 0.0;
         let gates = scene.plan.map_or(&[][..], |plan| &plan.gates);
         let closed = gates.iter().skip(self.opened).find(|gate| {
-            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= OPENS_IN_S) {
+            match neighbours.passes_in_s(gate, now).filter(|passes_s| *passes_s <= UNHEARD_GATE_WAIT_S) {
                 Some(passes_s) => in_s = libm::fmaxf(in_s, passes_s),
                 None => return true,
             }
@@ -130,7 +130,7 @@ impl Guidance {
     /// Whether the path and the guided descent are flown.
     pub fn path_done<const W: usize, const G: usize>(&self, scene: &Scene<'_, W, G>, now: Instant) -> bool {
         if self.is_algorithm2() {
-            let stands = self.stands() && scene.telemetry.velocity.norm() < RESTS_MPS;
+            let stands = self.stands() && scene.telemetry.velocity.norm() < AT_REST_MPS;
             return stands && self.on_path && self.waypoints.completed() && !self.aside;
         }
         let (Some(plan), Some(leg)) = (scene.plan, self.leg.as_ref()) else { return false };
@@ -158,7 +158,7 @@ impl Guidance {
                 (end - scene.telemetry.position).norm() < ARRIVED_M
                     && (end - self.smoother.position()).norm() < ARRIVED_M
             })
-            && scene.telemetry.velocity.norm() < RESTS_MPS
+            && scene.telemetry.velocity.norm() < AT_REST_MPS
             && (self.advice.stop_within_m > plan.descent_m || self.returning)
     }
 

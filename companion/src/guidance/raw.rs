@@ -8,7 +8,7 @@ use planner_core::track::{self, Reference, Tracker};
 use super::limits::JOIN_MPS;
 use super::smoother::TICK_S;
 use super::{
-    DESCENDED_M, FENCE_MARGIN_M, Guidance, LEADS_FOR, LEG_LEAD_M, LEG_LEAST_M, Phase, SETTLE_WINDOW_M, Scene,
+    DESCENDED_M, FENCE_MARGIN_M, Guidance, LEADS_FOR, LEG_LEAD_M, MIN_LEG_M, Phase, SETTLE_WINDOW_M, Scene,
     TOUCHDOWN_MPS,
 };
 use crate::autopilot::Kind;
@@ -73,10 +73,10 @@ impl Guidance {
         if self.phase == Phase::Descent && self.leg_tracker.along_m > before_m {
             self.progress_at = now;
         }
-        if self.phase == Phase::Join && (leg.length_m() < LEG_LEAST_M || self.leg_done()) {
+        if self.phase == Phase::Join && (leg.length_m() < MIN_LEG_M || self.leg_done()) {
             // Back up a descent it ends where that began: beside the path yet.
             let beside_m = (target - raw).norm();
-            let joined = beside_m < LEG_LEAST_M + JOIN_MPS * TICK_S;
+            let joined = beside_m < MIN_LEG_M + JOIN_MPS * TICK_S;
             (self.phase, self.leg) = (if joined { Phase::Path } else { Phase::Join }, None);
         }
         reference.map_or(raw, |reference| reference.position)
@@ -165,7 +165,7 @@ impl Guidance {
         let leg = self.leg.as_ref()?;
         let speed = self.leg_tracker.speed_mps.max(0.0);
         let braking_m = speed * speed / (2.0 * self.track.accel_z_mps2.min(self.track.accel_mps2));
-        let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + LEG_LEAST_M;
+        let ahead_m = self.leg_tracker.along_m + braking_m + 2.0 * speed * TICK_S + MIN_LEG_M;
         if leg.point_at(ahead_m).is_some_and(|ahead| !self.smoother.allows(&ahead)) {
             advice.stop_within_m = braking_m;
             self.fenced = true;
@@ -178,7 +178,7 @@ impl Guidance {
             length_m
         } else {
             let seen_m = path.project(&reference.position, self.tracker.along_m, SETTLE_WINDOW_M);
-            seen_m.max(self.tracker.along_m).min((length_m - LEG_LEAST_M).max(0.0))
+            seen_m.max(self.tracker.along_m).min((length_m - MIN_LEG_M).max(0.0))
         };
         Some(reference.position)
     }

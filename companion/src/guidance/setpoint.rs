@@ -12,7 +12,7 @@ const HOLD_PER_S2: f32 = 3.0;
 const DAMP_PER_S: f32 = 1.5;
 /// Bound on the sum of both accelerations, m/s²: a position that jumps must not throw the vehicle
 /// about.
-const HOLD_MOST_MPS2: f32 = 1.5;
+const MAX_HOLD_MPS2: f32 = 1.5;
 
 /// Setpoint for the autopilot.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,6 +35,6 @@ pub(super) fn correction(position: &Point, velocity: &Point, telemetry: &Telemet
     if !across.is_finite() {
         return Point::zeros();
     }
-    let share = if across > HOLD_MOST_MPS2 { HOLD_MOST_MPS2 / across } else { 1.0 };
+    let share = if across > MAX_HOLD_MPS2 { MAX_HOLD_MPS2 / across } else { 1.0 };
     Point::new(off.x * share, off.y * share, 0.0)
 }

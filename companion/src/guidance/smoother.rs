@@ -16,55 +16,55 @@
 //! - A *follower* ([`super::follower`]) goes where the curve leads, and holds the limits of acceleration and jerk exactly, beside
 //!   the geofence too ([`super::fence`]).
 //!
-//! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most [`TICKS`] ticks a step.
+//! ENU metres, seconds. Work: 2·[`MAX_WINDOW_TICKS`] vector sums for each tick, at most [`MAX_TICKS`] ticks a step.
 
 use libm::{fabsf, fmaxf, fminf, sqrtf};
 use planner_core::Point;
 
 use super::fence::Fence;
-use super::limits::{Limits, SMOOTH_MOST_S};
+use super::limits::{Limits, MAX_SMOOTHING_S};
 use super::motion::{Motion, shortened, within};
 
 /// Time between two raw points, seconds: the period of the setpoints.
 pub const TICK_S: f32 = 0.05;
 /// Most raw points taken in one call: a later step moves the setpoint no further.
-pub const TICKS: u8 = 4;
+pub const MAX_TICKS: u8 = 4;
 /// Longest window of each moving average, in ticks of [`TICK_S`].
-const MAX_WINDOW_TICKS: usize = (SMOOTH_MOST_S / TICK_S + 0.5) as usize;
+const MAX_WINDOW_TICKS: usize = (MAX_SMOOTHING_S / TICK_S + 0.5) as usize;
 /// Shortest window of each moving average, in ticks.
 const MIN_WINDOW_TICKS: usize = 8;
 /// Factor by which the averages' jerk stays below the limit: the rest is for corners and the clock.
-const JERK_ROOM: f32 = 1.12;
+const JERK_RESERVE: f32 = 1.12;
 /// Raw velocities that count for one value of both averages.
-const LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
+const HISTORY_LEN: usize = 2 * MAX_WINDOW_TICKS - 1;
 /// Share of the jerk left by the curve that the clock takes: the clock's own steps are 50 ms long.
-const CLOCK_SHARE: f32 = 0.7;
+const CLOCK_JERK_SHARE: f32 = 0.7;
 /// Share of the jerk that the clock plans with: the rest is for the next raw point, which it cannot
 /// foresee.
-const JERK_USED: f32 = 0.9;
+const PLANNED_JERK_SHARE: f32 = 0.9;
 /// Share of the jerk with which the end of a change of speed is planned: the curve may need the
 /// rest.
-const END_SHARE: f32 = 0.4;
+const END_JERK_SHARE: f32 = 0.4;
 /// Share of the jerk with which an acceleration ends: nothing depends on how soon the clock runs at
 /// 1 again.
-const RISE_SHARE: f32 = 0.15;
+const RISE_JERK_SHARE: f32 = 0.15;
 /// Least speed of the curve from which the clock's acceleration is computed, m/s.
-const SLOW_MPS: f32 = 0.2;
+const MIN_CURVE_MPS: f32 = 0.2;
 /// A setpoint slower than this stands, m/s.
-const STANDS_MPS: f32 = 0.01;
+const STANDSTILL_MPS: f32 = 0.01;
 /// Rate of decay at the end of a stop, 1/s: speed falls by this share of itself each second.
-const TAIL_PER_S: f32 = 4.0;
+const STOP_DECAY_PER_S: f32 = 4.0;
 /// Fastest that the setpoint follows a vehicle under other control, m/s: a place that moves faster
 /// is an estimate that jumps.
-const FOLLOWS_MPS: f32 = 15.0;
+const MAX_FOLLOWED_MPS: f32 = 15.0;
 /// Longest gap in the setpoints during which the vehicle still does what the last setpoint said,
 /// seconds.
-const GAP_S: f32 = 0.3;
+const MAX_SETPOINT_GAP_S: f32 = 0.3;
 /// Weight of the newest step in the velocity of a followed vehicle: the position is reported in
 /// steps of its own.
-const FOLLOWED_SHARE: f32 = 0.25;
+const FOLLOWED_VELOCITY_GAIN: f32 = 0.25;
 /// Greatest speed after following, over the speed at which the vehicle was followed.
-const FOLLOWED_MOST: f32 = 1.5;
+const MAX_SPEED_OVER_FOLLOWED: f32 = 1.5;
 /// Distance outside the fence up to which a raw point is moved inside without a report, metres.
 const FENCE_SLACK_M: f32 = 0.01;
 /// Distance by which a step may exceed the speed limit, metres: rounding at a kilometre from the
@@ -107,7 +107,7 @@ pub struct Smoother {
     /// Newest raw point.
     raw: Point,
     /// Raw steps, a ring; `at` is the newest.
-    steps: [Point; LEN],
+    steps: [Point; HISTORY_LEN],
     at: usize,
     /// Newest average, and its last three steps, oldest first.
     mean: Point,
@@ -145,7 +145,7 @@ impl Smoother {
             fence: fence.map(Fence::new),
             n: average(&limits),
             raw: Point::zeros(),
-            steps: [Point::zeros(); LEN],
+            steps: [Point::zeros(); HISTORY_LEN],
             at: 0,
             mean: Point::zeros(),
             slopes: [Point::zeros(); 3],
@@ -224,28 +224,28 @@ impl Smoother {
 
     /// Whether the setpoint stands.
     pub(crate) fn stands(&self) -> bool {
-        self.velocity().norm_squared() < STANDS_MPS * STANDS_MPS
+        self.velocity().norm_squared() < STANDSTILL_MPS * STANDSTILL_MPS
     }
 
     /// Distance that a stop takes from now on, metres: what is flown until the braking has built up, and the braking.
     pub(crate) fn braking_m(&self, urgent: bool) -> f32 {
         let velocity = self.velocity();
         let speed = velocity.norm();
-        if speed < STANDS_MPS {
+        if speed < STANDSTILL_MPS {
             return 0.0;
         }
         let accel = self.limits.accel_along(&(velocity / speed));
-        let jerk = CLOCK_SHARE * self.limits.jerk(urgent);
+        let jerk = CLOCK_JERK_SHARE * self.limits.jerk(urgent);
         let ahead = fmaxf(self.acceleration().dot(&velocity) / speed, 0.0);
         let build_up_s = (accel + ahead) / jerk + TICK_S;
-        let end_s = 0.5 * accel / (END_SHARE * self.limits.jerk(urgent)) + 0.5 / TAIL_PER_S;
+        let end_s = 0.5 * accel / (END_JERK_SHARE * self.limits.jerk(urgent)) + 0.5 / STOP_DECAY_PER_S;
         speed * speed / (2.0 * accel) + speed * build_up_s + fminf(speed, accel * end_s) * end_s + 0.02
     }
 
     /// Begins at a place, `unsent_s` after a place was sent last. After a short gap it goes on as it was: the autopilot has
     /// done so too.
     pub(crate) fn resume_at(&mut self, place: Point, unsent_s: f32) {
-        if !self.live && self.sent == Some(self.position()) && unsent_s < GAP_S {
+        if !self.live && self.sent == Some(self.position()) && unsent_s < MAX_SETPOINT_GAP_S {
             (self.live, self.resumes) = (true, true);
             self.rest();
         } else {
@@ -256,7 +256,8 @@ impl Smoother {
     /// At rest at a place, no further from what was sent last than a vehicle is followed: an estimate that jumps is no motion.
     pub(crate) fn begin_at(&mut self, place: Point, unsent_s: f32) {
         let place = if place.iter().all(|c| c.is_finite()) { self.inside(place) } else { self.position() };
-        let place = self.sent.map_or(place, |sent| sent + shortened(place - sent, FOLLOWS_MPS * unsent_s));
+        let place =
+            self.sent.map_or(place, |sent| sent + shortened(place - sent, MAX_FOLLOWED_MPS * unsent_s));
         self.motion = Motion::at(place);
         (self.live, self.resumes, self.followed) = (true, false, Point::zeros());
         self.rest();
@@ -267,7 +268,8 @@ impl Smoother {
         let (here, was_live, followed) = (self.position(), self.live, self.followed);
         self.begin_at(place, unsent_s);
         if was_live && unsent_s > 0.0 {
-            self.followed = followed + ((self.position() - here) / unsent_s - followed) * FOLLOWED_SHARE;
+            self.followed =
+                followed + ((self.position() - here) / unsent_s - followed) * FOLLOWED_VELOCITY_GAIN;
         }
     }
 
@@ -284,7 +286,7 @@ impl Smoother {
     /// Begins to hold its place with the velocity that the vehicle has there: it brakes, and comes back. A velocity that is not
     /// that of its places is not believed, and from what it has it can stop inside the fence.
     pub(crate) fn move_on(&mut self, velocity: &Point) {
-        let most_mps = fminf(self.limits.fastest_mps(), FOLLOWED_MOST * self.followed.norm());
+        let most_mps = fminf(self.limits.fastest_mps(), MAX_SPEED_OVER_FOLLOWED * self.followed.norm());
         let velocity = shortened(*velocity, most_mps);
         if velocity.iter().all(|c| c.is_finite()) {
             self.motion.velocity = velocity;
@@ -296,7 +298,7 @@ impl Smoother {
 
     /// Forgets the curve ahead; from a standstill, or nearly: the follower comes to rest by its own limits.
     pub(crate) fn rest(&mut self) {
-        self.steps = [Point::zeros(); LEN];
+        self.steps = [Point::zeros(); HISTORY_LEN];
         self.slopes = [Point::zeros(); 3];
         (self.raw, self.mean) = (self.position(), self.position());
         (self.share, self.clock, self.clock_rate) = (0.0, 1.0, 0.0);
@@ -321,7 +323,7 @@ impl Smoother {
             return 0;
         }
         let resumes = core::mem::take(&mut self.resumes);
-        self.dt_s = fminf(dt_s, if resumes { GAP_S } else { f32::from(TICKS) * TICK_S });
+        self.dt_s = fminf(dt_s, if resumes { MAX_SETPOINT_GAP_S } else { f32::from(MAX_TICKS) * TICK_S });
         // A hard stop that has begun ends as one.
         let brakes = self.clock_rate < 0.0 || self.acceleration().dot(&self.velocity()) < 0.0;
         self.stopping = pace.urgent || (self.stopping && brakes);
@@ -329,7 +331,7 @@ impl Smoother {
         let clock_before = self.clock;
         self.run_clock(pace, self.dt_s);
         self.share += 0.5 * (clock_before + self.clock) * self.dt_s / TICK_S;
-        let due = (self.share as u8).min(TICKS);
+        let due = (self.share as u8).min(MAX_TICKS);
         // After a gap the curve is one point.
         self.share = if resumes { 0.0 } else { fmaxf(self.share - f32::from(due), 0.0) };
         due
@@ -397,7 +399,7 @@ impl Smoother {
         let limits = &self.limits;
         let (_, slope, bend) = self.curve();
         let true_speed = slope.norm();
-        let speed = fmaxf(true_speed, SLOW_MPS);
+        let speed = fmaxf(true_speed, MIN_CURVE_MPS);
         let along = bend.dot(&slope) / speed;
         let third = (self.slopes[2] - self.slopes[1] * 2.0 + self.slopes[0]) / (TICK_S * TICK_S * TICK_S);
         let clock = self.clock;
@@ -405,9 +407,9 @@ impl Smoother {
         // Wanted change of the speed: towards the pace, and such that it ends there without a step of the acceleration.
         let lack = (pace.share.clamp(0.0, 1.0) - clock) * speed;
         let size = fmaxf(fabsf(lack) - fabsf(self.clock_rate) * speed * dt_s, 0.0);
-        let end_share = if lack > 0.0 { RISE_SHARE } else { END_SHARE };
+        let end_share = if lack > 0.0 { RISE_JERK_SHARE } else { END_JERK_SHARE };
         let end_jerk = end_share * limits.jerk(pace.urgent);
-        let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), TAIL_PER_S * size);
+        let rate = fminf(fminf(accel, sqrtf(2.0 * end_jerk * size)), STOP_DECAY_PER_S * size);
         let wanted = if lack < 0.0 { -rate } else { rate };
         let own = along * clock * clock;
         // The clock speeds up only by the part of the acceleration that the curve leaves, which may
@@ -419,8 +421,8 @@ impl Smoother {
         let ahead = bend + third * (clock * dt_s);
         let next = (clock + self.clock_rate * dt_s).clamp(0.0, 1.0);
         let change = ahead * (next * next) - self.asked;
-        let most = JERK_USED * limits.jerk(pace.urgent) * dt_s;
-        let slope_sq = fmaxf(slope.norm_squared(), SLOW_MPS * SLOW_MPS);
+        let most = PLANNED_JERK_SHARE * limits.jerk(pace.urgent) * dt_s;
+        let slope_sq = fmaxf(slope.norm_squared(), MIN_CURVE_MPS * MIN_CURVE_MPS);
         let middle = -change.dot(&slope) / slope_sq;
         let left = most * most - change.norm_squared() + middle * middle * slope_sq;
         let half = sqrtf(fmaxf(left, 0.0) / slope_sq);
@@ -434,7 +436,7 @@ impl Smoother {
     /// Takes a raw step in.
     fn take(&mut self, step: Point) {
         self.raw += step;
-        self.at = if self.at == 0 { LEN - 1 } else { self.at - 1 };
+        self.at = if self.at == 0 { HISTORY_LEN - 1 } else { self.at - 1 };
         self.steps[self.at] = step;
         // Both averages at once: a triangle of 2n − 1 weights.
         let n = self.n;
@@ -442,7 +444,7 @@ impl Smoother {
         let (mut slope, mut behind) = (Point::zeros(), Point::zeros());
         let mut tail = 1.0;
         for i in 0..2 * n - 1 {
-            let at = if self.at + i < LEN { self.at + i } else { self.at + i - LEN };
+            let at = if self.at + i < HISTORY_LEN { self.at + i } else { self.at + i - HISTORY_LEN };
             let weight = (if i < n { i + 1 } else { 2 * n - 1 - i }) as f32 * scale;
             slope += self.steps[at] * weight;
             tail -= weight;
@@ -468,7 +470,8 @@ impl Smoother {
 
 /// Ticks of each average: long enough for the autopilot's jerk.
 fn average(limits: &Limits) -> usize {
-    let n = libm::ceilf(2.0 * JERK_ROOM * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
+    let n =
+        libm::ceilf(2.0 * JERK_RESERVE * limits.accel_mps2 / (limits.jerk(false) * TICK_S) - 1e-3) as usize;
     n.clamp(MIN_WINDOW_TICKS, MAX_WINDOW_TICKS)
 }
 

@@ -49,9 +49,9 @@ pub(crate) enum Kind {
     Text,
 }
 
-const SENDERS: usize = 3;
-const KINDS: usize = 5;
-const LINKS: usize = 2;
+const SENDER_COUNT: usize = 3;
+const KIND_COUNT: usize = 5;
+const LINK_COUNT: usize = 2;
 
 /// A token bucket: `burst` answers at once, then one each `every_ms`.
 #[derive(Clone, Copy, Debug)]
@@ -68,7 +68,7 @@ const fn rate(every_ms: u64, burst: u64) -> Rate {
 /// Others can request by radio at most 22 + 30 + 19 + 20 + 6 bytes a second, of the 250 that the
 /// radio rate limit leaves in the air. A list of all parameters is one burst. PX4 sends TIMESYNC at
 /// 10 Hz, and needs no answer to fly.
-const RATES: [[Rate; KINDS]; SENDERS] = [
+const RATES: [[Rate; KIND_COUNT]; SENDER_COUNT] = [
     [rate(100, 10), rate(1000, 5), rate(50, 32), rate(100, 10), rate(1000, 6)],
     [rate(200, 5), rate(500, 5), rate(200, 16), rate(500, 4), rate(10_000, 1)],
     [rate(1000, 2), rate(1000, 3), rate(2000, 10), rate(2000, 2), rate(10_000, 1)],
@@ -77,7 +77,7 @@ const RATES: [[Rate; KINDS]; SENDERS] = [
 /// For each link, sender and kind the time at which its bucket is full again.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Rates {
-    full_at: [[[Instant; KINDS]; SENDERS]; LINKS],
+    full_at: [[[Instant; KIND_COUNT]; SENDER_COUNT]; LINK_COUNT],
 }
 
 impl Rates {

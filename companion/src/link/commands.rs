@@ -7,7 +7,7 @@
 //! components that we do not know is somebody else's and stays unanswered.
 
 use crate::link::frame::Frame;
-use crate::mission::{FRESH, Guard, Inputs, State, awaits};
+use crate::mission::{Guard, Inputs, MAX_POSITION_AGE, State, awaits};
 use crate::time::{Duration, Instant};
 
 const COMMAND_INT: u32 = 75;
@@ -43,7 +43,7 @@ const GLOBAL: u8 = 0;
 const GLOBAL_INT: u8 = 5;
 
 /// Time within which the same frame is a repetition, not a new command.
-const REPEAT: Duration = Duration::from_secs(5);
+const DUPLICATE_WINDOW: Duration = Duration::from_secs(5);
 
 /// A command that concerns us.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -97,8 +97,8 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
     // Both lay out 28 bytes of parameters, then command, target system, target component.
     let (target_system, target_component) = (p[30], p[31]);
     let for_system = target_system == 0 || target_system == system;
-    let for_component = target_component == 0 || target_component == crate::COMPONENT;
-    let own_echo = frame.system == system && frame.component == crate::COMPONENT;
+    let for_component = target_component == 0 || target_component == crate::COMPANION_COMPONENT;
+    let own_echo = frame.system == system && frame.component == crate::COMPANION_COMPONENT;
     if !for_system || !for_component || own_echo {
         return None;
     }
@@ -112,13 +112,13 @@ pub fn read(frame: &Frame, system: u8) -> Option<Command> {
             .then(|| (whole(16), whole(20), float(24))),
         from: (frame.system, frame.component),
         to_us: target_system == system,
-        to_component: target_component == crate::COMPONENT,
+        to_component: target_component == crate::COMPANION_COMPONENT,
     })
 }
 
 /// Bytes of a command that are compared: parameters, command, addressee, and the frame's further
 /// fields.
-const COMPARED: usize = 35;
+const COMPARED_LEN: usize = 35;
 
 /// A command frame and its answer.
 #[derive(Clone, Copy, Debug)]
@@ -126,7 +126,7 @@ struct Answered {
     from: (u8, u8),
     sequence: u8,
     message: u32,
-    payload: [u8; COMPARED],
+    payload: [u8; COMPARED_LEN],
     result: Option<u8>,
     at: Instant,
 }
@@ -146,16 +146,16 @@ impl Repeats {
         let same = |seen: &&Answered| {
             seen.from == (frame.system, frame.component)
                 && (seen.sequence, seen.message) == (frame.sequence, frame.message_id)
-                && seen.payload[..] == frame.padded()[..COMPARED]
-                && now - seen.at < REPEAT
+                && seen.payload[..] == frame.padded()[..COMPARED_LEN]
+                && now - seen.at < DUPLICATE_WINDOW
         };
         self.seen.iter().flatten().find(same).map(|seen| seen.result)
     }
 
     /// Remembers a frame and its answer.
     pub fn remember(&mut self, frame: &Frame, result: Option<u8>, at: Instant) {
-        let mut payload = [0; COMPARED];
-        payload.copy_from_slice(&frame.padded()[..COMPARED]);
+        let mut payload = [0; COMPARED_LEN];
+        payload.copy_from_slice(&frame.padded()[..COMPARED_LEN]);
         let (from, sequence, message) = ((frame.system, frame.component), frame.sequence, frame.message_id);
         self.seen[self.next] = Some(Answered { from, sequence, message, payload, result, at });
         self.next = (self.next + 1) % self.seen.len();
@@ -256,7 +256,7 @@ pub fn apply(pending: &mut Pending, state: State, inputs: &Inputs, command: &Com
         }
         PAUSE_CONTINUE if command.param1 == 1.0 => {
             // A place to go on from has to be known.
-            if state == PilotReturned && inputs.position_age >= FRESH {
+            if state == PilotReturned && inputs.position_age >= MAX_POSITION_AGE {
                 return Some(TEMPORARILY_REJECTED);
             }
             let taken = matches!(state, PilotControl | PilotReturned | Failsafe);

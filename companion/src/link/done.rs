@@ -25,17 +25,17 @@ pub const PAYLOAD_TYPE: u16 = 0xF10F;
 /// Version of the message's layout.
 pub const VERSION: u8 = 1;
 /// Most ranges of one message.
-pub const RANGES: usize = 19;
+pub const MAX_RANGES: usize = 19;
 /// Bytes of a range.
-pub(crate) const RANGE: usize = 6;
+pub(crate) const RANGE_LEN: usize = 6;
 /// Period of the message on the ground.
-pub(crate) const EVERY: Duration = Duration::from_millis(1000);
+pub(crate) const PERIOD_ON_GROUND: Duration = Duration::from_millis(1000);
 /// Period of the message in flight.
-pub(crate) const EVERY_IN_FLIGHT: Duration = Duration::from_millis(5000);
+pub(crate) const PERIOD_IN_FLIGHT: Duration = Duration::from_millis(5000);
 const TUNNEL_HEAD: usize = 5;
 const HEAD: usize = 10;
 /// Longest TUNNEL payload, bytes.
-pub const LENGTH: usize = TUNNEL_HEAD + HEAD + RANGES * RANGE;
+pub const MAX_LEN: usize = TUNNEL_HEAD + HEAD + MAX_RANGES * RANGE_LEN;
 
 /// The message.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -51,18 +51,18 @@ pub struct DoneReport {
     /// Whether the ranges are all that the sender's plan leaves out, not what it knows or a part of that.
     pub plan: bool,
     /// Waypoints that are photographed, as ranges of their numbers.
-    pub ranges: Vec<Range, RANGES>,
+    pub ranges: Vec<Range, MAX_RANGES>,
 }
 
 /// A range as it is sent and kept: what three bytes cannot hold is left out, and photographed again.
-pub(crate) fn range_bytes(range: &Range) -> [u8; RANGE] {
+pub(crate) fn range_bytes(range: &Range) -> [u8; RANGE_LEN] {
     let [a, b, c, over] = range.first.to_le_bytes();
     let [d, e, f, many] = range.end.saturating_sub(range.first).to_le_bytes();
-    if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE] }
+    if over == 0 && many == 0 { [a, b, c, d, e, f] } else { [0; RANGE_LEN] }
 }
 
 /// The range of these bytes: the inverse of the encoding above.
-pub(crate) fn range_of(bytes: &[u8; RANGE]) -> Range {
+pub(crate) fn range_of(bytes: &[u8; RANGE_LEN]) -> Range {
     let [a, b, c, d, e, f] = *bytes;
     let first = u32::from_le_bytes([a, b, c, 0]);
     Range { first, end: first + u32::from_le_bytes([d, e, f, 0]) }
@@ -70,8 +70,8 @@ pub(crate) fn range_of(bytes: &[u8; RANGE]) -> Range {
 
 impl DoneReport {
     /// Writes the whole TUNNEL payload, to everyone; the bytes written.
-    pub fn encode(&self, out: &mut [u8; LENGTH]) -> usize {
-        let len = HEAD + RANGE * self.ranges.len();
+    pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
+        let len = HEAD + RANGE_LEN * self.ranges.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEAD..];
@@ -85,7 +85,7 @@ impl DoneReport {
             0,
         ]);
         body[6..HEAD].copy_from_slice(&self.mission_crc.to_le_bytes());
-        for (to, range) in body[HEAD..].chunks_exact_mut(RANGE).zip(&self.ranges) {
+        for (to, range) in body[HEAD..].chunks_exact_mut(RANGE_LEN).zip(&self.ranges) {
             to.copy_from_slice(&range_bytes(range));
         }
         TUNNEL_HEAD + len
@@ -100,7 +100,7 @@ impl DoneReport {
             return None;
         }
         let count = usize::from(body[4]);
-        if count > RANGES || len != HEAD + RANGE * count {
+        if count > MAX_RANGES || len != HEAD + RANGE_LEN * count {
             return None;
         }
         let (ranges, _) = body[HEAD..].as_chunks();
@@ -121,7 +121,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn padded(report: &DoneReport) -> [u8; 255] {
-        let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+        let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
         let len = report.encode(&mut out);
         padded[..len].copy_from_slice(&out[..len]);
         padded
@@ -130,7 +130,7 @@ mod tests {
     proptest! {
         #[test]
         fn comes_back_as_sent_and_refuses_the_unsound(
-            ranges in proptest::collection::vec((0u32..1 << 24, 1u32..1 << 24), 0..=RANGES),
+            ranges in proptest::collection::vec((0u32..1 << 24, 1u32..1 << 24), 0..=MAX_RANGES),
             (mission_crc, round, flies, plan) in any::<(u32, u8, bool, bool)>(),
         ) {
             let ranges = ranges.iter().map(|&(first, count)| Range { first, end: first + count }).collect();

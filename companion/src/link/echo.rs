@@ -6,17 +6,17 @@
 use crate::time::{Duration, Instant};
 
 /// Intents remembered: three seconds of them.
-const SENT: usize = 16;
+const MAX_SENT_INTENTS: usize = 16;
 /// Unit of the time for which a message was held before its echo.
-const TICK: Duration = Duration::from_millis(10);
+const HELD_TICK: Duration = Duration::from_millis(10);
 /// Greatest delay that a message counts with, seconds: no vehicle can make another one useless by
 /// echoes that are wrong.
-const LATEST_S: f32 = 1.0;
+const MAX_DELAY_S: f32 = 1.0;
 /// Delay of the radio that is assumed before the first echo, seconds.
-const UNKNOWN_S: f32 = 0.2;
+const ASSUMED_DELAY_S: f32 = 0.2;
 /// Weight of a new delay that is shorter than the known one; a longer delay replaces the known one
 /// at once.
-const FORGETS: f32 = 0.125;
+const FALLING_DELAY_GAIN: f32 = 0.125;
 
 /// The part of an intent that acknowledges another vehicle's last intent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -33,7 +33,7 @@ impl Echo {
     /// The echo of a frame that was heard `held` ago; `None` if that is too long.
     pub(crate) fn new(rank: u16, sequence: u8, held: Duration) -> Option<Self> {
         let rank = u8::try_from(rank).ok().filter(|rank| *rank < u8::MAX)?;
-        let held = u8::try_from(held.micros() / TICK.micros()).ok().filter(|held| *held < u8::MAX)?;
+        let held = u8::try_from(held.micros() / HELD_TICK.micros()).ok().filter(|held| *held < u8::MAX)?;
         Some(Self { rank, sequence, held })
     }
 }
@@ -41,13 +41,13 @@ impl Echo {
 /// The own intents sent last: number and time, a ring.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Sent {
-    ring: [Option<(u8, Instant)>; SENT],
+    ring: [Option<(u8, Instant)>; MAX_SENT_INTENTS],
     count: usize,
 }
 
 impl Sent {
     pub(crate) fn note(&mut self, sequence: u8, now: Instant) {
-        self.ring[self.count % SENT] = Some((sequence, now));
+        self.ring[self.count % MAX_SENT_INTENTS] = Some((sequence, now));
         self.count = self.count.wrapping_add(1);
     }
 
@@ -59,8 +59,8 @@ impl Sent {
     /// Time that a message takes one way, seconds, by an echo of an own intent.
     pub(crate) fn delay_s(&self, echo: &Echo, now: Instant) -> Option<f32> {
         let (_, sent) = self.ring.iter().flatten().find(|(sequence, _)| *sequence == echo.sequence)?;
-        let round_s = (now - *sent).secs_f32() - f32::from(echo.held) * TICK.secs_f32();
-        Some((0.5 * round_s).clamp(0.0, LATEST_S))
+        let round_s = (now - *sent).secs_f32() - f32::from(echo.held) * HELD_TICK.secs_f32();
+        Some((0.5 * round_s).clamp(0.0, MAX_DELAY_S))
     }
 }
 
@@ -74,13 +74,13 @@ pub(crate) struct Lateness {
 
 impl Default for Lateness {
     fn default() -> Self {
-        Self { delay_s: UNKNOWN_S, known: false }
+        Self { delay_s: ASSUMED_DELAY_S, known: false }
     }
 }
 
 impl Lateness {
     pub(crate) fn take(&mut self, delay_s: f32) {
-        let share = if self.known && delay_s < self.delay_s { FORGETS } else { 1.0 };
+        let share = if self.known && delay_s < self.delay_s { FALLING_DELAY_GAIN } else { 1.0 };
         self.delay_s += (delay_s - self.delay_s) * share;
         self.known = true;
     }
@@ -121,7 +121,7 @@ mod tests {
                 if let Some(delay_s) = sent.delay_s(&echo, Instant::from_millis(4000 + at_ms)) {
                     late.take(delay_s);
                 }
-                prop_assert!((0.0..=LATEST_S).contains(&late.delay_s));
+                prop_assert!((0.0..=MAX_DELAY_S).contains(&late.delay_s));
             }
         }
     }

@@ -23,19 +23,19 @@ use crate::time::{Duration, Instant};
 /// Time after its first byte at which an incomplete frame is dropped.
 pub const PARTIAL_LIFETIME: Duration = Duration::from_millis(100);
 /// Longest frame without its signature, bytes: 10 of header, 255 of payload, 2 of CRC.
-pub const MAX_SENT: usize = 267;
+pub const MAX_FRAME_LEN: usize = 267;
 
 const V1_START: u8 = 0xFE;
 const V2_START: u8 = 0xFD;
 /// A deprecated message; the only one whose CRC seed is 0.
 const COMPONENT_INFORMATION: u32 = 395;
-const SIGNED: u8 = 0x01;
+const FLAG_SIGNED: u8 = 0x01;
 const SIGNATURE_LEN: usize = 13;
 /// Times of arrival are distinguished by steps of an eighth of the lifetime; bytes received in one step count as received
 /// with the last of them.
 const ARRIVAL_STEP_US: u64 = PARTIAL_LIFETIME.micros() / 8;
 /// Most arrival steps within [`PARTIAL_LIFETIME`], and one.
-const ARRIVALS: usize = 10;
+const MAX_ARRIVALS: usize = 10;
 
 /// A frame whose CRC is right.
 #[derive(Clone, Debug, PartialEq)]
@@ -109,10 +109,10 @@ struct Arrival {
 /// The decoder of one link. At most 480 bytes; all zero when new, so it may live in .bss.
 #[derive(Clone, Debug)]
 pub struct Framer {
-    buf: [u8; MAX_SENT],
+    buf: [u8; MAX_FRAME_LEN],
     len: usize,
     /// When the bytes of the buffer were received, oldest first; the last one covers the whole buffer.
-    arrivals: Vec<Arrival, ARRIVALS>,
+    arrivals: Vec<Arrival, MAX_ARRIVALS>,
     /// Number of the next bytes that belong to a frame of unknown id or to a signature.
     uncounted: usize,
     counters: Counters,
@@ -144,7 +144,7 @@ impl Framer {
     /// An empty decoder.
     pub const fn new() -> Self {
         Self {
-            buf: [0; MAX_SENT],
+            buf: [0; MAX_FRAME_LEN],
             len: 0,
             arrivals: Vec::new(),
             uncounted: 0,
@@ -221,9 +221,9 @@ impl Framer {
                 (6, 6 + usize::from(*len), 0, id)
             }
             [V2_START, _] => return Front::Needs(3),
-            [V2_START, _, incompat, ..] if incompat & !SIGNED != 0 => return Front::False,
+            [V2_START, _, incompat, ..] if incompat & !FLAG_SIGNED != 0 => return Front::False,
             [V2_START, len, incompat, ..] => {
-                let signature = if incompat & SIGNED != 0 { SIGNATURE_LEN } else { 0 };
+                let signature = if incompat & FLAG_SIGNED != 0 { SIGNATURE_LEN } else { 0 };
                 let id = b.get(7..10).map(|id| u32::from_le_bytes([id[0], id[1], id[2], 0]));
                 (10, 10 + usize::from(*len), signature, id)
             }
@@ -248,7 +248,7 @@ impl Framer {
         } else {
             (MavlinkVersion::V2, 10, b[4], b[5], b[6], u32::from_le_bytes([b[7], b[8], b[9], 0]))
         };
-        let signed = version == MavlinkVersion::V2 && b[2] & SIGNED != 0;
+        let signed = version == MavlinkVersion::V2 && b[2] & FLAG_SIGNED != 0;
         let mut payload = [0; 255];
         payload[..usize::from(len)].copy_from_slice(&b[at..at + usize::from(len)]);
         self.counters.frames = self.counters.frames.wrapping_add(1);
@@ -334,7 +334,7 @@ pub struct Header {
 }
 
 /// Writes one message as a V2 frame, trailing zeros cut; the bytes written, or 0 where `out` is too small
-/// ([`MAX_SENT`] is always enough).
+/// ([`MAX_FRAME_LEN`] is always enough).
 pub fn encode<M: MessageData>(header: Header, message: &M, out: &mut [u8]) -> usize {
     let mut payload = [0; 255];
     let len = message.ser(MavlinkVersion::V2, &mut payload);

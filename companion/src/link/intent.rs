@@ -28,10 +28,10 @@ use crate::link::echo::Echo;
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub const PAYLOAD_TYPE: u16 = 0xF10C;
 /// Most path points reported.
-pub const POINTS: usize = 8;
+pub const MAX_POINTS: usize = 8;
 /// Version of the message's layout.
 pub const VERSION: u8 = 5;
-const HEAD: usize = 32;
+const HEADER_LEN: usize = 32;
 const TUNNEL_HEAD: usize = 5;
 
 /// Flag of a vehicle that stands on the ground.
@@ -44,14 +44,14 @@ pub const LANDED: u8 = 4;
 pub const ON_PLAN: u8 = 8;
 /// Flag of a vehicle that has left the plan and rests where it is, or that a pilot keeps: this
 /// vehicle opens all gates and is an obstacle.
-pub const OUT: u8 = 16;
+pub const OUT_OF_PLAN: u8 = 16;
 /// Flag of a vehicle that stands, and will stand until another vehicle moves.
 pub const WAITING: u8 = 32;
 /// Flag of a vehicle whose path is blocked; it waits until all others stand, then flies a detour.
 pub const BLOCKED: u8 = 64;
 /// Flag of a vehicle that flies a detour, or will; its reported progress is the place where it left
 /// the plan.
-pub const DETOURS: u8 = 128;
+pub const ON_DETOUR: u8 = 128;
 
 /// One vehicle's intent.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -81,7 +81,7 @@ pub struct Intent {
     pub echo: Option<Echo>,
     /// Points that it flies along next: as far as it will go for now, then as far as it flies on unheard; none while somebody
     /// else flies it.
-    pub points: Vec<Point, POINTS>,
+    pub points: Vec<Point, MAX_POINTS>,
     /// Number of the last of those points beyond where it will stop for now.
     pub beyond: u8,
 }
@@ -89,7 +89,7 @@ pub struct Intent {
 impl Intent {
     /// Writes the whole TUNNEL payload, to everyone; the bytes written.
     pub fn encode(&self, out: &mut [u8; 133]) -> usize {
-        let len = HEAD + 12 * self.points.len();
+        let len = HEADER_LEN + 12 * self.points.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEAD..];
@@ -113,7 +113,9 @@ impl Intent {
             sequence,
             held,
         ]);
-        for (to, value) in body[HEAD..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter())) {
+        for (to, value) in
+            body[HEADER_LEN..].chunks_exact_mut(4).zip(self.points.iter().flat_map(|p| p.iter()))
+        {
             to.copy_from_slice(&value.to_le_bytes());
         }
         TUNNEL_HEAD + len
@@ -124,18 +126,18 @@ impl Intent {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
         let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
-        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+        if payload_type != PAYLOAD_TYPE || len < HEADER_LEN || body[0] != VERSION || body[1] != sender {
             return None;
         }
         let (count, beyond) = (usize::from(body[3] & 15), body[3] >> 4);
-        if count > POINTS || usize::from(beyond) > count || len < HEAD + 12 * count {
+        if count > MAX_POINTS || usize::from(beyond) > count || len < HEADER_LEN + 12 * count {
             return None;
         }
         let word = |at: usize| [body[at], body[at + 1], body[at + 2], body[at + 3]];
         let float = |at: usize| Some(f32::from_le_bytes(word(at))).filter(|v| v.is_finite());
         let mut points = Vec::new();
         for i in 0..count {
-            let at = HEAD + 12 * i;
+            let at = HEADER_LEN + 12 * i;
             points.push(Point::new(float(at)?, float(at + 4)?, float(at + 8)?)).ok()?;
         }
         Some(Self {
@@ -190,7 +192,7 @@ mod tests {
 
     #[test]
     fn comes_back_as_sent_and_refuses_the_unsound() {
-        for count in 0..=POINTS {
+        for count in 0..=MAX_POINTS {
             assert_eq!(Intent::decode(&padded(&sample(count)), 9), Some(sample(count)));
         }
         assert_eq!(Intent::decode(&padded(&sample(2)), 8), None, "another sender");

@@ -13,7 +13,7 @@ use mavlink::dialects::ardupilotmega::{
 use crate::link::frame::{self, Header};
 
 /// Entries that a link's queue holds.
-pub const DEPTH: usize = 32;
+pub const QUEUE_DEPTH: usize = 32;
 
 /// A message that waits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,7 +102,7 @@ pub enum Outgoing {
 /// The queue of one link.
 #[derive(Clone, Debug, Default)]
 pub struct Outbox {
-    queue: Deque<Outgoing, DEPTH>,
+    queue: Deque<Outgoing, QUEUE_DEPTH>,
     sequence: u8,
     dropped: u32,
 }
@@ -123,14 +123,14 @@ impl Outbox {
 
     /// Free entries.
     pub fn room(&self) -> usize {
-        DEPTH - self.queue.len()
+        QUEUE_DEPTH - self.queue.len()
     }
 
     /// The header of the next frame of this link.
     pub fn header(&mut self, system: u8) -> Header {
         let sequence = self.sequence;
         self.sequence = self.sequence.wrapping_add(1);
-        Header { system, component: crate::COMPONENT, sequence }
+        Header { system, component: crate::COMPANION_COMPONENT, sequence }
     }
 
     /// Writes the first that waits; 0 if none does.
@@ -143,7 +143,7 @@ impl Outbox {
             param2,
             param3,
             target_system: system,
-            target_component: crate::AUTOPILOT,
+            target_component: crate::AUTOPILOT_COMPONENT,
             ..COMMAND_LONG_DATA::default()
         };
         let long = match message {
@@ -166,7 +166,7 @@ impl Outbox {
                 let read = PARAM_REQUEST_READ_DATA {
                     param_index: -1,
                     target_system: system,
-                    target_component: crate::AUTOPILOT,
+                    target_component: crate::AUTOPILOT_COMPONENT,
                     param_id: name.into(),
                 };
                 return frame::encode(header, &read, out);
@@ -175,7 +175,7 @@ impl Outbox {
                 let set = PARAM_SET_DATA {
                     param_value,
                     target_system: system,
-                    target_component: crate::AUTOPILOT,
+                    target_component: crate::AUTOPILOT_COMPONENT,
                     param_id: name.into(),
                     param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
                 };

@@ -24,12 +24,12 @@ pub const PAYLOAD_TYPE: u16 = 0xF10E;
 /// Version of the message's layout.
 pub const VERSION: u8 = 1;
 /// Most vehicles of one message.
-pub const ENTRIES: usize = 22;
+pub const MAX_ENTRIES: usize = 22;
 const TUNNEL_HEAD: usize = 5;
-const HEAD: usize = 18;
-const ENTRY: usize = 5;
+const HEADER_LEN: usize = 18;
+const ENTRY_LEN: usize = 5;
 /// Longest TUNNEL payload, bytes.
-pub const LENGTH: usize = TUNNEL_HEAD + HEAD + ENTRIES * ENTRY;
+pub const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_ENTRIES * ENTRY_LEN;
 
 /// Whether a vehicle takes part. What comes later in this list outlasts what comes before.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -84,13 +84,13 @@ pub struct Roster {
     /// Hash of the division under way; 0 for none.
     pub hash: u32,
     /// The vehicles by rank.
-    pub entries: Vec<Entry, ENTRIES>,
+    pub entries: Vec<Entry, MAX_ENTRIES>,
 }
 
 impl Roster {
     /// Writes the whole TUNNEL payload, to everyone; the bytes written.
-    pub fn encode(&self, out: &mut [u8; LENGTH]) -> usize {
-        let len = HEAD + ENTRY * self.entries.len();
+    pub fn encode(&self, out: &mut [u8; MAX_LEN]) -> usize {
+        let len = HEADER_LEN + ENTRY_LEN * self.entries.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEAD..];
@@ -99,7 +99,7 @@ impl Roster {
         body[6..10].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[10..14].copy_from_slice(&self.counted.to_le_bytes());
         body[14..18].copy_from_slice(&self.hash.to_le_bytes());
-        for (to, entry) in body[HEAD..].chunks_exact_mut(ENTRY).zip(&self.entries) {
+        for (to, entry) in body[HEADER_LEN..].chunks_exact_mut(ENTRY_LEN).zip(&self.entries) {
             let bit = |set: bool, at: u8| u8::from(set) << at;
             to[0] = entry.standing as u8
                 | bit(entry.promise_dm.is_some(), 2)
@@ -117,11 +117,11 @@ impl Roster {
         let payload_type = u16::from_le_bytes([padded[0], padded[1]]);
         let len = usize::from(padded[4]);
         let body = padded[TUNNEL_HEAD..].get(..len.min(128))?;
-        if payload_type != PAYLOAD_TYPE || len < HEAD || body[0] != VERSION || body[1] != sender {
+        if payload_type != PAYLOAD_TYPE || len < HEADER_LEN || body[0] != VERSION || body[1] != sender {
             return None;
         }
         let count = usize::from(body[4]);
-        if count == 0 || count > ENTRIES || len != HEAD + ENTRY * count {
+        if count == 0 || count > MAX_ENTRIES || len != HEADER_LEN + ENTRY_LEN * count {
             return None;
         }
         let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
@@ -143,7 +143,7 @@ impl Roster {
             mission_crc: word(6),
             counted: word(10),
             hash: word(14),
-            entries: body[HEAD..].chunks_exact(ENTRY).map(entry).collect(),
+            entries: body[HEADER_LEN..].chunks_exact(ENTRY_LEN).map(entry).collect(),
         })
     }
 }
@@ -154,7 +154,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn padded(roster: &Roster) -> [u8; 255] {
-        let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+        let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
         let len = roster.encode(&mut out);
         padded[..len].copy_from_slice(&out[..len]);
         padded
@@ -163,7 +163,7 @@ mod tests {
     proptest! {
         #[test]
         fn comes_back_as_sent_and_refuses_the_unsound(
-            entries in proptest::collection::vec((0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()), 1..=ENTRIES),
+            entries in proptest::collection::vec((0u8..8, 0usize..4, any::<u16>(), any::<Option<u16>>(), any::<[bool; 2]>()), 1..=MAX_ENTRIES),
             head in any::<(u8, u8, u32, u32, u32)>(),
         ) {
             let entries = entries.iter().map(|&(incarnation, standing, done_dm, promise_dm, [holds, agrees])| Entry {

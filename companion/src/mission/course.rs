@@ -15,7 +15,7 @@ use crate::mission::{Action, Guard, Inputs, Interrupted, Row, State, To};
 use crate::time::{Duration, Instant};
 
 /// Greatest distance between the begin of a path and the vehicle, metres.
-const BEGINS_M: f32 = 0.1;
+const PATH_BEGIN_M: f32 = 0.1;
 /// A picture no further than this before the place where the vehicle comes back to its path is
 /// taken there, metres.
 const TAKEN_M: f32 = 0.05;
@@ -403,7 +403,7 @@ impl<const W: usize, const G: usize> Mission<W, G> {
         let finite = numbers.iter().all(|h| h.is_finite() && *h >= 0.0)
             && plan.gates.iter().all(|g| !g.at_m.is_nan() && !g.until_m.is_nan());
         let first = plan.path.waypoints().first();
-        let begins = first.is_some_and(|w| (w.position - place).norm() < BEGINS_M);
+        let begins = first.is_some_and(|w| (w.position - place).norm() < PATH_BEGIN_M);
         finite && (begins || !plan.task.flies())
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::time::Duration;
 
-pub(crate) const FRESH: Duration = Duration::from_millis(500); // Age up to which a position is known.
+pub(crate) const MAX_POSITION_AGE: Duration = Duration::from_millis(500); // Age up to which a position is known.
 
 /// Condition of a row. Every guard is a field, or a comparison of fields, of [`Inputs`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -373,7 +373,7 @@ pub struct Inputs {
 }
 
 /// Longest wait above a vehicle that rests: a vehicle that rests makes no room.
-const BARRED: Duration = Duration::from_secs(5);
+const MAX_WAIT_ABOVE_RESTING: Duration = Duration::from_secs(5);
 
 impl Inputs {
     /// Whether it may turn home over a field, and has not yet.
@@ -383,20 +383,20 @@ impl Inputs {
 
     /// Whether the column has not been free for `limit`, or a vehicle stands in it for good.
     fn no_room_for(&self, limit: Duration) -> bool {
-        self.column_blocked >= limit || self.column_barred >= BARRED
+        self.column_blocked >= limit || self.column_barred >= MAX_WAIT_ABOVE_RESTING
     }
 }
 
 /// Age up to which HEARTBEAT counts as heard: it comes at 1 Hz, and one late is not yet silence.
-pub(super) const HEARD: Duration = Duration::from_millis(1500);
+pub(super) const MAX_HEARTBEAT_AGE: Duration = Duration::from_millis(1500);
 
 impl Guard {
     /// Whether it holds, and has held for `limit`.
     pub fn holds(self, i: &Inputs, limit: Duration) -> bool {
         match self {
-            Self::AutopilotHeard => i.heartbeat_age < HEARD,
+            Self::AutopilotHeard => i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::NoHeartbeat => i.heartbeat_age > limit,
-            Self::PositionKnown => i.position_age < FRESH,
+            Self::PositionKnown => i.position_age < MAX_POSITION_AGE,
             Self::NoPosition => i.position_age > limit,
             Self::PositionJumped => i.jumped,
             Self::FoundFlying => i.airborne,
@@ -415,7 +415,7 @@ impl Guard {
             Self::StartArmed => i.start && i.armed,
             Self::StartBatteryLow => i.start && i.battery_low,
             Self::StartOutside => i.start && i.outside,
-            Self::AwayFromStart => i.position_age < FRESH && !i.at_start,
+            Self::AwayFromStart => i.position_age < MAX_POSITION_AGE && !i.at_start,
             Self::ChargeLow => i.battery_low,
             Self::Outside => i.outside,
             Self::StartVague => i.start && i.imprecise && i.in_state >= limit,
@@ -430,14 +430,14 @@ impl Guard {
             Self::Disarmed => !i.armed,
             Self::DisarmedAtGoal => !i.armed && i.at_goal,
             Self::StaysArmed => i.armed && i.in_state >= limit,
-            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD,
+            Self::StaysDisarmed => !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::StaysDisarmedPaused => {
-                !i.armed && i.in_state >= limit && i.heartbeat_age < HEARD && i.start && i.pause
+                !i.armed && i.in_state >= limit && i.heartbeat_age < MAX_HEARTBEAT_AGE && i.start && i.pause
             }
             Self::ArmedUnseen => i.armed_unseen,
             Self::ArmingUnanswered => i.arming_unanswered,
             Self::InAir => i.armed && (i.airborne || i.vertical),
-            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < HEARD,
+            Self::Unattended => i.airborne && i.offboard && i.ours && i.heartbeat_age < MAX_HEARTBEAT_AGE,
             Self::DisarmRefused => i.armed && i.disarm_refused && !i.landing,
             Self::LiftedOff => i.lifted_off,
             Self::ClimbDone => i.climb_done,
@@ -445,8 +445,8 @@ impl Guard {
             Self::Stalled => i.stalled >= limit,
             Self::PauseCommanded => i.pause,
             Self::ResumeCommanded => i.resume,
-            Self::BackOnPath => i.position_age < FRESH && i.near_path,
-            Self::BackOffPath => i.position_age < FRESH && !i.near_path,
+            Self::BackOnPath => i.position_age < MAX_POSITION_AGE && i.near_path,
+            Self::BackOffPath => i.position_age < MAX_POSITION_AGE && !i.near_path,
             Self::ResumedOnPath => i.offboard && i.resume && i.near_path,
             Self::ResumedOffPath => i.offboard && i.resume && !i.near_path,
             Self::PausedOnPad => i.pause && i.in_state >= limit,

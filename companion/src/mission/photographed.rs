@@ -7,21 +7,21 @@
 
 use planner_core::flight::{Done, Path, Photographs, Range};
 
-use crate::link::done::{DoneReport, RANGE, RANGES, range_bytes, range_of};
-use crate::storage::store::{self, BLOCK};
+use crate::link::done::{DoneReport, MAX_RANGES, RANGE_LEN, range_bytes, range_of};
+use crate::storage::store::{self, MAX_PROGRAM};
 use crate::time::{Duration, Instant};
 
 /// Most ranges of waypoints that are known to be photographed; a waypoint outside them is
 /// photographed again.
-pub const DONE: usize = 40;
+pub const MAX_DONE_RANGES: usize = 40;
 /// Newly photographed waypoints after which the ranges are stored in flash again.
-const KEEP_EVERY: u32 = 10;
+const STORE_EVERY_WAYPOINTS: u32 = 10;
 /// Time for which the ranges reported by vehicles in flight count, instead of what vehicles on the
 /// ground know: reports in flight come at least this often.
-const FOLLOWS: Duration = Duration::from_secs(25);
+const FLIGHT_REPORT_LIFETIME: Duration = Duration::from_secs(25);
 /// Bytes before the ranges: mission CRC and round.
-const HEAD: usize = 5;
-const _: () = assert!(HEAD + DONE * RANGE <= BLOCK);
+const HEADER_LEN: usize = 5;
+const _: () = assert!(HEADER_LEN + MAX_DONE_RANGES * RANGE_LEN <= MAX_PROGRAM);
 
 /// The photographed waypoints of an area.
 #[derive(Clone, Debug, Default)]
@@ -29,9 +29,9 @@ pub(crate) struct Photographed {
     /// Number of times that the area was begun again.
     round: u8,
     /// Waypoints that the plan leaves out, or will.
-    before: Done<DONE>,
+    before: Done<MAX_DONE_RANGES>,
     /// All that is known.
-    known: Done<DONE>,
+    known: Done<MAX_DONE_RANGES>,
     /// Number of waypoints that the flash has.
     kept: u32,
     /// Whether `before` has changed since a plan was requested.
@@ -51,12 +51,12 @@ pub(crate) struct Photographed {
 impl Photographed {
     /// Takes what the flash has kept of this mission.
     pub(crate) fn restore(&mut self, kept: &[u8], mission_crc: u32) {
-        let Some((head, ranges)) = kept.split_at_checked(HEAD) else { return };
+        let Some((head, ranges)) = kept.split_at_checked(HEADER_LEN) else { return };
         if head[..4] != mission_crc.to_le_bytes() {
             return;
         }
         self.round = head[4];
-        let (ranges, _) = ranges.as_chunks::<RANGE>();
+        let (ranges, _) = ranges.as_chunks::<RANGE_LEN>();
         ranges.iter().for_each(|bytes| _ = self.known.insert(range_of(bytes)));
         self.kept = self.known.count();
         self.before = self.known.clone();
@@ -65,14 +65,14 @@ impl Photographed {
     /// The record for the flash, if it is worth one: at once where no further waypoint is to come.
     pub(crate) fn keep(&mut self, mission_crc: u32, at_once: bool) -> Option<store::Photographed> {
         let count = self.known.count();
-        let least = if at_once { self.kept + 1 } else { self.kept + KEEP_EVERY };
+        let least = if at_once { self.kept + 1 } else { self.kept + STORE_EVERY_WAYPOINTS };
         // Fewer than before: another round.
         if (self.kept..least).contains(&count) {
             return None;
         }
         self.kept = count;
         let mut kept = store::Photographed::new();
-        // Both fit: `HEAD` and `DONE` ranges are no more than a block.
+        // Both fit: `HEADER_LEN` and `MAX_DONE_RANGES` ranges are no more than a block.
         let _ = kept.extend_from_slice(&mission_crc.to_le_bytes());
         let _ = kept.push(self.round);
         self.known.ranges().iter().for_each(|range| _ = kept.extend_from_slice(&range_bytes(range)));
@@ -144,7 +144,7 @@ impl Photographed {
         if newer > 127 {
             return;
         }
-        let follows = self.followed_at.is_some_and(|at| now - at <= FOLLOWS);
+        let follows = self.followed_at.is_some_and(|at| now - at <= FLIGHT_REPORT_LIFETIME);
         let plans = waits && !report.flies && !follows;
         if newer > 0 {
             self.round = report.round;
@@ -175,7 +175,7 @@ impl Photographed {
     /// The report to other vehicles, one part after the other; in flight, in turn, the waypoints
     /// that the plan leaves out, if one report holds them.
     pub(crate) fn report(&mut self, waits: bool, flies: bool) -> DoneReport {
-        let plan = flies && !self.reports_plan && self.before.ranges().len() <= RANGES;
+        let plan = flies && !self.reports_plan && self.before.ranges().len() <= MAX_RANGES;
         self.reports_plan = plan;
         if plan {
             let ranges = self.before.ranges().iter().copied().collect();
@@ -183,8 +183,8 @@ impl Photographed {
         }
         let done = if waits { &self.before } else { &self.known };
         let first = if self.next < done.ranges().len() { self.next } else { 0 };
-        self.next = first + RANGES;
-        let ranges = done.ranges().iter().skip(first).take(RANGES).copied().collect();
+        self.next = first + MAX_RANGES;
+        let ranges = done.ranges().iter().skip(first).take(MAX_RANGES).copied().collect();
         DoneReport { round: self.round, flies, ranges, ..DoneReport::default() }
     }
 }

@@ -82,7 +82,7 @@ pub struct Row {
     pub warning: bool,
 }
 
-pub(crate) const NOW: Duration = Duration::from_millis(0);
+pub(crate) const AT_ONCE: Duration = Duration::from_millis(0);
 
 /// States, a bit for each.
 pub(crate) const fn bits(states: &[State]) -> u32 {

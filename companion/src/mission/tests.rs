@@ -5,8 +5,8 @@ use std::fmt::Write;
 use std::string::String;
 use std::vec::Vec;
 
-use super::guard::HEARD;
-use super::row::NOW;
+use super::guard::MAX_HEARTBEAT_AGE;
+use super::row::AT_ONCE;
 use super::*;
 use crate::mission::table::*;
 use crate::time::Duration;
@@ -48,7 +48,7 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
     ("pilot's mode", |i| (i.mode_foreign, i.offboard) = (true, false)),
     ("failsafe", |i| (i.mode_foreign, i.offboard, i.critical) = (true, false, true)),
     ("position lost", |i| i.position_age = Duration::from_secs(3)),
-    ("position jumps", |i| (i.position_age, i.jumped) = (FRESH, true)),
+    ("position jumps", |i| (i.position_age, i.jumped) = (MAX_POSITION_AGE, true)),
     ("autopilot silent", |i| i.heartbeat_age = Duration::from_secs(4)),
     ("disarmed", |i| (i.armed, i.airborne) = (false, false)),
     ("battery low", |i| (i.battery_low, i.room_below) = (true, true)),
@@ -59,12 +59,13 @@ const INTERRUPTIONS: &[(&str, Shows)] = &[
 
 /// Inputs of a state in which nothing happens.
 pub(crate) fn quiet(state: State) -> Inputs {
-    let on_ground = WAITING.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
+    let on_ground =
+        WAITING_ON_GROUND.contains(&state) || ON_PAD.contains(&state) || matches!(state, Done | Aborted);
     let mut i = Inputs { armed: !on_ground, airborne: !on_ground, at_start: true, ..Inputs::default() };
     (i.has_goal, i.flown, i.ours) = (true, !on_ground, !on_ground);
     match state {
-        WaitAutopilot => i.heartbeat_age = HEARD,
-        WaitPosition => i.position_age = FRESH,
+        WaitAutopilot => i.heartbeat_age = MAX_HEARTBEAT_AGE,
+        WaitPosition => i.position_age = MAX_POSITION_AGE,
         Blocked => i.blocked = true,
         AutopilotSilent => i.heartbeat_age = Duration::from_secs(5),
         PositionLost => i.position_age = Duration::from_secs(2),
@@ -130,7 +131,7 @@ fn every_state_is_reached_and_every_wait_ends() {
     for state in State::ALL {
         let reached = TABLE.iter().any(|row| row.to == To::State(*state) && !row.from.contains(state));
         assert!(reached || *state == WaitAutopilot, "{state:?} is never reached");
-        let timed = |row: &&Row| row.from.contains(state) && row.limit > NOW;
+        let timed = |row: &&Row| row.from.contains(state) && row.limit > AT_ONCE;
         // On the ground, disarmed, waiting for a person, an autopilot or a neighbour may last.
         let patient = [WaitAutopilot, WaitPosition, Ready, Scheduled, Done, Aborted];
         assert!(
@@ -266,8 +267,8 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             match (from, row.guard) {
                 (PositionLost, G::BackOnPath | G::BackOffPath) | (AutopilotSilent, G::AutopilotHeard) => {}
                 (WaitPosition, G::PositionKnown) | (WaitAutopilot, G::AutopilotHeard) => {}
-                (PositionLost | WaitPosition, _) => inputs.position_age = FRESH,
-                (AutopilotSilent, _) => inputs.heartbeat_age = HEARD,
+                (PositionLost | WaitPosition, _) => inputs.position_age = MAX_POSITION_AGE,
+                (AutopilotSilent, _) => inputs.heartbeat_age = MAX_HEARTBEAT_AGE,
                 (Arming, _) => inputs.armed = false,
                 (Scheduled | PadReplanning | Streaming | Engaging, guard) => inputs.armed = guard == G::Armed,
                 (Blocked, guard) => inputs.blocked = guard != G::PathClear,
@@ -283,7 +284,7 @@ fn every_row_is_taken_when_only_its_guard_holds_and_not_before_its_limit() {
             inputs.at_start |= !matches!(row.guard, G::AwayFromStart | G::StartElsewhere);
             let taken = update(*from, &inputs).expect("a row");
             assert!(core::ptr::eq(taken, row), "{from:?} with {:?}: {}", row.guard, taken.text);
-            if row.limit > NOW {
+            if row.limit > AT_ONCE {
                 let quiet = Inputs { armed: inputs.armed, ..Inputs::default() };
                 let before = update(*from, &quiet);
                 assert!(
@@ -326,7 +327,7 @@ fn the_pilot_outranks_everything_in_the_air() {
 #[test]
 fn every_text_is_explained() {
     let page = include_str!("../../../docs/companion.md");
-    let served = crate::services::ftp::TEXTS.iter().map(|(_, text)| *text);
+    let served = crate::services::ftp::FTP_TEXTS.iter().map(|(_, text)| *text);
     for text in TABLE.iter().map(|row| row.text).filter(|text| !text.is_empty()).chain(served) {
         assert!(text.len() <= 50, "{text}");
         assert!(page.contains(&std::format!("\n| {text} | ")), "{text}");

@@ -6,7 +6,7 @@ use crate::time::{Duration, Instant};
 
 /// Time for which a vehicle waits for one that has not started before it reports that, and time
 /// between two reports.
-const NAMED_AFTER: Duration = Duration::from_secs(30);
+const REPORT_WAIT_AFTER: Duration = Duration::from_secs(30);
 
 /// The vehicle that this one waits for, and since when, or since the wait was reported last.
 #[derive(Clone, Copy, Debug, Default)]
@@ -21,7 +21,7 @@ impl Waits {
         if id != self.id || id == 0 {
             *self = Self { id, since: now };
         }
-        let named = id != 0 && now - self.since >= NAMED_AFTER;
+        let named = id != 0 && now - self.since >= REPORT_WAIT_AFTER;
         if named {
             self.since = now;
         }

@@ -24,16 +24,16 @@ use crate::storage::mission_file::{MissionVehicle, MissionView};
 use crate::swarm::fleet::Lot;
 
 /// Changes of the lanes' order that companions try: on a board a few million instructions.
-pub const LOOKS: u32 = 2000;
+pub const MAX_ORDER_CHANGES: u32 = 2000;
 /// Most rings of an area.
-pub const RINGS: usize = 128;
+pub const MAX_RINGS: usize = 128;
 /// Clearance that every leg over the fields is taken to have, metres: there are no walls.
-const OPEN_FIELD_M: f32 = 10.0;
+const OPEN_FIELD_CLEARANCE_M: f32 = 10.0;
 
 /// Memory for areas of at most `X` vertices, `L` lanes and `K` vehicles.
 pub struct Workspace<const X: usize, const L: usize, const K: usize> {
     vertices: Vec<Flat, X>,
-    rings: Vec<Ring, RINGS>,
+    rings: Vec<Ring, MAX_RINGS>,
     strips: tracks::Workspace<X>,
     tracks: Tracks<L>,
     pack: PackWorkspace<K>,
@@ -183,7 +183,7 @@ impl<'m> Request<'_, 'm> {
 fn area<'a, const X: usize>(
     view: &CoverageView<'_>,
     vertices: &'a mut Vec<Flat, X>,
-    rings: &'a mut Vec<Ring, RINGS>,
+    rings: &'a mut Vec<Ring, MAX_RINGS>,
 ) -> Result<Area<'a>, CoverageError> {
     vertices.clear();
     rings.clear();
@@ -255,7 +255,7 @@ pub fn plan<
         looks: header.looks,
     };
     tracks::build(&area, &pattern, &transit, &mut ws.strips, &mut ws.tracks)?;
-    if ws.tracks.waypoint_count() > Photographs::NUMBERS {
+    if ws.tracks.waypoint_count() > Photographs::MAX_AREA_WAYPOINTS {
         return Err(CoverageError::LanesFull.into());
     }
     let (mut vehicles, mut pads) = (Vec::<_, K>::new(), Vec::<_, K>::new());
@@ -288,7 +288,7 @@ pub fn plan<
     let swarm = Swarm {
         pads: &pads,
         manner: Manner { waypoint_m: header.spacing.waypoint_m, look, trigger: header.trigger },
-        clearance_m: OPEN_FIELD_M,
+        clearance_m: OPEN_FIELD_CLEARANCE_M,
         schedule: mission.header().schedule,
         gates_most,
         done: &[],

@@ -18,11 +18,12 @@ mod stream;
 use heapless::Deque;
 
 use self::memory::Memory;
-pub use self::packet::DATA;
 #[cfg(test)]
-pub(crate) use self::packet::TEXTS;
+pub(crate) use self::packet::FTP_TEXTS;
+pub use self::packet::MAX_DATA;
 use self::packet::{
-    ACK, EFBIG, EIO, HEAD, NAK, NakError, REMOVED, Request, Text, chunk, decimal, is_open, op, upload_text,
+    ACK, EFBIG, EIO, FILE_REMOVED, HEADER_LEN, NAK, NakError, Request, Text, chunk, decimal, is_open, op,
+    upload_text,
 };
 use self::stream::{Stream, due};
 use crate::link::frame::Frame;
@@ -41,15 +42,15 @@ pub(crate) fn changes_files(padded: &[u8; 255]) -> bool {
 }
 
 /// Most requests that wait; `mavftp` has five under way.
-const QUEUE: usize = 6;
+const MAX_QUEUED_REQUESTS: usize = 6;
 /// A session whose client was silent for this long may be taken over by another client.
-const IDLE: Duration = Duration::from_secs(10);
+const SESSION_IDLE: Duration = Duration::from_secs(10);
 
 #[derive(Clone, Copy, Debug)]
 struct Reply {
     link: usize,
     to: (u8, u8),
-    packet: [u8; HEAD + DATA],
+    packet: [u8; HEADER_LEN + MAX_DATA],
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +78,7 @@ enum Doing {
 /// The server. 4 kB, most of it requests that wait.
 #[derive(Clone, Debug)]
 pub struct Ftp {
-    queue: Deque<Request, QUEUE>,
+    queue: Deque<Request, MAX_QUEUED_REQUESTS>,
     reply: Option<Reply>,
     session: Option<Session>,
     doing: Doing,
@@ -291,7 +292,7 @@ impl Ftp {
             op::REMOVE => match request.file().filter(|file| store.size(*file).is_some()) {
                 Some(file) => {
                     store.remove(file);
-                    self.text = Some(REMOVED);
+                    self.text = Some(FILE_REMOVED);
                     self.finish(request, Ok(()));
                 }
                 None => self.nak(request, NakError::NotFound),
@@ -311,7 +312,7 @@ impl Ftp {
         if !request.path().is_empty() {
             return self.nak(request, NakError::NotFound);
         }
-        let mut entries = heapless::Vec::<u8, DATA>::new();
+        let mut entries = heapless::Vec::<u8, MAX_DATA>::new();
         let held = File::ALL.iter().filter_map(|file| Some((file.name(), store.size(*file)?)));
         for (name, size) in held.skip(request.offset as usize) {
             let mut digits = [0; 10];
@@ -358,7 +359,7 @@ impl Ftp {
             Ok(_) => return self.nak(request, NakError::Protected),
             Err(no) => return self.nak(request, no),
         }
-        if usize::from(request.size) > DATA || request.size == 0 {
+        if usize::from(request.size) > MAX_DATA || request.size == 0 {
             return self.nak(request, NakError::InvalidSize);
         }
         if let Some(UploadState::Ended(Err(why))) = store.upload() {
@@ -398,7 +399,7 @@ impl Ftp {
     }
 
     fn is_idle(&self, session: &Session) -> bool {
-        self.now - session.used > IDLE
+        self.now - session.used > SESSION_IDLE
     }
 
     /// Opens a session; says so where there is none to be had.
@@ -461,8 +462,8 @@ impl Ftp {
     }
 
     fn put(&mut self, request: &Request, opcode: u8, burst_complete: u8, data: &[u8]) {
-        let data = &data[..data.len().min(DATA)];
-        let mut packet = [0; HEAD + DATA];
+        let data = &data[..data.len().min(MAX_DATA)];
+        let mut packet = [0; HEADER_LEN + MAX_DATA];
         packet[..2].copy_from_slice(&request.sequence.wrapping_add(1).to_le_bytes());
         packet[2..8].copy_from_slice(&[
             request.session,
@@ -473,7 +474,7 @@ impl Ftp {
             0,
         ]);
         packet[8..12].copy_from_slice(&request.offset.to_le_bytes());
-        packet[HEAD..HEAD + data.len()].copy_from_slice(data);
+        packet[HEADER_LEN..HEADER_LEN + data.len()].copy_from_slice(data);
         self.reply = Some(Reply { link: request.link, to: request.client, packet });
     }
 }

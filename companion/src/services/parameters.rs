@@ -35,12 +35,12 @@ const fn whole(name: &'static str, least: f32, most: f32, default: f32) -> Param
 }
 
 /// Number of parameters.
-pub const COUNT: usize = 10;
+pub const PARAMETER_COUNT: usize = 10;
 /// Bytes that all parameters take in flash.
-pub const STORED_LEN: usize = COUNT * ENTRY_LEN;
+pub const STORED_LEN: usize = PARAMETER_COUNT * ENTRY_LEN;
 
 /// All parameters, sorted by name; `companion/README.md` prints the same table.
-pub const TABLE: [Parameter; COUNT] = [
+pub const TABLE: [Parameter; PARAMETER_COUNT] = [
     real("FLK_ACCEL", 0.2, 5.0, 1.5),
     whole("FLK_BATT_LOW", 0.0, 100.0, 15.0),
     real("FLK_CLIMB_MAX", 0.2, 5.0, 5.0),
@@ -76,7 +76,7 @@ pub enum Refused {
 /// The values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Parameters {
-    values: [f32; COUNT],
+    values: [f32; PARAMETER_COUNT],
 }
 
 impl Default for Parameters {
@@ -171,7 +171,7 @@ mod tests {
             }
             assert_eq!(parameter.whole, values.set(index, parameter.least + 0.5) == Err(Refused::Range));
         }
-        assert_eq!(values.set(COUNT, 1.0), Err(Refused::Unknown));
+        assert_eq!(values.set(PARAMETER_COUNT, 1.0), Err(Refused::Unknown));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use crate::events::Event;
 use crate::link::frame::{self, Framer, Header};
 use crate::mission::State;
 use crate::services::parameters::TABLE;
-use crate::storage::store::READ;
+use crate::storage::store::MAX_READ;
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, obey, started};
 
@@ -34,11 +34,11 @@ impl Ground {
     fn ask<M: MessageData>(&mut self, link: Link, message: &M) -> Vec<Frame> {
         let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut bytes = [0; frame::MAX_SENT];
+        let mut bytes = [0; frame::MAX_FRAME_LEN];
         let length = frame::encode(header, message, &mut bytes);
         let now = self.bench.now;
         self.bench.companion.handle_bytes(link, now, &bytes[..length]);
-        let mut read = [0; READ];
+        let mut read = [0; MAX_READ];
         let mut heard = Vec::new();
         let mut framer = Framer::new();
         loop {
@@ -85,7 +85,7 @@ fn parameters_are_listed_read_set_and_kept() {
         let read = |index: i16, name: &str| PARAM_REQUEST_READ_DATA {
             param_index: index,
             target_system: SYSTEM,
-            target_component: crate::COMPONENT,
+            target_component: crate::COMPANION_COMPONENT,
             param_id: name.into(),
         };
         assert_eq!(values(&ground.ask(link, &read(2, "")))[0].param_id.to_str(), Ok("FLK_CLIMB_MAX"));
@@ -98,7 +98,7 @@ fn parameters_are_listed_read_set_and_kept() {
         let set = |name: &str, value: f32| PARAM_SET_DATA {
             param_value: value,
             target_system: SYSTEM,
-            target_component: crate::COMPONENT,
+            target_component: crate::COMPANION_COMPONENT,
             param_id: name.into(),
             param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
         };
@@ -138,10 +138,10 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
     };
     let mut ground = Ground::new();
     for (message, wanted, asked) in [
-        (reboot(1.0, 0.0, crate::COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
-        (reboot(0.0, 1.0, crate::COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
+        (reboot(1.0, 0.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
+        (reboot(0.0, 1.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
         (reboot(0.0, 1.0, 0), Some(MavResult::MAV_RESULT_ACCEPTED), 1),
-        (reboot(2.0, 0.0, crate::COMPONENT), Some(MavResult::MAV_RESULT_DENIED), 0),
+        (reboot(2.0, 0.0, crate::COMPANION_COMPONENT), Some(MavResult::MAV_RESULT_DENIED), 0),
         // The autopilot's.
         (reboot(1.0, 0.0, 0), None, 0),
     ] {
@@ -150,7 +150,7 @@ fn a_restart_is_asked_of_the_shell_unless_armed() {
     }
     let mut ground = Ground::new();
     ground.bench = Bench::following(config());
-    let heard = ground.ask(Link::Swarm, &reboot(1.0, 0.0, crate::COMPONENT));
+    let heard = ground.ask(Link::Swarm, &reboot(1.0, 0.0, crate::COMPANION_COMPONENT));
     assert_eq!(result(&heard), Some(MavResult::MAV_RESULT_TEMPORARILY_REJECTED));
     assert_eq!(restarts(&mut ground), 0);
 }
@@ -182,7 +182,7 @@ fn time_and_version_are_told_on_either_link() {
             command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
             param1: AUTOPILOT_VERSION_DATA::ID as f32,
             target_system: SYSTEM,
-            target_component: crate::COMPONENT,
+            target_component: crate::COMPANION_COMPONENT,
             ..COMMAND_LONG_DATA::default()
         };
         let heard = ground.ask(link, &request);
@@ -200,7 +200,7 @@ fn a_flood_of_each_question_is_answered_at_its_rate() {
         let mut bench = Bench::new(config());
         bench.until(State::Ready, 6.0);
         let (mut counts, mut framer) = ([0u32; 3], Framer::new());
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         for i in 0..seconds * 20u32 {
             for k in 0..30u32 {
                 let header = Header { system: sender, component: 7, sequence: (i * 30 + k) as u8 };
@@ -250,7 +250,7 @@ fn a_parameter_counts_at_once_on_the_ground_and_after_the_flight_in_the_air() {
     let set = |value, name: &str| PARAM_SET_DATA {
         param_value: value,
         target_system: SYSTEM,
-        target_component: crate::COMPONENT,
+        target_component: crate::COMPANION_COMPONENT,
         param_id: name.into(),
         param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
     };

@@ -33,19 +33,19 @@ pub const MAGIC: [u8; 8] = *b"FLKMISS\n";
 /// alone, and version 1, which names no ground station and means 255.
 pub const VERSION: u16 = 3;
 /// Version 2, which does not state the kind of mission.
-const WITHOUT_KIND: u16 = 2;
+const VERSION_WITHOUT_KIND: u16 = 2;
 /// Version 1, which names no ground stations.
-const WITHOUT_GROUND_STATIONS: u16 = 1;
+const VERSION_WITHOUT_GROUND_STATIONS: u16 = 1;
 /// Longest mission file that a board keeps, bytes.
-pub const MOST_BYTES: usize = 4096;
+pub const MAX_BYTES: usize = 4096;
 /// Bytes before the first vehicle.
 pub const HEADER_LEN: usize = 104;
 const CRC_LEN: usize = 4;
 /// Flag of a mission file whose six geofence numbers count.
-const FENCED: u8 = 1;
+const FLAG_FENCED: u8 = 1;
 /// Kinds of mission, in the byte after the flags.
-const GOALS: u8 = 0;
-const COVERAGE: u8 = 1;
+const KIND_GOALS: u8 = 0;
+const KIND_COVERAGE: u8 = 1;
 /// Settings that all vehicles of a mission share.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MissionHeader {
@@ -180,10 +180,10 @@ pub fn write(
         Method::Algorithm2 => 1,
         Method::Priority => 2,
     };
-    out[22] = if header.geofence.is_some() { FENCED } else { 0 };
+    out[22] = if header.geofence.is_some() { FLAG_FENCED } else { 0 };
     out[23] = match block {
-        Block::Goals(_) => GOALS,
-        Block::Coverage(_) => COVERAGE,
+        Block::Goals(_) => KIND_GOALS,
+        Block::Coverage(_) => KIND_COVERAGE,
     };
     out[24..26].copy_from_slice(&vehicle_count.to_le_bytes());
     out[26..28].copy_from_slice(&goal_count.to_le_bytes());
@@ -240,15 +240,15 @@ impl<'a> MissionView<'a> {
         }
         let (u16_at, u32_at) = (|at: usize| u16_at(head, at), |at: usize| u32_at(head, at));
         let ground_stations = match u16_at(8) {
-            WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
-            WITHOUT_KIND | VERSION => [head[28], head[29], head[30], head[31]],
+            VERSION_WITHOUT_GROUND_STATIONS => USUAL_GROUND_STATIONS,
+            VERSION_WITHOUT_KIND | VERSION => [head[28], head[29], head[30], head[31]],
             other => return Err(FileError::Version(other).into()),
         };
         let total = u32_at(12) as usize;
         let (vehicle_count, goal_count) = (usize::from(u16_at(24)), usize::from(u16_at(26)));
-        let kind = if u16_at(8) == VERSION { head[23] } else { GOALS };
+        let kind = if u16_at(8) == VERSION { head[23] } else { KIND_GOALS };
         let least = encoded_len(vehicle_count, goal_count);
-        let fits = if kind == GOALS { total == least } else { total > least };
+        let fits = if kind == KIND_GOALS { total == least } else { total > least };
         if usize::from(u16_at(10)) != HEADER_LEN || !fits {
             return Err(FileError::Length.into());
         }
@@ -285,7 +285,7 @@ impl<'a> MissionView<'a> {
             geofence: match (head[22], head[23]) {
                 (_, other) if other != kind => return Err(FileError::Header("flags").into()),
                 (0, _) => None,
-                (FENCED, _) => Some((point_at(head, 76), point_at(head, 88))),
+                (FLAG_FENCED, _) => Some((point_at(head, 76), point_at(head, 88))),
                 _ => return Err(FileError::Header("flags").into()),
             },
             ground_stations,
@@ -294,14 +294,14 @@ impl<'a> MissionView<'a> {
         let (vehicles, rest) = covered[HEADER_LEN..].split_at(vehicle_count * VEHICLE_LEN);
         let (goals, block) = rest.split_at(goal_count * GOAL_LEN);
         let kind = match kind {
-            GOALS => Kind::Goals,
-            COVERAGE => Kind::Coverage(CoverageView::parse(block, vehicle_count)?),
+            KIND_GOALS => Kind::Goals,
+            KIND_COVERAGE => Kind::Coverage(CoverageView::parse(block, vehicle_count)?),
             _ => return Err(FileError::Header("kind").into()),
         };
         let (vehicles, goals) = (vehicles.as_chunks().0, goals.as_chunks().0);
         let view = Self { header, crc, vehicles, goals, kind };
         view.check_lists()?;
-        if u16_at(8) != WITHOUT_GROUND_STATIONS
+        if u16_at(8) != VERSION_WITHOUT_GROUND_STATIONS
             && view.vehicles().any(|v| ground_stations.contains(&v.task.id))
         {
             return Err(FileError::Header("ground_stations").into());

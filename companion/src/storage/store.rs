@@ -29,7 +29,9 @@ use core::ops::Range;
 
 use self::area::{Area, Condition, Seal};
 pub(crate) use self::flash::crc32;
-pub use self::flash::{Answer, BLOCK, Erasing, Fault, File, FlashRequest, Layout, READ, ReadFlash, WORD};
+pub use self::flash::{
+    Answer, Erasing, Fault, File, FlashRequest, Layout, MAX_PROGRAM, MAX_READ, ReadFlash, WORD,
+};
 use self::job::Job;
 use self::journal::Journal;
 pub use self::upload_state::{UploadError, UploadState};
@@ -37,7 +39,7 @@ use self::window::Window;
 use crate::services::parameters::Parameters;
 
 /// Photographed waypoints of an area, as the mission writes them.
-pub(crate) type Photographed = heapless::Vec<u8, BLOCK>;
+pub(crate) type Photographed = heapless::Vec<u8, MAX_PROGRAM>;
 
 /// A companion's flash.
 #[derive(Clone, Debug)]
@@ -59,7 +61,7 @@ pub struct Store {
     paused: Job,
     /// Whether the shell is at work for us.
     asked: bool,
-    buffer: [u8; BLOCK],
+    buffer: [u8; MAX_PROGRAM],
     word: [u8; WORD],
     erasure_failed: bool,
 }
@@ -84,7 +86,7 @@ impl Store {
             job: Job::None,
             paused: Job::None,
             asked: false,
-            buffer: [0; BLOCK],
+            buffer: [0; MAX_PROGRAM],
             word: [0; WORD],
             erasure_failed: false,
         };
@@ -173,13 +175,13 @@ impl Store {
         }
     }
 
-    /// Asks for bytes of a file; false where others are under way. At most [`READ`] are given, fewer at its end.
+    /// Asks for bytes of a file; false where others are under way. At most [`MAX_READ`] are given, fewer at its end.
     pub fn read(&mut self, file: File, offset: u32, len: usize) -> bool {
         let Some(extent) = self.extent(file).filter(|extent| offset < extent.end - extent.start) else {
             return false;
         };
         let at = extent.start + offset;
-        let len = len.min(READ).min((extent.end - at) as usize);
+        let len = len.min(MAX_READ).min((extent.end - at) as usize);
         self.read_at(Job::Read { at, len })
     }
 

@@ -7,10 +7,10 @@
 //! left the plan: a vehicle that waits for it goes on waiting, so it flies alone. On the ground it is out, and the next may go.
 //!
 //! Two must not begin at once, each before it hears of the other. So a turn is claimed first: the vehicle reports that its path is
-//! blocked and no longer that it waits, for [`CLAIM`], longer than a word takes to be heard. It begins only if all others
+//! blocked and no longer that it waits, for [`TURN_CLAIM`], longer than a word takes to be heard. It begins only if all others
 //! wait then; a vehicle that hears a lower system id claim waits again.
 //!
-//! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`STRETCHES`] of the path a
+//! A vehicle that is out is looked at along the whole path before its gates open, and from then on twice a second: [`MAX_STRETCHES_PER_STEP`] of the path a
 //! step, so a look among many takes several steps.
 //!
 //! Over a field there is no roadmap, and nobody waits for a turn: who is stopped flies around what stops it and back to its path
@@ -26,61 +26,61 @@ use planner_core::Point;
 use planner_core::detour;
 use planner_core::frames::Geodetic;
 
-use self::beside::{Beside, FIELD_M};
+use self::beside::{Beside, LOOK_AHEAD_M};
 use self::homeward::Homeward;
 use crate::autopilot::telemetry::Telemetry;
 use crate::link::commands::{ACCEPTED, Command};
 use crate::mission::State;
-use crate::swarm::neighbours::STANDING_MPS;
+use crate::swarm::neighbours::MAX_HOVER_MPS;
 use crate::swarm::obstacles::Obstacles;
 use crate::swarm::sweep::Sweep;
 use crate::swarm::view::{Reported, View};
 use crate::time::{Duration, Instant};
 
 /// Time between two checks whether the path is blocked.
-const LOOK_EVERY: Duration = Duration::from_millis(500);
+const BLOCKED_CHECK_EVERY: Duration = Duration::from_millis(500);
 /// Stretches of the path that are checked in one step, each against one keep-out zone; a step
 /// checks the whole path at least once.
-const STRETCHES: usize = 160;
+const MAX_STRETCHES_PER_STEP: usize = 160;
 /// Cost of gathering one keep-out zone, as a number of those stretches.
-const THING_COST: usize = 12;
+const ZONE_COST: usize = 12;
 /// Time for which all other vehicles have to stand before a detour begins, seconds: longer than a
 /// gate that opened takes to be seen and obeyed.
-const QUIET_S: u64 = 3;
+const ALL_STAND_S: u64 = 3;
 /// Time for which a vehicle claims its turn before it takes the turn.
-const CLAIM: Duration = Duration::from_secs(1);
+const TURN_CLAIM: Duration = Duration::from_secs(1);
 /// Time that each blocked vehicle with a lower id has to begin its detour, seconds.
 const TURN_S: u64 = 2;
 /// Time from a search that found no detour to the next search, seconds.
-const RETRY_S: u64 = 10;
+const DETOUR_RETRY_S: u64 = 10;
 /// Wait while all others stand that is a dead end: the vehicle that is waited for found no detour.
-const DEAD_END: Duration = Duration::from_secs(30);
+const DEAD_END_AFTER: Duration = Duration::from_secs(30);
 /// Time from a search that found no landing place aside to the next search, seconds.
-const ASIDE_AGAIN_S: u64 = 30;
+const SIDESTEP_RETRY_S: u64 = 30;
 /// Wait of a landing after which a vehicle that hears no other one seeks a landing place aside.
-const DEAF_ASIDE: Duration = Duration::from_secs(60);
-/// Searches without a detour after which a vehicle gives up, or one fewer within [`GIVES_UP_S`].
-const DETOURS_TRIED: u8 = 4;
+const UNHEARD_SIDESTEP_AFTER: Duration = Duration::from_secs(60);
+/// Searches without a detour after which a vehicle gives up, or one fewer within [`GIVE_UP_AFTER_S`].
+const MAX_DETOUR_SEARCHES: u8 = 4;
 /// Time after which one search fewer is enough, seconds.
-const GIVES_UP_S: u64 = 60;
+const GIVE_UP_AFTER_S: u64 = 60;
 /// Time without progress after which a detour is blocked too.
-const STUCK: Duration = Duration::from_secs(20);
+const STUCK_AFTER: Duration = Duration::from_secs(20);
 /// Progress after which a vehicle that was blocked is blocked again, not still, metres.
-const FURTHER_M: f32 = 2.0;
+const BLOCKED_AGAIN_M: f32 = 2.0;
 /// Time for which whatever kept the vehicle from going on still does; once the vehicle counts as
-/// blocked it is [`FREE`]: a neighbour that sways at the edge of the path must not make the block
+/// blocked it is [`BLOCKED_HINDERED_WITHIN`]: a neighbour that sways at the edge of the path must not make the block
 /// begin again and again.
-const LATELY: Duration = Duration::from_millis(500);
+const HINDERED_WITHIN: Duration = Duration::from_millis(500);
 /// Time without a hindrance after which a blocked vehicle is free.
-const FREE: Duration = Duration::from_secs(3);
+const BLOCKED_HINDERED_WITHIN: Duration = Duration::from_secs(3);
 /// Time under a pilot's control after which the pilot keeps the vehicle for good: others fly around it.
-const KEPT: Duration = Duration::from_secs(20);
+const PILOT_KEEPS_AFTER: Duration = Duration::from_secs(20);
 /// Time after which an abort is over whose end the autopilot does not report.
-const SETTLED: Duration = Duration::from_secs(5);
+const ABORT_OVER_AFTER: Duration = Duration::from_secs(5);
 /// Time after which a vehicle on its pad that no other vehicle hears waits like one that waits for others.
-const UNHEARD: Duration = Duration::from_secs(10);
+const UNHEARD_ON_PAD_AFTER: Duration = Duration::from_secs(10);
 /// Age from which a neighbour's position is vague.
-const FRESH: Duration = Duration::from_secs(2);
+const MAX_POSITION_AGE: Duration = Duration::from_secs(2);
 /// Greatest stray from the path, metres: a path that much nearer to a keep-out zone is blocked.
 const BLOCKED_WITHIN_M: f32 = 0.25;
 
@@ -228,7 +228,7 @@ impl Detours {
             && view.guidance.along_m() >= 0.0;
         let over_field = view.config.division.is_some();
         let flies = view.mission.plan().is_some_and(|plan| plan.task.flies());
-        (self.in_the_way || self.is_stopped(view, FREE))
+        (self.in_the_way || self.is_stopped(view, BLOCKED_HINDERED_WITHIN))
             && over_field
             && on_path
             && flies
@@ -269,8 +269,10 @@ impl Detours {
         let lasted = view.mission.in_state(view.now);
         match view.mission.state() {
             State::Done => !view.guidance.at_goal(&view.scene) || self.left,
-            State::Aborted => view.telemetry.on_ground == Some(true) || lasted >= SETTLED,
-            State::PilotControl | State::PilotReturned => view.mission.with_pilot(view.now) >= KEPT,
+            State::Aborted => view.telemetry.on_ground == Some(true) || lasted >= ABORT_OVER_AFTER,
+            State::PilotControl | State::PilotReturned => {
+                view.mission.with_pilot(view.now) >= PILOT_KEEPS_AFTER
+            }
             _ => false,
         }
     }
@@ -286,23 +288,23 @@ impl Detours {
     fn is_held<const V: usize, const W: usize, const G: usize>(&self, view: &View<'_, V, W, G>) -> bool {
         let now = view.now;
         let held = view.guidance.advice.waiting_for != 0 || view.guidance.filter.is_stopped();
-        let rests = view.telemetry.velocity.norm() < STANDING_MPS;
+        let rests = view.telemetry.velocity.norm() < MAX_HOVER_MPS;
         let stands = view.guidance.stands() && rests;
         match view.mission.state() {
             State::Scheduled | State::PadReplanning => {
                 self.blocked
                     || !view.guidance.filter.column_clear()
-                    || view.neighbours.silence(now, view.mission.started_at()) >= UNHEARD
+                    || view.neighbours.silence(now, view.mission.started_at()) >= UNHEARD_ON_PAD_AFTER
                     || (held && view.guidance.advice.stop_within_m <= 0.05)
             }
             State::Follow => held && stands,
             State::Climb => {
-                view.guidance.filter.is_stopped() && view.telemetry.velocity.norm() < STANDING_MPS
+                view.guidance.filter.is_stopped() && view.telemetry.velocity.norm() < MAX_HOVER_MPS
             }
             // Blocked on its way down it stays there.
             State::Blocked => view.guidance.pauses() && rests,
             // The vehicle goes on by itself only once its column is free.
-            State::LandingHeld => view.telemetry.velocity.norm() < STANDING_MPS,
+            State::LandingHeld => view.telemetry.velocity.norm() < MAX_HOVER_MPS,
             _ => false,
         }
     }
@@ -310,7 +312,7 @@ impl Detours {
     /// The place that the vehicle reports.
     pub(crate) fn reported_place(&self, telemetry: &Telemetry, now: Instant) -> Reported {
         let t = telemetry;
-        let vague = self.lost_at.is_some() || t.position_age(now) > FRESH;
+        let vague = self.lost_at.is_some() || t.position_age(now) > MAX_POSITION_AGE;
         let (position, at) = self.lost_at.unwrap_or((t.position, t.position_at.unwrap_or_default()));
         Reported { position, velocity: if vague { Point::zeros() } else { t.velocity }, at }
     }
@@ -348,7 +350,7 @@ impl Detours {
             self.look_began = None;
             return None;
         }
-        let due = now - self.looked_at >= LOOK_EVERY;
+        let due = now - self.looked_at >= BLOCKED_CHECK_EVERY;
         if due {
             self.looked_at = now;
             self.look_began.get_or_insert(now);
@@ -378,16 +380,17 @@ impl Detours {
         let now = view.now;
         let stuck = self.flying
             && view.mission.state() != State::Scheduled
-            && now - view.guidance.progress_at() > STUCK;
+            && now - view.guidance.progress_at() > STUCK_AFTER;
         let aside = self.aside && view.guidance.is_at_end(&view.scene);
         let astray = self.left && (!self.flying || aside) && !self.lands;
-        let dead_end = self.is_held(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END);
-        let free = if view.mission.state() == State::Blocked { FREE } else { LATELY };
+        let dead_end = self.is_held(view) && self.quiet_since.is_some_and(|at| now - at > DEAD_END_AFTER);
+        let free =
+            if view.mission.state() == State::Blocked { BLOCKED_HINDERED_WITHIN } else { HINDERED_WITHIN };
         let stopped = self.is_stopped(view, free);
         self.blocked =
             !view.guidance.returning && (stuck || astray || dead_end || stopped || self.in_the_way);
         let along_m = view.guidance.along_m();
-        if self.blocked && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + FURTHER_M) {
+        if self.blocked && self.blocked_here.is_none_or(|(at_m, _)| along_m > at_m + BLOCKED_AGAIN_M) {
             self.blocked_here = Some((along_m, now));
         }
         if !view.neighbours.all_stand(now) {
@@ -408,7 +411,7 @@ impl Detours {
     ) -> bool {
         let (now, filter) = (view.now, &view.guidance.filter);
         let for_good = view.config.division.is_some() && !view.neighbours.follows_plan(filter.last_blocker());
-        filter.blocked_for(now, free) > STUCK || (for_good && filter.hindered_for(now) > STUCK)
+        filter.blocked_for(now, free) > STUCK_AFTER || (for_good && filter.hindered_for(now) > STUCK_AFTER)
     }
 
     /// Whether anything is; `None` while the look goes on.
@@ -420,13 +423,13 @@ impl Detours {
         let Some(plan) = view.mission.plan() else { return Some(false) };
         let here = if on_ground { view.mission.pad() } else { view.telemetry.position };
         let along_m = view.guidance.along_m();
-        let cost = detour::stretches_ahead(&plan.path, along_m) + THING_COST;
+        let cost = detour::stretches_ahead(&plan.path, along_m) + ZONE_COST;
         let apart_m = view.config.safety_distance_m + BLOCKED_WITHIN_M;
         let (now, neighbours) = (view.now, view.neighbours);
         let new = self.obstacles.new_ones();
         self.sweep.go_on(
             new.len() + neighbours.len(),
-            &mut (cost.max(STRETCHES) as u16),
+            &mut (cost.max(MAX_STRETCHES_PER_STEP) as u16),
             cost as u16,
             |source, tell| match new.get(source) {
                 Some(obstacle) => tell(*obstacle),
@@ -435,7 +438,7 @@ impl Detours {
             // Over a field it photographs what comes before, and flies around what blocks the way when it comes there.
             |obstacle| {
                 let until_m = match view.config.division {
-                    Some(_) => along_m.max(0.0) + FIELD_M,
+                    Some(_) => along_m.max(0.0) + LOOK_AHEAD_M,
                     None => f32::INFINITY,
                 };
                 let (climb_m, descent_m) = (plan.climb_m, plan.descent_m);
@@ -446,9 +449,9 @@ impl Detours {
 
     /// Whether it may claim its turn to fly around.
     fn is_due<const V: usize, const W: usize, const G: usize>(&self, view: &View<'_, V, W, G>) -> bool {
-        let wait_s = QUIET_S
+        let wait_s = ALL_STAND_S
             + TURN_S * view.neighbours.blocked_before(view.config.system_id)
-            + RETRY_S * u64::from(self.failed);
+            + DETOUR_RETRY_S * u64::from(self.failed);
         // Over a field nobody flies around.
         self.blocked
             && view.config.division.is_none()
@@ -462,7 +465,7 @@ impl Detours {
         view: &View<'_, V, W, G>,
     ) -> bool {
         self.is_due(view)
-            && self.claimed_since.is_some_and(|at| view.now - at >= CLAIM)
+            && self.claimed_since.is_some_and(|at| view.now - at >= TURN_CLAIM)
             && view.neighbours.all_wait(view.now)
     }
 
@@ -471,17 +474,17 @@ impl Detours {
         &self,
         view: &View<'_, V, W, G>,
     ) -> bool {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(ASIDE_AGAIN_S);
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(SIDESTEP_RETRY_S);
         view.mission.plan().is_some_and(|plan| plan.task.flies())
             && (!view.neighbours.is_deaf(view.now)
                 || view.neighbours.all_rest()
-                || view.guidance.filter.column_blocked_for(view.now) >= DEAF_ASIDE)
+                || view.guidance.filter.column_blocked_for(view.now) >= UNHEARD_SIDESTEP_AFTER)
             && self.no_way_aside_at.is_none_or(retries)
     }
 
     /// Whether enough ways around were not found, or led nowhere.
     pub(crate) fn gives_up(&self) -> bool {
-        self.hopeless || self.failed.saturating_add(self.fruitless) >= DETOURS_TRIED
+        self.hopeless || self.failed.saturating_add(self.fruitless) >= MAX_DETOUR_SEARCHES
     }
 
     /// How long it waits under a vehicle that lands, unable to go elsewhere; zero for a while after no way aside was found.
@@ -489,7 +492,7 @@ impl Detours {
         &self,
         view: &View<'_, V, W, G>,
     ) -> Duration {
-        let retries = |at: Instant| view.now - at >= Duration::from_secs(RETRY_S);
+        let retries = |at: Instant| view.now - at >= Duration::from_secs(DETOUR_RETRY_S);
         let trapped = view.guidance.trapped_since().filter(|_| self.no_way_aside_at.is_none_or(retries));
         trapped.map_or(Duration::default(), |at| view.now - at)
     }

@@ -4,13 +4,13 @@
 //! and reordered messages do no harm. Where a vehicle is lost or leaves, each of the others states once how far it flies on: its
 //! promise. It holds there. From the entries all compute the same division, report its hash, and fly on once all that live
 //! have reported the same one and hold ([`Fleet::step`]). A vehicle photographs only while it has its lease: within
-//! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT`] after each of them last heard
+//! [`LEASE`] a majority said that it hears it. Others take its part no sooner than [`SILENT_AFTER`] after each of them last heard
 //! it. Why no waypoint has two owners is in `docs/coverage.md`, claim by claim; `tests/tests/fleet_model` searches it.
 
 use heapless::Vec;
 use planner_core::file::CRC32;
 
-use crate::link::roster::{ENTRIES, Entry, Roster, Standing};
+use crate::link::roster::{Entry, MAX_ENTRIES, Roster, Standing};
 use crate::time::{Duration, Instant};
 
 mod lots;
@@ -20,16 +20,16 @@ pub use lots::{Lot, Lots};
 /// Time for which a vehicle goes on photographing after a majority last reported that they hear it.
 pub const LEASE: Duration = Duration::from_secs(20);
 /// Greatest age of a report that renews the lease.
-pub const HEARD: Duration = Duration::from_secs(1);
+pub const LEASE_HEARD_WITHIN: Duration = Duration::from_secs(1);
 /// Silence after which a vehicle's share is divided among the others.
-pub const SILENT: Duration = Duration::from_secs(45);
+pub const SILENT_AFTER: Duration = Duration::from_secs(45);
 /// Time for which a vehicle commits itself to fly on, seconds, up to the last picture that it takes
 /// within it. A vehicle requests a division this long before its path ends if its route goes on
 /// there.
-pub const PROMISE_S: f32 = 10.0;
+pub const COMMITMENT_S: f32 = 10.0;
 /// Most divisions of a mission; after the last one the waypoints that a vehicle leaves stay
 /// unphotographed.
-pub const DIVISIONS: usize = 12;
+pub const MAX_DIVISIONS: usize = 12;
 /// Incarnations that can be told apart: 3 bits.
 const INCARNATIONS: u8 = 8;
 
@@ -38,9 +38,9 @@ const INCARNATIONS: u8 = 8;
 pub struct Limits {
     /// As [`LEASE`].
     pub lease: Duration,
-    /// As [`HEARD`].
+    /// As [`LEASE_HEARD_WITHIN`].
     pub heard: Duration,
-    /// As [`SILENT`].
+    /// As [`SILENT_AFTER`].
     pub silent: Duration,
     /// A lost vehicle is down once it has been silent for so long.
     pub down: Duration,
@@ -50,7 +50,7 @@ impl Limits {
     /// Time limits of a flight in which a vehicle that no other vehicle hears any more is down
     /// after `down`.
     pub const fn of_flight(down: Duration) -> Self {
-        Self { lease: LEASE, heard: HEARD, silent: SILENT, down }
+        Self { lease: LEASE, heard: LEASE_HEARD_WITHIN, silent: SILENT_AFTER, down }
     }
 }
 
@@ -103,7 +103,7 @@ pub struct Fleet<const V: usize> {
     own: usize,
     members: Vec<Member, V>,
     /// The divisions that count.
-    divisions: Vec<Lots<V>, DIVISIONS>,
+    divisions: Vec<Lots<V>, MAX_DIVISIONS>,
     counted: u32,
     /// Inputs of the division under way, once all of them are known.
     lots: Lots<V>,
@@ -395,7 +395,7 @@ impl<const V: usize> Fleet<V> {
             first: first as u8,
             counted: self.counted,
             hash,
-            entries: self.members.iter().skip(first).take(ENTRIES).map(entry).collect(),
+            entries: self.members.iter().skip(first).take(MAX_ENTRIES).map(entry).collect(),
             ..Roster::default()
         }
     }

@@ -20,14 +20,14 @@ use planner_core::flight::Gate;
 use planner_core::frames::{self, Geodetic};
 use planner_core::safety::Joint;
 
-pub(crate) use self::bounds::STANDING_MPS;
+pub(crate) use self::bounds::MAX_HOVER_MPS;
 use self::bounds::*;
 use self::contact::Contact;
 pub(crate) use self::met::{Met, Reach};
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::{Ground, REACHES_ALL_M, RosterEntry};
 use crate::link::echo::{Echo, Lateness};
-use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, Intent, LANDED, ON_PLAN, OUT, WAITING};
+use crate::link::intent::{BLOCKED, GROUNDED, Intent, LANDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
 use crate::swarm::fleet::Fleet;
 use crate::time::{Duration, Instant};
 
@@ -77,15 +77,15 @@ impl<const V: usize> Neighbours<V> {
             roster: 0,
             dropped: 0,
             clear_at: Instant::ZERO,
-            fastest_mps: libm::fmaxf(nominal_mps, LANDS_MPS),
-            reckoned_mps: nominal_mps * RECKONED_SHARE,
+            fastest_mps: libm::fmaxf(nominal_mps, MAX_LANDING_MPS),
+            reckoned_mps: nominal_mps * RECKONED_SPEED_SHARE,
             edge_m: f32::INFINITY,
             place: Point::zeros(),
             relay_next: 0,
             own_rank: 0,
             fleet: None,
             ground: None,
-            down: DOWN,
+            down: DOWN_AFTER,
             stray_m: 0.0,
             roster_next: 0,
         };
@@ -104,14 +104,14 @@ impl<const V: usize> Neighbours<V> {
     /// The own place now, and how far the radio reaches, metres.
     pub(crate) fn set_place(&mut self, place: Point, radio_range_m: f32) {
         let all = radio_range_m >= REACHES_ALL_M;
-        self.edge_m = if all { f32::INFINITY } else { EDGE_SHARE * radio_range_m };
+        self.edge_m = if all { f32::INFINITY } else { RANGE_EDGE_SHARE * radio_range_m };
         self.place = place;
     }
 
     /// Whether every vehicle of the roster that is still to fly, or flies, was last heard where the radio may not reach: no
     /// radio has failed.
     pub(crate) fn all_beyond(&self) -> bool {
-        let beyond = |c: &Contact| c.at_edge || c.position_at.is_none() || c.tells(LANDED | OUT);
+        let beyond = |c: &Contact| c.at_edge || c.position_at.is_none() || c.tells(LANDED | OUT_OF_PLAN);
         self.edge_m.is_finite() && self.contacts[..self.roster].iter().all(beyond)
     }
 
@@ -180,7 +180,7 @@ impl<const V: usize> Neighbours<V> {
     /// Rank in the roster of a vehicle whose intents are of our mission.
     fn member(&self, id: u8, now: Instant) -> Option<usize> {
         let at = self.in_roster(id)?;
-        self.contacts[at].belongs_at.is_some_and(|heard| now - heard < BELONGS).then_some(at)
+        self.contacts[at].belongs_at.is_some_and(|heard| now - heard < MEMBERSHIP_LIFETIME).then_some(at)
     }
 
     fn in_roster(&self, id: u8) -> Option<usize> {
@@ -209,9 +209,9 @@ impl<const V: usize> Neighbours<V> {
         if let Some(at) = self.member(id, now).or_else(|| self.stranger(id)) {
             return self.contacts.get_mut(at);
         }
-        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
-        let room = self.contacts.len() - self.roster < STRANGERS;
-        match Some(id).filter(|_| room).and_then(|id| self.add(id, STRANGER)) {
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
+        let room = self.contacts.len() - self.roster < MAX_STRANGERS;
+        match Some(id).filter(|_| room).and_then(|id| self.add(id, STRANGER_RANK)) {
             Some(at) => self.contacts.get_mut(at),
             None => {
                 self.dropped = self.dropped.wrapping_add(1);
@@ -261,7 +261,7 @@ impl<const V: usize> Neighbours<V> {
         let cm_per_s = Vector3::new(f32::from(data.vx), f32::from(data.vy), f32::from(data.vz));
         contact.state.velocity = frames::swap_enu_ned(&(cm_per_s * 0.01));
         contact.speed_mps = contact.state.velocity.norm();
-        if contact.speed_mps >= STANDING_MPS {
+        if contact.speed_mps >= MAX_HOVER_MPS {
             contact.moved_at = now;
         }
     }
@@ -289,10 +289,10 @@ impl<const V: usize> Neighbours<V> {
         contact.other_plan = follows && plan_crc.is_some_and(|crc| crc != intent.plan_crc);
         (contact.heard_at, contact.belongs_at) = (Some(now), Some(now));
         contact.flags = intent.flags;
-        if contact.tells(GROUNDED) && !contact.tells(LANDED | OUT) && contact.position_at.is_some() {
+        if contact.tells(GROUNDED) && !contact.tells(LANDED | OUT_OF_PLAN) && contact.position_at.is_some() {
             contact.pad = Some(contact.state.position);
         }
-        let out = contact.tells(OUT) && contact.position_at.is_some();
+        let out = contact.tells(OUT_OF_PLAN) && contact.position_at.is_some();
         contact.out_at = contact.out_at.or(Some(now)).filter(|_| out);
         // Ranks beyond the bitmap are not reported.
         if rank >= 32 || intent.heard & (1 << rank) != 0 {
@@ -318,7 +318,7 @@ impl<const V: usize> Neighbours<V> {
     /// whether it blocks the path ([`Self::found_clear`]).
     pub fn at(&mut self, now: Instant) -> &[Neighbour] {
         self.heard.clear();
-        self.keep_strangers(|c| c.heard_within(now, STRANGER_STAYS));
+        self.keep_strangers(|c| c.heard_within(now, STRANGER_LIFETIME));
         for contact in &self.contacts {
             let progress_m = contact.passed_m(now);
             let placed_at = contact.position_at;
@@ -328,13 +328,13 @@ impl<const V: usize> Neighbours<V> {
             let dead = contact.is_dead(self.clear_at);
             let state = Neighbour {
                 // Of a vehicle that was never heard itself only the progress is known.
-                position: placed_at.map_or(NOWHERE, |_| contact.state.position),
+                position: placed_at.map_or(FAR_AWAY, |_| contact.state.position),
                 age_s: placed_at.map_or(0.0, |at| (now - at).secs_f32()),
                 rank: contact.rank,
                 progress_m,
                 grounded: contact.state.grounded || dead,
                 out: contact.out_at.is_some_and(|since| since <= self.clear_at) || dead,
-                detours: contact.tells(DETOURS),
+                detours: contact.tells(ON_DETOUR),
                 ..contact.state
             };
             // Cannot overflow: there are as many slots as contacts.
@@ -362,13 +362,17 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether all vehicles of the roster have landed, are out of the plan, or have been silent for so long that they lie.
     pub(crate) fn all_down(&self, now: Instant) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT) || !c.heard_within(now, self.down))
+        self.contacts[..self.roster]
+            .iter()
+            .all(|c| c.tells(LANDED | OUT_OF_PLAN) || !c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster counts as dead, but not yet as one that lies.
     pub(crate) fn any_comes_down_unheard(&self, now: Instant) -> bool {
         let roster = &self.contacts[..self.roster];
-        roster.iter().any(|c| !c.tells(GROUNDED | OUT) && c.is_dead(now) && c.heard_within(now, self.down))
+        roster
+            .iter()
+            .any(|c| !c.tells(GROUNDED | OUT_OF_PLAN) && c.is_dead(now) && c.heard_within(now, self.down))
     }
 
     /// Whether a vehicle of the roster has landed, or is out of the plan.
@@ -378,7 +382,8 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether a vehicle of the roster was not heard yet, or stands on the ground without having flown.
     pub(crate) fn is_not_started(&self, id: u8) -> bool {
-        let waits = |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT));
+        let waits =
+            |c: &Contact| c.heard_at.is_none() || (c.tells(GROUNDED) && !c.tells(LANDED | OUT_OF_PLAN));
         self.in_roster(id).is_some_and(|at| waits(&self.contacts[at]))
     }
 
@@ -395,7 +400,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether nobody of the roster is heard: rather this vehicle's radio than all of theirs.
     pub(crate) fn is_deaf(&self, now: Instant) -> bool {
-        self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, SILENT))
+        self.roster > 0 && self.contacts[..self.roster].iter().all(|c| !c.heard_within(now, MAY_LAND_AFTER))
     }
 
     /// The echo of one neighbour's last intent, of each in turn.
@@ -406,7 +411,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whom we heard lately, a bit for each rank.
     pub fn heard_bits(&self, now: Instant) -> u32 {
-        let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, LATELY));
+        let heard = self.contacts.iter().filter(|c| c.rank < 32 && c.heard_within(now, HEARD_WITHIN));
         heard.fold(0, |bits, c| bits | 1 << c.rank)
     }
 
@@ -477,7 +482,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether every other vehicle of the roster reported that it has landed or is out; true where there is none.
     pub fn all_rest(&self) -> bool {
-        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT))
+        self.contacts[..self.roster].iter().all(|c| c.tells(LANDED | OUT_OF_PLAN))
     }
 
     /// Time since any neighbour of the roster was heard, or since one reported that it hears us, whichever is longer; zero when

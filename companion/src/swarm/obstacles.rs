@@ -8,9 +8,9 @@ use planner_core::frames::{self, Geodetic};
 use crate::link::commands::{ACCEPTED, Command, DENIED, TEMPORARILY_REJECTED};
 
 /// Most reported obstacles that were not on the map.
-pub(crate) const OBSTACLES: usize = 16;
+pub(crate) const MAX_OBSTACLES: usize = 16;
 /// Greatest radius of a reported obstacle, metres: a wrong digit must not close a whole building.
-pub(crate) const OBSTACLE_MAX_M: f32 = 20.0;
+pub(crate) const MAX_OBSTACLE_RADIUS_M: f32 = 20.0;
 /// Two obstacles nearer than this are one that was sent twice, metres; a revocation this near an
 /// obstacle revokes it.
 const SAME_OBSTACLE_M: f32 = 0.1;
@@ -18,7 +18,7 @@ const SAME_OBSTACLE_M: f32 = 0.1;
 /// Obstacles that were not on the map, and for how many of them a way around was planned.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Obstacles {
-    known: Vec<KeepOff, OBSTACLES>,
+    known: Vec<KeepOff, MAX_OBSTACLES>,
     avoided: usize,
     /// Number of obstacles known when a detour was last requested: the detour does not avoid those
     /// that came later.
@@ -47,7 +47,7 @@ impl Obstacles {
         let Some((lat, lon, alt_m)) = command.place else { return DENIED };
         let (lat_deg, lon_deg) = (f64::from(lat) * 1e-7, f64::from(lon) * 1e-7);
         let place = Geodetic { lat_deg, lon_deg, alt_m: f64::from(alt_m) };
-        if !(place.is_valid() && command.param1 <= OBSTACLE_MAX_M) {
+        if !(place.is_valid() && command.param1 <= MAX_OBSTACLE_RADIUS_M) {
             return DENIED;
         }
         let centre = frames::geodetic_to_enu(origin, &place);

@@ -17,7 +17,7 @@ use planner_core::frames::{self, Geodetic};
 
 use crate::autopilot::Kind;
 use crate::autopilot::px4;
-use crate::link::frame::{self, Frame, Framer, Header, MAX_SENT};
+use crate::link::frame::{self, Frame, Framer, Header, MAX_FRAME_LEN};
 use crate::link::intent;
 use crate::{Companion, Config, Duration, Event, Instant, Link, Wanted};
 
@@ -183,7 +183,7 @@ impl Bench {
     }
 
     pub fn bytes<M: MessageData>(&mut self, message: &M) -> Vec<u8> {
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let len = frame::encode(header, message, &mut out);
@@ -205,7 +205,7 @@ impl Bench {
             target_component: component,
             ..Default::default()
         };
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: self.gcs_sequence };
         self.gcs_sequence = self.gcs_sequence.wrapping_add(1);
         let len = frame::encode(header, &data, &mut out);
@@ -214,12 +214,12 @@ impl Bench {
     }
 
     pub fn start(&mut self) {
-        self.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, crate::COMPONENT);
+        self.command(MavCmd::MAV_CMD_MISSION_START, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
     }
 
     pub fn drain(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
-            let mut out = [0; MAX_SENT];
+            let mut out = [0; MAX_FRAME_LEN];
             loop {
                 let len = self.companion.poll_transmit(link, &mut out);
                 if len == 0 {
@@ -227,7 +227,7 @@ impl Bench {
                 }
                 let mut input = &out[..len];
                 let frame = self.framers[link as usize].next(self.now, &mut input).expect("a whole frame");
-                assert_eq!((frame.system, frame.component), (SYSTEM, crate::COMPONENT));
+                assert_eq!((frame.system, frame.component), (SYSTEM, crate::COMPANION_COMPONENT));
                 self.receive(link, frame);
             }
         }

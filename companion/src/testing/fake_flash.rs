@@ -16,7 +16,9 @@ use rand_core::Rng;
 use rand_pcg::Pcg32;
 
 use crate::storage::mission_file::{self, Block, MissionHeader, MissionVehicle};
-use crate::storage::store::{BLOCK, Erasing, Fault, FlashRequest, Layout, READ, ReadFlash, Store, WORD};
+use crate::storage::store::{
+    Erasing, Fault, FlashRequest, Layout, MAX_PROGRAM, MAX_READ, ReadFlash, Store, WORD,
+};
 
 /// Layout like the H743's bank, but smaller, so that many cuts are tried in little time.
 pub const LAYOUT: Layout =
@@ -95,7 +97,7 @@ impl Flash {
         assert!(
             (at as usize).is_multiple_of(WORD)
                 && bytes.len().is_multiple_of(WORD)
-                && (1..=BLOCK).contains(&bytes.len())
+                && (1..=MAX_PROGRAM).contains(&bytes.len())
         );
         for (i, word) in bytes.chunks(WORD).enumerate() {
             let at = at as usize + i * WORD;
@@ -127,7 +129,7 @@ pub fn obey(
     flash: &mut Flash,
     request: FlashRequest<'_>,
     erasing: Erasing,
-    read: &mut [u8; READ],
+    read: &mut [u8; MAX_READ],
 ) -> Result<Result<usize, Fault>, Cut> {
     match request {
         FlashRequest::Erase { at } => {
@@ -140,7 +142,7 @@ pub fn obey(
             Ok(Ok(0))
         }
         FlashRequest::Read { at, len } => {
-            assert!(len <= READ && len > 0);
+            assert!(len <= MAX_READ && len > 0);
             Ok(flash.read(at, &mut read[..len]).map(|()| len))
         }
     }
@@ -148,7 +150,7 @@ pub fn obey(
 
 /// Does what the store asks until it asks for nothing.
 pub fn run(store: &mut Store, flash: &mut Flash, erasing: Erasing) -> Result<(), Cut> {
-    let mut read = [0; READ];
+    let mut read = [0; MAX_READ];
     for _ in 0..100_000 {
         let Some(request) = store.poll(erasing) else { return Ok(()) };
         let outcome = obey(flash, request, erasing, &mut read)?;

@@ -44,7 +44,7 @@ fn main() -> ! {
     build(scratch, 0.0);
     build(scratch, cases::CLEARANCE_M);
     let ws = CASES.take();
-    for number in 0..cases::PLANS {
+    for number in 0..cases::PLAN_CASES {
         let case = cases::plan_case(&view, number, ws);
         let [costs, assignment, paths, scales] = [case.costs, case.assignment, case.paths, case.scales];
         println!("case {number} {costs:08x} {assignment:08x} {paths:08x} {scales:08x}");
@@ -95,14 +95,14 @@ fn paths(view: &RoadmapView<'_>, goals: &Goals<VEHICLES>, search: &mut SearchWor
 fn steps() {
     let mut rng = Pcg32::seed_from_u64(1);
     let (mut worst, mut sum) = (0, 0);
-    for number in 0..cases::STEPS {
+    for number in 0..cases::STEP_CASES {
         let case = StepCase::new(&mut rng, VEHICLES, number % 2 == 0);
         let (_, count) = instructions(|| black_box(&case).advise(Method::Priority));
         worst = worst.max(count);
         sum += count;
     }
     println!("count step {worst}");
-    println!("count mean-step {}", sum / cases::STEPS as u64);
+    println!("count mean-step {}", sum / cases::STEP_CASES as u64);
 }
 
 /// A roadmap built from the map.
@@ -110,7 +110,7 @@ fn build(scratch: &mut Scratch, clearance_m: f32) {
     let (head, words) = memory::map();
     let grid = cases::map(&head, words);
     let builder = scratch.builder();
-    let config = Config { clearance_m, ..cases::BUILT };
+    let config = Config { clearance_m, ..cases::ROADMAP_CONFIG };
     let name = if clearance_m > 0.0 { "build-with-clearance" } else { "build" };
     counted(name, || builder.build(&grid, &[], &config)).expect("a roadmap");
     let (nodes, edges) = (builder.nodes(), builder.edges());

@@ -11,20 +11,20 @@ use heapless::String;
 
 use super::{chosen, stack};
 use crate::chips::{ResetCause, fault};
-use crate::kept::{Kept, TEXT, WORDS, Work};
+use crate::kept::{Kept, RECORD_WORDS, TEXT, Work};
 
 #[unsafe(link_section = ".crash")]
-static mut RECORD: MaybeUninit<[u32; WORDS]> = MaybeUninit::uninit();
+static mut RECORD: MaybeUninit<[u32; RECORD_WORDS]> = MaybeUninit::uninit();
 
 /// Reads the kept record. Interrupts are off: tasks and the end of the program use it.
 fn read() -> Option<Kept> {
     // SAFETY: nobody else runs, and any bytes are words.
-    Kept::from_words(&unsafe { (&raw const RECORD).cast::<[u32; WORDS]>().read_volatile() })
+    Kept::from_words(&unsafe { (&raw const RECORD).cast::<[u32; RECORD_WORDS]>().read_volatile() })
 }
 
 fn write(kept: &Kept) {
     // SAFETY: as above.
-    unsafe { (&raw mut RECORD).cast::<[u32; WORDS]>().write_volatile(kept.to_words()) };
+    unsafe { (&raw mut RECORD).cast::<[u32; RECORD_WORDS]>().write_volatile(kept.to_words()) };
 }
 
 /// Changes what is kept.

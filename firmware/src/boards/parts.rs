@@ -4,7 +4,7 @@ use embassy_executor::SendSpawner;
 use heapless::Vec;
 
 /// Most warnings.
-pub const WARNINGS: usize = 2;
+pub const MAX_WARNINGS: usize = 2;
 
 /// A board, ready: with its receivers, transmitters, flash and watchdog.
 pub struct Parts<R, T, F, W> {
@@ -21,5 +21,5 @@ pub struct Parts<R, T, F, W> {
     /// Awake.
     pub watchdog: W,
     /// Warnings about the board for a person.
-    pub warnings: Vec<&'static str, WARNINGS>,
+    pub warnings: Vec<&'static str, MAX_WARNINGS>,
 }

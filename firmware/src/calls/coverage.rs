@@ -19,11 +19,11 @@ use crate::capacity::{AREA_CORNERS, AREA_VERTICES, GATES, LANES, VEHICLES, WAYPO
 use crate::scratch::Coverage;
 
 /// Changes of the lanes' order that are tried.
-pub const LOOKS: u32 = companion::planner::coverage::LOOKS;
+pub const MAX_ORDER_CHANGES: u32 = companion::planner::coverage::MAX_ORDER_CHANGES;
 /// Vehicles of the plans that have a limit.
-const FEW: usize = 3;
+const LIMITED_VEHICLES: usize = 3;
 /// Packings that POWELL tries.
-const SEARCH: powell::Config = powell::Config::USUAL;
+const POWELL_SEARCH: powell::Config = powell::Config::USUAL;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 
 /// A sum of bits in which order counts.
@@ -88,7 +88,7 @@ fn vehicles(count: usize) -> Vec<Vehicle, VEHICLES> {
 fn pattern(angle_deg: Option<f32>, lane_m: f32) -> Pattern {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
-    Pattern { spacing, angle_deg, margin_m: 0.0, looks: LOOKS }
+    Pattern { spacing, angle_deg, margin_m: 0.0, looks: MAX_ORDER_CHANGES }
 }
 
 fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
@@ -105,19 +105,21 @@ fn cameras(meter: &mut impl Meter, sum: &mut Sum) {
 /// The whole plan of three vehicles, and its parts.
 fn plans(meter: &mut impl Meter, area: Area<'_>, lent: &mut Coverage, sum: &mut Sum) {
     let transit = Transit::<1>::empty();
-    let few = vehicles(FEW);
+    let few = vehicles(LIMITED_VEHICLES);
     let Coverage { tracks, left, build, powell, plan, .. } = lent;
     let bytes = size_of_val(tracks) + size_of_val(build) + size_of_val(powell);
     meter.call("a coverage plan, 3", bytes, || {
         tracks::build(&area, &pattern(None, 10.0), &transit, build, tracks).expect("lanes");
         let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
-        powell::powell(&work, &SEARCH, powell, plan).expect("routes");
+        powell::powell(&work, &POWELL_SEARCH, powell, plan).expect("routes");
     });
     sum.tracks(tracks);
     sum.plan(plan);
     let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
     meter
-        .call("powell::powell, 3", size_of_val(powell), || powell::powell(&work, &SEARCH, powell, plan))
+        .call("powell::powell, 3", size_of_val(powell), || {
+            powell::powell(&work, &POWELL_SEARCH, powell, plan)
+        })
         .expect("routes");
     let pack = &mut powell.pack;
     for unit in [Unit::Lane, Unit::Waypoint] {
@@ -277,7 +279,7 @@ fn edges(meter: &mut impl Meter, lent: &mut Coverage, sum: &mut Sum) {
         })
         .expect("lanes");
     sum.tracks(tracks);
-    let few = vehicles(FEW);
+    let few = vehicles(LIMITED_VEHICLES);
     let work = Work { tracks, transit: &transit, vehicles: &few, heights: HEIGHTS, unit: Unit::Waypoint };
     meter
         .call("pack::binpat, 3 around zones", size_of_val(&powell.pack), || {

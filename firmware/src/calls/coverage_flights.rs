@@ -28,7 +28,7 @@ use crate::scratch;
 pub type Flights = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Vehicles of the plans that have a limit.
-const FEW: usize = 3;
+const LIMITED_VEHICLES: usize = 3;
 const HEIGHTS: Heights = Heights { mission_m: 35.0, layer_m: 5.0 };
 const CRUISE_MPS: f32 = 5.0;
 const CLIMB_MPS: f32 = 3.0;
@@ -53,11 +53,11 @@ pub(super) const SWARM: Swarm<'static> = Swarm {
 /// Height of a path's first point above the pad, metres.
 const CLIMB_M: f32 = 2.0;
 /// Distance from pad to pad, metres.
-const PADS_M: f32 = 5.0;
+const PAD_SPACING_M: f32 = 5.0;
 /// Area of five vertices, 300 by 150 m.
-const FIVE: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
+const FIVE_VERTICES: [[f32; 2]; 5] = [[0.0, 0.0], [300.0, 0.0], [320.0, 80.0], [300.0, 150.0], [0.0, 150.0]];
 /// No-fly zones within that area.
-const ZONES: [[[f32; 2]; 4]; 2] = [
+const NO_FLY_ZONES: [[[f32; 2]; 4]; 2] = [
     [[80.0, 40.0], [110.0, 45.0], [105.0, 80.0], [75.0, 70.0]],
     [[200.0, 60.0], [240.0, 60.0], [240.0, 110.0], [200.0, 110.0]],
 ];
@@ -72,7 +72,7 @@ pub fn run(meter: &mut impl Meter, lent: &mut scratch::Scratch, out: &mut Flight
 #[inline(never)]
 fn whole(meter: &mut impl Meter, lent: &mut scratch::Area, out: &mut Flights) -> u32 {
     let mut sum = 1;
-    for zones in [&[][..], &ZONES[..]] {
+    for zones in [&[][..], &NO_FLY_ZONES[..]] {
         mission(meter, zones, lent, out, &mut sum);
     }
     sum
@@ -84,8 +84,8 @@ fn add(sum: &mut u32, flights: &Flights) {
 
 /// The rings of an area with so many zones.
 fn rings(zones: usize) -> Vec<Ring, 4> {
-    let zone = |k: usize| Ring { end: (FIVE.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
-    let outer = Ring { end: FIVE.len() as u16, kind: RingKind::Outer };
+    let zone = |k: usize| Ring { end: (FIVE_VERTICES.len() + 4 * (k + 1)) as u16, kind: RingKind::NoFly };
+    let outer = Ring { end: FIVE_VERTICES.len() as u16, kind: RingKind::Outer };
     core::iter::once(outer).chain((0..zones).map(zone)).collect()
 }
 
@@ -93,7 +93,7 @@ fn rings(zones: usize) -> Vec<Ring, 4> {
 fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
     let header = MissionHeader {
         roadmap_crc: 0,
-        mode: crate::cases::MODE,
+        mode: crate::cases::ASSIGNMENT_MODE,
         method: Method::Priority,
         origin: flight::ORIGIN,
         cruise_mps: CRUISE_MPS,
@@ -104,17 +104,17 @@ fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
     };
     let vehicle = |k: usize| MissionVehicle {
         task: VehicleTask { id: 1 + k as u8, required_clearance_m: 1.5, climb_m: CLIMB_M, goal: None },
-        start: Point::new(PADS_M * k as f32, -10.0, CLIMB_M),
+        start: Point::new(PAD_SPACING_M * k as f32, -10.0, CLIMB_M),
         radius_m: 0.3,
         speed_max_mps: 8.0,
     };
-    let vehicles: Vec<_, FEW> = (0..FEW).map(vehicle).collect();
+    let vehicles: Vec<_, LIMITED_VEHICLES> = (0..LIMITED_VEHICLES).map(vehicle).collect();
     let area = CoverageHeader {
         unit: Unit::Waypoint,
         parts: Parts::Anyone,
         heading: Heading::Sweep,
         trigger: Trigger::Distance,
-        looks: super::coverage::LOOKS,
+        looks: super::coverage::MAX_ORDER_CHANGES,
         heights: HEIGHTS,
         spacing: spacing(10.0),
         angle_deg: None,
@@ -122,11 +122,11 @@ fn file(zones: &[[[f32; 2]; 4]], out: &mut [u8]) -> usize {
         ground: None,
     };
     let share = Share { weight: 1.0, climb_mps: CLIMB_MPS, descend_mps: DESCEND_MPS };
-    let corners = FIVE.iter().chain(zones.iter().flatten());
+    let corners = FIVE_VERTICES.iter().chain(zones.iter().flatten());
     let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
     let parts = CoverageParts {
         header: area,
-        shares: &[share; FEW],
+        shares: &[share; LIMITED_VEHICLES],
         rings: &rings(zones.len()),
         vertices: &vertices,
     };
@@ -155,7 +155,7 @@ fn mission(
         false => ["planner::coverage::plan, 3, zones", "planner::coverage::plan, 3 after two losses, zones"],
     };
     let lent_bytes = size_of::<scratch::Area>();
-    let mut losses: Vec<[Lot; FEW], 2> = Vec::new();
+    let mut losses: Vec<[Lot; LIMITED_VEHICLES], 2> = Vec::new();
     for lost in [None, Some(0), Some(1)] {
         if let Some(lost) = lost {
             // Each in the air stands in the middle of its path; one that was lost before is on the ground.
@@ -187,15 +187,15 @@ fn mission(
 fn parts(meter: &mut impl Meter, lent: &mut scratch::Coverage, out: &mut Flights) -> u32 {
     let mut sum = 1;
     let names = ["flights::plan, 3", "losses::again, 3"];
-    for zones in [&[][..], &ZONES[..]] {
-        let corners = FIVE.iter().chain(zones.iter().flatten());
+    for zones in [&[][..], &NO_FLY_ZONES[..]] {
+        let corners = FIVE_VERTICES.iter().chain(zones.iter().flatten());
         let vertices: Vec<Flat, 16> = corners.map(|[x, y]| Flat::new(*x, *y)).collect();
         let rings = rings(zones.len());
         let case = Case {
             area: Area::new(&vertices, &rings).expect("an area"),
             angle_deg: None,
             lane_m: 10.0,
-            count: FEW,
+            count: LIMITED_VEHICLES,
         };
         divided(meter, &case, names, lent, out, &mut sum);
     }
@@ -221,7 +221,7 @@ struct Case<'a> {
 }
 
 fn vehicles(count: usize) -> (Vec<Vehicle, VEHICLES>, Vec<Pad, VEHICLES>) {
-    let place = |k: usize| Flat::new(PADS_M * k as f32, -10.0);
+    let place = |k: usize| Flat::new(PAD_SPACING_M * k as f32, -10.0);
     let vehicle = |k: usize| Vehicle {
         place: place(k),
         home: place(k),
@@ -253,7 +253,7 @@ fn divided(
     transit.learn(case.area).expect("they fit");
     let scratch::Coverage { tracks, build, powell, plan: routes, losses, schedule, .. } = lent;
     let pack = &mut powell.pack;
-    let looks = super::coverage::LOOKS;
+    let looks = super::coverage::MAX_ORDER_CHANGES;
     let pattern = Pattern { spacing: spacing(case.lane_m), angle_deg: case.angle_deg, margin_m: 0.0, looks };
     tracks::build(&case.area, &pattern, &transit, build, tracks).expect("lanes");
     let (vehicles, pads) = vehicles(case.count);

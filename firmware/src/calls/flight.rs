@@ -3,7 +3,7 @@
 //! The script is a PX4 that goes where its setpoint says, and neighbours that send random places, intents and flags, or nothing.
 //! Half of the flights are hard: everybody is near, and off the plan, out of it, or silent for up to 90 s.
 
-use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
 use companion::link::roster::{self, Entry, Roster};
 use companion::{Duration, Event, Instant, Link, PlanFailure};
@@ -45,16 +45,16 @@ pub const CRUISE_MPS: f32 = 5.0;
 const MISSION_CRC: u32 = 0xC0FFEE;
 const PLAN_CRC: u32 = 5;
 /// Least distance of a neighbour that is beside, metres.
-const BESIDE_M: f32 = 4.0;
+const MIN_BESIDE_M: f32 = 4.0;
 /// Control steps counted in each flight.
-const STEPS: usize = 200;
+const COUNTED_STEPS: usize = 200;
 /// Most steps of 0.9 s before the counted ones, in which silent neighbours grow old. A longer step
 /// would be a gap in the position.
-const AGEING: usize = 100;
+const MAX_AGEING_STEPS: usize = 100;
 const STEP_TIME: Duration = Duration::from_millis(50);
 const AGEING_TIME: Duration = Duration::from_millis(900);
 /// Steps of 50 ms within which the vehicle is in the air.
-const TAKE_OFF: usize = 400;
+const MAX_TAKE_OFF_STEPS: usize = 400;
 
 const HEARTBEAT: u32 = 0;
 const SYS_STATUS: u32 = 1;
@@ -101,7 +101,7 @@ pub fn is_hard(seed: u64) -> bool {
 /// that the path is checked to its end.
 fn near(seed: u64, rng: &mut Pcg32, reach_m: f32) -> Point {
     let at = anywhere(rng, reach_m);
-    if seed.is_multiple_of(4) { at + at * (BESIDE_M / at.norm().max(0.1)) } else { at }
+    if seed.is_multiple_of(4) { at + at * (MIN_BESIDE_M / at.norm().max(0.1)) } else { at }
 }
 
 /// One flight, its control steps counted by `meter`; how many there were.
@@ -121,7 +121,7 @@ pub fn fly<M: Meter>(
     for (i, other) in flight.others.iter_mut().enumerate() {
         let (flags, silent) = match seed % 4 {
             // All on ways of their own: each is looked at along the whole path ahead.
-            1 => (AIR | intent::DETOURS, false),
+            1 => (AIR | intent::ON_DETOUR, false),
             3 => EASY[below(&mut rng, EASY.len())],
             _ => HARD[below(&mut rng, HARD.len())],
         };
@@ -132,12 +132,12 @@ pub fn fly<M: Meter>(
     }
     flight.tell_all(&mut rng, |_| true);
     if hard {
-        for _ in 0..below(&mut rng, AGEING) {
+        for _ in 0..below(&mut rng, MAX_AGEING_STEPS) {
             flight.tell(0, &mut rng);
             flight.tick(OTHER_STEP, AGEING_TIME);
         }
     }
-    for step in 0..STEPS {
+    for step in 0..COUNTED_STEPS {
         if !flight.flies() {
             return step;
         }
@@ -152,7 +152,7 @@ pub fn fly<M: Meter>(
         flight.meter.call(FILTER, size_of::<BoardCompanion>(), || companion.ask_filter(now));
         flight.tick(if hard { HARD_STEP } else { STEP }, STEP_TIME);
     }
-    STEPS
+    COUNTED_STEPS
 }
 
 /// One flight among neighbours that are near but seldom on the path, the safety filter alone counted by `meter`: in full flight,
@@ -169,7 +169,7 @@ pub fn filter<M: Meter>(
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut flight = Flight::on_pad(plan, companion, meter);
     flight.take_off();
-    for round in 0..ROUNDS {
+    for round in 0..FILTER_ROUNDS {
         for i in 0..flight.others.len() {
             flight.others[i].place = flight.place + far_away();
             flight.others[i].flags = FILTERED[below(&mut rng, FILTERED.len())];
@@ -201,18 +201,23 @@ fn far_away() -> Point {
 }
 
 /// Rounds of a flight in which the filter is counted.
-const ROUNDS: usize = 40;
-const FILTERED: [u8; 4] = [AIR, AIR | intent::DETOURS, intent::FLYING, intent::FLYING | intent::OUT];
+const FILTER_ROUNDS: usize = 40;
+const FILTERED: [u8; 4] =
+    [AIR, AIR | intent::ON_DETOUR, intent::FLYING, intent::FLYING | intent::OUT_OF_PLAN];
 const AIR: u8 = intent::FLYING | intent::ON_PLAN;
 /// Flags of a neighbour, and whether it falls silent.
 const EASY: [(u8, bool); 4] = [
     (AIR, false),
     (intent::GROUNDED | intent::ON_PLAN | intent::WAITING, false),
-    (AIR | intent::DETOURS, false),
+    (AIR | intent::ON_DETOUR, false),
     (intent::GROUNDED | intent::LANDED | intent::ON_PLAN, false),
 ];
-const HARD: [(u8, bool); 4] =
-    [(intent::FLYING, false), (intent::FLYING | intent::OUT, false), (AIR, true), (intent::FLYING, true)];
+const HARD: [(u8, bool); 4] = [
+    (intent::FLYING, false),
+    (intent::FLYING | intent::OUT_OF_PLAN, false),
+    (AIR, true),
+    (intent::FLYING, true),
+];
 
 impl<'a, M: Meter> Flight<'a, M> {
     /// On its pad, all others far away, and past every gate.
@@ -248,14 +253,14 @@ impl<'a, M: Meter> Flight<'a, M> {
     fn take_off(&mut self) {
         let mut rng = Pcg32::seed_from_u64(0);
         self.tell_all(&mut rng, |_| true);
-        for step in 0..TAKE_OFF {
+        for step in 0..MAX_TAKE_OFF_STEPS {
             if step.is_multiple_of(4) {
                 self.tell(0, &mut rng);
             }
             if self.companion.state() == companion::State::Ready {
                 let mut order = [0; 33];
                 order[28..30].copy_from_slice(&MISSION_START.to_le_bytes());
-                (order[30], order[31]) = (SYSTEM, companion::COMPONENT);
+                (order[30], order[31]) = (SYSTEM, companion::COMPANION_COMPONENT);
                 self.hear(Link::Swarm, (255, 190), COMMAND_LONG, &order);
             }
             self.tick(OTHER_STEP, STEP_TIME);
@@ -302,7 +307,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         let sequence = &mut self.sequences[usize::from(from.0)];
         *sequence = sequence.wrapping_add(1);
         let header = Header { system: from.0, component: from.1, sequence: *sequence };
-        let mut bytes = [0; MAX_SENT];
+        let mut bytes = [0; MAX_FRAME_LEN];
         let extra = frame::extra_crc(id).expect("a message of the dialect");
         let len = frame::encode_raw(header, id, extra, payload, &mut bytes);
         let (now, companion) = (self.now, &mut *self.companion);
@@ -325,7 +330,7 @@ impl<'a, M: Meter> Flight<'a, M> {
     fn tell(&mut self, i: usize, rng: &mut Pcg32) {
         let Other { place, flags, progress_m, .. } = self.others[i];
         let system_id = 2 + i as u8;
-        let points = (0..intent::POINTS).map(|_| place + anywhere(rng, 3.0)).collect();
+        let points = (0..intent::MAX_POINTS).map(|_| place + anywhere(rng, 3.0)).collect();
         let intent = Intent {
             system_id,
             flags,
@@ -339,7 +344,7 @@ impl<'a, M: Meter> Flight<'a, M> {
         };
         let mut payload = [0; 133];
         let len = intent.encode(&mut payload);
-        self.hear(Link::Swarm, (system_id, companion::COMPONENT), TUNNEL, &payload[..len]);
+        self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
         if self.has_area() {
             self.tell_roster(system_id);
         }
@@ -353,19 +358,19 @@ impl<'a, M: Meter> Flight<'a, M> {
         for to in position[20..26].chunks_exact_mut(2) {
             to.copy_from_slice(&(uniform(rng, -200.0, 200.0) as i16).to_le_bytes());
         }
-        self.hear(Link::Swarm, (system_id, companion::COMPONENT), GLOBAL_POSITION_INT, &position);
+        self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), GLOBAL_POSITION_INT, &position);
     }
 
     /// The roster that the neighbour reports: all fly.
     fn tell_roster(&mut self, system_id: u8) {
-        for first in (0..VEHICLES).step_by(roster::ENTRIES) {
-            let known = VEHICLES.min(first + roster::ENTRIES) - first;
+        for first in (0..VEHICLES).step_by(roster::MAX_ENTRIES) {
+            let known = VEHICLES.min(first + roster::MAX_ENTRIES) - first;
             let entries = core::iter::repeat_n(Entry::default(), known).collect();
             let mission_crc = MISSION_CRC;
             let roster = Roster { system_id, first: first as u8, mission_crc, entries, ..Roster::default() };
-            let mut payload = [0; roster::LENGTH];
+            let mut payload = [0; roster::MAX_LEN];
             let len = roster.encode(&mut payload);
-            self.hear(Link::Swarm, (system_id, companion::COMPONENT), TUNNEL, &payload[..len]);
+            self.hear(Link::Swarm, (system_id, companion::COMPANION_COMPONENT), TUNNEL, &payload[..len]);
         }
     }
 
@@ -373,7 +378,7 @@ impl<'a, M: Meter> Flight<'a, M> {
     fn drain(&mut self) {
         for link in [Link::Autopilot, Link::Swarm] {
             loop {
-                let mut out = [0; MAX_SENT];
+                let mut out = [0; MAX_FRAME_LEN];
                 let companion = &mut *self.companion;
                 let len = self.meter.call("Companion::poll_transmit", size_of::<BoardCompanion>(), || {
                     companion.poll_transmit(link, &mut out)

@@ -15,7 +15,7 @@ use planner_core::track::{self, TrackConfig, Tracker};
 use planner_core::voxel::{GridError, GridShape, MAX_DIM, Outside, VoxelGrid};
 
 /// Numbers that break code which does not check them.
-pub(super) const HARD: [f32; 14] = [
+pub(super) const HARD_NUMBERS: [f32; 14] = [
     0.0,
     -0.0,
     1.0,
@@ -82,8 +82,8 @@ impl<'a, L: Listener> Answers<'a, L> {
 
 /// Points of hard numbers.
 pub(super) fn points() -> impl Iterator<Item = Point> {
-    let at = |i: usize| HARD[i % HARD.len()];
-    (0..HARD.len() * 3).map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
+    let at = |i: usize| HARD_NUMBERS[i % HARD_NUMBERS.len()];
+    (0..HARD_NUMBERS.len() * 3).map(move |i| Point::new(at(i), at(i * 5 + i / 14), at(i * 9 + i / 7)))
 }
 
 /// Makes all calls that need no roadmap.
@@ -138,7 +138,7 @@ fn grids(to: &mut Answers<'_, impl Listener>) {
         // Of these shapes only a grid of 4 × 4 × 4 cells or less has one word, and none has four.
         assert!(grid.is_err(), "{shape:?}");
     }
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         let shape = GridShape { resolution_m: hard, ..SHAPE };
         let grid = VoxelGrid::new(shape, Outside::Free, &WORDS);
         assert_eq!(grid.is_ok(), hard > 0.0 && hard.is_finite());
@@ -177,7 +177,7 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
         let inside = Point::new(2.2, 2.7, 1.2);
         for p in points() {
             let snapped = to.call("lattice::snap", || segment::snap(&SHAPE, &p));
-            for hard in HARD {
+            for hard in HARD_NUMBERS {
                 let clear = to.call("segment::segment_is_clear", || {
                     segment::segment_is_clear(&grid, &p, &inside, hard)
                 });
@@ -197,7 +197,7 @@ fn segments(to: &mut Answers<'_, impl Listener>) {
                 to.add(distance[1]);
             }
         }
-        for cells in HARD {
+        for cells in HARD_NUMBERS {
             let error = to.call("lattice::snap_error_cells", || segment::snap_error_cells(cells));
             to.add(error);
         }
@@ -227,7 +227,7 @@ fn samples(to: &mut Answers<'_, impl Listener>) {
     let mut nodes = [Point::zeros(); 8];
     let mut index = to.call("neighbours::Workspace::new", prm::Workspace::<8, 16>::new);
     assert!(to.call("neighbours::Workspace::is_empty", || index.is_empty()));
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for config in [
             Config { edge_min_m: hard, ..good },
             Config { edge_max_m: hard, ..good },
@@ -302,8 +302,8 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
         let _ = path.push(Point::new(round as f32, 0.0, 1.0), 1.0);
         let length_m = to.call("flight::Path::length_m", || path.length_m());
         assert!(length_m.is_finite() && length_m >= 0.0, "{length_m}");
-        for (i, &hard) in HARD.iter().enumerate() {
-            let other = HARD[(i * 5 + round) % HARD.len()];
+        for (i, &hard) in HARD_NUMBERS.iter().enumerate() {
+            let other = HARD_NUMBERS[(i * 5 + round) % HARD_NUMBERS.len()];
             to.call("flight::Path::label", || path.label(hard, other));
             to.call("flight::Path::label_last", || path.label_last(hard, other));
             to.call("flight::Path::label_by", || path.label_by(hard, |from, to| (to - from).norm() * other));
@@ -344,14 +344,16 @@ fn paths(to: &mut Answers<'_, impl Listener>) {
 /// Pictures along a path, whatever their spacing.
 fn tasks(to: &mut Answers<'_, impl Listener>, path: &Path<4>) {
     let last = to.call("flight::Path::last", || path.last()).expect("a path with waypoints");
-    let waypoints = Range { first: Photographs::NUMBERS - 1, end: Photographs::NUMBERS };
-    for spacing_m in HARD {
+    let waypoints =
+        Range { first: Photographs::MAX_AREA_WAYPOINTS - 1, end: Photographs::MAX_AREA_WAYPOINTS };
+    for spacing_m in HARD_NUMBERS {
         let new = || Photographs::new(spacing_m, Look::Ahead, Trigger::Distance);
         let mut photographs = to.call("photographs::Photographs::new", new);
-        for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::WAYPOINTS), (62, 63)] {
+        for (from, until) in [(0, last), (last, last), (1, 0), (0, Photographs::MAX_PATH_WAYPOINTS), (62, 63)]
+        {
             let marked =
                 to.call("photographs::Photographs::mark", || photographs.mark(from, until, waypoints));
-            assert_eq!(marked.is_ok(), from <= until && until < Photographs::WAYPOINTS);
+            assert_eq!(marked.is_ok(), from <= until && until < Photographs::MAX_PATH_WAYPOINTS);
         }
         let photographs =
             to.call("photographs::Photographs::of_area", || photographs.of_area(u32::MAX, spacing_m > 0.0));
@@ -416,7 +418,7 @@ fn neighbours(to: &mut Answers<'_, impl Listener>) {
     let empty: Path<4> = Path::new();
     [0.0, 4.0].iter().for_each(|&x| path.push(Point::new(x, 0.0, 1.0), 1.0).expect("two points"));
     for (i, p) in points().enumerate() {
-        let hard = HARD[i % HARD.len()];
+        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let all: Vec<Neighbour, 4> = (0..4)
             .map(|k| Neighbour {
                 id: k,
@@ -447,7 +449,7 @@ fn neighbours(to: &mut Answers<'_, impl Listener>) {
 
 fn sets(to: &mut Answers<'_, impl Listener>) {
     for (i, p) in points().enumerate() {
-        let hard = HARD[i % HARD.len()];
+        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let braking = Braking { accel_mps2: hard, jerk_mps3: p.x };
         let stop_m = to.call("safety::Braking::stop_m", || braking.stop_m(p.y));
         to.add(stop_m);

@@ -13,7 +13,7 @@ use planner_core::plan::{PlanError, SwarmPlan};
 use planner_core::schedule::{ScheduleConfig, ScheduleWorkspace};
 
 use super::coverage_flights;
-use super::limits::{Answers, HARD, Listener, points};
+use super::limits::{Answers, HARD_NUMBERS, Listener, points};
 use super::limits_coverage::{self as coverage, CORNERS, FLEET, HEIGHTS, LANES, Lanes, VEHICLES, Ways};
 
 /// Waypoints and gates of one vehicle.
@@ -107,7 +107,7 @@ fn plans(
         planned
     };
     assert_eq!(plan(good, routes, &SWARM), Ok(()));
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
             let planned = plan(&Work { heights, ..*good }, routes, &SWARM);
             assert_eq!(matches!(planned, Err(PlanError::Config(_))), !is_good(hard));
@@ -197,7 +197,7 @@ fn fields(
 ) {
     let mut file = [0; 64];
     let field = ground(&mut file);
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         let usual = Following { field, height_m: 30.0, tolerance_m: 3.0, slope: 0.5 };
         for following in [
             usual,
@@ -243,7 +243,7 @@ fn divisions(
     }
     let fate = Fate { lives: true, along_m: 60.0 };
     let lost = Fate { lives: false, along_m: 60.0 };
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for hit in [Fate { along_m: hard, ..fate }, Fate { along_m: hard, ..lost }] {
             for fates in [&[fate, hit, fate][..], &[hit; VEHICLES], &[lost, hit, lost], &[hit, fate], &[]] {
                 memory.losses.begin(good.tracks, good.transit, &[]).expect("nothing is done");
@@ -301,7 +301,7 @@ fn ways_home(
     };
     let natures = [Nature::Solid, Nature::Landing, Nature::Lying];
     for (i, p) in points().enumerate() {
-        let hard = HARD[i % HARD.len()];
+        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
         let thing = KeepOff { from: p, to: here, radius_m: hard, nature: natures[i % 3] };
         for request in [
             good,

@@ -10,7 +10,7 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, Flat, bound, divide, exact, sweep};
 use planner_core::flight::Range;
 
-use super::limits::{Answers, HARD, Listener};
+use super::limits::{Answers, HARD_NUMBERS, Listener};
 
 /// Capacities: lanes, vertices, corners of no-fly zones, vehicles.
 pub(super) const LANES: usize = 8;
@@ -99,7 +99,7 @@ pub(super) fn area() -> Area<'static> {
 
 fn cameras(to: &mut Answers<'_, impl Listener>) {
     let pixels = [6000, 4000];
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for camera in [
             Camera::Diagonal { fov_deg: 73.7, aspect: 1.5 },
             Camera::Diagonal { fov_deg: hard, aspect: 1.5 },
@@ -137,8 +137,8 @@ fn to_check(to: &mut Answers<'_, impl Listener>, spacing: &Spacing) -> Result<()
 }
 
 fn areas(to: &mut Answers<'_, impl Listener>) {
-    for x in HARD {
-        for y in HARD {
+    for x in HARD_NUMBERS {
+        for y in HARD_NUMBERS {
             let mut vertices = CORNERS_OF_ALL;
             vertices[2] = Flat::new(x, y);
             let found = to.call("area::Area::new", || Area::new(&vertices, &RINGS));
@@ -188,8 +188,8 @@ fn ways(to: &mut Answers<'_, impl Listener>, transit: &mut Ways<'static>) {
         }
         let corners = to.call("transit::Transit::corners", || transit.corners().len());
         assert_eq!(corners, if known { CORNERS } else { 0 });
-        for x in HARD {
-            for y in HARD {
+        for x in HARD_NUMBERS {
+            for y in HARD_NUMBERS {
                 let (from, there) = (Flat::new(x, y), Flat::new(15.0, 40.0));
                 let forbids = to.call("transit::Transit::forbids", || transit.forbids(&from));
                 assert!(known || !forbids);
@@ -213,7 +213,7 @@ fn lanes(to: &mut Answers<'_, impl Listener>, area: &Area<'_>, transit: &Ways<'_
     *build = to.call("strips::Workspace::new", tracks::Workspace::new);
     *tracks = to.call("lanes::Tracks::new", Tracks::new);
     numbers(to, tracks);
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for pattern in [
             Pattern { angle_deg: Some(hard), ..PATTERN },
             Pattern { margin_m: hard, ..PATTERN },
@@ -227,7 +227,7 @@ fn lanes(to: &mut Answers<'_, impl Listener>, area: &Area<'_>, transit: &Ways<'_
                 numbers(to, tracks);
             }
         }
-        for end in HARD {
+        for end in HARD_NUMBERS {
             let (from, end) = (Flat::new(hard, 0.0), Flat::new(0.0, end));
             for count in NUMBERS {
                 let lane = Lane { from, to: end, first: count, count, start_m: 0.0, strip: 0 };
@@ -323,7 +323,7 @@ fn packs(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut Len
             to.count((ends.0 ^ ends.1) as usize);
         }
     };
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for unit in [Unit::Lane, Unit::Waypoint] {
             for heights in [Heights { mission_m: hard, ..HEIGHTS }, Heights { layer_m: hard, ..HEIGHTS }] {
                 pack(to, &Work { unit, heights, ..good }, ws, plan);
@@ -367,7 +367,7 @@ fn searches(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut 
     let mut ways_m = [0.0; 512];
     let mut reaches = [0; 1024];
     let mut states = [(0, 0); 1 << (2 * VEHICLES)];
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for vehicles in &fleets(hard) {
             let work = Work { vehicles, ..good };
             let checked = work.check::<VEHICLES>();
@@ -389,11 +389,11 @@ fn searches(to: &mut Answers<'_, impl Listener>, transit: &Ways<'_>, lent: &mut 
             to.add(plan.max_cost_s());
         }
     }
-    for vehicles in [0, VEHICLES, exact::MOST_VEHICLES, usize::MAX] {
+    for vehicles in [0, VEHICLES, exact::MAX_EXACT_VEHICLES, usize::MAX] {
         for waypoints in [0, 1, usize::MAX] {
             let lengths =
                 to.call("exact::Workspace::lengths", || exact::Workspace::lengths(vehicles, waypoints));
-            assert!(lengths[2] <= 1 << (2 * exact::MOST_VEHICLES));
+            assert!(lengths[2] <= 1 << (2 * exact::MAX_EXACT_VEHICLES));
         }
     }
     let mut small = exact::Workspace { ways_m: &mut [], reaches: &mut [], states: &mut [] };

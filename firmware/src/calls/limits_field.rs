@@ -5,7 +5,7 @@ use planner_core::coverage::Flat;
 use planner_core::field::follow::Following;
 use planner_core::field::{self, FieldShape, FieldView, MAX_NODES};
 
-use super::limits::{Answers, HARD, Listener};
+use super::limits::{Answers, HARD_NUMBERS, Listener};
 
 const COLUMNS: u16 = 3;
 const ROWS: u16 = 2;
@@ -15,12 +15,12 @@ const BYTES: usize = 64;
 const ENDS: [f32; 3] = [0.0, 7.5, -1.0];
 /// Coordinates so far that a path to one of them has tens of thousands of samples: each is tried
 /// with one slope.
-const FAR: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
+const FAR_COORDINATES: [f32; 3] = [-1e19, f32::INFINITY, f32::NAN];
 
 pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
     let good = FieldShape { low: Flat::new(-1.0, 2.0), cell_m: 5.0, columns: COLUMNS, rows: ROWS };
     let mut file = [0; BYTES];
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for shape in [FieldShape { cell_m: hard, ..good }, FieldShape { low: Flat::new(hard, 0.0), ..good }] {
             let written = to.call("field::write", || field::write(&shape, &NODES, &mut file));
             to.is(written.is_ok());
@@ -50,8 +50,8 @@ pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
     to.count(crc as usize);
     let highest_m = to.call("field::FieldView::highest_m", || field.highest_m());
     to.add(highest_m);
-    for x in HARD {
-        for y in HARD {
+    for x in HARD_NUMBERS {
+        for y in HARD_NUMBERS {
             let height_m = to.call("field::FieldView::height_at", || field.height_at(&Flat::new(x, y)));
             to.add(height_m);
         }
@@ -60,8 +60,8 @@ pub(super) fn fields(to: &mut Answers<'_, impl Listener>) {
 }
 
 fn paths(to: &mut Answers<'_, impl Listener>, field: FieldView<'_>) {
-    for (i, hard) in HARD.into_iter().enumerate() {
-        for end in ENDS.into_iter().chain(FAR.get(i).copied()) {
+    for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
+        for end in ENDS.into_iter().chain(FAR_COORDINATES.get(i).copied()) {
             let following = Following { field, height_m: 30.0, tolerance_m: 3.0, slope: hard };
             let (here, there) = (Flat::new(0.0, 3.0), Flat::new(end, 4.0));
             let lowest_m = to.call("follow::Following::lowest_m", || following.lowest_m(&there));

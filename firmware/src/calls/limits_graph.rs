@@ -7,10 +7,10 @@ use planner_core::frames::Geodetic;
 use planner_core::roadmap::{self, Edge, HalfEdge, LANDMARKS, RoadmapHeader, RoadmapView};
 use planner_core::search::{self, SearchError, SearchWorkspace, WithLengths};
 
-use super::limits::{Answers, HARD, Listener, points};
+use super::limits::{Answers, HARD_NUMBERS, Listener, points};
 
 /// Most nodes that a workspace holds.
-pub(super) const NODES: usize = 8;
+pub(super) const MAX_NODES: usize = 8;
 
 const HEADER: RoadmapHeader = RoadmapHeader {
     origin: Geodetic { lat_deg: 40.0, lon_deg: -3.0, alt_m: 700.0 },
@@ -23,7 +23,7 @@ const HEADER: RoadmapHeader = RoadmapHeader {
 };
 
 /// Places of the nodes: two starts, two goals opposite, two nodes between.
-pub(super) const PLACES: [Point; 6] = [
+pub(super) const NODE_PLACES: [Point; 6] = [
     Point::new(0.0, 0.0, 2.0),
     Point::new(0.0, 6.0, 2.0),
     Point::new(12.0, 6.0, 2.0),
@@ -47,7 +47,7 @@ pub(super) fn any(_: u16, _: &HalfEdge) -> bool {
 /// Leaves a good file; returns its length.
 pub(super) fn files(
     to: &mut Answers<'_, impl Listener>,
-    ws: &mut SearchWorkspace<NODES>,
+    ws: &mut SearchWorkspace<MAX_NODES>,
     file: &mut [u8; 512],
 ) -> usize {
     let all = [0, 1, 7, u32::MAX as usize / 4, usize::MAX / 8, usize::MAX];
@@ -57,7 +57,7 @@ pub(super) fn files(
         assert!(len.is_none_or(|len| len <= u32::MAX as usize));
     }
     let edges = edges();
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         for header in [
             RoadmapHeader { edge_min_m: hard, ..HEADER },
             RoadmapHeader { edge_max_m: hard, ..HEADER },
@@ -66,36 +66,36 @@ pub(super) fn files(
             RoadmapHeader { starts: hard as u16, goals: u16::MAX, ..HEADER },
             RoadmapHeader { origin: Geodetic { lat_deg: hard.into(), ..HEADER.origin }, ..HEADER },
         ] {
-            let written = to.call("write::write", || roadmap::write(&header, &PLACES, &edges, file));
+            let written = to.call("write::write", || roadmap::write(&header, &NODE_PLACES, &edges, file));
             // A file that was written can be read.
             let read = written.and_then(|len| RoadmapView::parse(&file[..len]).map(|view| view.crc()));
             assert_eq!(written.is_ok(), read.is_ok(), "{header:?}");
             to.is(written.is_ok());
         }
         let with = [Edge { clearance_m: hard, ..edges[0] }];
-        to.is(roadmap::write(&HEADER, &PLACES, &with, file).is_ok());
+        to.is(roadmap::write(&HEADER, &NODE_PLACES, &with, file).is_ok());
     }
     for (a, b) in [(0, 0), (0, 6), (u16::MAX, 0)] {
-        assert!(roadmap::write(&HEADER, &PLACES, &[Edge { a, b, clearance_m: 1.0 }], file).is_err());
+        assert!(roadmap::write(&HEADER, &NODE_PLACES, &[Edge { a, b, clearance_m: 1.0 }], file).is_err());
     }
     for p in points() {
-        let mut places = PLACES;
+        let mut places = NODE_PLACES;
         places[5] = p;
         to.is(roadmap::write(&HEADER, &places, &edges, file).is_ok());
     }
-    assert!(roadmap::write(&HEADER, &PLACES, &edges, &mut file[..100]).is_err());
+    assert!(roadmap::write(&HEADER, &NODE_PLACES, &edges, &mut file[..100]).is_err());
     let mut small = SearchWorkspace::<2>::new();
-    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[], &mut small, file).is_err());
-    for hard in HARD {
+    assert!(roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[], &mut small, file).is_err());
+    for hard in HARD_NUMBERS {
         let heights_m = [2.0, hard, 2.0, 2.0, 2.0, f32::INFINITY];
-        let written = roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &heights_m, ws, file);
-        let good = (0.0..=roadmap::MAX_WAY_M).contains(&hard) || hard == f32::INFINITY;
+        let written = roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &heights_m, ws, file);
+        let good = (0.0..=roadmap::MAX_LANDMARK_DISTANCE_M).contains(&hard) || hard == f32::INFINITY;
         assert_eq!(written.is_ok(), good, "{hard}");
     }
-    assert!(roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &[1.0; 5], ws, file).is_err());
+    assert!(roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &[1.0; 5], ws, file).is_err());
     let len = to
         .call("write::write_with_landmarks", || {
-            roadmap::write_with_landmarks(&HEADER, &PLACES, &edges, &HEIGHTS_M, ws, file)
+            roadmap::write_with_landmarks(&HEADER, &NODE_PLACES, &edges, &HEIGHTS_M, ws, file)
         })
         .expect("a good roadmap");
     let mut head = [0; roadmap::HEADER_LEN];
@@ -110,12 +110,12 @@ pub(super) fn files(
     for cut in 0..len {
         assert!(RoadmapView::parse(&file[..cut]).is_err());
     }
-    assert_eq!(roadmap::encoded_len(PLACES.len(), edges.len(), LANDMARKS + 1), Some(len));
+    assert_eq!(roadmap::encoded_len(NODE_PLACES.len(), edges.len(), LANDMARKS + 1), Some(len));
     len
 }
 
 /// Indices of nodes: valid ones, and ones of which there is no node.
-pub(super) const INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
+pub(super) const NODE_INDICES: [u16; 6] = [0, 1, 5, 6, 8, u16::MAX];
 
 pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>) {
     let nodes = to.call("roadmap::RoadmapView::node_count", || view.node_count());
@@ -128,8 +128,8 @@ pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'
     assert_eq!(to.call("roadmap::RoadmapView::origin", || *view.origin()), HEADER.origin);
     let crc = to.call("roadmap::RoadmapView::crc", || view.crc());
     to.count(crc as usize);
-    for i in 0..INDICES.len() * INDICES.len() {
-        let (a, b) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
+    for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
+        let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < nodes;
         let place = to.call("roadmap::RoadmapView::node", || view.node(a));
         assert_eq!(place.iter().all(|c| c.is_finite()), usize::from(a) < nodes);
@@ -149,7 +149,7 @@ pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'
         to.is(around.is_some());
     }
     let edge = view.edge_between(0, 4).expect("an edge");
-    for hard in HARD {
+    for hard in HARD_NUMBERS {
         let clears = to.call("roadmap::RoadmapView::clears", || view.clears(&edge, hard));
         assert_eq!(clears, hard < 1.0, "{hard}");
     }
@@ -158,11 +158,11 @@ pub(super) fn roadmaps(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'
 pub(super) fn searches(
     to: &mut Answers<'_, impl Listener>,
     view: &RoadmapView<'_>,
-    ws: &mut SearchWorkspace<NODES>,
+    ws: &mut SearchWorkspace<MAX_NODES>,
 ) {
-    let fresh = to.call("search::SearchWorkspace::new", SearchWorkspace::<NODES>::new);
-    let mut way: Vec<u16, NODES> = Vec::new();
-    for node in INDICES {
+    let fresh = to.call("search::SearchWorkspace::new", SearchWorkspace::<MAX_NODES>::new);
+    let mut way: Vec<u16, MAX_NODES> = Vec::new();
+    for node in NODE_INDICES {
         // Before the first search nothing is reached.
         assert!(to.call("search::SearchWorkspace::distance_m", || fresh.distance_m(node)).is_infinite());
         assert!(to.call("search::SearchWorkspace::path_to", || fresh.path_to(node, &mut way)).is_err());
@@ -172,8 +172,8 @@ pub(super) fn searches(
     assert!(WithLengths::new(*view, &mut lengths[..17]).is_err());
     let with =
         to.call("search::WithLengths::new", || WithLengths::new(*view, &mut lengths)).expect("18 half-edges");
-    for i in 0..INDICES.len() * INDICES.len() {
-        let (a, b) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
+    for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
+        let (a, b) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let there = usize::from(a.max(b)) < view.node_count();
         let found = to.call("search::astar", || search::astar(view, a, b, any, ws, &mut way));
         assert_eq!(found.is_ok(), there);
@@ -214,8 +214,8 @@ pub(super) fn assignments(to: &mut Answers<'_, impl Listener>) {
         to.add(most.map_or(-1.0, |a| a.largest));
         total
     };
-    for i in 0..HARD.len() * HARD.len() {
-        let (a, b) = (HARD[i / HARD.len()], HARD[i % HARD.len()]);
+    for i in 0..HARD_NUMBERS.len() * HARD_NUMBERS.len() {
+        let (a, b) = (HARD_NUMBERS[i / HARD_NUMBERS.len()], HARD_NUMBERS[i % HARD_NUMBERS.len()]);
         let costs = [a, b, a, b, a, 1.0, 2.0, b, a];
         let bad = costs.iter().any(|c| c.is_nan() || *c == f32::NEG_INFINITY);
         for (rows, cols) in [(3, 3), (1, 3), (3, 1), (2, 3)] {

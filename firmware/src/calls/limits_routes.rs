@@ -12,10 +12,10 @@ use planner_core::schedule::sipp::{self, Route, SippWorkspace};
 use planner_core::schedule::{self, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use planner_core::search::SearchWorkspace;
 
-use super::limits::{Answers, HARD, Listener, points};
+use super::limits::{Answers, HARD_NUMBERS, Listener, points};
 use super::limits_area_flights as area_flights;
 use super::limits_field as field;
-use super::limits_graph::{self as graph, INDICES, NODES, PLACES, any};
+use super::limits_graph::{self as graph, MAX_NODES, NODE_INDICES, NODE_PLACES, any};
 
 /// Capacities: vehicles, waypoints, timed segments, gates.
 const VEHICLES: usize = 3;
@@ -23,7 +23,7 @@ const WAYPOINTS: usize = 8;
 const PIECES: usize = 256;
 const GATES: usize = 16;
 
-type Workspace = PlanWorkspace<NODES, VEHICLES, PIECES>;
+type Workspace = PlanWorkspace<MAX_NODES, VEHICLES, PIECES>;
 type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 
 /// Memory lent to the calls.
@@ -108,7 +108,7 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
         assert_eq!(to.call("request::PlanRequest::check", || request.check()), Err(error));
         assert_eq!(plan::plan_swarm(view, request, ws, out), Err(error));
     };
-    for hard in HARD.into_iter().filter(|&x| !(x >= 0.0 && x.is_finite())) {
+    for hard in HARD_NUMBERS.into_iter().filter(|&x| !(x >= 0.0 && x.is_finite())) {
         for task in [
             VehicleTask { required_clearance_m: hard, ..TASKS[1] },
             VehicleTask { climb_m: hard, ..TASKS[1] },
@@ -118,7 +118,7 @@ fn plans(to: &mut Answers<'_, impl Listener>, view: &RoadmapView<'_>, ws: &mut W
         }
         refused(&request(&TASKS, &[1.5, hard]), PlanError::BadDescent(1));
     }
-    for hard in HARD.into_iter().filter(|&x| !(x > 0.0 && x.is_finite())) {
+    for hard in HARD_NUMBERS.into_iter().filter(|&x| !(x > 0.0 && x.is_finite())) {
         for schedule in [
             ScheduleConfig { separation_m: hard, ..SCHEDULE },
             ScheduleConfig { parked_separation_m: hard, ..SCHEDULE },
@@ -185,8 +185,8 @@ fn schedules(
         });
         assert!(answer.is_ok() || index > 1 || answer == Err(ScheduleError::GatesFull));
     }
-    for (i, hard) in HARD.into_iter().enumerate() {
-        let other = HARD[(i * 5) % HARD.len()];
+    for (i, hard) in HARD_NUMBERS.into_iter().enumerate() {
+        let other = HARD_NUMBERS[(i * 5) % HARD_NUMBERS.len()];
         let cfg = ScheduleConfig { separation_m: other, cruise_mps: hard, ..SCHEDULE };
         let good = |x: f32| x > 0.0 && x.is_finite();
         let checked = to.call("config::ScheduleConfig::check", || cfg.check());
@@ -224,8 +224,8 @@ fn schedules(
             }
         }
     }
-    for i in 0..INDICES.len() * INDICES.len() {
-        let (from, to_node) = (INDICES[i / INDICES.len()], INDICES[i % INDICES.len()]);
+    for i in 0..NODE_INDICES.len() * NODE_INDICES.len() {
+        let (from, to_node) = (NODE_INDICES[i / NODE_INDICES.len()], NODE_INDICES[i % NODE_INDICES.len()]);
         let route =
             Route { cfg: &SCHEDULE, from, to: to_node, not_before_s: 0.0, parked: &[], handover_s: 0.0 };
         let mut flight = plan.flights[0].clone();
@@ -240,14 +240,14 @@ fn schedules(
 fn detours(
     to: &mut Answers<'_, impl Listener>,
     view: &RoadmapView<'_>,
-    ws: &mut SearchWorkspace<NODES>,
+    ws: &mut SearchWorkspace<MAX_NODES>,
     own: &mut VehiclePlan<WAYPOINTS, GATES>,
 ) {
     let mut nodes: Vec<u16, WAYPOINTS> = Vec::new();
     let good = DetourRequest {
         aside: false,
-        here: PLACES[0],
-        leg: [PLACES[0], PLACES[4]],
+        here: NODE_PLACES[0],
+        leg: [NODE_PLACES[0], NODE_PLACES[4]],
         leg_clearance_m: 1.0,
         goal: Goal::Node(0),
         descent_m: 1.5,
@@ -258,8 +258,8 @@ fn detours(
     let path = own.path.clone();
     let empty: Path<WAYPOINTS> = Path::new();
     for (i, p) in points().enumerate() {
-        let hard = HARD[i % HARD.len()];
-        let thing = KeepOff { from: p, to: PLACES[5], radius_m: hard, nature: natures[i % 3] };
+        let hard = HARD_NUMBERS[i % HARD_NUMBERS.len()];
+        let thing = KeepOff { from: p, to: NODE_PLACES[5], radius_m: hard, nature: natures[i % 3] };
         for request in [
             good,
             DetourRequest { aside: true, ..good },
@@ -268,7 +268,7 @@ fn detours(
             DetourRequest { descent_m: hard, leg_clearance_m: hard, ..good },
             DetourRequest { required_clearance_m: hard, ..good },
             DetourRequest { goal: Goal::Home { over: p, layer_m: hard }, ..good },
-            DetourRequest { fence: Some((p, PLACES[5])), ..good },
+            DetourRequest { fence: Some((p, NODE_PLACES[5])), ..good },
         ] {
             let bad = [
                 to.call("detour::DetourRequest::check", || request.check()).is_err(),
@@ -300,7 +300,7 @@ fn detours(
             let request = DetourRequest { goal: Goal::Node(goal), ..good };
             assert!(detour::plan(view, &request, &mut [thing], ws, &mut nodes, &mut own.path).is_err());
         }
-        let holds = to.call("detour::KeepOff::holds", || thing.holds(&PLACES[5]));
+        let holds = to.call("detour::KeepOff::holds", || thing.holds(&NODE_PLACES[5]));
         assert!(!holds || hard > 0.0 || hard.is_nan());
         for path in [&path, &empty] {
             let blocked = to.call("detour::is_blocked", || {

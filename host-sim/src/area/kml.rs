@@ -6,12 +6,12 @@ use kml::types::{Geometry, LinearRing, Polygon};
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Most folders within each other: a file that nests deeper is refused before it is read.
-const DEPTH: usize = 64;
+const MAX_FOLDER_DEPTH: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
     // The reader calls itself for each folder and geometry within another one.
     let nested = ["<Folder", "<Document", "<MultiGeometry"];
-    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > DEPTH {
+    if nested.iter().map(|tag| text.matches(tag).count()).sum::<usize>() > MAX_FOLDER_DEPTH {
         return Err(AreaFileError::malformed("KML that can be read", &"it has more than 64 folders"));
     }
     let file: Kml<f64> = text.parse().map_err(|error: kml::Error| AreaFileError::malformed("KML", &error))?;

@@ -14,7 +14,7 @@ mod wkt;
 
 use std::path::Path;
 
-pub use self::polygons::{AreaFileError, MOST_VERTICES, Polygons, RingXy};
+pub use self::polygons::{AreaFileError, MAX_VERTICES, Polygons, RingXy};
 use crate::files;
 
 /// Format of a file.
@@ -75,7 +75,7 @@ pub fn parse(text: &str, format: Format) -> Result<Polygons, AreaFileError> {
     }
     polygons.outers.iter_mut().chain(&mut polygons.holes).chain(&mut polygons.no_fly).for_each(open);
     let count = polygons.vertex_count();
-    if count > MOST_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
+    if count > MAX_VERTICES { Err(AreaFileError::TooManyVertices(count)) } else { Ok(polygons) }
 }
 
 /// Drops vertices that repeat the one before, around the end too.

@@ -8,7 +8,7 @@ use planner_core::coverage::Flat;
 
 /// A point within this distance of a border is on the border, metres: neighbouring fields share
 /// borders, and coordinates are rounded.
-const BORDER_M: f64 = 0.01;
+const ON_BORDER_M: f64 = 0.01;
 
 /// How rings lie to each other that share ground where they must not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,7 +38,7 @@ pub fn find(outers: &[&[Flat]], holes: &[&[Flat]]) -> Option<Overlap> {
         let Some(own) = outers.iter().position(around) else { return Some(Overlap::HoleOut(index)) };
         left_m2[own] -= hole.area_m2();
     }
-    let nothing = |(ring, left_m2): (&Wide, &f64)| *left_m2 < BORDER_M * ring.perimeter_m();
+    let nothing = |(ring, left_m2): (&Wide, &f64)| *left_m2 < ON_BORDER_M * ring.perimeter_m();
     outers.iter().zip(&left_m2).position(nothing).map(Overlap::NothingLeft)
 }
 
@@ -129,8 +129,8 @@ impl Wide {
         let mut shares = vec![0.0, 1.0];
         for (c, d) in self.edges() {
             let far = |axis: usize| {
-                c[axis].max(d[axis]) < a[axis].min(b[axis]) - BORDER_M
-                    || c[axis].min(d[axis]) > a[axis].max(b[axis]) + BORDER_M
+                c[axis].max(d[axis]) < a[axis].min(b[axis]) - ON_BORDER_M
+                    || c[axis].min(d[axis]) > a[axis].max(b[axis]) + ON_BORDER_M
             };
             if far(0) || far(1) {
                 continue;
@@ -151,7 +151,7 @@ impl Wide {
             let (along, to) = ([b[0] - a[0], b[1] - a[1]], [place[0] - a[0], place[1] - a[1]]);
             let length2 = along[0] * along[0] + along[1] * along[1];
             let share = ((to[0] * along[0] + to[1] * along[1]) / length2).clamp(0.0, 1.0);
-            (to[0] - along[0] * share).hypot(to[1] - along[1] * share) <= BORDER_M
+            (to[0] - along[0] * share).hypot(to[1] - along[1] * share) <= ON_BORDER_M
         })
     }
 

@@ -5,7 +5,7 @@ use thiserror::Error;
 use crate::quote::quoted;
 
 /// Most vertices of all polygons.
-pub const MOST_VERTICES: usize = 10_000;
+pub const MAX_VERTICES: usize = 10_000;
 
 /// One closed line; whether its last vertex repeats the first does not matter.
 pub type RingXy = Vec<[f64; 2]>;
@@ -42,7 +42,7 @@ pub enum AreaFileError {
     #[error("holds no polygon{0}")]
     NoPolygon(&'static str),
     /// The file holds too many vertices.
-    #[error("holds {0} vertices; at most {MOST_VERTICES} can be used")]
+    #[error("holds {0} vertices; at most {MAX_VERTICES} can be used")]
     TooManyVertices(usize),
 }
 

@@ -77,7 +77,7 @@ fn what_is_none_is_refused() {
     assert!(parse(&deep, Format::GeoJson).is_err());
     let deep = "GEOMETRYCOLLECTION(".repeat(50_000);
     assert!(parse(&deep, Format::Wkt).is_err());
-    let many: Vec<String> = (0..=MOST_VERTICES).map(|i| format!("{i} {i}")).collect();
+    let many: Vec<String> = (0..=MAX_VERTICES).map(|i| format!("{i} {i}")).collect();
     let many = format!("POLYGON(({}))", many.join(","));
     assert!(matches!(parse(&many, Format::Wkt), Err(AreaFileError::TooManyVertices(_))));
 }

@@ -8,10 +8,10 @@ use wkt::types::{LineString, Polygon};
 use super::polygons::{AreaFileError, Polygons, RingXy};
 
 /// Most collections in a file: the reader calls itself for each collection within another one.
-const COLLECTIONS: usize = 64;
+const MAX_COLLECTIONS: usize = 64;
 
 pub(super) fn parse(text: &str) -> Result<Polygons, AreaFileError> {
-    if text.to_ascii_uppercase().matches("COLLECTION").count() > COLLECTIONS {
+    if text.to_ascii_uppercase().matches("COLLECTION").count() > MAX_COLLECTIONS {
         return Err(AreaFileError::malformed("WKT that can be read", &"it has more than 64 collections"));
     }
     // PostGIS writes the reference system before it; [area] says what the coordinates are.

@@ -1,9 +1,9 @@
 //! What lies in an emulated board's flash.
 
 use anyhow::ensure;
-use companion::services::ftp::DATA;
+use companion::services::ftp::MAX_DATA;
 use companion::storage::store::window::Taken;
-use companion::storage::store::{Erasing, File, READ, Store, UploadState};
+use companion::storage::store::{Erasing, File, MAX_READ, Store, UploadState};
 
 use planner_core::field;
 
@@ -13,12 +13,12 @@ use crate::flash::{DeskFlash, LAYOUT};
 pub const BANK2: u32 = 0x6000_0000;
 /// Address of the marks, a byte for each flash word: the state of that word, erased, programmed, or
 /// torn while it was being programmed or erased.
-pub const MARKS: u32 = 0x6020_0000;
+pub const WORD_MARKS: u32 = 0x6020_0000;
 pub const ERASED: u8 = 0;
 pub const WHOLE: u8 = 1;
 pub const TORN: u8 = 2;
 /// Address and value of the mark that the bank holds something.
-pub const MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
+pub const BANK_MADE: (u32, u32) = (0x6030_0000, 0x464c_4153);
 
 /// Content of a bank of flash after these files were uploaded to an empty one, its other slot
 /// erased.
@@ -29,7 +29,7 @@ pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
     let mut flash = DeskFlash::open(None)?;
     let mut store = Store::mount(LAYOUT, &mut flash);
     let mut settle = |store: &mut Store| {
-        let mut read = [0; READ];
+        let mut read = [0; MAX_READ];
         while let Some(request) = store.poll(Erasing::Allowed) {
             let outcome = flash.obey(request, &mut read);
             store.handle(outcome);
@@ -43,8 +43,8 @@ pub fn bank(roadmap: &[u8], mission: &[u8]) -> anyhow::Result<Vec<u8>> {
         let opened = store.open(file, Erasing::Allowed);
         ensure!(opened.is_ok(), "a board's store takes no {}: {opened:?}", file.name());
         settle(&mut store);
-        for (i, piece) in bytes.chunks(DATA).enumerate() {
-            let taken = store.take((i * DATA) as u32, piece);
+        for (i, piece) in bytes.chunks(MAX_DATA).enumerate() {
+            let taken = store.take((i * MAX_DATA) as u32, piece);
             ensure!(taken == Taken::Yes, "a board's store refuses {}: {taken:?}", file.name());
             settle(&mut store);
         }

@@ -23,11 +23,11 @@ pub use self::probe::STACK_LEN;
 use crate::quote::quoted_path;
 
 /// Wall time without an answer after which a board counts as hanging.
-const PATIENCE: Duration = Duration::from_secs(10);
+const ANSWER_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Shell command that starts a board. Semihosting prints the board's log to standard output, so the
 /// board answers by another descriptor.
-const START: &str = r#"exec qemu-system-arm "$@" 3>&1 >"$LOG""#;
+const START_COMMAND: &str = r#"exec qemu-system-arm "$@" 3>&1 >"$LOG""#;
 
 /// Bytes that a port of a board receives or sent.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -70,7 +70,7 @@ impl Emulated {
     pub fn start(program: &Path, log: &Path) -> anyhow::Result<Self> {
         ensure!(program.is_file(), "no firmware: {}", quoted_path(program));
         let mut qemu = Command::new("sh");
-        qemu.args(["-c", START, "sh"])
+        qemu.args(["-c", START_COMMAND, "sh"])
             .args(["-machine", "mps2-an500", "-icount", "shift=1,sleep=off"])
             .args(["-display", "none", "-monitor", "none", "-serial", "none"])
             .arg("-semihosting-config")
@@ -128,7 +128,7 @@ impl Emulated {
     /// # Errors
     /// The board hangs, or is gone.
     pub fn finish(&mut self) -> anyhow::Result<Answer> {
-        self.finish_within(PATIENCE)
+        self.finish_within(ANSWER_TIMEOUT)
     }
 
     /// The same with another patience: a board that goes nowhere until its watchdog resets it takes this machine seconds.

@@ -5,19 +5,19 @@ use std::time::Duration;
 use anyhow::ensure;
 use lock_step::ToBoard;
 
-use super::bank::{BANK2, ERASED, MADE, MARKS, TORN, WHOLE};
+use super::bank::{BANK_MADE, BANK2, ERASED, TORN, WHOLE, WORD_MARKS};
 use super::{Answer, Emulated};
 use crate::flash::LAYOUT;
 use companion::storage::store::WORD;
 
 /// Bytes of memory in a message.
-const CHUNK: usize = 32 << 10;
+const MEMORY_CHUNK: usize = 32 << 10;
 /// Address of the stack, as in the board's memory map.
-const STACK: u32 = 0x2008_A000;
+const STACK_ADDRESS: u32 = 0x2008_A000;
 /// Length of the stack, bytes.
 pub const STACK_LEN: usize = 88 << 10;
 /// Value of a byte that no stack has touched since the start.
-const PAINT: u8 = 0xcc;
+const STACK_PAINT: u8 = 0xcc;
 
 impl Emulated {
     /// Reads the board's memory from an address on.
@@ -27,7 +27,7 @@ impl Emulated {
     pub fn peek(&mut self, address: u32, length: usize) -> anyhow::Result<Vec<u8>> {
         let mut memory = Vec::new();
         while memory.len() < length {
-            let len = (length - memory.len()).min(CHUNK) as u16;
+            let len = (length - memory.len()).min(MEMORY_CHUNK) as u16;
             self.send(&ToBoard::Peek { address: address + memory.len() as u32, len }.to_bytes())?;
             memory.extend(self.finish()?.memory);
         }
@@ -39,8 +39,9 @@ impl Emulated {
     /// # Errors
     /// The board is gone.
     pub fn poke(&mut self, address: u32, bytes: &[u8]) -> anyhow::Result<()> {
-        for (i, bytes) in bytes.chunks(CHUNK).enumerate() {
-            let head = ToBoard::Poke { address: address + (i * CHUNK) as u32, len: bytes.len() as u16 };
+        for (i, bytes) in bytes.chunks(MEMORY_CHUNK).enumerate() {
+            let head =
+                ToBoard::Poke { address: address + (i * MEMORY_CHUNK) as u32, len: bytes.len() as u16 };
             self.send(&[&head.to_bytes(), bytes].concat())?;
             self.finish()?;
         }
@@ -66,8 +67,8 @@ impl Emulated {
         let mark = |word: &[u8]| if word.iter().all(|byte| *byte == 0xFF) { ERASED } else { WHOLE };
         let marks: Vec<u8> = bank.chunks(WORD).map(mark).collect();
         self.poke(BANK2, bank)?;
-        self.poke(MARKS, &marks)?;
-        self.poke(MADE.0, &MADE.1.to_le_bytes())
+        self.poke(WORD_MARKS, &marks)?;
+        self.poke(BANK_MADE.0, &BANK_MADE.1.to_le_bytes())
     }
 
     /// Words of its flash that are being programmed or erased, in its order.
@@ -75,7 +76,7 @@ impl Emulated {
     /// # Errors
     /// The board is gone.
     pub fn torn(&mut self) -> anyhow::Result<Vec<usize>> {
-        let marks = self.peek(MARKS, LAYOUT.len() as usize / WORD)?;
+        let marks = self.peek(WORD_MARKS, LAYOUT.len() as usize / WORD)?;
         Ok((0..marks.len()).filter(|word| marks[*word] == TORN).collect())
     }
 
@@ -84,7 +85,7 @@ impl Emulated {
     /// # Errors
     /// The board is gone.
     pub fn stack_used(&mut self) -> anyhow::Result<usize> {
-        let stack = self.peek(STACK, STACK_LEN)?;
-        Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == PAINT).count())
+        let stack = self.peek(STACK_ADDRESS, STACK_LEN)?;
+        Ok(STACK_LEN - stack.iter().take_while(|byte| **byte == STACK_PAINT).count())
     }
 }

@@ -18,10 +18,10 @@ use crate::link::{Link, LinkUrl};
 use crate::progress::printed;
 use crate::say;
 
-const STEP: Duration = Duration::from_millis(4);
-const LATEST: Duration = Duration::from_secs(1);
+const PHYSICS_STEP: Duration = Duration::from_millis(4);
+const MAX_CLOCK_LAG: Duration = Duration::from_secs(1);
 /// Longest datagram, bytes: small enough for any path.
-const DATAGRAM: usize = 1400;
+const MAX_DATAGRAM: usize = 1400;
 
 /// Arguments of `host-sim autopilot`.
 #[derive(Args, Clone, Debug)]
@@ -116,10 +116,10 @@ pub fn run(args: &AutopilotArgs) -> anyhow::Result<ExitCode> {
         for (port, (url, link)) in links.iter_mut().enumerate() {
             exchange(&mut autopilot, port, &mut **link).with_context(|| format!("link lost: {url}"))?;
         }
-        autopilot.step(STEP.as_secs_f32(), ground_up_m);
-        next += STEP;
+        autopilot.step(PHYSICS_STEP.as_secs_f32(), ground_up_m);
+        next += PHYSICS_STEP;
         let now = Instant::now();
-        if now > next + LATEST {
+        if now > next + MAX_CLOCK_LAG {
             next = now;
         }
         std::thread::sleep(next.saturating_duration_since(now));
@@ -137,7 +137,7 @@ fn exchange(autopilot: &mut Autopilot, port: usize, link: &mut dyn Link) -> std:
         autopilot.handle_bytes_on(port, &buffer[..len]);
     }
     loop {
-        let len = autopilot.poll_transmit_from(port, &mut buffer[..DATAGRAM]);
+        let len = autopilot.poll_transmit_from(port, &mut buffer[..MAX_DATAGRAM]);
         if len == 0 {
             return Ok(());
         }

@@ -5,8 +5,8 @@ use std::process::ExitCode;
 use std::thread::sleep;
 use std::time::{Duration, Instant as Clock};
 
-use companion::link::frame::MAX_SENT;
-use companion::storage::store::{READ, Store};
+use companion::link::frame::MAX_FRAME_LEN;
+use companion::storage::store::{MAX_READ, Store};
 use companion::{Config, Event, Instant, Link, State};
 use heapless::Vec as FixedVec;
 
@@ -47,12 +47,12 @@ pub struct Args {
 }
 
 /// Sleep between two polls of the links.
-const NAP: Duration = Duration::from_millis(1);
+const POLL_SLEEP: Duration = Duration::from_millis(1);
 /// Time for which a companion whose mission has ended goes on reporting that to the others and to
 /// ground stations, as a board does for good.
-const FAREWELL: Duration = Duration::from_secs(2);
+const REPORT_END_FOR: Duration = Duration::from_secs(2);
 /// Silence of its autopilot after which a vehicle cannot be helped.
-const HEARD: companion::Duration = companion::Duration::from_secs(5);
+const MAX_AUTOPILOT_SILENCE: companion::Duration = companion::Duration::from_secs(5);
 
 /// Runs until the mission ends. Exit code 0 if it was flown to its end.
 ///
@@ -85,7 +85,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Clock::now();
     let now = || Instant::from_micros(began.elapsed().as_micros() as u64);
     let mut buffer = [0; 2048];
-    let mut read = [0; READ];
+    let mut read = [0; MAX_READ];
     let mut finished_at = None;
     loop {
         for (link, io) in &mut links {
@@ -125,7 +125,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 Event::StateChanged { from, to, text, .. } => {
                     say!("{:9.3} s  {from:?} → {to:?}  {text}", began.elapsed().as_secs_f32());
                     if args.start && to == State::Ready {
-                        let mut frame = [0; MAX_SENT];
+                        let mut frame = [0; MAX_FRAME_LEN];
                         let length = mission_start(config.ground_stations[0], args.id, &mut frame);
                         companion.handle_bytes(Link::Swarm, now(), &frame[..length]);
                     }
@@ -148,14 +148,14 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         let state = companion.state();
         // In the air work may be left: a pilot may hand the vehicle back.
         let t = companion.telemetry();
-        let heard = t.heartbeat_age(now()) < HEARD;
+        let heard = t.heartbeat_age(now()) < MAX_AUTOPILOT_SILENCE;
         let flies = t.armed && t.on_ground == Some(false) && heard;
         if !is_finished(state) || flies {
             finished_at = None;
-        } else if finished_at.get_or_insert_with(Clock::now).elapsed() > FAREWELL {
+        } else if finished_at.get_or_insert_with(Clock::now).elapsed() > REPORT_END_FOR {
             return Ok(if state == State::Done && !is_short { ExitCode::SUCCESS } else { ExitCode::FAILURE });
         }
-        sleep(NAP);
+        sleep(POLL_SLEEP);
     }
 }
 

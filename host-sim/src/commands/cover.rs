@@ -58,7 +58,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let scenario = scenario::load(&args.scenario)?;
     scenario.check_supported()?;
     let files = files(&scenario);
-    let names: Vec<&str> = output::NAMES.into_iter().chain(files.iter().map(String::as_str)).collect();
+    let names: Vec<&str> = output::RESULT_FILES.into_iter().chain(files.iter().map(String::as_str)).collect();
     let mut results = Results::open(&args.out, &names)?;
     let usual = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
     let planned = Planned::new(&scenario, args.method.unwrap_or(usual))?;
@@ -66,7 +66,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let findings = check::check(&planned, &check::flown(&planned, &flights));
     let result = described(&planned, &findings);
     let written = add_flights(&planned, &flights, &mut results)?;
-    results.add(output::NAMES[0], result::json(&result)?.as_bytes())?;
+    results.add(output::RESULT_FILES[0], result::json(&result)?.as_bytes())?;
     let timing = Timing {
         search_s: planned.seconds[0] + planned.seconds[1],
         assignment_s: planned.seconds[2],
@@ -74,10 +74,10 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
         wall_s: began.elapsed().as_secs_f64(),
         ..Timing::default()
     };
-    results.add(output::NAMES[1], result::json(&timing)?.as_bytes())?;
+    results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     let mut page = page::page(&planned, &flights, &findings, serde_json::to_value(&result)?);
     page.timing = Some(serde_json::to_value(&timing)?);
-    results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
+    results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
     results.keep()?;
     remove_stale(&args.out, &written)?;
     print(&result, &findings, &args.out);

@@ -157,7 +157,7 @@ fn plan_and_fly(
     faults::check(&scenario)?;
     let kept = flashes.filter(|_| scenario.area.is_some()).map(Kept::open).transpose()?;
     let gateway = shown.qgc.map(|url| url.open().map(Gateway::new)).transpose()?;
-    let mut results = Results::open(out, &output::NAMES)?;
+    let mut results = Results::open(out, &output::RESULT_FILES)?;
     let began = Instant::now();
     let progress = Progress::on_terminal();
     let mut mission = Mission::prepare(scenario, &progress)?;

@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
     let scenario = load(&args.scenario, None)?;
     let names = ["starts.txt", "goals.txt", "roadmap.bin", "field.bin", "mission.bin"];
-    let mut results = Results::open(&args.out, &[&output::NAMES[..], &names].concat())?;
+    let mut results = Results::open(&args.out, &[&output::RESULT_FILES[..], &names].concat())?;
     let mut mission = Mission::prepare_for(scenario, args.board, &Progress::on_terminal())?;
     let plan = mission.plan()?;
     if let Some((board, why)) = args.board.and_then(|board| Some((board, mission.excess(&plan, board)?))) {

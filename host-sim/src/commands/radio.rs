@@ -6,7 +6,7 @@ use std::time::{Duration, Instant as Clock};
 
 use anyhow::Context;
 use companion::Instant;
-use companion::link::frame::{Framer, MAX_SENT};
+use companion::link::frame::{Framer, MAX_FRAME_LEN};
 use planner_core::Point;
 
 use crate::link::{Link, LinkUrl};
@@ -32,7 +32,7 @@ pub struct Args {
     seed: u64,
 }
 
-const NAP: Duration = Duration::from_millis(1);
+const POLL_SLEEP: Duration = Duration::from_millis(1);
 
 fn number(text: &str, most: f64) -> Result<f64, String> {
     let sound = text.parse().ok().filter(|value| (0.0..=most).contains(value));
@@ -72,7 +72,7 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 let length = link.receive(&mut buffer).with_context(lost)?;
                 let mut input = &buffer[..length];
                 while let Some(frame) = framer.next(Instant::from_micros(now_us), &mut input) {
-                    let mut packet = [0; MAX_SENT];
+                    let mut packet = [0; MAX_FRAME_LEN];
                     let length = frame.encode(&mut packet);
                     radio.broadcast(now_us, Some(station), &places, &packet[..length]);
                 }
@@ -84,6 +84,6 @@ pub fn run(args: &Args) -> anyhow::Result<ExitCode> {
                 link.send(&packet).with_context(lost)?;
             }
         }
-        sleep(NAP);
+        sleep(POLL_SLEEP);
     }
 }

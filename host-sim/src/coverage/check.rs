@@ -16,7 +16,7 @@ use super::heights::{self, HeightFindings};
 use super::{Flight, Planned};
 
 /// Most cells of the area that are checked; a larger area is checked in larger cells.
-const MOST_CELLS: f64 = 4e7;
+const MAX_CHECKED_CELLS: f64 = 4e7;
 
 /// Findings of the check.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -204,7 +204,7 @@ impl Cells {
         }
         let [wide, tall] = [high[0] - cells.low[0], high[1] - cells.low[1]];
         let lane_m = f64::from(planned.wanted.spacing.lane_m);
-        cells.side = (lane_m / 10.0).max((wide * tall / MOST_CELLS).sqrt());
+        cells.side = (lane_m / 10.0).max((wide * tall / MAX_CHECKED_CELLS).sqrt());
         cells.size = [wide, tall].map(|side| (side / cells.side).ceil().max(1.0) as usize);
         cells
     }
@@ -212,7 +212,7 @@ impl Cells {
     /// Cells of which some count, so that an area narrower than one is judged too.
     fn that_count(planned: &Planned<'_>) -> Self {
         let mut cells = Self::new(planned);
-        let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MOST_CELLS;
+        let most = |[columns, rows]: [usize; 2]| (columns * rows) as f64 * 4.0 <= MAX_CHECKED_CELLS;
         while !cells.held(planned, cells.size, 0.5).contains(&true) && most(cells.size) {
             cells.side /= 2.0;
             cells.size = cells.size.map(|count| 2 * count);

@@ -10,11 +10,11 @@ use planner_core::Point;
 use planner_core::coverage::Flat;
 use planner_core::coverage::pack::Route;
 
-use super::{CORNERS, Planned};
+use super::{MAX_CORNERS, Planned};
 use crate::scenario::coverage::Trigger;
 
 /// A corner within this distance of a picture is at the picture's place, metres.
-const SAME_M: f32 = 0.01;
+const SAME_PLACE_M: f32 = 0.01;
 
 /// Action of a vehicle at a point of its flight.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -140,11 +140,11 @@ fn photographed(
     let mut leg = 0;
     for (number, place) in places {
         let at_m = along_m(place);
-        while leg + 2 < path.len() && along_m(&path[leg + 1].xy()) <= at_m + SAME_M {
+        while leg + 2 < path.len() && along_m(&path[leg + 1].xy()) <= at_m + SAME_PLACE_M {
             leg += 1;
             let corner = path[leg];
             // Where each picture is a waypoint, the corner is one already.
-            if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_M {
+            if !by_waypoint || (along_m(&corner.xy()) - at_m).abs() > SAME_PLACE_M {
                 stops.push(Stop { position: corner, act: Act::Lane, lane });
             }
         }
@@ -159,7 +159,7 @@ fn photographed(
 }
 
 /// The corners of the way between two places.
-fn corners(planned: &Planned<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, CORNERS> {
+fn corners(planned: &Planned<'_>, from: &Flat, to: &Flat) -> Fixed<Flat, MAX_CORNERS> {
     let mut corners = Fixed::new();
     // The plan has a finite length, so there is a way between all that it joins.
     if planned.transit.way(from, to, &mut corners).is_err() {

@@ -7,9 +7,9 @@ use super::flight::{Act, Flown, Stop};
 
 /// Greatest distance between the height samples of a leg, metres; over fine maps a quarter of a
 /// cell.
-const SAMPLE_M: f32 = 1.0;
+const MAX_SAMPLE_SPACING_M: f32 = 1.0;
 /// Rounding of a height, metres.
-const ROUNDING_M: f32 = 0.02;
+const HEIGHT_ROUNDING_M: f32 = 0.02;
 
 /// Findings about the heights above terrain.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,7 +36,7 @@ impl HeightFindings {
 /// Checks flights against the ground; none where it is level.
 pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindings> {
     let terrain = planned.wanted.terrain.as_ref()?;
-    let sample_m = (terrain.grid.cell_m() / 4.0).min(SAMPLE_M);
+    let sample_m = (terrain.grid.cell_m() / 4.0).min(MAX_SAMPLE_SPACING_M);
     let mut findings =
         HeightFindings { least_m: f32::INFINITY, most_m: 0.0, steepest: 0.0, too_low: 0, too_steep: 0 };
     for flight in flights {
@@ -48,7 +48,7 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindi
             }
             let (from, to) = (leg[0].position, leg[1].position);
             let [least_m, most_m] = above_ground(planned, &from, &to, sample_m);
-            findings.too_low += u64::from(least_m < planned.wanted.height_m - ROUNDING_M);
+            findings.too_low += u64::from(least_m < planned.wanted.height_m - HEIGHT_ROUNDING_M);
             if leg.iter().any(|stop| stop.act == Act::Transit) {
                 continue;
             }
@@ -57,8 +57,8 @@ pub fn check(planned: &Planned<'_>, flights: &[Flown<'_>]) -> Option<HeightFindi
             let (way_m, up_m) = ((to - from).xy().norm(), to.z - from.z);
             let most_mps = if up_m > 0.0 { vehicle.climb_mps } else { vehicle.descend_mps };
             let allowed_m = most_mps / vehicle.cruise_mps * way_m;
-            findings.too_steep += u64::from(up_m.abs() > allowed_m * 1.01 + ROUNDING_M);
-            if way_m > SAMPLE_M {
+            findings.too_steep += u64::from(up_m.abs() > allowed_m * 1.01 + HEIGHT_ROUNDING_M);
+            if way_m > MAX_SAMPLE_SPACING_M {
                 findings.steepest = findings.steepest.max(up_m.abs() / way_m);
             }
         }

@@ -28,17 +28,17 @@ use planner_core::coverage::transit::Transit;
 use planner_core::coverage::{CoverageError, exact, powell};
 use planner_core::frames::{Geodetic, enu_to_geodetic};
 
-pub use self::planned::{CORNERS, LANES, Planned, VEHICLES};
-use self::sorties::{LaneTooLong, SWAP_S, Sortie, USABLE_CHARGE};
-use crate::area::MOST_VERTICES;
+pub use self::planned::{MAX_CORNERS, MAX_LANES, MAX_VEHICLES, Planned};
+use self::sorties::{BATTERY_SWAP_S, LaneTooLong, Sortie, USABLE_CHARGE};
+use crate::area::MAX_VERTICES;
 use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method, ORIGIN_HINT};
 
 /// Changes of the lanes' order that the desk tries.
-pub const LOOKS: u32 = 20_000_000;
+pub const MAX_ORDER_CHANGES: u32 = 20_000_000;
 
 /// Greatest distance of a start above or below the ground, metres.
-const MOST_OFF_GROUND_M: f32 = 1.5;
+const MAX_OFF_GROUND_M: f32 = 1.5;
 
 /// A sortie, its stops, and when each is passed, seconds.
 pub type Flight = (Sortie, Vec<flight::Stop>, Vec<f32>);
@@ -49,7 +49,7 @@ impl<'a> Planned<'a> {
     /// # Errors
     /// There is no plan: why, and where in the scenario.
     pub fn new(scenario: &'a Scenario, method: Method) -> anyhow::Result<Self> {
-        Self::searched(scenario, method, LOOKS)
+        Self::searched(scenario, method, MAX_ORDER_CHANGES)
     }
 
     /// The plan as companions make it: they compare no more orders of the lanes than a board can.
@@ -58,7 +58,7 @@ impl<'a> Planned<'a> {
     /// As [`Self::new`].
     pub fn flown(scenario: &'a Scenario) -> anyhow::Result<Self> {
         let method = scenario.area.as_ref().map(|area| area.method).unwrap_or_default();
-        Self::searched(scenario, method, companion::planner::coverage::LOOKS)
+        Self::searched(scenario, method, companion::planner::coverage::MAX_ORDER_CHANGES)
     }
 
     fn searched(scenario: &'a Scenario, method: Method, looks: u32) -> anyhow::Result<Self> {
@@ -81,7 +81,7 @@ impl<'a> Planned<'a> {
         let pattern =
             Pattern { spacing: wanted.usable, angle_deg: wanted.angle_deg, margin_m: wanted.margin_m, looks };
         let mut tracks = Box::new(Tracks::new());
-        let mut workspace = Box::new(tracks::Workspace::<MOST_VERTICES>::new());
+        let mut workspace = Box::new(tracks::Workspace::<MAX_VERTICES>::new());
         tracks::build(&area, &pattern, &transit, &mut workspace, &mut tracks).map_err(failed)?;
         let lanes = began.elapsed().as_secs_f64();
         let began = Instant::now();
@@ -156,7 +156,7 @@ impl<'a> Planned<'a> {
     /// Cost of a route with all its sorties and the swaps between them, seconds.
     pub fn cost_s(&self, route: &Route) -> f32 {
         let swaps = self.sorties_of(route).count().saturating_sub(1) as f32;
-        self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>() + swaps * SWAP_S
+        self.sorties_of(route).map(|sortie| sortie.route.cost_s).sum::<f32>() + swaps * BATTERY_SWAP_S
     }
 
     /// Cost of a route without the swaps, metres.
@@ -223,7 +223,7 @@ impl<'a> Planned<'a> {
                 (sortie.begin_s, sortie.depart_s) = (begin_s, depart_s);
                 end_s = sortie.end_s().max(end_s);
             }
-            begin_s = end_s + SWAP_S;
+            begin_s = end_s + BATTERY_SWAP_S;
         }
         Ok(())
     }
@@ -277,7 +277,7 @@ impl<'a> Planned<'a> {
 pub fn check_ground(scenario: &Scenario) -> anyhow::Result<()> {
     let Some(area) = &scenario.area else { return Ok(()) };
     let above_m = |vehicle: &crate::scenario::Vehicle| vehicle.start.z - area.ground_m(&vehicle.start.xy());
-    let stray = |vehicle: &crate::scenario::Vehicle| above_m(vehicle).abs() > MOST_OFF_GROUND_M;
+    let stray = |vehicle: &crate::scenario::Vehicle| above_m(vehicle).abs() > MAX_OFF_GROUND_M;
     if let Some(index) = scenario.vehicles.iter().position(stray) {
         let vehicle = &scenario.vehicles[index];
         bail!(
@@ -314,7 +314,7 @@ fn vehicle(vehicle: &crate::scenario::Vehicle, scenario: &Scenario) -> Vehicle {
 }
 
 /// Least share of the path, metres: far below any spacing of waypoints.
-const LEAST_SHARE_M: f32 = 1e-3;
+const MIN_SHARE_M: f32 = 1e-3;
 
 /// Divides the path by a method. Returns the shares by which companions divide it in the same way, if there are some.
 ///
@@ -358,7 +358,7 @@ fn as_shares<const L: usize, const N: usize, const K: usize>(
     for (share, route) in shares.iter_mut().zip(&exact.routes) {
         let end_m = work.tracks.along_m(route.end - 1);
         // A bin without length would hold nothing: the first waypoint alone has none.
-        *share = (end_m - packed_m).max(LEAST_SHARE_M);
+        *share = (end_m - packed_m).max(MIN_SHARE_M);
         packed_m = end_m;
     }
     let mut plan = Plan::new();
@@ -380,16 +380,16 @@ fn explained(error: CoverageError, wanted: &coverage::Area, vehicles: usize) -> 
         CoverageError::Setting(name) => format!("{name} is out of its range"),
         CoverageError::Gaps => "the spacings leave gaps between the pictures".to_owned(),
         CoverageError::LanesFull => {
-            format!("it takes more than {LANES} lanes\nhint: a greater height_m or lane_m takes fewer")
+            format!("it takes more than {MAX_LANES} lanes\nhint: a greater height_m or lane_m takes fewer")
         }
         CoverageError::NoFlyFull => {
-            format!("no-fly zones have more than {CORNERS} outward corners\nhint: draw them with fewer")
+            format!("no-fly zones have more than {MAX_CORNERS} outward corners\nhint: draw them with fewer")
         }
         CoverageError::NothingToCover => "no-fly zones hold the whole area".to_owned(),
         CoverageError::InsideNoFly(index) => format!("vehicle {index} starts inside a no-fly zone"),
         CoverageError::Unreachable => "no-fly zones leave no way to a part of it".to_owned(),
         CoverageError::Vehicles => {
-            let most = if vehicles > VEHICLES { VEHICLES } else { exact::MOST_VEHICLES };
+            let most = if vehicles > MAX_VEHICLES { MAX_VEHICLES } else { exact::MAX_EXACT_VEHICLES };
             format!("it takes 1 to {most} vehicles, not {vehicles}")
         }
         CoverageError::WorkspaceTooSmall => "the planner's memory is too small for it".to_owned(),

@@ -10,7 +10,7 @@ use super::{Flight, Planned, parts};
 use crate::report::{Curve, Outline, OutlineKind, Plot, ReportData, TrackPoint, VehicleTrack};
 
 /// Spacing of the points of a height profile, metres.
-const PROFILE_M: f32 = 5.0;
+const PROFILE_SPACING_M: f32 = 5.0;
 
 /// Data of the report page.
 pub fn page(
@@ -68,7 +68,7 @@ fn profile(planned: &Planned<'_>, flights: &[Flight]) -> Plot {
         let mut ground = Curve { name: format!("ground below {id}"), ..Curve::default() };
         for (leg, times) in stops.windows(2).zip(times_s.windows(2)) {
             let step = leg[1].position - leg[0].position;
-            let parts = (step.xy().norm() / PROFILE_M).ceil().max(1.0) as usize;
+            let parts = (step.xy().norm() / PROFILE_SPACING_M).ceil().max(1.0) as usize;
             for share in (0..=parts).map(|part| part as f32 / parts as f32) {
                 let (at, t_s) = (leg[0].position + step * share, times[0] + (times[1] - times[0]) * share);
                 for (curve, height_m) in [(&mut path, at.z), (&mut ground, planned.wanted.ground_m(&at.xy()))]

@@ -10,11 +10,11 @@ use crate::scenario::Scenario;
 use crate::scenario::coverage::{self, Method};
 
 /// Most vehicles of a coverage mission.
-pub const VEHICLES: usize = 32;
+pub const MAX_VEHICLES: usize = 32;
 /// Most lanes on the desk.
-pub const LANES: usize = 8192;
+pub const MAX_LANES: usize = 8192;
 /// Most outward corners of no-fly zones on the desk.
-pub const CORNERS: usize = 256;
+pub const MAX_CORNERS: usize = 256;
 
 /// Flight of a vehicle on one battery.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,11 +55,11 @@ pub struct Planned<'a> {
     /// Vehicles as the planner sees them, in the scenario's order.
     pub vehicles: Vec<Vehicle>,
     /// The lanes.
-    pub tracks: Box<Tracks<LANES>>,
+    pub tracks: Box<Tracks<MAX_LANES>>,
     /// Ways around no-fly zones.
-    pub transit: Box<Transit<'a, CORNERS>>,
+    pub transit: Box<Transit<'a, MAX_CORNERS>>,
     /// The routes.
-    pub plan: Plan<VEHICLES>,
+    pub plan: Plan<MAX_VEHICLES>,
     /// The shares W that they are packed by, one a vehicle; none where they follow from nothing of the kind.
     pub shares: Option<Vec<f32>>,
     /// No division can end before, seconds.

@@ -1,7 +1,7 @@
 //! Departures: routes of two vehicles may meet at one waypoint, and transits cross on the way up and down. The vehicle that flies longest
 //! leaves first; each other one leaves as soon as it keeps the separation to all before it, as planned.
 //!
-//! Flights are compared every [`STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety
+//! Flights are compared every [`COMPARISON_STEP_S`] at cruise speed without turns. Real flights stray from that: on board the safety
 //! filter is what keeps vehicles apart, and this only keeps it from having to.
 
 use planner_core::Point;
@@ -9,13 +9,13 @@ use planner_core::Point;
 use super::flight::Stop;
 
 /// Time between two comparisons of the vehicles' places, seconds.
-const STEP_S: f32 = 0.25;
+const COMPARISON_STEP_S: f32 = 0.25;
 /// Time between two departures that are tried, seconds.
-const DELAY_S: f32 = 2.0;
+const DEPARTURE_STEP_S: f32 = 2.0;
 /// Horizontal distance from its pad up to which a vehicle is over its pad, metres.
 const OVER_PAD_M: f32 = 0.01;
 /// Longest wait of a vehicle on the ground, seconds.
-const LONGEST_S: f32 = 900.0;
+const MAX_GROUND_WAIT_S: f32 = 900.0;
 
 /// A flight as planned, from its own departure on.
 pub struct Timed<'a> {
@@ -26,14 +26,14 @@ pub struct Timed<'a> {
 }
 
 /// Departures of all flights, seconds, and the least distance between any two vehicles, one of them in the air; infinite
-/// for one vehicle. None where no departure within [`LONGEST_S`] keeps the separation.
+/// for one vehicle. None where no departure within [`MAX_GROUND_WAIT_S`] keeps the separation.
 pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>, f32)> {
     let tracks: Vec<Vec<Point>> = flights.iter().map(sampled).collect();
     let mut order: Vec<usize> = (0..flights.len()).collect();
     order.sort_by_key(|i| std::cmp::Reverse(tracks[*i].len()));
     let mut delays: Vec<Option<usize>> = vec![None; flights.len()];
     let mut least_m = f32::INFINITY;
-    let step = (DELAY_S / STEP_S) as usize;
+    let step = (DEPARTURE_STEP_S / COMPARISON_STEP_S) as usize;
     for &own in &order {
         let gap = |delay: usize| {
             let others = order.iter().filter_map(|other| delays[*other].map(|d| (&tracks[*other][..], d)));
@@ -43,12 +43,12 @@ pub fn departures(flights: &[Timed<'_>], separation_m: f32) -> Option<(Vec<f32>,
             }
             Some(least_m)
         };
-        let tried = (0..=(LONGEST_S / DELAY_S) as usize).map(|k| k * step);
+        let tried = (0..=(MAX_GROUND_WAIT_S / DEPARTURE_STEP_S) as usize).map(|k| k * step);
         let (delay, gap_m) = tried.into_iter().find_map(|delay| gap(delay).map(|gap_m| (delay, gap_m)))?;
         delays[own] = Some(delay);
         least_m = least_m.min(gap_m);
     }
-    Some((delays.iter().map(|delay| delay.unwrap_or(0) as f32 * STEP_S).collect(), least_m))
+    Some((delays.iter().map(|delay| delay.unwrap_or(0) as f32 * COMPARISON_STEP_S).collect(), least_m))
 }
 
 /// Place of a vehicle at each step of its flight.
@@ -56,7 +56,7 @@ fn sampled(flight: &Timed<'_>) -> Vec<Point> {
     let end_s = flight.times_s.last().copied().unwrap_or(0.0);
     let mut next = 1;
     let place = |step: usize| {
-        let time_s = step as f32 * STEP_S;
+        let time_s = step as f32 * COMPARISON_STEP_S;
         while next + 1 < flight.times_s.len() && flight.times_s[next] < time_s {
             next += 1;
         }
@@ -64,7 +64,7 @@ fn sampled(flight: &Timed<'_>) -> Vec<Point> {
         let share = if to > from { ((time_s - from) / (to - from)).clamp(0.0, 1.0) } else { 1.0 };
         flight.stops[next - 1].position.lerp(&flight.stops[next].position, share)
     };
-    (0..=(end_s / STEP_S).ceil() as usize).map(place).collect()
+    (0..=(end_s / COMPARISON_STEP_S).ceil() as usize).map(place).collect()
 }
 
 /// The least distance between two flights that begin with these delays, while one of them is in the air. None where it is less
@@ -120,7 +120,8 @@ mod tests {
         // Pads 2 m apart are no reason to come as near over the lanes.
         let (departures_s, least_m) = departures(&[timed(beside), timed(long)], 8.0).expect("they can wait");
         assert!(departures_s[0] > 0.0 && least_m < 3.1, "{departures_s:?}, {least_m}");
-        let places = |flight: &Timed<'_>, delay_s: f32| (sampled(flight), (delay_s / STEP_S) as usize);
+        let places =
+            |flight: &Timed<'_>, delay_s: f32| (sampled(flight), (delay_s / COMPARISON_STEP_S) as usize);
         let (long_places, beside_places) =
             (places(&timed(long), 0.0), places(&timed(beside), departures_s[0]));
         for step in 0..long_places.0.len() {

@@ -5,13 +5,13 @@
 //! no less than what it holds: ways are the shortest, so a detour over the pad never is. So the search for the first lane
 //! of a sortie ends at the first one that is too far back: n lanes, at most m a sortie: n · m.
 //!
-//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`SWAP_S`] after the last one of the round before
+//! Sorties are flown in rounds: the k-th of all vehicles begin together, [`BATTERY_SWAP_S`] after the last one of the round before
 //! is home. So departures keep vehicles apart, however long a swap really takes. Seconds, metres.
 //!
 //! C_k has one climb and one descent and no turns, as in the paper. A battery has to last for what is flown: down to the
 //! lanes from the layer, up again, and turns from rest to rest, too.
 
-use planner_core::coverage::flights::ACCEL_MPS2;
+use planner_core::coverage::flights::PLANNED_ACCEL_MPS2;
 use planner_core::coverage::pack::Route;
 use sim_autopilot::VehicleLimits;
 
@@ -23,7 +23,7 @@ use crate::scenario;
 /// Share of its charge that a vehicle uses before it lands (`FLK_BATT_LOW`).
 pub const USABLE_CHARGE: f32 = 0.85;
 /// Time from a landing to the next start with another battery, seconds.
-pub const SWAP_S: f32 = 120.0;
+pub const BATTERY_SWAP_S: f32 = 120.0;
 
 /// The whole of a route.
 pub(super) fn whole(planned: &Planned<'_>, route: Route) -> Sortie {
@@ -59,7 +59,7 @@ fn over_terrain_s(planned: &Planned<'_>, route: &Route) -> f32 {
         down_m => -down_m / vehicle.descend_mps,
     });
     let corners = stops.iter().filter(|stop| stop.act == Act::Lane).count() as f32;
-    ups.sum::<f32>() + corners * vehicle.cruise_mps / ACCEL_MPS2
+    ups.sum::<f32>() + corners * vehicle.cruise_mps / PLANNED_ACCEL_MPS2
 }
 
 /// Further time of stops at both ends of each lane, and over the pad, seconds: a lane, and a
@@ -68,10 +68,10 @@ fn turns_s(planned: &Planned<'_>, route: &Route) -> f32 {
     let cruise_mps = planned.vehicles[usize::from(route.vehicle)].cruise_mps;
     let [from, to] = [route.first, route.end - 1].map(|number| planned.tracks.lane_of(number));
     let lanes = (to - from + 1) as f32;
-    let stop_s = cruise_mps / ACCEL_MPS2;
+    let stop_s = cruise_mps / PLANNED_ACCEL_MPS2;
     // The distance from one lane to the next may be too short for that.
     let step_m = planned.wanted.spacing.lane_m.min(cruise_mps * stop_s);
-    let step_s = 2.0 * (step_m / ACCEL_MPS2).sqrt() - step_m / cruise_mps;
+    let step_s = 2.0 * (step_m / PLANNED_ACCEL_MPS2).sqrt() - step_m / cruise_mps;
     (lanes + 2.0) * stop_s + (lanes - 1.0) * step_s
 }
 

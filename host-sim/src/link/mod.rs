@@ -120,7 +120,7 @@ impl LinkUrl {
         Ok(match self {
             Self::Tcp(_) | Self::Serial { .. } => {
                 let url = self.clone();
-                let open = move || url.open_once(reconnect::RETRY / 4).ok();
+                let open = move || url.open_once(reconnect::RECONNECT_EVERY / 4).ok();
                 Box::new(reconnect::ReconnectingLink::new(self.to_string(), link, Box::new(open)))
             }
             _ => link,

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use super::transport::Link;
 
 /// Time between two attempts to connect.
-pub(super) const RETRY: Duration = Duration::from_secs(1);
+pub(super) const RECONNECT_EVERY: Duration = Duration::from_secs(1);
 
 /// Opens the link again, if it can be opened now.
 type Open = Box<dyn Fn() -> Option<Box<dyn Link>> + Send>;
@@ -30,7 +30,7 @@ impl ReconnectingLink {
     fn reopen(&mut self) -> Option<&mut Box<dyn Link>> {
         if self.link.is_none() && Instant::now() >= self.retry_at {
             self.link = (self.open)();
-            self.retry_at = Instant::now() + RETRY;
+            self.retry_at = Instant::now() + RECONNECT_EVERY;
             if self.link.is_some() {
                 eprintln!("link is back: {}", self.name);
             }
@@ -41,7 +41,7 @@ impl ReconnectingLink {
     fn lose(&mut self, why: &io::Error) {
         eprintln!("link lost: {}: {why}; trying again every second", self.name);
         self.link = None;
-        self.retry_at = Instant::now() + RETRY;
+        self.retry_at = Instant::now() + RECONNECT_EVERY;
     }
 }
 

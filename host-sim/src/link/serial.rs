@@ -10,9 +10,9 @@ use super::transport::{Link, is_quiet};
 
 /// Most bytes that wait for a line slower than its sender: at 57600 baud less than a second. Beyond
 /// it frames are dropped, since old setpoints are worse than none.
-const QUEUE: usize = 4096;
+const MAX_QUEUED_BYTES: usize = 4096;
 /// Bytes written at once: the system takes this much without waiting whenever it is ready for any.
-const PIECE: usize = 256;
+const WRITE_CHUNK: usize = 256;
 
 /// An open serial port.
 pub struct Port {
@@ -43,12 +43,12 @@ impl Link for Port {
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        if self.queue.len() + bytes.len() <= QUEUE {
+        if self.queue.len() + bytes.len() <= MAX_QUEUED_BYTES {
             self.queue.extend_from_slice(bytes);
         }
         let mut sent = 0;
         while sent < self.queue.len() {
-            let end = self.queue.len().min(sent + PIECE);
+            let end = self.queue.len().min(sent + WRITE_CHUNK);
             match self.device.write(&self.queue[sent..end]) {
                 Ok(count) => sent += count,
                 Err(error) if is_idle(&error) => break,

@@ -1,4 +1,4 @@
-//! TCP links. What a peer does not take at once waits in a queue; a peer that lags [`QUEUE`] bytes behind is cut off.
+//! TCP links. What a peer does not take at once waits in a queue; a peer that lags [`MAX_QUEUED_BYTES`] bytes behind is cut off.
 
 use std::io::{self, Read, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::time::Duration;
 use super::transport::{Link, is_quiet};
 
 /// Most bytes that wait for a client: about ten seconds of PX4's flood.
-const QUEUE: usize = 256 * 1024;
+const MAX_QUEUED_BYTES: usize = 256 * 1024;
 
 struct Connection {
     stream: TcpStream,
@@ -44,7 +44,7 @@ impl Connection {
             }
         }
         self.queue.drain(..sent);
-        if self.queue.len() > QUEUE {
+        if self.queue.len() > MAX_QUEUED_BYTES {
             return Err(io::Error::new(io::ErrorKind::TimedOut, "the other side does not read"));
         }
         Ok(())

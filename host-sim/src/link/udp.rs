@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 use super::transport::{Link, is_quiet};
 
 /// Silence after which a client gets nothing more.
-const FORGET: Duration = Duration::from_secs(60);
+const CLIENT_LIFETIME: Duration = Duration::from_secs(60);
 /// Most clients of one hub; the one longest unheard makes room.
-const CLIENTS: usize = 16;
+const MAX_CLIENTS: usize = 16;
 
 fn transmit(socket: &UdpSocket, bytes: &[u8], to: SocketAddr) -> io::Result<()> {
     match socket.send_to(bytes, to) {
@@ -80,8 +80,8 @@ impl Hub {
             client.1 = now;
             return;
         }
-        if self.clients.len() == CLIENTS {
-            let oldest = (0..CLIENTS).min_by_key(|&k| self.clients[k].1).unwrap_or(0);
+        if self.clients.len() == MAX_CLIENTS {
+            let oldest = (0..MAX_CLIENTS).min_by_key(|&k| self.clients[k].1).unwrap_or(0);
             self.clients.swap_remove(oldest);
         }
         self.clients.push((from, now));
@@ -101,7 +101,7 @@ impl Link for Hub {
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.clients.retain(|client| client.1.elapsed() < FORGET);
+        self.clients.retain(|client| client.1.elapsed() < CLIENT_LIFETIME);
         for &(to, _) in &self.clients {
             transmit(&self.socket, bytes, to)?;
         }

@@ -11,18 +11,18 @@ use planner_core::voxel::{GridShape, Outside, VoxelGrid};
 use pulp::Arch;
 use rayon::prelude::*;
 
-use search::{FAN, Node, Search, Segment};
+use search::{BOXES_PER_NODE, Node, Search, Segment};
 
 mod lanes;
 mod search;
 
 /// Most boxes that one thread parts; more are parted on several threads.
-const BOXES_A_PIECE: usize = 512;
+const MAX_BOXES_PER_THREAD: usize = 512;
 /// Places along an axis at which boxes may be parted.
-const BINS: usize = 16;
+const SPLIT_BINS: usize = 16;
 /// Distance within which a segment opens the nodes that it passes, metres: the clearance of most
 /// edges is less.
-const NEAR_M: f32 = 0.6;
+const OPEN_NODE_WITHIN_M: f32 = 0.6;
 
 /// Cells `low..high`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -131,7 +131,7 @@ pub struct BoxTree {
 impl BoxTree {
     /// The tree over a map. O(bricks + boxes · log boxes).
     pub fn new(grid: &VoxelGrid<'_>) -> Self {
-        let nodes = nodes_over(&mut boxes(grid), NEAR_M / grid.shape().resolution_m);
+        let nodes = nodes_over(&mut boxes(grid), OPEN_NODE_WITHIN_M / grid.shape().resolution_m);
         Self { shape: *grid.shape(), outside: grid.outside(), nodes, arch: Arch::new() }
     }
 
@@ -171,13 +171,13 @@ fn put(node: &mut Node, lane: usize, part: &[CellBox]) {
 /// The nodes over some boxes and below; the first is over all. `near` as [`in_two`] has it.
 fn nodes_over(boxes: &mut [CellBox], near: f32) -> Vec<Node> {
     let mut node = Node::EMPTY;
-    if boxes.len() <= FAN {
+    if boxes.len() <= BOXES_PER_NODE {
         boxes.chunks(1).enumerate().for_each(|(lane, one)| put(&mut node, lane, one));
         return vec![node];
     }
-    let is_large = boxes.len() > BOXES_A_PIECE;
+    let is_large = boxes.len() > MAX_BOXES_PER_THREAD;
     let mut parts = vec![boxes];
-    while parts.len() < FAN {
+    while parts.len() < BOXES_PER_NODE {
         let Some(largest) = (0..parts.len()).filter(|&i| parts[i].len() > 1).max_by_key(|&i| parts[i].len())
         else {
             break;
@@ -205,7 +205,7 @@ fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) 
     let mut best = (f32::INFINITY, 0, 0);
     for axis in 0..3 {
         let Some(bin) = bins(boxes, axis) else { continue };
-        let mut all: [Option<(CellBox, usize)>; BINS] = [None; BINS];
+        let mut all: [Option<(CellBox, usize)>; SPLIT_BINS] = [None; SPLIT_BINS];
         for b in boxes.iter() {
             let one = &mut all[bin(b)];
             *one = one.map_or(Some((*b, 1)), |(whole, count)| Some((whole.join(b), count + 1)));
@@ -218,11 +218,11 @@ fn in_two(boxes: &mut [CellBox], near: f32) -> (&mut [CellBox], &mut [CellBox]) 
             sum.map_or(0.0, |(whole, count)| whole.passed_by(near) * count as f32)
         };
         let (mut above, mut below) = (None, None);
-        let mut costs = [0.0; BINS];
-        for i in (1..BINS).rev() {
+        let mut costs = [0.0; SPLIT_BINS];
+        for i in (1..SPLIT_BINS).rev() {
             costs[i] = add(&mut above, all[i]);
         }
-        for i in 1..BINS {
+        for i in 1..SPLIT_BINS {
             let cost = add(&mut below, all[i - 1]) + costs[i];
             let count = below.map_or(0, |(_, count)| count);
             let least = boxes.len().div_ceil(3);
@@ -256,11 +256,12 @@ fn extent(boxes: &[CellBox], axis: usize) -> Option<(u32, u32)> {
     Some((centers().min()?, centers().max()?))
 }
 
-/// Which of [`BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
+/// Which of [`SPLIT_BINS`] bins along an axis a box is in; `None` where the centres of all are at one place.
 fn bins(boxes: &[CellBox], axis: usize) -> Option<impl Fn(&CellBox) -> usize + use<>> {
     let (low, high) = extent(boxes, axis)?;
-    (low < high)
-        .then_some(move |b: &CellBox| (b.center(axis) - low) as usize * (BINS - 1) / (high - low) as usize)
+    (low < high).then_some(move |b: &CellBox| {
+        (b.center(axis) - low) as usize * (SPLIT_BINS - 1) / (high - low) as usize
+    })
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use super::error::MapError;
-use super::octree::{DEPTH, INNER, Inner, Octree};
+use super::octree::{INNER, Inner, Octree, TREE_DEPTH};
 use crate::files;
 
 /// Values of the header's `id` that are read; the colours of a ColorOcTree are dropped.
@@ -159,10 +159,10 @@ impl<'a> Reader<'a> {
             if child != INNER {
                 continue;
             }
-            if depth + 1 == DEPTH {
+            if depth + 1 == TREE_DEPTH {
                 return Err(self.fail(
                     begin,
-                    format!("leaves at depth {DEPTH}"),
+                    format!("leaves at depth {TREE_DEPTH}"),
                     "a child that is an inner node",
                 ));
             }

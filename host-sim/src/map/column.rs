@@ -12,11 +12,11 @@ use planner_core::voxel::Outside;
 use super::VoxelMap;
 
 /// Greatest distance at which [`nearest_column`] searches, metres.
-const NEAREST_M: f32 = 5.0;
+const NEAREST_COLUMN_WITHIN_M: f32 = 5.0;
 /// Most cells that [`nearest_column`] reads: a second or two.
-const NEAREST_CELLS: f32 = 3e8;
+const NEAREST_COLUMN_CELLS: f32 = 3e8;
 /// Spacing of the places that [`nearest_column`] tries, metres.
-const NEAREST_STEP_M: f32 = 0.1;
+const NEAREST_COLUMN_STEP_M: f32 = 0.1;
 
 /// Why a vehicle cannot fly straight up or down between the ground and a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -129,7 +129,7 @@ fn nearest_above(map: &VoxelMap, point: &Point, ground: u32, low_m: f32, reach_m
 
 /// The nearest place at the same height whose column is clear, within 5 m, or nearer where much room is required.
 pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: f32) -> Option<Point> {
-    let steps = (NEAREST_M / NEAREST_STEP_M) as i32;
+    let steps = (NEAREST_COLUMN_WITHIN_M / NEAREST_COLUMN_STEP_M) as i32;
     let mut offsets: Vec<(i32, i32)> =
         (-steps..=steps).flat_map(|i| (-steps..=steps).map(move |j| (i, j))).collect();
     offsets.sort_by_key(|&(i, j)| (i * i + j * j, i, j));
@@ -138,9 +138,9 @@ pub fn nearest_column(map: &VoxelMap, point: &Point, radius_m: f32, required_m: 
     let across = 2.0 * required_m / map.shape.resolution_m + 3.0;
     let layers =
         (map.shape.dims[2] as f32).min(across + (point.z - map.shape.min.z) / map.shape.resolution_m);
-    let most = (NEAREST_CELLS / (across * across * layers)) as usize;
+    let most = (NEAREST_COLUMN_CELLS / (across * across * layers)) as usize;
     offsets.into_iter().take(most).find_map(|(i, j)| {
-        let (x, y) = (point.x + i as f32 * NEAREST_STEP_M, point.y + j as f32 * NEAREST_STEP_M);
+        let (x, y) = (point.x + i as f32 * NEAREST_COLUMN_STEP_M, point.y + j as f32 * NEAREST_COLUMN_STEP_M);
         let place = Point::new(round(x), round(y), point.z);
         column(map, &place, radius_m, required_m).is_ok().then_some(place)
     })

@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::occupancy::OccupancyMap;
 use super::octree::Octree;
-use super::{MapError, RESOLUTIONS_M, Source, bt, building};
+use super::{MapError, RESOLUTION_RANGE_M, Source, bt, building};
 use crate::files::Results;
 use crate::say;
 
@@ -175,8 +175,8 @@ fn info(file: &str, resolution_m: Option<f32>) -> Result<Info, MapError> {
 
 /// Edge of a planning cell as scenarios take it.
 fn resolution(text: &str) -> Result<f32, String> {
-    let given = text.parse().ok().filter(|r: &f32| RESOLUTIONS_M.contains(&f64::from(*r)));
-    let (least, most) = (RESOLUTIONS_M.start(), RESOLUTIONS_M.end());
+    let given = text.parse().ok().filter(|r: &f32| RESOLUTION_RANGE_M.contains(&f64::from(*r)));
+    let (least, most) = (RESOLUTION_RANGE_M.start(), RESOLUTION_RANGE_M.end());
     given.ok_or_else(|| format!("expected a number from {least} to {most}, in metres"))
 }
 

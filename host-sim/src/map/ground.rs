@@ -8,7 +8,7 @@ use super::occupancy::OccupancyMap;
 use super::octree::Occupancy;
 
 /// Most cells of a ground; larger grounds have larger cells.
-const MOST_CELLS: f32 = 4e6;
+const MAX_GROUND_CELLS: f32 = 4e6;
 
 /// The ground, whose top is as high as `low`, with the air over it to `high`, in cells of `cell_m` or larger ones.
 ///
@@ -18,7 +18,7 @@ pub fn level(low: &Point, high: &Point, cell_m: f32) -> Result<OccupancyMap, Map
     let size = high - low;
     let mut cell_m = cell_m;
     let dims = |cell_m: f32| [size.x, size.y, size.z].map(|side| (side / cell_m).ceil().max(1.0));
-    while dims(cell_m).iter().product::<f32>() > MOST_CELLS {
+    while dims(cell_m).iter().product::<f32>() > MAX_GROUND_CELLS {
         cell_m *= 1.5;
     }
     let [x, y, z] = dims(cell_m).map(|cells| cells as u32);

@@ -23,10 +23,10 @@ pub use occupancy::{OccupancyMap, Unknown, VoxelMap};
 pub use octree::{Occupancy, Octree};
 
 /// Description of the maps that can be given.
-pub const READS: &str = "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
+pub const ACCEPTED_MAPS: &str = "an OctoMap `.bt` file, or `builtin:building`, `builtin:building?seed=N`";
 
 /// Range of the planning resolution, metres.
-pub const RESOLUTIONS_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
+pub const RESOLUTION_RANGE_M: std::ops::RangeInclusive<f64> = 0.001..=100.0;
 
 /// Map that a name stands for.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub enum Source<'a> {
 impl<'a> Source<'a> {
     /// Decides by the name alone.
     pub fn parse(file: &'a str) -> Result<Self, MapError> {
-        let unknown = || MapError::UnknownKind { file: file.into(), expected: READS };
+        let unknown = || MapError::UnknownKind { file: file.into(), expected: ACCEPTED_MAPS };
         if let Some(builtin) = file.strip_prefix("builtin:") {
             let (name, seed) = match builtin.split_once("?seed=") {
                 Some((name, seed)) => (name, seed.parse().map_err(|_| unknown())?),

@@ -2,18 +2,18 @@
 //!
 //! A map's leaves are laid on the planning grid so that nothing known is lost on the unsafe side: a planning cell is
 //! occupied if any occupied leaf reaches into it, else unknown if any part of it is unknown, else free. Leaves that
-//! reach in by less than [`HAIR`] of a cell (rounding of the resolution) do not count. With the map's own resolution,
+//! reach in by less than [`NEGLIGIBLE_CELL_SHARE`] of a cell (rounding of the resolution) do not count. With the map's own resolution,
 //! or a multiple of it, the grid begins at a cell boundary of the map, and the map's own resolution is kept exactly.
 
 use planner_core::Point;
 use planner_core::voxel::{GridShape, MAX_DIM, Outside, VoxelGrid};
 
 use super::error::MapError;
-use super::octree::{KEY_ORIGIN, KEYS, Occupancy, Octree};
+use super::octree::{KEY_ORIGIN, KEYS_PER_AXIS, Occupancy, Octree};
 
 /// Share of a planning cell's edge that counts as nothing: above the rounding of f32 over
 /// [`MAX_DIM`] cells.
-pub const HAIR: f64 = 2e-3;
+pub const NEGLIGIBLE_CELL_SHARE: f64 = 2e-3;
 /// Most cells of a planning grid; 4 bytes each while a map is laid on it.
 pub const MAX_CELLS: u64 = 1 << 27;
 
@@ -82,7 +82,8 @@ impl OccupancyMap {
         } else {
             exact
         };
-        let span = [0, 1, 2].map(|a| (f64::from(hi[a] - lo[a]) * scale - HAIR).ceil().max(1.0));
+        let span =
+            [0, 1, 2].map(|a| (f64::from(hi[a] - lo[a]) * scale - NEGLIGIBLE_CELL_SHARE).ceil().max(1.0));
         let dims = span.map(|s| s.min(f64::from(u32::MAX)) as u32);
         let corner = lo.map(|k| ((f64::from(k) - f64::from(KEY_ORIGIN)) * tree.resolution_m()) as f32);
         let shape = GridShape { dims, min: Point::from(corner), resolution_m };
@@ -93,7 +94,7 @@ impl OccupancyMap {
             let from = [0, 1, 2].map(|a| f64::from(leaf.min[a] - lo[a]) * scale);
             let to = from.map(|f| f + f64::from(leaf.size) * scale);
             // An obstacle reaching in by a hair is rounding; free space is summed to the last sliver.
-            let hair = if leaf.occupied { HAIR } else { 0.0 };
+            let hair = if leaf.occupied { NEGLIGIBLE_CELL_SHARE } else { 0.0 };
             let first = from.map(|f| (f + hair).floor() as u32);
             let last = [0, 1, 2].map(|a| ((to[a] - hair).ceil() as u32).max(first[a] + 1).min(dims[a]));
             let overlap = |axis: usize, c: u32| {
@@ -141,7 +142,7 @@ impl OccupancyMap {
         let refuse = |why: String| MapError::Grid { file: name.into(), why };
         let corner = self.shape.min;
         let (tree, shift) = self.to_shifted_octree();
-        if shift.iter().any(|s| s.abs() > HAIR * f64::from(self.shape.resolution_m)) {
+        if shift.iter().any(|s| s.abs() > NEGLIGIBLE_CELL_SHARE * f64::from(self.shape.resolution_m)) {
             let why = format!(
                 "its corner [{}, {}, {}] does not lie on a multiple of {} m, as OctoMap's cells do",
                 corner.x, corner.y, corner.z, self.shape.resolution_m
@@ -160,7 +161,7 @@ impl OccupancyMap {
         let (mut min, mut shift) = ([0; 3], [0.0; 3]);
         for axis in 0..3 {
             let cells = f64::from(self.shape.min[axis]) / resolution;
-            let most = f64::from(KEYS - self.shape.dims[axis].min(KEYS));
+            let most = f64::from(KEYS_PER_AXIS - self.shape.dims[axis].min(KEYS_PER_AXIS));
             let key = (cells.round() + f64::from(KEY_ORIGIN)).clamp(0.0, most);
             min[axis] = key as u32;
             shift[axis] = (cells - (key - f64::from(KEY_ORIGIN))) * resolution;

@@ -5,11 +5,11 @@
 //! children of that node begin. A lookup walks at most 16 nodes; a walk over all leaves touches each inner node once.
 
 /// Levels below the root; the smallest cell has this depth.
-pub const DEPTH: u32 = 16;
+pub const TREE_DEPTH: u32 = 16;
 /// Smallest cells along one edge of the root.
-pub const KEYS: u32 = 1 << DEPTH;
+pub const KEYS_PER_AXIS: u32 = 1 << TREE_DEPTH;
 /// Key of the cell whose lower faces pass through coordinate 0.
-pub const KEY_ORIGIN: u32 = KEYS / 2;
+pub const KEY_ORIGIN: u32 = KEYS_PER_AXIS / 2;
 
 /// Occupancy of a place.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -96,11 +96,11 @@ impl Octree {
         mut cell: impl FnMut([u32; 3]) -> Occupancy,
     ) -> Option<Self> {
         let end = [0, 1, 2].map(|a| u64::from(min[a]) + u64::from(dims[a]));
-        if end.iter().any(|&e| e > u64::from(KEYS)) {
+        if end.iter().any(|&e| e > u64::from(KEYS_PER_AXIS)) {
             return None;
         }
         let mut builder = Builder { inner: Vec::new(), min, end: end.map(|e| e as u32), cell: &mut cell };
-        match builder.build([0; 3], KEYS) {
+        match builder.build([0; 3], KEYS_PER_AXIS) {
             Child::Leaf(UNKNOWN) => {}
             // A root without children has no code in the file; only a box of all 65536³ cells comes here.
             Child::Leaf(_) => return None,
@@ -121,7 +121,7 @@ impl Octree {
     /// Calls `visit` for every leaf, in the file's order.
     pub fn for_each_leaf(&self, mut visit: impl FnMut(Leaf)) {
         if let Some(root) = self.root() {
-            self.walk(root, [0; 3], KEYS / 2, &mut visit);
+            self.walk(root, [0; 3], KEYS_PER_AXIS / 2, &mut visit);
         }
     }
 
@@ -139,10 +139,10 @@ impl Octree {
     /// Occupancy of the smallest cell with these keys; beyond the key space it is unknown.
     pub fn at_key(&self, key: [u32; 3]) -> Occupancy {
         let Some(mut node) = self.root() else { return Occupancy::Unknown };
-        if key.iter().any(|&k| k >= KEYS) {
+        if key.iter().any(|&k| k >= KEYS_PER_AXIS) {
             return Occupancy::Unknown;
         }
-        for bit in (0..DEPTH).rev() {
+        for bit in (0..TREE_DEPTH).rev() {
             let index = (key[0] >> bit & 1) | (key[1] >> bit & 1) << 1 | (key[2] >> bit & 1) << 2;
             match node.child(index) {
                 FREE => return Occupancy::Free,
@@ -157,7 +157,7 @@ impl Octree {
     /// Occupancy of a point, metres in the map's frame.
     pub fn at(&self, point: [f64; 3]) -> Occupancy {
         let key = point.map(|c| (c / self.resolution_m).floor() + f64::from(KEY_ORIGIN));
-        if key.iter().all(|k| (0.0..f64::from(KEYS)).contains(k)) {
+        if key.iter().all(|k| (0.0..f64::from(KEYS_PER_AXIS)).contains(k)) {
             self.at_key(key.map(|k| k as u32))
         } else {
             Occupancy::Unknown
@@ -185,7 +185,7 @@ impl Octree {
 
     /// Lowest and highest key (exclusive) of the known space along each axis, or `None` for an empty tree.
     pub fn key_bounds(&self) -> Option<([u32; 3], [u32; 3])> {
-        let (mut lo, mut hi) = ([KEYS; 3], [0; 3]);
+        let (mut lo, mut hi) = ([KEYS_PER_AXIS; 3], [0; 3]);
         self.for_each_leaf(|leaf| {
             for axis in 0..3 {
                 lo[axis] = lo[axis].min(leaf.min[axis]);
@@ -286,6 +286,6 @@ mod tests {
 
     #[test]
     fn a_box_beyond_the_key_space_is_refused() {
-        assert!(Octree::from_cells(1.0, [KEYS - 1, 0, 0], [2, 1, 1], |_| Occupancy::Free).is_none());
+        assert!(Octree::from_cells(1.0, [KEYS_PER_AXIS - 1, 0, 0], [2, 1, 1], |_| Occupancy::Free).is_none());
     }
 }

@@ -13,7 +13,7 @@ use companion::storage::mission_file::{Block, Kind};
 use companion::swarm::fleet::Lot;
 use planner_core::Point;
 use planner_core::coverage::area::Area;
-use planner_core::coverage::flights::FURTHEST_M;
+use planner_core::coverage::flights::MAX_PATH_LENGTH_M;
 use planner_core::coverage::pack::Unit;
 use planner_core::coverage::transit::Transit;
 use planner_core::detour::{DetourRequest, KeepOff};
@@ -23,21 +23,21 @@ use planner_core::plan::{PlanError, VehicleTask};
 use planner_core::schedule::{ScheduleError, ScheduleWorkspace};
 
 use super::ready::{Mission, OwnPlan, SwarmPlan, schedule_config};
-use crate::area::MOST_VERTICES;
+use crate::area::MAX_VERTICES;
 use crate::capacity::{BOARD_CORNERS, Board, GATES, VEHICLES, WAYPOINTS, on_heap};
 use crate::coverage::sorties::{self, USABLE_CHARGE};
-use crate::coverage::{CORNERS, LANES, Planned, VEHICLES as COVERAGE_VEHICLES};
+use crate::coverage::{MAX_CORNERS, MAX_LANES, MAX_VEHICLES as COVERAGE_VEHICLES, Planned};
 use crate::scenario::coverage::{Method, Terrain};
 use crate::scenario::{self, Scenario};
 use crate::{map, margins};
 
 /// Height over the pad at which the take-off ends and the landing begins, metres: everything
 /// between them is path.
-const OVER_PAD_M: f32 = 3.0;
+const PATH_OVER_PAD_M: f32 = 3.0;
 /// Extent of the ground beyond area and pads, and of the air over the highest layer, metres.
-const AROUND_M: f32 = 30.0;
+const AROUND_AREA_M: f32 = 30.0;
 
-type DeskWorkspace = Workspace<MOST_VERTICES, LANES, COVERAGE_VEHICLES>;
+type DeskWorkspace = Workspace<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES>;
 
 /// The mission up to its files.
 pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> anyhow::Result<Mission> {
@@ -59,7 +59,7 @@ pub(super) fn prepare(mut scenario: Scenario, board: Option<&'static Board>) -> 
         .collect();
     check_batteries(&planned)?;
     check_height(&planned)?;
-    let top_m = OVER_PAD_M.min(above_ground_m(planned.wanted));
+    let top_m = PATH_OVER_PAD_M.min(above_ground_m(planned.wanted));
     drop(planned);
     for vehicle in &mut scenario.vehicles {
         vehicle.start.z += vehicle.radius_m + top_m;
@@ -176,8 +176,8 @@ fn ground(planned: &Planned<'_>) -> anyhow::Result<map::OccupancyMap> {
     }
     let heights = planned.wanted.heights;
     high.z = heights.mission_m + heights.layer_m * (planned.vehicles.len() + 1) as f32;
-    let around = Point::new(AROUND_M, AROUND_M, 0.0);
-    high.z += AROUND_M;
+    let around = Point::new(AROUND_AREA_M, AROUND_AREA_M, 0.0);
+    high.z += AROUND_AREA_M;
     if let Some(terrain) = &planned.wanted.terrain {
         low.z = uneven_m(terrain)?[0];
     }
@@ -204,7 +204,7 @@ impl Mission {
             parts,
             heading: area.heading,
             trigger: area.trigger,
-            looks: coverage::LOOKS,
+            looks: coverage::MAX_ORDER_CHANGES,
             heights: area.heights,
             spacing: area.usable,
             angle_deg: area.angle_deg,
@@ -228,7 +228,7 @@ impl Mission {
         let Kind::Coverage(view) = mission.kind() else { bail!("no area: {}", self.scenario.path) };
         let mut schedule = on_heap(ScheduleWorkspace::new);
         let mut plan = on_heap(SwarmPlan::new);
-        coverage::plan::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, VEHICLES, WAYPOINTS>(
+        coverage::plan::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, VEHICLES, WAYPOINTS>(
             &Request {
                 mission: &mission,
                 view,
@@ -276,7 +276,7 @@ impl Mission {
         let mission = self.mission_view();
         let Kind::Coverage(view) = mission.kind() else { return Err(PlanFailure::Invalid) };
         let (mut ws, mut own) = (on_heap(DeskWorkspace::new), Box::new(OwnPlan::default()));
-        coverage::around::<MOST_VERTICES, LANES, COVERAGE_VEHICLES, CORNERS, WAYPOINTS, GATES>(
+        coverage::around::<MAX_VERTICES, MAX_LANES, COVERAGE_VEHICLES, MAX_CORNERS, WAYPOINTS, GATES>(
             view,
             self.field(),
             request,
@@ -314,7 +314,7 @@ impl Mission {
             ),
             Error::Plan(PlanError::Path(id, PathError::TooLong)) => anyhow!(
                 "the route of vehicle {id} is too long: {path}: a flight there, along one lane and home takes more than \
-                 {FURTHEST_M} m\nhint: pads nearer to the area, or lanes at another angle_deg"
+                 {MAX_PATH_LENGTH_M} m\nhint: pads nearer to the area, or lanes at another angle_deg"
             ),
             Error::Plan(PlanError::Schedule(id, ScheduleError::Blocked)) => anyhow!(
                 "vehicle {id} cannot pass the others: {path}: no departure keeps it apart from them\nhint: pads further \

@@ -24,11 +24,11 @@ pub type SwarmPlan = plan::SwarmPlan<VEHICLES, WAYPOINTS>;
 pub type OwnPlan = VehiclePlan<WAYPOINTS, GATES>;
 
 /// Acceleration and braking that missions are planned with, m/s².
-pub const ACCEL_MPS2: f32 = 1.5;
+pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Nominal speed of take-off and landing, m/s.
 pub const VERTICAL_MPS: f32 = 1.0;
 /// Mean speed of a flight over its cruise speed: corners, braking and gusts take the rest.
-const PACE: f32 = 0.9;
+const MEAN_SPEED_SHARE: f32 = 0.9;
 
 /// A mission ready to be planned and flown.
 pub struct Mission {
@@ -65,7 +65,7 @@ pub(super) fn schedule_config(scenario: &Scenario) -> ScheduleConfig {
             scenario.deconfliction.safety_distance_m,
             &scenario.vehicles,
         ),
-        cruise_mps: PACE * scenario.mission.cruise_mps,
+        cruise_mps: MEAN_SPEED_SHARE * scenario.mission.cruise_mps,
         vertical_mps: VERTICAL_MPS,
     }
 }

@@ -1,21 +1,21 @@
 //! Routes with more lanes than a path holds: how often all divide what is left, if nobody is lost.
 
 use anyhow::bail;
-use companion::swarm::fleet::{DIVISIONS, Lot, PROMISE_S};
+use companion::swarm::fleet::{COMMITMENT_S, Lot, MAX_DIVISIONS};
 use planner_core::flight::{Flight, Task};
 
 use super::ready::{Mission, SwarmPlan};
 use crate::capacity::WAYPOINTS;
 
 /// Divisions that are kept for losses.
-const FOR_LOSSES: usize = 3;
+const DIVISIONS_FOR_LOSSES: usize = 3;
 
 /// When a flight asks for a division, seconds after the plan began by its labels; none where it is the whole route.
 fn division_requested_at_s(flight: &Flight<WAYPOINTS>) -> Option<f32> {
     let Task::Photograph(photographs) = &flight.task else { return None };
     let end_m = photographs.end_m(&flight.path).filter(|_| photographs.goes_on)?;
     let end = flight.path.waypoints().iter().find(|waypoint| waypoint.along_m >= end_m)?;
-    Some(flight.depart_s + end.at_s - PROMISE_S)
+    Some(flight.depart_s + end.at_s - COMMITMENT_S)
 }
 
 /// Lot of a flight if all are to hold `t_s` seconds after the plan began.
@@ -25,7 +25,7 @@ fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
     let Some(next) = waypoints.iter().position(|waypoint| waypoint.at_s > flown_s) else {
         return Lot {
             lives: !flight.task.flies(),
-            along_dm: if flight.task.flies() { Lot::WHOLE } else { 0 },
+            along_dm: if flight.task.flies() { Lot::WHOLE_PATH } else { 0 },
         };
     };
     let on_pad = flight.climb_m > 0.0 && (next == 0 || flown_s <= 0.0);
@@ -41,7 +41,8 @@ fn lot(flight: &Flight<WAYPOINTS>, t_s: f32) -> Lot {
 
 /// Lots when the first vehicle of a plan requests a division, by rank; none where no route goes on.
 pub fn next_lots(plan: &SwarmPlan) -> Option<Vec<Lot>> {
-    let hold_s = plan.flights.iter().filter_map(division_requested_at_s).min_by(f32::total_cmp)? + PROMISE_S;
+    let hold_s =
+        plan.flights.iter().filter_map(division_requested_at_s).min_by(f32::total_cmp)? + COMMITMENT_S;
     let mut flights: Vec<_> = plan.flights.iter().collect();
     flights.sort_by_key(|flight| flight.id);
     Some(flights.into_iter().map(|flight| lot(flight, hold_s)).collect())
@@ -54,12 +55,12 @@ impl Mission {
         let mut next = next_lots(plan);
         while let Some(lots) = next {
             losses.push(lots);
-            if losses.len() > DIVISIONS - FOR_LOSSES {
+            if losses.len() > MAX_DIVISIONS - DIVISIONS_FOR_LOSSES {
                 bail!(
                     "area too large: {}: its routes take more than {} stretches of {WAYPOINTS} corners each\nhint: more \
                      vehicles, wider lanes, or the plans of `cover`, which autopilots fly alone",
                     self.scenario.path,
-                    DIVISIONS - FOR_LOSSES
+                    MAX_DIVISIONS - DIVISIONS_FOR_LOSSES
                 );
             }
             next = next_lots(&*self.plan_rest(&[], losses.iter().map(|lots| &lots[..]))?);

@@ -1,14 +1,14 @@
 //! CPP (Luna 2022): Tables 2 to 6 and A1 to A12, ours beside theirs; Figs. 8 to 10, 12 and 13 in the report.
 //!
 //! The paper states neither areas nor places of the vehicles, camera, V_a, V_d or Δh. Ours are in [`SHORT_TRACK`],
-//! [`LONG_TRACK`], [`CONVEX`], [`COMPARED`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
+//! [`LONG_TRACK`], [`CONVEX`], [`COMPARED_AREAS`] and [`SMALL`]; V_a 3 m/s, V_d 1 m/s, Δh 5 m, waypoints as far apart as lanes. Theirs in A1 to
 //! A12 were flown in Gazebo; ours are the planned costs C_k, without turns. CV is 100 · SD / Av in both, SD the sample's.
 
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Instant;
 
-use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT};
+use super::cpp_data::{COSTS_M, FEWER_M, FLOWN, LONG, MEAN_MAX_S, PLANNING_S, REAL_S, SHORT_COLUMNS};
 use super::cpp_figures;
 use super::cpp_rows::{Row, Summary};
 use crate::commands::cover;
@@ -29,15 +29,15 @@ const LONG_TRACK: &str = "[[0, 0], [320, 0], [320, 420], [0, 420]]";
 /// Area of Table 2: convex, five vertices.
 const CONVEX: &str = "[[0, 0], [140, -20], [170, 70], [100, 130], [10, 110]]";
 /// Areas of Fig. 9: two more that are convex.
-const COMPARED: [&str; 2] =
+const COMPARED_AREAS: [&str; 2] =
     ["[[0, 0], [300, 0], [340, 110], [160, 190], [0, 150]]", "[[0, 0], [200, -15], [260, 120], [90, 200]]"];
 /// Area of Table 4: small, so that the distance to the area counts.
 const SMALL: &str = "[[0, 0], [60, 0], [60, 60], [0, 60]]";
 /// Starts of the UAVs of Table 4: one is far away.
-const FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
+const STARTS_ONE_FAR: [[f64; 2]; 3] = [[-110.0, -60.0], [20.0, -20.0], [40.0, -20.0]];
 const METHODS: [Method; 3] = [Method::SimpleBinpat, Method::Binpat, Method::PowellBinpat];
 /// Plans of each kind that are timed.
-const RUNS: usize = 51;
+const TIMED_RUNS: usize = 51;
 
 /// A scenario: polygon, vehicles in a row 20 m before its first corner, spacing, height.
 fn scenario(polygon: &str, places: &[[f64; 2]], lane_m: f64, height_m: f64) -> anyhow::Result<Scenario> {
@@ -116,7 +116,7 @@ impl Tables {
 /// Results that cannot be written.
 pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let began = Instant::now();
-    let mut results = Results::open(out, &[&output::NAMES[..], &["tables.json"]].concat())?;
+    let mut results = Results::open(out, &[&output::RESULT_FILES[..], &["tables.json"]].concat())?;
     let mut tables = Tables { rows: Vec::new(), complete: true, worst: None };
     table_2(&mut tables)?;
     let planning = table_3()?;
@@ -129,10 +129,10 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let (_, mut worst) = tables.worst.clone().unwrap_or_default();
     worst["command"] = "paper cpp".into();
     worst["complete"] = tables.complete.into();
-    results.add(output::NAMES[0], result::json(&worst)?.as_bytes())?;
+    results.add(output::RESULT_FILES[0], result::json(&worst)?.as_bytes())?;
     let plan_s = planning.iter().flatten().sum();
     let timing = Timing { plan_s, wall_s: began.elapsed().as_secs_f64(), ..Timing::default() };
-    results.add(output::NAMES[1], result::json(&timing)?.as_bytes())?;
+    results.add(output::RESULT_FILES[1], result::json(&timing)?.as_bytes())?;
     // Fig. 8 d: Table 2's plan by POWELL-BINPAT.
     let scenario = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
     let planned = Planned::new(&scenario, Method::PowellBinpat)?;
@@ -140,7 +140,7 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
     let result = serde_json::to_value(cover::described(&planned, &findings))?;
     let mut page = page::page(&planned, &planned.flights(), &findings, result);
     page.figures = figures(&tables)?;
-    results.add(output::NAMES[2], report::page(&page)?.as_bytes())?;
+    results.add(output::RESULT_FILES[2], report::page(&page)?.as_bytes())?;
     results.keep()?;
     say!();
     say!("{}", if tables.complete { "complete" } else { "NOT COMPLETE: a plan leaves something out" });
@@ -150,9 +150,11 @@ pub fn run(out: &Path) -> anyhow::Result<ExitCode> {
 /// The paper's drawings of our plans.
 fn figures(tables: &Tables) -> anyhow::Result<Vec<Figure>> {
     let convex = scenario(CONVEX, &in_a_row(3), 10.0, 35.0)?;
-    let compared =
-        [scenario(COMPARED[0], &in_a_row(3), 10.0, 35.0)?, scenario(COMPARED[1], &in_a_row(3), 10.0, 35.0)?];
-    let small = scenario(SMALL, &FAR, 10.0, 35.0)?;
+    let compared = [
+        scenario(COMPARED_AREAS[0], &in_a_row(3), 10.0, 35.0)?,
+        scenario(COMPARED_AREAS[1], &in_a_row(3), 10.0, 35.0)?,
+    ];
+    let small = scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
     let [fig_8, fig_9, fig_10] = cpp_figures::routes(&convex, &compared, &small)?;
     let [fig_12, fig_13] = cpp_figures::spreads(&tables.rows);
     Ok(vec![fig_8, fig_9, fig_10, fig_12, fig_13])
@@ -173,12 +175,12 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
     for (row, method) in all.iter_mut().zip(METHODS) {
         for (slot, count) in row.iter_mut().zip(2..) {
             let scenario = scenario(CONVEX, &in_a_row(count), 10.0, 35.0)?;
-            let mut times = Vec::with_capacity(RUNS);
-            for _ in 0..RUNS {
+            let mut times = Vec::with_capacity(TIMED_RUNS);
+            for _ in 0..TIMED_RUNS {
                 times.push(Planned::new(&scenario, method)?.seconds.iter().sum::<f64>());
             }
             times.sort_by(f64::total_cmp);
-            *slot = times[RUNS / 2];
+            *slot = times[TIMED_RUNS / 2];
         }
     }
     Ok(all)
@@ -186,7 +188,7 @@ fn table_3() -> anyhow::Result<[[f64; 6]; 3]> {
 
 /// One vehicle stands so far away that the others are done sooner without it.
 fn table_4(tables: &mut Tables) -> anyhow::Result<()> {
-    let scenario = scenario(SMALL, &FAR, 10.0, 35.0)?;
+    let scenario = scenario(SMALL, &STARTS_ONE_FAR, 10.0, 35.0)?;
     for (method, theirs) in METHODS[1..].iter().zip(FEWER_M) {
         let ours = tables.costs(&scenario, *method, "m")?;
         tables.add("4", *method, (10.0, 35.0), "m", [ours, theirs.to_vec()]);
@@ -198,7 +200,7 @@ fn flown(tables: &mut Tables) -> anyhow::Result<()> {
     let mut mean_max = [[0.0; 3]; 2];
     for table in &FLOWN {
         let method = Method::named(table.method).map_err(anyhow::Error::msg)?;
-        let (polygon, columns) = if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT) };
+        let (polygon, columns) = if table.long { (LONG_TRACK, LONG) } else { (SHORT_TRACK, SHORT_COLUMNS) };
         for (spacing, theirs) in columns.into_iter().zip(table.times_s) {
             let scenario = scenario(polygon, &in_a_row(theirs.len()), spacing.0, spacing.1)?;
             let ours = tables.costs(&scenario, method, "s")?;

@@ -4,12 +4,12 @@
 //!    way whose narrowest edge is as wide as that of the widest way there is (Hu 1961). So whatever clearance is
 //!    required, a node that could reach another one before still can.
 //! 2. *Near.* Of the others, those to each node's nearest neighbours come first: a share of the room.
-//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`SOURCES`] nodes lose most by: the number of
+//! 3. *Far.* The rest of the room goes to the edges that the shortest paths from [`PATH_SOURCES`] nodes lose most by: the number of
 //!    paths over an edge, times how much longer the way around it is over the edges kept so far. Half of them are chosen
 //!    first, since what is around the others is shorter then.
 //!
 //! Vehicles of several sizes fly on one roadmap, so nearest neighbours and shortest paths are those of each class of
-//! required clearances ([`CLASSES_M`]).
+//! required clearances ([`CLEARANCE_CLASSES_M`]).
 //!
 //! Cost: edges · log edges, a search a source and class, and a short one a node, class and round, on all cores.
 
@@ -21,14 +21,14 @@ use planner_core::roadmap::Edge;
 use rayon::prelude::*;
 
 /// Required clearances for which paths are kept short, metres.
-pub const CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
+pub const CLEARANCE_CLASSES_M: [f32; 3] = [0.3, 0.8, 1.2];
 /// Share of the edges that goes to nearest neighbours. More keep the longest detours short, fewer
 /// the usual ones; measured on the scanned maps of `tests/tests/boards_hold.rs`.
-const NEAR_SHARE: f32 = 0.65;
+const NEAREST_EDGE_SHARE: f32 = 0.65;
 /// Nodes from which shortest paths are counted.
-const SOURCES: usize = 64;
+const PATH_SOURCES: usize = 64;
 /// Rounds in which the far edges are chosen; a third one gains a tenth of what the second does.
-const ROUNDS: usize = 2;
+const FAR_EDGE_ROUNDS: usize = 2;
 /// Greatest length of a detour around an edge, over the edge's length; a longer detour counts as
 /// this long.
 const MAX_DETOUR_RATIO: f32 = 1.5;
@@ -42,16 +42,16 @@ pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
         edges.iter().map(|edge| (nodes[usize::from(edge.b)] - nodes[usize::from(edge.a)]).norm()).collect();
     let mut kept = widest_forest(nodes.len(), edges);
     let room = most.checked_sub(kept.iter().filter(|&&kept| kept).count())?;
-    let near = (room as f32 * NEAR_SHARE) as usize;
+    let near = (room as f32 * NEAREST_EDGE_SHARE) as usize;
     let rows = rows(nodes.len(), edges, &lengths);
     let ranks = ranks(&rows, edges.len());
     keep(&mut kept, near, &lengths, |i| ranks[i]);
     let usages: Vec<Vec<u32>> = classes().map(|class| usage(&rows, edges.len(), class)).collect();
     let far = room - near;
-    for round in 0..ROUNDS {
+    for round in 0..FAR_EDGE_ROUNDS {
         let losses = losses(&rows, &usages, &kept);
         // The bits of floats that are not negative are in their order.
-        let most = far * (round + 1) / ROUNDS - far * round / ROUNDS;
+        let most = far * (round + 1) / FAR_EDGE_ROUNDS - far * round / FAR_EDGE_ROUNDS;
         keep(&mut kept, most, &lengths, |i| Reverse(losses[i].to_bits()));
     }
     Some(edges.iter().zip(&kept).filter(|(_, kept)| **kept).map(|(edge, _)| *edge).collect())
@@ -61,7 +61,7 @@ pub fn cap(nodes: &[Point], edges: &[Edge], most: usize) -> Option<Vec<Edge>> {
 #[derive(Clone, Copy)]
 struct Out {
     to: u16,
-    /// Number of [`CLASSES_M`] that the edge is wider than.
+    /// Number of [`CLEARANCE_CLASSES_M`] that the edge is wider than.
     class: u8,
     length_m: f32,
     edge: u32,
@@ -71,7 +71,8 @@ struct Out {
 fn rows(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out>> {
     let mut rows = vec![Vec::new(); nodes];
     for (i, (edge, &length_m)) in edges.iter().zip(lengths).enumerate() {
-        let class = CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count() as u8;
+        let class =
+            CLEARANCE_CLASSES_M.iter().filter(|&&required_m| edge.clearance_m > required_m).count() as u8;
         for (from, to) in [(edge.a, edge.b), (edge.b, edge.a)] {
             rows[usize::from(from)].push(Out { to, class, length_m, edge: i as u32 });
         }
@@ -87,7 +88,7 @@ fn rows(nodes: usize, edges: &[Edge], lengths: &[f32]) -> Vec<Vec<Out>> {
 fn ranks(rows: &[Vec<Out>], edges: usize) -> Vec<u32> {
     let mut ranks = vec![u32::MAX; edges];
     for row in rows {
-        let mut shorter = [0; CLASSES_M.len() + 1];
+        let mut shorter = [0; CLEARANCE_CLASSES_M.len() + 1];
         for out in row {
             for count in &mut shorter[..=usize::from(out.class)] {
                 let rank = &mut ranks[out.edge as usize];
@@ -137,7 +138,7 @@ fn keep<O: Ord>(kept: &mut [bool], count: usize, lengths: &[f32], order: impl Fn
 
 /// The classes of vehicles, as [`Out::class`] has them.
 fn classes() -> impl Iterator<Item = u8> {
-    1..=CLASSES_M.len() as u8
+    1..=CLEARANCE_CLASSES_M.len() as u8
 }
 
 /// For each edge that is not kept how much longer the shortest paths over it become, metres, in the mean over all paths of a
@@ -195,10 +196,10 @@ fn ways_within(source: usize, rows: &[Vec<Out>], class: u8, most_m: f32) -> Vec<
     way_m
 }
 
-/// For each edge the number of shortest paths that lead over it, of those from [`SOURCES`] nodes to all others, of vehicles
+/// For each edge the number of shortest paths that lead over it, of those from [`PATH_SOURCES`] nodes to all others, of vehicles
 /// of a class.
 fn usage(rows: &[Vec<Out>], edges: usize, class: u8) -> Vec<u32> {
-    let sources = SOURCES.min(rows.len());
+    let sources = PATH_SOURCES.min(rows.len());
     let searches: Vec<Vec<(u32, u32)>> = (0..sources)
         .into_par_iter()
         .map(|source| paths_from(source * rows.len() / sources, rows, class))

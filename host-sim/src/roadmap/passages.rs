@@ -19,9 +19,9 @@ use planner_core::voxel::GridShape;
 use crate::map::{BoxTree, VoxelMap};
 
 /// What a way keeps beyond the clearance, metres: more than rounding, and than the millimetre that the file rounds down to.
-const SLACK_M: f32 = 1.2e-3;
+const CLEARANCE_SLACK_M: f32 = 1.2e-3;
 /// Most cells of a grid that is searched: the search keeps nine bytes a cell.
-const MOST_CELLS: usize = 1 << 25;
+const MAX_SEARCHED_CELLS: usize = 1 << 25;
 
 /// A start and a goal, by their nodes, and the clearance that the vehicle between them needs, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +101,7 @@ impl Parts {
 
 /// Whether a straight flight keeps the clearance, by more than rounding.
 fn is_clear(tree: &BoxTree, a: &Point, b: &Point, required_m: f32) -> bool {
-    let enough_m = required_m + SLACK_M;
+    let enough_m = required_m + CLEARANCE_SLACK_M;
     tree.clearance_m(a, b, 2.0 * enough_m, enough_m) > enough_m
 }
 
@@ -117,7 +117,7 @@ impl<'a> Search<'a> {
     /// The search; none where the map is too large.
     fn new(map: &'a VoxelMap, tree: &'a BoxTree, required_m: f32) -> Option<Self> {
         let cells = map.shape.dims.iter().try_fold(1_usize, |all, &d| all.checked_mul(d as usize))?;
-        (cells <= MOST_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })
+        (cells <= MAX_SEARCHED_CELLS).then_some(Self { shape: &map.shape, map, tree, required_m })
     }
 
     fn index(&self, [i, j, k]: [u32; 3]) -> usize {

@@ -3,10 +3,10 @@
 use std::fmt;
 use std::ops::Range;
 
-use crate::quote::{MOST, quoted};
+use crate::quote::{MAX_QUOTE_CHARS, quoted};
 
 /// Characters of a long line that are shown before the one in error.
-const BEFORE: usize = 40;
+const CONTEXT_CHARS: usize = 40;
 
 /// Error of a scenario: the fault, its place, and a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -74,9 +74,9 @@ impl fmt::Display for ScenarioError {
 /// A line as it is shown, of which `marked` characters from `from` on are meant; then how many characters of it stand
 /// before those, and how many of those are shown. Of a long line that is the part around them.
 fn around(text: &str, from: usize, marked: usize) -> (String, usize, usize) {
-    let begin = if from + marked > MOST { from.saturating_sub(BEFORE) } else { 0 };
+    let begin = if from + marked > MAX_QUOTE_CHARS { from.saturating_sub(CONTEXT_CHARS) } else { 0 };
     let plain = |c: char| if quoted(c.encode_utf8(&mut [0; 4])).chars().count() == 1 { c } else { ' ' };
-    let mut shown: String = text.chars().skip(begin).take(MOST - 2).map(plain).collect();
+    let mut shown: String = text.chars().skip(begin).take(MAX_QUOTE_CHARS - 2).map(plain).collect();
     let length = shown.chars().count();
     if text.chars().nth(begin + length).is_some() {
         shown.push('…');
@@ -97,9 +97,9 @@ mod tests {
         let text = format!("{}KEY = 1{}", "x".repeat(5000), "y".repeat(5000));
         let (shown, before, marked) = around(&text, 5000, 3);
         assert_eq!(shown.chars().skip(before).take(marked).collect::<String>(), "KEY");
-        assert!(shown.chars().count() <= MOST && shown.starts_with('…') && shown.ends_with('…'));
+        assert!(shown.chars().count() <= MAX_QUOTE_CHARS && shown.starts_with('…') && shown.ends_with('…'));
         assert_eq!(around("a\tb\u{1b}c", 2, 1), ("a b c".to_owned(), 2, 1));
         let (shown, before, marked) = around(&text, 0, 9000);
-        assert_eq!((before + marked, shown.chars().count()), (MOST - 2, MOST - 1));
+        assert_eq!((before + marked, shown.chars().count()), (MAX_QUOTE_CHARS - 2, MAX_QUOTE_CHARS - 1));
     }
 }

@@ -28,16 +28,16 @@ use super::types::{
 use crate::capacity::VEHICLES;
 use crate::files;
 use crate::link::LinkUrl;
-use crate::map::{RESOLUTIONS_M, Source, Unknown};
+use crate::map::{RESOLUTION_RANGE_M, Source, Unknown};
 use crate::margins;
 use crate::quote::{quoted, quoted_path};
 
 /// Time after which a flight is given up unless the scenario says otherwise, seconds.
-const LIMIT_S: f32 = 600.0;
+const DEFAULT_TIME_LIMIT_S: f32 = 600.0;
 /// Most faults of a scenario.
 const MAX_FAULTS: usize = 1000;
 /// Mission origin where the scenario gives none: a test field.
-const ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
+const DEFAULT_ORIGIN: Geodetic = Geodetic { lat_deg: 40.3327, lon_deg: -3.7659, alt_m: 700.0 };
 
 /// Content of a scenario's root table, if it is TOML and all its keys are known.
 pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>) -> Result<T> {
@@ -69,7 +69,7 @@ pub(super) fn root<T>(text: Text<'_>, read: impl FnOnce(&Table<'_>) -> Result<T>
 pub(super) fn goals_mission(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let mut unsupported = Vec::new();
     let Common { seed, deconfliction, simulation, estimator_span } =
-        common(text, root, (margins::STRAY_M, LIMIT_S))?;
+        common(text, root, (margins::PAIR_STRAY_M, DEFAULT_TIME_LIMIT_S))?;
     let map_table = root.required("map", "add `[map]` with `file = \"builtin:building\"`")?.table()?;
     let (map, has_origin) = map(&map_table, folder)?;
     let roadmap = root.get("roadmap").map(|v| v.table()).transpose()?;
@@ -213,13 +213,13 @@ fn map(table: &Table<'_>, folder: &Path) -> Result<(Map, bool)> {
     let origin = table.get("origin").map(|v| geodetic(&v)).transpose()?;
     let map = Map {
         file,
-        resolution_m: table.f32("resolution_m", 0.25, RESOLUTIONS_M)?,
+        resolution_m: table.f32("resolution_m", 0.25, RESOLUTION_RANGE_M)?,
         unknown: table.word(
             "unknown",
             Unknown::Blocked,
             &[("blocked", Unknown::Blocked), ("free", Unknown::Free)],
         )?,
-        origin: origin.unwrap_or(ORIGIN),
+        origin: origin.unwrap_or(DEFAULT_ORIGIN),
     };
     table.finish()?;
     Ok((map, origin.is_some()))

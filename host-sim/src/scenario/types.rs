@@ -195,14 +195,14 @@ pub struct Vehicle {
 }
 
 /// Climbing speed V_a of a vehicle that has none of its own, m/s.
-const CLIMB_MPS: f32 = 3.0;
+const DEFAULT_CLIMB_MPS: f32 = 3.0;
 /// Descending speed V_d of a vehicle that has none of its own, m/s.
-const DESCEND_MPS: f32 = 1.0;
+const DEFAULT_DESCEND_MPS: f32 = 1.0;
 
 impl Vehicle {
     /// V_a and V_d, metres a second.
     pub fn climbs_mps(&self) -> [f32; 2] {
-        [self.climb_mps.unwrap_or(CLIMB_MPS), self.descend_mps.unwrap_or(DESCEND_MPS)]
+        [self.climb_mps.unwrap_or(DEFAULT_CLIMB_MPS), self.descend_mps.unwrap_or(DEFAULT_DESCEND_MPS)]
     }
 }
 

@@ -8,9 +8,9 @@
 
 use std::path::Path;
 
-use companion::link::frame::{Frame, Framer, MAX_SENT};
+use companion::link::frame::{Frame, Framer, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Instant, Link as Port, State};
+use companion::{COMPANION_COMPONENT, Instant, Link as Port, State};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{HEARTBEAT_DATA, STATUSTEXT_DATA, TUNNEL_DATA};
 use planner_core::Point;
@@ -182,7 +182,7 @@ impl Board {
     fn sent(&mut self, now_us: u64, bytes: &[u8], lines: &mut Lines<'_>) {
         let mut input = bytes;
         while let Some(frame) = self.framer.next(Instant::from_micros(now_us), &mut input) {
-            let mut packet = [0; MAX_SENT];
+            let mut packet = [0; MAX_FRAME_LEN];
             let length = frame.encode(&mut packet);
             lines.radio.broadcast(now_us, Some(lines.station), lines.places, &packet[..length]);
             self.note(&frame, &mut lines.said);
@@ -191,7 +191,7 @@ impl Board {
 
     /// Keeps what the board reports of itself.
     fn note(&mut self, frame: &Frame, said: &mut dyn FnMut(&str)) {
-        if frame.component != COMPONENT {
+        if frame.component != COMPANION_COMPONENT {
             return;
         }
         match frame.message_id {

@@ -5,9 +5,9 @@
 //! | `kill` | all power gone: silent, falls to the floor below and lies there | never |
 //! | `radio-cut` | sends (`tx`), hears (`rx`) or does neither (`both`, if not given) | hears and sends again |
 //! | `serial-stall` | no byte between companion and autopilot, either way | 3 s if not given |
-//! | `serial-corrupt` | [`CORRUPTION`] of all bytes change a bit | as before |
+//! | `serial-corrupt` | [`CORRUPTED_SHARE`] of all bytes change a bit | as before |
 //! | `position-jump` | the estimate moves by `offset_m`, 5 m east if not given | jumps back |
-//! | `origin-change` | the EKF origin moves by `offset_m`, [`ORIGIN_MOVES_M`] if not given | moves back |
+//! | `origin-change` | the EKF origin moves by `offset_m`, [`ORIGIN_CHANGE_M`] if not given | moves back |
 //! | `gps-loss` | no position | position again |
 //! | `battery-low` | [`BATTERY_LEFT`] of the charge is left | never |
 //! | `pilot-takeover` | Position or Brake mode by the pilot's switch | as `pilot-return` |
@@ -33,15 +33,15 @@ use crate::report::{Event, Level};
 use crate::scenario::{Companion, FAULT_OBSTACLE, Fault, Scenario};
 
 /// Share of bytes changed by `serial-corrupt`: half of all frames of a setpoint's length are lost.
-const CORRUPTION: f64 = 0.01;
+const CORRUPTED_SHARE: f64 = 0.01;
 /// Charge left by `battery-low`: below the companions' limit, above the autopilots'.
 const BATTERY_LEFT: f32 = 0.1;
 /// Offset by which `position-jump` moves the estimate, metres.
-const JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
+const POSITION_JUMP_M: Point = Point::new(5.0, 0.0, 0.0);
 /// Offset by which `origin-change` moves the origin, metres.
-const ORIGIN_MOVES_M: Point = Point::new(40.0, -30.0, 5.0);
+const ORIGIN_CHANGE_M: Point = Point::new(40.0, -30.0, 5.0);
 /// Length of a stall or a boot where the script states none, seconds.
-const SPELL_S: f32 = 3.0;
+const DEFAULT_FAULT_S: f32 = 3.0;
 
 /// Refuses what cannot be done to a vehicle: what strikes a companion or its radio needs them in this process.
 ///
@@ -165,7 +165,7 @@ impl<'a> Script<'a> {
 
 fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow::Result<()> {
     let member = &mut world.members[i];
-    let spell_us = now_us + (fault.duration_s.unwrap_or(SPELL_S) * 1e6) as u64;
+    let spell_us = now_us + (fault.duration_s.unwrap_or(DEFAULT_FAULT_S) * 1e6) as u64;
     match fault.kind {
         "kill" => {
             world.radio.cut(i, Cut { tx: true, rx: true });
@@ -176,9 +176,9 @@ fn begin(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>) -> anyhow:
             world.radio.cut(i, Cut { tx: way != "rx", rx: way != "tx" });
         }
         "serial-stall" => member.stall(spell_us),
-        "serial-corrupt" => member.corrupt(CORRUPTION),
-        "position-jump" => member.autopilot.jump_position(&fault.offset_m.unwrap_or(JUMP_M)),
-        "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_MOVES_M)),
+        "serial-corrupt" => member.corrupt(CORRUPTED_SHARE),
+        "position-jump" => member.autopilot.jump_position(&fault.offset_m.unwrap_or(POSITION_JUMP_M)),
+        "origin-change" => member.autopilot.move_ekf_origin(&fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
         "gps-loss" => member.autopilot.set_gps_ok(false),
         "battery-low" => member.autopilot.set_battery(BATTERY_LEFT),
         "pilot-takeover" => member.autopilot.pilot_takes_over(),
@@ -200,8 +200,8 @@ fn end(fault: &Fault, i: usize, now_us: u64, world: &mut World<'_>, corruption: 
     match fault.kind {
         "radio-cut" => world.radio.cut(i, Cut::default()),
         "serial-corrupt" => member.corrupt(corruption),
-        "position-jump" => member.autopilot.jump_position(&-fault.offset_m.unwrap_or(JUMP_M)),
-        "origin-change" => member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_MOVES_M)),
+        "position-jump" => member.autopilot.jump_position(&-fault.offset_m.unwrap_or(POSITION_JUMP_M)),
+        "origin-change" => member.autopilot.move_ekf_origin(&-fault.offset_m.unwrap_or(ORIGIN_CHANGE_M)),
         "gps-loss" => member.autopilot.set_gps_ok(true),
         "pilot-takeover" => give_back(i, now_us, world),
         "late-plan" | "bad-roadmap" => member.planner = Planner::Sound,

@@ -18,7 +18,7 @@ use crate::link::Link;
 /// HEARTBEAT, COMMAND_ACK, STATUSTEXT.
 const FROM_COMPANIONS: [u32; 3] = [0, 77, 253];
 /// Longest datagram, bytes: small enough for any path.
-const DATAGRAM: usize = 1400;
+const MAX_DATAGRAM: usize = 1400;
 
 /// A link to a ground station.
 pub struct Gateway {
@@ -65,7 +65,7 @@ impl Gateway {
         }
         for member in members {
             loop {
-                let length = member.tell_ground(now_us, &mut buffer[..DATAGRAM]);
+                let length = member.tell_ground(now_us, &mut buffer[..MAX_DATAGRAM]);
                 if length == 0 {
                     break;
                 }
@@ -77,7 +77,7 @@ impl Gateway {
 
     /// Whole frames, gathered up to the size of a datagram.
     fn send(&mut self, frames: &[u8]) -> io::Result<()> {
-        if self.datagram.len() + frames.len() > DATAGRAM {
+        if self.datagram.len() + frames.len() > MAX_DATAGRAM {
             self.flush()?;
         }
         self.datagram.extend_from_slice(frames);

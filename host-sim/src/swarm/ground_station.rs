@@ -15,12 +15,12 @@ use super::radio::Radio;
 /// MAV_COMP_ID_MISSIONPLANNER.
 const COMPONENT_ID: u8 = 190;
 /// Time after which a command that was not obeyed is repeated, microseconds.
-const REPEAT_US: u64 = 1_000_000;
+const COMMAND_EVERY_US: u64 = 1_000_000;
 /// Time with some vehicle ready after which the ready vehicles are started without the rest,
 /// microseconds.
-const PATIENCE_US: u64 = 90_000_000;
+const START_WITHOUT_REST_US: u64 = 90_000_000;
 /// Time for which an order is repeated, microseconds: some messages are lost.
-const ORDERED_US: u64 = 10_000_000;
+const ORDER_REPEATED_FOR_US: u64 = 10_000_000;
 
 /// Command to one vehicle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,7 +105,7 @@ impl GroundStation {
     /// Commands a vehicle to do this from now on, in place of what it was told before.
     pub fn order(&mut self, now_us: u64, vehicle: usize, order: Order) {
         self.orders.retain(|&(of, ..)| of != vehicle);
-        self.orders.push((vehicle, order, now_us + ORDERED_US));
+        self.orders.push((vehicle, order, now_us + ORDER_REPEATED_FOR_US));
     }
 
     /// Reports an obstacle to all vehicles, from now on.
@@ -131,15 +131,15 @@ impl GroundStation {
                 self.ready_us.get_or_insert(now_us);
             }
             let settled = members.iter().all(|m| state(m) == State::Ready || is_finished(state(m)));
-            let waited = self.ready_us.is_some_and(|since_us| now_us >= since_us + PATIENCE_US);
+            let waited = self.ready_us.is_some_and(|since_us| now_us >= since_us + START_WITHOUT_REST_US);
             if !(self.ready_us.is_some() && (settled || waited)) {
                 return Vec::new();
             }
             self.first_us = Some(now_us);
             self.last_us = now_us;
-            return vec![self.frame(&order(START, EVERYBODY, 0.0))];
+            return vec![self.frame(&order(START, ALL_SYSTEMS, 0.0))];
         }
-        if now_us < self.last_us + REPEAT_US {
+        if now_us < self.last_us + COMMAND_EVERY_US {
             return Vec::new();
         }
         self.last_us = now_us;
@@ -151,7 +151,7 @@ impl GroundStation {
         for (centre, radius_m) in self.obstacles.clone() {
             frames.push(self.frame(&COMMAND_INT_DATA {
                 command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
-                target_system: EVERYBODY,
+                target_system: ALL_SYSTEMS,
                 frame: MavFrame::MAV_FRAME_GLOBAL,
                 param1: radius_m,
                 x: (centre.lat_deg * 1e7).round() as i32,
@@ -175,7 +175,7 @@ impl GroundStation {
     }
 
     fn frame(&mut self, command: &impl MessageData) -> Vec<u8> {
-        let mut buffer = [0; frame::MAX_SENT];
+        let mut buffer = [0; frame::MAX_FRAME_LEN];
         let length = encode(command, self.system_id, self.sequence, &mut buffer);
         self.sequence = self.sequence.wrapping_add(1);
         buffer[..length].to_vec()
@@ -186,10 +186,10 @@ const START: MavCmd = MavCmd::MAV_CMD_MISSION_START;
 const PAUSE_CONTINUE: MavCmd = MavCmd::MAV_CMD_DO_PAUSE_CONTINUE;
 
 /// Target system that means all.
-const EVERYBODY: u8 = 0;
+const ALL_SYSTEMS: u8 = 0;
 
 /// A frame by which ground station `from` commands the start; returns its length.
-pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
+pub fn mission_start(from: u8, target_system: u8, out: &mut [u8; frame::MAX_FRAME_LEN]) -> usize {
     encode(&order(START, target_system, 0.0), from, 0, out)
 }
 
@@ -197,6 +197,11 @@ fn order(command: MavCmd, target_system: u8, param1: f32) -> COMMAND_LONG_DATA {
     COMMAND_LONG_DATA { command, target_system, param1, ..COMMAND_LONG_DATA::DEFAULT }
 }
 
-fn encode(command: &impl MessageData, system: u8, sequence: u8, out: &mut [u8; frame::MAX_SENT]) -> usize {
+fn encode(
+    command: &impl MessageData,
+    system: u8,
+    sequence: u8,
+    out: &mut [u8; frame::MAX_FRAME_LEN],
+) -> usize {
     frame::encode(Header { system, component: COMPONENT_ID, sequence }, command, out)
 }

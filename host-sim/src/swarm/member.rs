@@ -1,7 +1,7 @@
 //! One vehicle of the simulated swarm: a companion, an autopilot and the serial link between them.
 
 use anyhow::Context;
-use companion::storage::store::{READ, Store};
+use companion::storage::store::{MAX_READ, Store};
 use companion::{Config, Event, Instant, Link, State, Wanted};
 use planner_core::Point;
 use sim_autopilot::{Autopilot, Photo};
@@ -20,7 +20,7 @@ use crate::report::{self, Level};
 use crate::say;
 
 /// Steps between two readings of the height of the ground below, which changes slowly.
-const GROUND_STEPS: u64 = 25;
+const GROUND_CHECK_STEPS: u64 = 25;
 
 /// How the shell answers a companion that asks for a plan.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -212,7 +212,7 @@ impl Member {
         log: &mut Vec<report::Event>,
     ) -> anyhow::Result<()> {
         let now_us = (step + 1) * STEP_US;
-        if step % GROUND_STEPS == station as u64 % GROUND_STEPS {
+        if step % GROUND_CHECK_STEPS == station as u64 % GROUND_CHECK_STEPS {
             self.ground_m =
                 mission.ground_below(&self.autopilot.truth().position).unwrap_or(f32::NEG_INFINITY);
         }
@@ -311,7 +311,7 @@ impl Member {
             }
         }
         if let Some(flash) = &mut self.flash {
-            let mut read = [0; READ];
+            let mut read = [0; MAX_READ];
             while let Some(request) = self.companion.poll_flash() {
                 let outcome = flash.obey(request, &mut read);
                 self.companion.handle_flash(now, outcome);

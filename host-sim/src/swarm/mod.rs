@@ -45,16 +45,16 @@ use crate::shortage;
 /// A vehicle within this distance of its goal has reached it, metres.
 const REACHED_M: f32 = 0.5;
 /// Distance from its pad beyond which a vehicle has left the pad, metres.
-const AWAY_M: f32 = 2.0;
+const OFF_PAD_M: f32 = 2.0;
 /// Simulated time that goes on after the last vehicle is done, seconds.
 const AFTERMATH_S: f64 = 1.0;
 /// Standstill of all vehicles after a fault after which no vehicle will fly any more, seconds:
 /// longer than from a gate's opening to the take-off.
-const STILL_S: f64 = 30.0;
+const STANDSTILL_S: f64 = 30.0;
 /// Greatest lag of the simulation behind the wall clock that is made up for: if the simulation
 /// hurried, autopilots would live through seconds in which no companion in another process can say
 /// anything.
-const LATEST: Duration = Duration::from_millis(200);
+const MAX_CLOCK_LAG: Duration = Duration::from_millis(200);
 
 /// A flown mission.
 pub struct Flight {
@@ -153,7 +153,7 @@ fn simulate(
         }
         if realtime || by_clock {
             let due = Duration::from_micros(now_us) + put_off;
-            put_off += began.elapsed().saturating_sub(due + LATEST);
+            put_off += began.elapsed().saturating_sub(due + MAX_CLOCK_LAG);
             std::thread::sleep(due.saturating_sub(began.elapsed()));
         }
     }
@@ -255,7 +255,7 @@ impl<'a> Run<'a> {
                 *nearest_m = match plan.flights[i].task.goal() {
                     Some(_) => nearest_m.min(off.norm()),
                     // The flight began where it ends: over its pad.
-                    None if off.xy().norm() > AWAY_M => f32::INFINITY,
+                    None if off.xy().norm() > OFF_PAD_M => f32::INFINITY,
                     None => nearest_m.min(off.xy().norm()),
                 };
             }
@@ -283,7 +283,7 @@ impl<'a> Run<'a> {
         if !(self.script.is_over() && started && members.iter().all(still)) {
             self.moved_s = self.t_s;
         }
-        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > STILL_S;
+        let over = (0..members.len()).all(done) || self.t_s - self.moved_s > STANDSTILL_S;
         if self.ends_at_s.is_infinite() && self.script.is_over() && over {
             self.ends_at_s = self.t_s + AFTERMATH_S;
         }

@@ -12,16 +12,16 @@ use crate::map::edt::ClearanceField;
 use crate::terrain::HeightGrid;
 
 /// Rounding of positions, metres: an overlap by less than this is no contact.
-const TOUCH_M: f32 = 1e-3;
+const CONTACT_ROUNDING_M: f32 = 1e-3;
 /// Time without progress, while a path is left, that counts as a deadlock, seconds.
 const DEADLOCK_S: f64 = 20.0;
 /// Least movement along the path that counts as progress, metres.
-const PROGRESS_M: f32 = 0.1;
+const MIN_PROGRESS_M: f32 = 0.1;
 /// Distance from its hover at which a vehicle that reports no progress has moved on, metres: more
 /// than it sways.
-const AWAY_M: f32 = 1.0;
+const OFF_HOVER_M: f32 = 1.0;
 /// Time between two recorded points, seconds.
-const RECORD_S: f64 = 0.2;
+const RECORD_EVERY_S: f64 = 0.2;
 
 /// Phase of a vehicle's flight, as the referee needs to know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -167,7 +167,7 @@ impl<'a> Referee<'a> {
             }
         }
         self.watch_pairs(t_s, seen);
-        if t_s - self.recorded_s >= RECORD_S - 1e-6 {
+        if t_s - self.recorded_s >= RECORD_EVERY_S - 1e-6 {
             self.recorded_s = t_s;
             self.samples.push(Sample { t_s: t_s as f32, ..self.window });
             self.window = NOTHING;
@@ -195,7 +195,7 @@ impl<'a> Referee<'a> {
         let above_m = place.z - ground_m;
         self.window.clearance_m = self.window.clearance_m.min(above_m);
         self.min_clearance_m = self.min_clearance_m.min(above_m);
-        above_m < radius_m - TOUCH_M
+        above_m < radius_m - CONTACT_ROUNDING_M
     }
 
     fn watch_walls(&mut self, i: usize, t_s: f64, now: &Observation) {
@@ -209,13 +209,13 @@ impl<'a> Referee<'a> {
         // A distance changes by no more than the way flown since it was measured.
         let (at_least_m, at_most_m) = match self.vehicles[i].measured {
             Some((place, clearance_m)) => {
-                let moved_m = (now.position - place).norm() + TOUCH_M;
+                let moved_m = (now.position - place).norm() + CONTACT_ROUNDING_M;
                 (clearance_m - moved_m, clearance_m + moved_m)
             }
             None => (0.0, f32::INFINITY),
         };
         let touches = if at_least_m < wanted && self.field.lower_bound_m(&now.position) < wanted {
-            let reach = wanted.min(CLEARANCE_LOOK_M);
+            let reach = wanted.min(MAX_MEASURED_CLEARANCE_M);
             let clearance_m = point_clearance(&self.grid, &now.position, reach.min(at_most_m));
             if clearance_m < reach {
                 self.vehicles[i].measured = Some((now.position, clearance_m));
@@ -224,7 +224,7 @@ impl<'a> Referee<'a> {
                 self.window.clearance_m = self.window.clearance_m.min(clearance_m);
                 self.min_clearance_m = self.min_clearance_m.min(clearance_m);
             }
-            let touches = clearance_m < radius_m - TOUCH_M;
+            let touches = clearance_m < radius_m - CONTACT_ROUNDING_M;
             touches && (flying || self.touches_beside(&now.position, radius_m))
         } else {
             false
@@ -258,7 +258,7 @@ impl<'a> Referee<'a> {
                     let corner = shape.min + Point::new(i as f32, j as f32, k as f32) * shape.resolution_m;
                     let top = corner.z + shape.resolution_m;
                     let nearest = position.sup(&corner).inf(&(corner + Point::repeat(shape.resolution_m)));
-                    top > position.z && (nearest - position).norm() < radius_m - TOUCH_M
+                    top > position.z && (nearest - position).norm() < radius_m - CONTACT_ROUNDING_M
                 })
             })
         })
@@ -313,13 +313,13 @@ impl<'a> Referee<'a> {
     fn watch_progress(&mut self, i: usize, t_s: f64, now: &Observation) {
         let vehicle = &mut self.vehicles[i];
         // Progress does not fall: it is that along another path.
-        let anew = now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - AWAY_M);
+        let anew = now.progress_m.filter(|progress_m| *progress_m < vehicle.best_progress_m - OFF_HOVER_M);
         if let Some(progress_m) = anew {
-            vehicle.best_progress_m = progress_m - AWAY_M;
+            vehicle.best_progress_m = progress_m - OFF_HOVER_M;
         }
         let moved = match now.progress_m {
-            Some(progress_m) => progress_m > vehicle.best_progress_m + PROGRESS_M,
-            None => (now.position - vehicle.progressed_at).norm() > AWAY_M,
+            Some(progress_m) => progress_m > vehicle.best_progress_m + MIN_PROGRESS_M,
+            None => (now.position - vehicle.progressed_at).norm() > OFF_HOVER_M,
         };
         if now.phase != Phase::Flying || now.ordered || moved {
             vehicle.best_progress_m =
@@ -348,7 +348,7 @@ fn no_progress() -> String {
 }
 
 /// Greatest clearance that is measured, metres.
-const CLEARANCE_LOOK_M: f32 = 3.0;
+const MAX_MEASURED_CLEARANCE_M: f32 = 3.0;
 const NOTHING: Sample = Sample { t_s: 0.0, separation_m: f32::INFINITY, clearance_m: f32::INFINITY };
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ pub struct SerialConfig {
 }
 
 /// Share of bytes lost, or of writes damaged, above which the link explains a failure.
-const TELLS: f64 = 0.02;
+const EXPLAINING_SHARE: f64 = 0.02;
 /// The usual rates of lines, bits per second.
 const BAUDS: [u64; 8] = [9600, 19_200, 38_400, 57_600, 115_200, 230_400, 460_800, 921_600];
 
@@ -66,7 +66,7 @@ impl SerialLink {
     pub fn trouble(&self, lasted_s: f64) -> Option<String> {
         let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
         let lost = share(self.overrun, self.offered);
-        if lost > TELLS {
+        if lost > EXPLAINING_SHARE {
             let offered = (self.offered as f64 / lasted_s.max(1e-3)) as u64;
             let enough = BAUDS.iter().find(|baud| *baud / 10 > offered).unwrap_or(&BAUDS[BAUDS.len() - 1]);
             return Some(format!(
@@ -78,14 +78,14 @@ impl SerialLink {
             ));
         }
         let damaged = share(self.writes_damaged, self.writes_sent);
-        (damaged > TELLS).then(|| {
+        (damaged > EXPLAINING_SHARE).then(|| {
             format!(
                 "its serial link damaged {:.0} % of what it carried, and damaged messages are dropped: {} of its bytes \
                  change; a simulation.serial_corruption of {:.0e} damages less than {:.0} %",
                 100.0 * damaged,
                 self.config.corruption as f32,
-                self.config.corruption * TELLS / damaged,
-                100.0 * TELLS
+                self.config.corruption * EXPLAINING_SHARE / damaged,
+                100.0 * EXPLAINING_SHARE
             )
         })
     }

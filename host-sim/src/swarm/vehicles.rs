@@ -11,13 +11,13 @@ use super::member::Member;
 use super::serial::SerialConfig;
 use crate::capacity::VEHICLES;
 use crate::flash::DeskFlash;
-use crate::mission::{ACCEL_MPS2, Mission};
+use crate::mission::{Mission, PLANNED_ACCEL_MPS2};
 use crate::scenario::Companion;
 
 /// Default range of a simulated radio, metres: a radio of this range reaches every vehicle.
 const DEFAULT_RANGE_M: f32 = 500.0;
 /// Least radio range that a companion may be given, metres.
-const RANGE_LEAST_M: f32 = 1.0;
+const MIN_RANGE_M: f32 = 1.0;
 
 /// The vehicles of a mission, each on its pad, in the order of the scenario.
 ///
@@ -96,9 +96,9 @@ pub fn companion_config(mission: &Mission, id: u8) -> anyhow::Result<Config<VEHI
     let geofence = scenario.mission.geofence.as_ref().map(|fence| (fence.min, fence.max));
     // The operator knows how far the radio reaches.
     let radio_range_m = match scenario.simulation.radio_range_m {
-        range_m if range_m < DEFAULT_RANGE_M => range_m.max(RANGE_LEAST_M),
+        range_m if range_m < DEFAULT_RANGE_M => range_m.max(MIN_RANGE_M),
         _ => REACHES_ALL_M,
     };
     let method = scenario.deconfliction.method;
-    Ok(Config { accel_mps2: ACCEL_MPS2, method, geofence, radio_range_m, ..config })
+    Ok(Config { accel_mps2: PLANNED_ACCEL_MPS2, method, geofence, radio_range_m, ..config })
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::crs::{Crs, System};
 use super::error::TerrainError;
-use super::limits::{MOST_BYTES, MOST_CELLS};
+use super::limits::{MAX_BYTES, MAX_CELLS};
 use super::raster::Raster;
 use crate::files;
 
@@ -13,10 +13,10 @@ const FORMAT: &str = "an ESRI grid";
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let length = files::regular(path)?;
-    if length > MOST_BYTES {
+    if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
-    let text = String::from_utf8(files::read(path, MOST_BYTES)?);
+    let text = String::from_utf8(files::read(path, MAX_BYTES)?);
     let text = text.map_err(|_| TerrainError::malformed(FORMAT, &"it is not text"))?;
     let beside = path.with_extension("prj");
     let crs = match beside.is_file() {
@@ -66,7 +66,7 @@ pub(super) fn parse(text: &str, crs: Crs) -> Result<Raster, TerrainError> {
     if !whole(columns) || !whole(rows) {
         return Err(bad("it has no cells"));
     }
-    if columns * rows > MOST_CELLS as f64 {
+    if columns * rows > MAX_CELLS as f64 {
         return Err(TerrainError::TooManyCells((columns * rows) as u128));
     }
     let cell = [need(cell[0], "cellsize")?, need(cell[1], "cellsize")?];

@@ -6,9 +6,9 @@
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Most chunks of a compressed cloud: 64 MB of entries.
-const MOST_CHUNKS: u32 = 1 << 22;
+const MAX_CHUNKS: u32 = 1 << 22;
 /// Number of the record that names the compressor.
-const COMPRESSOR: u64 = 22204;
+const COMPRESSOR_RECORD: u64 = 22204;
 
 /// Whether no size that a reader would take memory for is beyond the file. It reads from the beginning again.
 pub(super) fn check<R: Read + Seek>(file: &mut R) -> io::Result<Result<(), &'static str>> {
@@ -42,7 +42,7 @@ impl<R: Read + Seek> Numbers<'_, R> {
         let (mut at, count) = (self.at(94, 2)?, self.at(100, 4)?);
         for _ in 0..count.min(self.length / 54) {
             let (id, size) = (self.at(at + 18, 2)?, self.at(at + 20, 2)?);
-            if id == COMPRESSOR {
+            if id == COMPRESSOR_RECORD {
                 let items = self.at(at + 54 + 32, 2)?;
                 let (mut first, mut layers) = (0, 0);
                 for item in 0..items {
@@ -92,7 +92,7 @@ fn sizes<R: Read + Seek>(file: &mut R, length: u64) -> io::Result<Result<(), &'s
         table_at = numbers.at(length.saturating_sub(8), 8)?;
     }
     let chunks = numbers.at(table_at.saturating_add(4), 4)?;
-    if chunks > u64::from(MOST_CHUNKS) || chunks > length || table_at > length {
+    if chunks > u64::from(MAX_CHUNKS) || chunks > length || table_at > length {
         return Ok(Err("it has more chunks than bytes"));
     }
     let Some((first, layers)) = numbers.layers()? else { return Ok(Ok(())) };

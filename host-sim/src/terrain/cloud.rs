@@ -15,25 +15,25 @@ use super::error::TerrainError;
 use super::frame::{Frame, beside};
 use super::geokeys::GeoKeys;
 use super::grid::HeightGrid;
-use super::limits::MOST_BYTES;
+use super::limits::MAX_BYTES;
 use super::{claims, guard};
 use crate::files;
 
 const FORMAT: &str = "a point cloud";
 /// Mean number of returns in a cell.
-const RETURNS: f64 = 4.0;
+const RETURNS_PER_CELL: f64 = 4.0;
 /// Least side of a cell, metres.
-const LEAST_CELL_M: f64 = 0.5;
+const MIN_CELL_M: f64 = 0.5;
 /// Most cells without returns that are bridged.
-const REACH: usize = 3;
+const BRIDGED_CELLS: usize = 3;
 /// Returns read at a time.
-const BATCH: u64 = 4096;
+const RETURNS_PER_BATCH: u64 = 4096;
 /// Classes of returns that are errors: low points and high noise.
-const NOISE: [u8; 2] = [7, 18];
+const NOISE_CLASSES: [u8; 2] = [7, 18];
 
 pub(super) fn read(path: &Path, frame: &Frame<'_>) -> Result<HeightGrid, TerrainError> {
     let length = files::regular(path)?;
-    if length > MOST_BYTES {
+    if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
     decode(BufReader::new(File::open(path)?), frame)
@@ -64,14 +64,16 @@ where
     let most = reader.header().number_of_points();
     let mut count = 0;
     while count < most {
-        let read = reader.fill_points(BATCH.min(most - count), &mut points).map_err(|error| bad(&error))?;
+        let read = reader
+            .fill_points(RETURNS_PER_BATCH.min(most - count), &mut points)
+            .map_err(|error| bad(&error))?;
         if read == 0 {
             return Err(bad(&format!("it has {count} returns, its header says {most}")));
         }
         count += read;
         let places = points.x().zip(points.y()).zip(points.z()).zip(points.classification());
         for (((x, y), z), class) in places {
-            if NOISE.contains(&class) || !z.is_finite() {
+            if NOISE_CLASSES.contains(&class) || !z.is_finite() {
                 continue;
             }
             if let Some(place) = crs.to_mission(frame.origin, [x, y]) {
@@ -79,7 +81,7 @@ where
             }
         }
     }
-    grid.bridge(REACH);
+    grid.bridge(BRIDGED_CELLS);
     Ok(grid)
 }
 
@@ -122,7 +124,8 @@ fn empty(header: &Header, crs: &Crs, frame: &Frame<'_>) -> Result<HeightGrid, Te
         return HeightGrid::new([Flat::zeros(); 2], 1.0);
     };
     let sides = high - low;
-    let cell_m = (f64::from(sides.x) * f64::from(sides.y) * RETURNS / count as f64).sqrt().max(LEAST_CELL_M);
+    let cell_m =
+        (f64::from(sides.x) * f64::from(sides.y) * RETURNS_PER_CELL / count as f64).sqrt().max(MIN_CELL_M);
     let cell_m = cell_m as f32;
     // The last return is in a cell too.
     let half = Flat::repeat(cell_m / 2.0);

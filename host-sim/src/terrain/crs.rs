@@ -6,7 +6,7 @@ use planner_core::frames::{Geodetic, enu_to_geodetic, geodetic_to_enu};
 use proj4rs::Proj;
 use proj4rs::transform::transform;
 
-use super::error::{TerrainError, WARP};
+use super::error::{TerrainError, WARP_HINT};
 
 /// Metres in a foot.
 pub(super) const FOOT_M: f64 = 0.3048;
@@ -144,7 +144,7 @@ pub(super) fn unit_m(code: u16) -> Result<f64, TerrainError> {
         9001 => Ok(1.0),
         9002 => Ok(FOOT_M),
         9003 => Ok(US_FOOT_M),
-        other => Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP }),
+        other => Err(TerrainError::System { what: format!("units of EPSG:{other}"), hint: WARP_HINT }),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use super::limits::{MOST_BYTES, MOST_CELLS};
+use super::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted;
 
 /// Why a file gives no heights.
@@ -12,7 +12,7 @@ pub enum TerrainError {
     #[error("cannot be read: {0}")]
     Read(#[from] std::io::Error),
     /// The file is longer than is read.
-    #[error("cannot be read: it has {0} bytes, at most {MOST_BYTES} are read")]
+    #[error("cannot be read: it has {0} bytes, at most {MAX_BYTES} are read")]
     TooLong(u64),
     /// The file's name says nothing about its format.
     #[error("is in no known format: its name ends in none of .asc, .tif, .tiff, .las, .laz")]
@@ -37,7 +37,7 @@ pub enum TerrainError {
     #[error("does not say where it is; {0}")]
     Nowhere(&'static str),
     /// The file has too many cells, or the box would have.
-    #[error("has {0} cells here; at most {MOST_CELLS} are held")]
+    #[error("has {0} cells here; at most {MAX_CELLS} are held")]
     TooManyCells(u128),
     /// The requested box has no height.
     #[error("has no height here: {0} lies elsewhere, or holds none")]
@@ -45,7 +45,8 @@ pub enum TerrainError {
 }
 
 /// Hint of an error about a coordinate system.
-pub(super) const WARP: &str = "convert it: gdalwarp -t_srs EPSG:32630, with your zone, or pdal translate";
+pub(super) const WARP_HINT: &str =
+    "convert it: gdalwarp -t_srs EPSG:32630, with your zone, or pdal translate";
 
 impl TerrainError {
     pub(super) fn malformed(format: &'static str, why: &impl ToString) -> Self {
@@ -53,6 +54,6 @@ impl TerrainError {
     }
 
     pub(super) fn system(what: &str) -> Self {
-        Self::System { what: quoted(what), hint: WARP }
+        Self::System { what: quoted(what), hint: WARP_HINT }
     }
 }

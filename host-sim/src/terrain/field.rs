@@ -1,22 +1,22 @@
 //! The field that vehicles follow, made of a height map: `field.bin`.
 //!
-//! A node is the highest ground within [`STEPS`] of a cell and of what a vehicle may be beside its path; then nodes are
+//! A node is the highest ground within [`READ_AROUND_SAMPLE_CELLS`] of a cell and of what a vehicle may be beside its path; then nodes are
 //! raised until none is steeper than vehicles climb and descend at cruise speed. All of the box must have heights.
 
 use planner_core::coverage::Flat;
-use planner_core::field::{self, FieldShape, MAX_NODES, STEP_M};
+use planner_core::field::{self, FieldShape, HEIGHT_STEP_M, MAX_NODES};
 use thiserror::Error;
 
 use super::grid::HeightGrid;
 
 /// Reach of heights read around a path, in cells: samples of the path are half a cell apart, and
 /// the nodes of a sample lie within one cell of the sample.
-pub const STEPS: f32 = 1.5;
+pub const READ_AROUND_SAMPLE_CELLS: f32 = 1.5;
 /// Least side of a cell, metres.
-const LEAST_CELL_M: f32 = 2.0;
+const MIN_CELL_M: f32 = 2.0;
 /// Height steps by which neighbouring nodes may differ at the least: fewer would round the slope
 /// away.
-const LEAST_RISE: f32 = 5.0;
+const MIN_RISE_STEPS: f32 = 5.0;
 
 /// Why there is no field.
 #[derive(Clone, Copy, Debug, Error, PartialEq)]
@@ -48,22 +48,22 @@ impl FieldConfig {
     /// metres.
     fn around_m(&self, cell_m: f32, own_cell_m: f32) -> f32 {
         // A height map's cell holds what is within one of its cells.
-        STEPS * cell_m + self.reach_m + own_cell_m
+        READ_AROUND_SAMPLE_CELLS * cell_m + self.reach_m + own_cell_m
     }
 
     /// Distance from node to node over a map of fine cells, metres.
     fn least_cell_m(&self) -> f32 {
         let sides = self.area[1] - self.area[0];
-        let rise = LEAST_RISE * STEP_M * std::f32::consts::SQRT_2 / self.slope;
+        let rise = MIN_RISE_STEPS * HEIGHT_STEP_M * std::f32::consts::SQRT_2 / self.slope;
         let fits = (sides.x * sides.y / (MAX_NODES as f32 * 0.9)).sqrt();
         // A long and narrow box has a border of nodes more.
         let long = sides.amax() / (MAX_NODES as f32 / 8.0);
-        LEAST_CELL_M.max(rise).max(fits).max(long)
+        MIN_CELL_M.max(rise).max(fits).max(long)
     }
 
     /// The box of heights that a field needs, but for the map's cells that are read around any box.
     pub fn window(&self) -> [Flat; 2] {
-        let beyond = Flat::repeat((STEPS + 1.0) * self.least_cell_m() + self.reach_m);
+        let beyond = Flat::repeat((READ_AROUND_SAMPLE_CELLS + 1.0) * self.least_cell_m() + self.reach_m);
         [self.area[0] - beyond, self.area[1] + beyond]
     }
 }
@@ -91,7 +91,7 @@ pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldEr
                 Some(height_m) if !found.holes => height_m,
                 _ => return Err(FieldError::Hole(place.x, place.y)),
             };
-            let node_dm = (height_m / STEP_M - 1e-3).ceil();
+            let node_dm = (height_m / HEIGHT_STEP_M - 1e-3).ceil();
             if node_dm.abs() > f32::from(i16::MAX) {
                 return Err(FieldError::High(height_m));
             }
@@ -99,7 +99,7 @@ pub fn field(grid: &HeightGrid, config: &FieldConfig) -> Result<Vec<u8>, FieldEr
         }
     }
     // Along one of the axes: a slope across both is steeper by the square root of two.
-    let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / STEP_M + 1e-3) as i32;
+    let most = (config.slope * cell_m / std::f32::consts::SQRT_2 / HEIGHT_STEP_M + 1e-3) as i32;
     flatten(&mut nodes_dm, columns, most.clamp(1, i32::from(i16::MAX)));
     let mut bytes = vec![0; shape.encoded_len()];
     field::write(&shape, &nodes_dm, &mut bytes).map_err(|_| FieldError::Shape)?;

@@ -16,10 +16,10 @@ pub struct Frame<'a> {
 }
 
 /// Cells read around a window.
-const BESIDE: f32 = 5.0;
+const WINDOW_BORDER_CELLS: f32 = 5.0;
 
 /// A window and the cells around it.
 pub(super) fn beside([low, high]: [Flat; 2], cell_m: f32) -> [Flat; 2] {
-    let beyond = Flat::repeat(BESIDE * cell_m);
+    let beyond = Flat::repeat(WINDOW_BORDER_CELLS * cell_m);
     [low - beyond, high + beyond]
 }

@@ -1,7 +1,7 @@
 //! The keys by which GeoTIFF, and point clouds before LAS 1.4, say where their numbers are.
 
 use super::crs::{Crs, System, unit_m};
-use super::error::{TerrainError, WARP};
+use super::error::{TerrainError, WARP_HINT};
 
 const MODEL: u16 = 1024;
 const RASTER: u16 = 1025;
@@ -60,7 +60,7 @@ impl GeoKeys {
             && (said - known).abs() > 1e-6
         {
             let what = format!("units of {said} m, its coordinate system in units of {known} m");
-            return Err(TerrainError::System { what, hint: WARP });
+            return Err(TerrainError::System { what, hint: WARP_HINT });
         }
         Ok(Crs::Said(Box::new(system)))
     }

@@ -11,17 +11,17 @@ use tiff::{ColorType, TiffError};
 use super::crs::Crs;
 use super::error::TerrainError;
 use super::geokeys::GeoKeys;
-use super::limits::{MOST_BYTES, MOST_CELLS};
+use super::limits::{MAX_BYTES, MAX_CELLS};
 use super::raster::Raster;
 use crate::files;
 
 const FORMAT: &str = "a GeoTIFF";
 /// Longest strip or tile, bytes.
-const MOST_CHUNK: usize = 1 << 27;
+const MAX_CHUNK: usize = 1 << 27;
 
 pub(super) fn read(path: &Path) -> Result<Raster, TerrainError> {
     let length = files::regular(path)?;
-    if length > MOST_BYTES {
+    if length > MAX_BYTES {
         return Err(TerrainError::TooLong(length));
     }
     decode(BufReader::new(File::open(path)?))
@@ -40,13 +40,13 @@ fn malformed(error: TiffError) -> TerrainError {
 
 pub(super) fn decode<R: Read + Seek>(file: R) -> Result<Raster, TerrainError> {
     let mut limits = Limits::default();
-    limits.decoding_buffer_size = MOST_CHUNK;
-    limits.intermediate_buffer_size = MOST_CHUNK;
+    limits.decoding_buffer_size = MAX_CHUNK;
+    limits.intermediate_buffer_size = MAX_CHUNK;
     limits.ifd_value_size = 1 << 24;
     let mut decoder = Decoder::new(file).map_err(malformed)?.with_limits(limits);
     let (columns, rows) = decoder.dimensions().map_err(malformed)?;
     let (columns, rows) = (columns as usize, rows as usize);
-    if columns.saturating_mul(rows) > MOST_CELLS {
+    if columns.saturating_mul(rows) > MAX_CELLS {
         return Err(TerrainError::TooManyCells(columns as u128 * rows as u128));
     }
     if columns == 0 || rows == 0 {

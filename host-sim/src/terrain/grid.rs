@@ -3,7 +3,7 @@
 use planner_core::coverage::Flat;
 
 use super::error::TerrainError;
-use super::limits::MOST_CELLS;
+use super::limits::MAX_CELLS;
 
 /// Heights of the ground. Cell (0, 0) has the least east and north.
 #[derive(Clone, Debug, PartialEq)]
@@ -39,7 +39,7 @@ impl HeightGrid {
         }
         let count = |side: f32| (f64::from(side) / f64::from(cell_m)).ceil().max(1.0);
         let (columns, rows) = (count(sides.x), count(sides.y));
-        if columns * rows > MOST_CELLS as f64 {
+        if columns * rows > MAX_CELLS as f64 {
             return Err(TerrainError::TooManyCells((columns * rows) as u128));
         }
         let size = [columns as usize, rows as usize];

@@ -1,6 +1,6 @@
 //! How large files of heights may be.
 
 /// Longest file read, bytes.
-pub const MOST_BYTES: u64 = 1 << 28;
+pub const MAX_BYTES: u64 = 1 << 28;
 /// Most cells of a file or a grid: 128 MB of heights.
-pub const MOST_CELLS: usize = 1 << 25;
+pub const MAX_CELLS: usize = 1 << 25;

@@ -29,7 +29,7 @@ pub use self::error::TerrainError;
 pub use self::field::{FieldConfig, FieldError, field};
 pub use self::frame::Frame;
 pub use self::grid::{HeightGrid, Heights};
-pub use self::limits::{MOST_BYTES, MOST_CELLS};
+pub use self::limits::{MAX_BYTES, MAX_CELLS};
 use crate::quote::quoted_path;
 
 /// Reads a file of heights.

@@ -8,17 +8,17 @@
 use std::time::{Duration, Instant as Clock};
 
 /// First and shortest timeout, seconds: a companion that plans answers later than one that rests.
-const SHORTEST_S: f32 = 0.4;
+const MIN_TIMEOUT_S: f32 = 0.4;
 /// Longest timeout, seconds: MAVLink FTP servers recognise a repeated request for a few seconds,
 /// ours for at least three.
-const LONGEST_S: f32 = 2.0;
+const MAX_TIMEOUT_S: f32 = 2.0;
 /// Weights of a new round trip and of its deviation, and number of deviations added to the timeout
 /// (section 2).
-const GAIN: f32 = 0.125;
+const ROUND_TRIP_GAIN: f32 = 0.125;
 const DEVIATION_GAIN: f32 = 0.25;
 const DEVIATIONS: f32 = 4.0;
 /// Most requests under way at once: the companion keeps six.
-const UNDER_WAY: usize = 4;
+const MAX_UNDER_WAY: usize = 4;
 
 /// Retransmission timeout and window of one link.
 pub struct Retransmission {
@@ -35,9 +35,9 @@ impl Retransmission {
     pub fn new(now: Clock) -> Self {
         Self {
             round_trip: None,
-            wait: Duration::from_secs_f32(SHORTEST_S),
+            wait: Duration::from_secs_f32(MIN_TIMEOUT_S),
             doubled_at: now,
-            window: UNDER_WAY,
+            window: MAX_UNDER_WAY,
         }
     }
 
@@ -50,7 +50,7 @@ impl Retransmission {
     pub fn is_over(&mut self, sent_at: Clock, now: Clock) -> bool {
         let over = now.saturating_duration_since(sent_at) > self.wait;
         if over && sent_at >= self.doubled_at {
-            self.wait = (2 * self.wait).min(Duration::from_secs_f32(LONGEST_S));
+            self.wait = (2 * self.wait).min(Duration::from_secs_f32(MAX_TIMEOUT_S));
             self.doubled_at = now;
             self.window = (self.window / 2).max(1);
         }
@@ -63,14 +63,14 @@ impl Retransmission {
         let (smoothed_s, deviation_s) = match self.round_trip {
             None => (time_s, 0.5 * time_s),
             Some((smoothed_s, deviation_s)) => (
-                smoothed_s + GAIN * (time_s - smoothed_s),
+                smoothed_s + ROUND_TRIP_GAIN * (time_s - smoothed_s),
                 deviation_s + DEVIATION_GAIN * ((time_s - smoothed_s).abs() - deviation_s),
             ),
         };
         self.round_trip = Some((smoothed_s, deviation_s));
-        let wait_s = (smoothed_s + DEVIATIONS * deviation_s).clamp(SHORTEST_S, LONGEST_S);
+        let wait_s = (smoothed_s + DEVIATIONS * deviation_s).clamp(MIN_TIMEOUT_S, MAX_TIMEOUT_S);
         self.wait = Duration::from_secs_f32(wait_s);
-        self.window = (self.window + 1).min(UNDER_WAY);
+        self.window = (self.window + 1).min(MAX_UNDER_WAY);
     }
 }
 

@@ -4,7 +4,7 @@
 //! the inner loop has no test for it: its reduced costs come out infinite. Both are kept aside and put back at the end.
 
 use super::costs::Costs;
-use super::state::{LANES, NONE, Paths, State};
+use super::state::{Paths, SIMD_LANES, State, UNASSIGNED};
 
 /// Serves the free row number `k`. False if no path leads to a free column.
 pub(super) fn from_one(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, k: usize) -> bool {
@@ -18,7 +18,7 @@ pub(super) fn from_one(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Pat
 pub(super) fn from_all(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>) -> bool {
     paths.distance.fill(f64::INFINITY);
     let mut least = f64::INFINITY;
-    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == NONE) {
+    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
         least = relax(costs.row(row, state.row), state.price, 0.0, row, paths);
     }
     shortest(costs, state, paths, least)
@@ -61,29 +61,29 @@ fn shortest(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_>, mut
 
 /// `distance = min(distance, cost - price - offset)` over all columns; returns the least distance.
 fn relax(line: &[f32], price: &[f64], offset: f64, row: u16, paths: &mut Paths<'_>) -> f64 {
-    let (lines, line_rest) = line.as_chunks::<LANES>();
-    let (prices, price_rest) = price.as_chunks::<LANES>();
-    let (distances, distance_rest) = paths.distance.as_chunks_mut::<LANES>();
-    let (previous, previous_rest) = paths.previous.as_chunks_mut::<LANES>();
-    let mut least = [f64::INFINITY; LANES];
+    let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
+    let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
+    let (distances, distance_rest) = paths.distance.as_chunks_mut::<SIMD_LANES>();
+    let (previous, previous_rest) = paths.previous.as_chunks_mut::<SIMD_LANES>();
+    let mut least = [f64::INFINITY; SIMD_LANES];
     for (((line, price), distance), previous) in lines.iter().zip(prices).zip(distances).zip(previous) {
         // Whole chunks in, whole chunks out, and selects within: so the compiler makes vectors of the lanes, and nothing
         // is mispredicted.
-        let (mut nearest, mut through) = (*distance, [0.0; LANES]);
-        for lane in 0..LANES {
+        let (mut nearest, mut through) = (*distance, [0.0; SIMD_LANES]);
+        for lane in 0..SIMD_LANES {
             through[lane] = f64::from(line[lane]) - price[lane] - offset;
         }
-        let mut nearer = [0_u16; LANES];
-        for lane in 0..LANES {
+        let mut nearer = [0_u16; SIMD_LANES];
+        for lane in 0..SIMD_LANES {
             nearer[lane] = if through[lane] < nearest[lane] { u16::MAX } else { 0 };
             nearest[lane] = if through[lane] < nearest[lane] { through[lane] } else { nearest[lane] };
         }
-        for lane in 0..LANES {
+        for lane in 0..SIMD_LANES {
             least[lane] = if nearest[lane] < least[lane] { nearest[lane] } else { least[lane] };
         }
         *distance = nearest;
         let mut from = *previous;
-        for lane in 0..LANES {
+        for lane in 0..SIMD_LANES {
             from[lane] = (from[lane] & !nearer[lane]) | (row & nearer[lane]);
         }
         *previous = from;
@@ -112,7 +112,7 @@ fn nearest(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> N
     let mut offer = |first: usize, distances: &[f64]| {
         for (k, _) in distances.iter().enumerate().filter(|(_, d)| **d == least) {
             let col = (first + k) as u16;
-            if row_of[first + k] == NONE {
+            if row_of[first + k] == UNASSIGNED {
                 return Some(col);
             }
             queue[count] = col;
@@ -120,10 +120,10 @@ fn nearest(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> N
         }
         None
     };
-    let (chunks, rest) = distance.as_chunks::<LANES>();
+    let (chunks, rest) = distance.as_chunks::<SIMD_LANES>();
     for (chunk, distances) in chunks.iter().enumerate() {
         if distances.iter().fold(false, |any, &d| any | (d == least))
-            && let Some(free) = offer(chunk * LANES, distances)
+            && let Some(free) = offer(chunk * SIMD_LANES, distances)
         {
             return Nearest::Free(free);
         }
@@ -137,7 +137,7 @@ fn nearest(distance: &[f64], row_of: &[u16], least: f64, queue: &mut [u16]) -> N
 /// Gives each column on the path to the row it was reached from.
 fn flip(state: &mut State<'_>, previous: &[u16], end: u16) {
     let mut col = end;
-    while col != NONE {
+    while col != UNASSIGNED {
         let row = previous[usize::from(col)];
         let released = state.col_of[usize::from(row)];
         state.join(row, col);
@@ -156,7 +156,7 @@ pub(super) fn from_all_bottleneck(
     let done = &mut *paths.settled_price;
     done.fill(0.0);
     paths.distance.fill(f64::INFINITY);
-    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == NONE) {
+    for row in (0..costs.rows as u16).filter(|&row| state.col_of[usize::from(row)] == UNASSIGNED) {
         relax_largest(
             costs.row(row, state.row),
             f64::NEG_INFINITY,

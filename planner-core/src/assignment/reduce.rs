@@ -1,10 +1,10 @@
 //! The cheap first phases of Jonker–Volgenant: most rows find their column here.
 
 use super::costs::Costs;
-use super::state::{LANES, NONE, Paths, State};
+use super::state::{Paths, SIMD_LANES, State, UNASSIGNED};
 
 /// Columns of a large matrix that are reduced together: four cache lines of each row.
-const WIDE: usize = 64;
+const BLOCK_COLUMNS: usize = 64;
 
 /// Column reduction (square matrices only: it prices columns that would have to stay at 0 when left over), then two
 /// rounds of augmenting row reduction. Returns how many rows are left in `state.free`, or `None` if some row or, in a
@@ -32,9 +32,9 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
     // Many columns at a time, the last perhaps partly again: the fewer passes over the rows of a large matrix, the fewer
     // cache misses. A small one has no room for so many.
     match costs.cols {
-        0..LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
-        LANES..WIDE => cheapest_rows_by::<LANES>(costs, state.price, paths.previous),
-        _ => cheapest_rows_by::<WIDE>(costs, state.price, paths.previous),
+        0..SIMD_LANES => cheapest_rows_by::<1>(costs, state.price, paths.previous),
+        SIMD_LANES..BLOCK_COLUMNS => cheapest_rows_by::<SIMD_LANES>(costs, state.price, paths.previous),
+        _ => cheapest_rows_by::<BLOCK_COLUMNS>(costs, state.price, paths.previous),
     }
     if state.price.contains(&f64::INFINITY) {
         return None;
@@ -44,7 +44,7 @@ fn reduce_columns(costs: &Costs<'_>, state: &mut State<'_>, paths: &mut Paths<'_
     for col in (0..costs.cols as u16).rev() {
         let row = paths.previous[usize::from(col)];
         paths.settled[usize::from(row)] += 1;
-        if state.col_of[usize::from(row)] == NONE {
+        if state.col_of[usize::from(row)] == UNASSIGNED {
             state.join(row, col);
         }
     }
@@ -92,11 +92,11 @@ fn cheapest_rows<const K: usize>(costs: &Costs<'_>, first: usize, price: &mut [f
 }
 
 fn least_reduced(line: &[f32], price: &[f64]) -> f64 {
-    let (lines, line_rest) = line.as_chunks::<LANES>();
-    let (prices, price_rest) = price.as_chunks::<LANES>();
-    let mut least = [f64::INFINITY; LANES];
+    let (lines, line_rest) = line.as_chunks::<SIMD_LANES>();
+    let (prices, price_rest) = price.as_chunks::<SIMD_LANES>();
+    let mut least = [f64::INFINITY; SIMD_LANES];
     for (line, price) in lines.iter().zip(prices) {
-        for lane in 0..LANES {
+        for lane in 0..SIMD_LANES {
             let reduced = f64::from(line[lane]) - price[lane];
             least[lane] = if reduced < least[lane] { reduced } else { least[lane] };
         }
@@ -130,12 +130,12 @@ fn reduce_rows(costs: &Costs<'_>, state: &mut State<'_>, rows_in: usize) -> Opti
         let falls = price < state.price[usize::from(col)] && budget > 0;
         if falls {
             state.price[usize::from(col)] = price;
-        } else if state.row_of[usize::from(col)] != NONE && two.second == two.least {
+        } else if state.row_of[usize::from(col)] != UNASSIGNED && two.second == two.least {
             col = two.second_col;
         }
         let evicted = state.row_of[usize::from(col)];
-        if evicted != NONE {
-            state.col_of[usize::from(evicted)] = NONE;
+        if evicted != UNASSIGNED {
+            state.col_of[usize::from(evicted)] = UNASSIGNED;
             if falls {
                 at -= 1;
                 budget -= 1;
@@ -160,20 +160,21 @@ struct Two {
 
 impl Two {
     fn cheapest(line: &[f32], price: &[f64]) -> Self {
-        let mut two = Self { least: f64::INFINITY, second: f64::INFINITY, col: NONE, second_col: NONE };
+        let mut two =
+            Self { least: f64::INFINITY, second: f64::INFINITY, col: UNASSIGNED, second_col: UNASSIGNED };
         // The first few decide the second cheapest roughly; after them most chunks hold nothing below it, which eight
         // subtractions and compares tell without a branch within.
-        let head = line.len().min(2 * LANES);
+        let head = line.len().min(2 * SIMD_LANES);
         two.offer(0, &line[..head], &price[..head]);
-        let (lines, line_rest) = line[head..].as_chunks::<LANES>();
-        let (prices, price_rest) = price[head..].as_chunks::<LANES>();
+        let (lines, line_rest) = line[head..].as_chunks::<SIMD_LANES>();
+        let (prices, price_rest) = price[head..].as_chunks::<SIMD_LANES>();
         for (chunk, (line, price)) in lines.iter().zip(prices).enumerate() {
             let mut below = 0;
-            for lane in 0..LANES {
+            for lane in 0..SIMD_LANES {
                 below |= u64::from(f64::from(line[lane]) - price[lane] < two.second);
             }
             if below != 0 {
-                two.offer(head + chunk * LANES, line, price);
+                two.offer(head + chunk * SIMD_LANES, line, price);
             }
         }
         two.offer(line.len() - line_rest.len(), line_rest, price_rest);

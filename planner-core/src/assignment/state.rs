@@ -1,10 +1,10 @@
 //! The matching so far, and the memory of one search.
 
 /// Index that means "not assigned".
-pub(super) const NONE: u16 = u16::MAX;
+pub(super) const UNASSIGNED: u16 = u16::MAX;
 /// Columns handled together; enough for the widest vector registers, small enough to stay in
 /// registers.
-pub(super) const LANES: usize = 8;
+pub(super) const SIMD_LANES: usize = 8;
 
 /// Dual prices and the matching so far, sides swapped so that there are never more rows than columns.
 pub(super) struct State<'w> {
@@ -20,8 +20,8 @@ pub(super) struct State<'w> {
 impl State<'_> {
     pub(super) fn reset(&mut self) {
         self.price.fill(0.0);
-        self.row_of.fill(NONE);
-        self.col_of.fill(NONE);
+        self.row_of.fill(UNASSIGNED);
+        self.col_of.fill(UNASSIGNED);
     }
 
     pub(super) fn join(&mut self, row: u16, col: u16) {

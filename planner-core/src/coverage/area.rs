@@ -11,10 +11,10 @@ use super::Flat;
 /// Furthest coordinate, metres: at 100 km f32 steps by 8 mm.
 pub const MAX_VERTEX_M: f32 = 150_000.0;
 /// Two vertices nearer than this are one vertex, metres.
-pub const SAME_M: f32 = 1e-3;
+pub const SAME_VERTEX_M: f32 = 1e-3;
 /// Two edges cross if each reaches at least this far beyond the other, metres: neighbouring fields
 /// share borders, and coordinates are rounded.
-const CROSSING_M: f64 = 0.01;
+const MIN_CROSSING_M: f64 = 0.01;
 
 /// Kind of the region that a ring encloses.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,7 +201,7 @@ impl<'a> Area<'a> {
     fn check_duplicates(&self) -> Result<(), AreaError> {
         let mut start = 0;
         for (_, ring) in self.each() {
-            if let Some(k) = edges_of(ring).position(|(a, b)| (b - a).amax() < SAME_M) {
+            if let Some(k) = edges_of(ring).position(|(a, b)| (b - a).amax() < SAME_VERTEX_M) {
                 return Err(AreaError::Duplicate { vertex: (start + (k + 1) % ring.len()) as u16 });
             }
             start += ring.len();
@@ -211,8 +211,9 @@ impl<'a> Area<'a> {
 
     fn check_sizes(&self) -> Result<(), AreaError> {
         // A strip as long as half its border and a millimetre wide.
-        let is_flat =
-            |(_, ring): (_, &[Flat])| fabs(signed_area(ring)) < perimeter(ring) * f64::from(SAME_M) / 2.0;
+        let is_flat = |(_, ring): (_, &[Flat])| {
+            fabs(signed_area(ring)) < perimeter(ring) * f64::from(SAME_VERTEX_M) / 2.0
+        };
         match self.each().position(is_flat) {
             Some(ring) => Err(AreaError::NoArea { ring: ring as u16 }),
             None => Ok(()),
@@ -315,7 +316,7 @@ fn inner_place(ring: &[Flat]) -> Flat {
     best.1
 }
 
-/// Whether the segments `a b` and `c d` cross, each reaching at least [`CROSSING_M`] beyond the other.
+/// Whether the segments `a b` and `c d` cross, each reaching at least [`MIN_CROSSING_M`] beyond the other.
 fn cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
     let apart = |p: f32, q: f32, r: f32, s: f32| {
         libm::fmaxf(p, q) < libm::fminf(r, s) || libm::fmaxf(r, s) < libm::fminf(p, q)
@@ -327,7 +328,7 @@ fn cross(a: &Flat, b: &Flat, c: &Flat, d: &Flat) -> bool {
         let along = to - from;
         let length = sqrt(cross_f64(&along, &Flat::new(-along.y, along.x)));
         let (p, q) = (cross_f64(&along, &(p - from)), cross_f64(&along, &(q - from)));
-        p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > CROSSING_M * length
+        p * q < 0.0 && libm::fmin(fabs(p), fabs(q)) > MIN_CROSSING_M * length
     };
     beyond(a, b, c, d) && beyond(c, d, a, b)
 }

@@ -19,24 +19,24 @@ use crate::flight::{Path, PathError, Task, VehiclePlan};
 use crate::search::SearchError;
 
 /// Most places of the visibility graph.
-const PLACES: usize = 320;
+const MAX_PLACES: usize = 320;
 /// Corners of the polygon around an end of a keep-out zone's axis.
-const CORNERS: usize = 8;
+const CORNERS_PER_END: usize = 8;
 /// Radius of those corners, as a share of the distance to keep: the line between two neighbouring
 /// corners still keeps that distance.
-const OUTWARD: f32 = 1.09;
+const CORNER_RADIUS_SHARE: f32 = 1.09;
 /// Rounding added to the radius of the corners, metres.
-const OUTWARD_M: f32 = 0.05;
+const CORNER_ROUNDING_M: f32 = 0.05;
 /// Two corners nearer than this are one place, metres.
 const SAME_CORNER_M: f32 = 0.01;
 /// Most height samples of one leg: on a longer leg the samples are further apart.
-const MOST_SAMPLES: f32 = 65_536.0;
+const MAX_LEG_SAMPLES: f32 = 65_536.0;
 /// Least height of a leg above the field, metres; a leg straight up or down is exempt.
-const OVER_FIELD_M: f32 = 1.5;
+const MIN_HEIGHT_OVER_FIELD_M: f32 = 1.5;
 /// Rings around a vehicle on which a landing place aside is sought, a metre apart.
-const RINGS: usize = 20;
+const MAX_SIDESTEP_RINGS: usize = 20;
 /// Directions on each ring in which a landing place aside is sought.
-const DIRECTIONS: usize = 16;
+const SIDESTEP_DIRECTIONS: usize = 16;
 
 /// Zones, ground and things that no leg meets.
 struct Clear<'a, 't, const N: usize> {
@@ -68,10 +68,10 @@ impl<const N: usize> Clear<'_, '_, N> {
         if length_m < SAME_CORNER_M {
             return true;
         }
-        let count = fminf(ceilf(2.0 * length_m / field.shape().cell_m), MOST_SAMPLES) as u32;
+        let count = fminf(ceilf(2.0 * length_m / field.shape().cell_m), MAX_LEG_SAMPLES) as u32;
         (0..=count).all(|sample| {
             let place = a + step * (sample as f32 / count as f32);
-            place.z >= field.height_at(&place.xy()) + OVER_FIELD_M
+            place.z >= field.height_at(&place.xy()) + MIN_HEIGHT_OVER_FIELD_M
         })
     }
 }
@@ -142,28 +142,34 @@ pub fn plan_vehicle<const N: usize, const W: usize, const G: usize>(
 /// The nearest place to rest at that is reached straight.
 fn aside<const N: usize>(clear: &Clear<'_, '_, N>) -> Option<Point> {
     let here = clear.here;
-    let step = core::f32::consts::TAU / DIRECTIONS as f32;
+    let step = core::f32::consts::TAU / SIDESTEP_DIRECTIONS as f32;
     let place = |i: usize| {
-        let (far_m, angle) = ((i / DIRECTIONS + 1) as f32, (i % DIRECTIONS) as f32 * step);
+        let (far_m, angle) = ((i / SIDESTEP_DIRECTIONS + 1) as f32, (i % SIDESTEP_DIRECTIONS) as f32 * step);
         here + Point::new(cosf(angle), sinf(angle), 0.0) * far_m
     };
     let rests = |place: &Point| {
         !clear.transit.forbids(&place.xy()) && !clear.obstacles.iter().any(|obstacle| obstacle.holds(place))
     };
-    (0..RINGS * DIRECTIONS).map(place).find(|place| rests(place) && clear.leg(&here, place))
+    (0..MAX_SIDESTEP_RINGS * SIDESTEP_DIRECTIONS)
+        .map(place)
+        .find(|place| rests(place) && clear.leg(&here, place))
 }
 
 /// Places at one height, and the shortest ways found to them so far.
 struct Graph {
-    places: Vec<Flat, PLACES>,
-    far_m: [f32; PLACES],
-    before: [u16; PLACES],
-    ended: [bool; PLACES],
+    places: Vec<Flat, MAX_PLACES>,
+    far_m: [f32; MAX_PLACES],
+    before: [u16; MAX_PLACES],
+    ended: [bool; MAX_PLACES],
 }
 
 impl Graph {
-    const EMPTY: Self =
-        Self { places: Vec::new(), far_m: [0.0; PLACES], before: [0; PLACES], ended: [false; PLACES] };
+    const EMPTY: Self = Self {
+        places: Vec::new(),
+        far_m: [0.0; MAX_PLACES],
+        before: [0; MAX_PLACES],
+        ended: [false; MAX_PLACES],
+    };
 
     /// The shortest way between two places of one height: all its points but the first, none where it stays. Whether there is one.
     fn search<const N: usize, const W: usize>(
@@ -174,20 +180,20 @@ impl Graph {
         points: &mut Vec<Point, W>,
     ) -> Result<bool, DetourError> {
         /// Index of the path's start in the visibility graph.
-        const HERE: usize = 0;
+        const START_NODE: usize = 0;
         /// Index of the path's end in the visibility graph.
-        const THERE: usize = 1;
+        const END_NODE: usize = 1;
         let height_m = from.z;
         self.gather(clear, from, to);
         let level = |place: &Flat| Point::new(place.x, place.y, height_m);
         self.far_m.fill(f32::INFINITY);
         self.ended.fill(false);
-        self.far_m[HERE] = 0.0;
+        self.far_m[START_NODE] = 0.0;
         loop {
             let open = (0..self.places.len()).filter(|&i| !self.ended[i] && self.far_m[i].is_finite());
             let whole = |i: usize| self.far_m[i] + (self.places[i] - to.xy()).norm();
             let Some(next) = open.min_by(|&a, &b| whole(a).total_cmp(&whole(b))) else { return Ok(false) };
-            if next == THERE {
+            if next == END_NODE {
                 break;
             }
             self.ended[next] = true;
@@ -200,8 +206,8 @@ impl Graph {
                 }
             }
         }
-        let mut at = THERE;
-        while at != HERE {
+        let mut at = END_NODE;
+        while at != START_NODE {
             points.push(level(&self.places[at])).map_err(|_| DetourError::Path(PathError::PathFull))?;
             at = usize::from(self.before[at]);
         }
@@ -217,7 +223,7 @@ impl Graph {
         add(from.xy());
         add(to.xy());
         clear.transit.corners().iter().for_each(|corner| add(*corner));
-        let step = core::f32::consts::TAU / CORNERS as f32;
+        let step = core::f32::consts::TAU / CORNERS_PER_END as f32;
         for obstacle in clear.obstacles {
             let (low_m, high_m) = match obstacle.from.z < obstacle.to.z {
                 true => (obstacle.from.z, obstacle.to.z),
@@ -227,11 +233,11 @@ impl Graph {
             if beside_m > obstacle.radius_m {
                 continue;
             }
-            let far_m = obstacle.radius_m * OUTWARD + OUTWARD_M;
+            let far_m = obstacle.radius_m * CORNER_RADIUS_SHARE + CORNER_ROUNDING_M;
             let twice = (obstacle.from - obstacle.to).xy().norm() > SAME_CORNER_M;
             let ends = [Some(obstacle.from), twice.then_some(obstacle.to)];
             for end in ends.into_iter().flatten() {
-                for i in 0..CORNERS {
+                for i in 0..CORNERS_PER_END {
                     let angle = i as f32 * step;
                     let place = end.xy() + Flat::new(cosf(angle), sinf(angle)) * far_m;
                     if !clear.transit.forbids(&place) {

@@ -12,14 +12,14 @@ use super::pack::Work;
 use crate::sort;
 
 /// Most vehicles that the bound distinguishes.
-const MOST: usize = 32;
+const MAX_VEHICLES: usize = 32;
 
 /// The bound, seconds.
 ///
 /// # Errors
 /// As [`Work::check`] for at most 32 vehicles.
 pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> Result<f32, CoverageError> {
-    work.check::<MOST>()?;
+    work.check::<MAX_VEHICLES>()?;
     let fastest = |speed: fn(&super::pack::Vehicle) -> f32| work.vehicles.iter().map(speed).fold(0.0, fmaxf);
     let cruise_mps = fastest(|v| v.cruise_mps);
     let vertical = |layer: u8| {
@@ -28,7 +28,7 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
     };
     let mut longest = Largest::new();
     let mut furthest_s: f32 = 0.0;
-    let mut nearest_m = [f32::INFINITY; MOST];
+    let mut nearest_m = [f32::INFINITY; MAX_VEHICLES];
     for lane in work.tracks.lanes() {
         let step = lane.length_m() / fmaxf((lane.count - 1) as f32, 1.0);
         for k in 0..lane.count {
@@ -63,17 +63,17 @@ pub fn lower_bound_s<const L: usize, const N: usize>(work: &Work<'_, L, N>) -> R
 
 /// The largest of many numbers, falling.
 struct Largest {
-    values: [f32; MOST],
+    values: [f32; MAX_VEHICLES],
 }
 
 impl Largest {
     fn new() -> Self {
-        Self { values: [0.0; MOST] }
+        Self { values: [0.0; MAX_VEHICLES] }
     }
 
     fn take(&mut self, value: f32) {
         let at = self.values.partition_point(|held| *held >= value);
-        if at < MOST {
+        if at < MAX_VEHICLES {
             self.values[at..].rotate_right(1);
             self.values[at] = value;
         }

@@ -4,7 +4,7 @@
 //! Whether all can be done within T seconds is a dynamic program. `reach[vehicles][layers]` is the most waypoints, counted
 //! from the first, that these vehicles in these layers can photograph within T. A route's cost falls neither if it ends
 //! later nor if it begins earlier, by the triangle inequality; so each step takes as much as fits, which two pointers find
-//! for every beginning at once. T is halved down to [`RESOLUTION`].
+//! for every beginning at once. T is halved down to [`TIME_RESOLUTION`].
 //!
 //! Cost: a few dozen rounds of Σ C(K, m)² · (K − m)² steps, m to K, and K² · n for the pointers.
 
@@ -12,9 +12,9 @@ use super::CoverageError;
 use super::pack::{PackWorkspace, Plan, Route, Work, binpat, set_costs};
 
 /// Most vehicles of an exact division.
-pub const MOST_VEHICLES: usize = 10;
+pub const MAX_EXACT_VEHICLES: usize = 10;
 /// Relative resolution to which the mission time T is found.
-pub const RESOLUTION: f32 = 1e-5;
+pub const TIME_RESOLUTION: f32 = 1e-5;
 
 /// Memory lent: lengths by [`Workspace::lengths`].
 pub struct Workspace<'a> {
@@ -29,7 +29,7 @@ pub struct Workspace<'a> {
 impl Workspace<'_> {
     /// Lengths of the three for so many vehicles and waypoints: the greatest number there is where no memory has so much.
     pub fn lengths(vehicles: usize, waypoints: usize) -> [usize; 3] {
-        let vehicles = vehicles.min(MOST_VEHICLES);
+        let vehicles = vehicles.min(MAX_EXACT_VEHICLES);
         let reaches = (vehicles * vehicles).saturating_mul(waypoints.saturating_add(1));
         [(2 * vehicles).saturating_mul(waypoints), reaches, 1 << (2 * vehicles)]
     }
@@ -38,7 +38,7 @@ impl Workspace<'_> {
 /// The best plan there is.
 ///
 /// # Errors
-/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MOST_VEHICLES`]; [`CoverageError::WorkspaceTooSmall`].
+/// As [`binpat`]; [`CoverageError::Vehicles`] for more than [`MAX_EXACT_VEHICLES`]; [`CoverageError::WorkspaceTooSmall`].
 pub fn exact<const L: usize, const N: usize, const K: usize>(
     work: &Work<'_, L, N>,
     ws: &mut Workspace<'_>,
@@ -47,7 +47,7 @@ pub fn exact<const L: usize, const N: usize, const K: usize>(
 ) -> Result<(), CoverageError> {
     work.check::<K>()?;
     let (count, waypoints) = (work.vehicles.len(), work.tracks.waypoint_count() as usize);
-    if count > MOST_VEHICLES {
+    if count > MAX_EXACT_VEHICLES {
         return Err(CoverageError::Vehicles);
     }
     let [ways, reaches, states] = Workspace::lengths(count, waypoints);
@@ -58,11 +58,11 @@ pub fn exact<const L: usize, const N: usize, const K: usize>(
     binpat(work, pack, out)?;
     let mut table = Table { work, ws, count, waypoints };
     table.measure();
-    let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + RESOLUTION));
+    let (mut low, mut high) = (0.0, out.max_cost_s() * (1.0 + TIME_RESOLUTION));
     if table.reach(high) {
         table.read(out);
     }
-    while high - low > high * RESOLUTION {
+    while high - low > high * TIME_RESOLUTION {
         let middle = low + (high - low) / 2.0;
         if table.reach(middle) {
             table.read(out);

@@ -15,13 +15,13 @@ use crate::Point;
 use crate::field::follow::Following;
 use crate::flight::{Flight, Look, Path, PathError, Photographs, Range, Task, Trigger};
 use crate::plan::{PlanError, SwarmPlan};
-use crate::schedule::{self, PIECE_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
+use crate::schedule::{self, MAX_TIMED_SEGMENT_M, ScheduleConfig, ScheduleError, ScheduleWorkspace};
 use crate::sort;
 
 /// Acceleration and braking that coverage flights are planned with, m/s².
-pub const ACCEL_MPS2: f32 = 1.5;
+pub const PLANNED_ACCEL_MPS2: f32 = 1.5;
 /// Longest path, metres: vehicles report their progress to each other in 16 bits, in decimetres.
-pub const FURTHEST_M: f32 = 6_553.0;
+pub const MAX_PATH_LENGTH_M: f32 = 6_553.0;
 
 /// A vehicle of the mission, beside what it is packed by.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -74,7 +74,7 @@ pub struct Swarm<'a> {
 }
 
 /// Flights of all vehicles, flight `i` of vehicle `i`, and when each leaves its pad. One without a route stays there. Of a route
-/// with more than `W` corners, or longer than [`FURTHEST_M`], a flight is the first stretch ([`Photographs::goes_on`]): as many lanes as leave
+/// with more than `W` corners, or longer than [`MAX_PATH_LENGTH_M`], a flight is the first stretch ([`Photographs::goes_on`]): as many lanes as leave
 /// room for the way home. What is left is for the next division ([`super::losses`]).
 ///
 /// # Errors
@@ -216,7 +216,15 @@ fn grounded<const W: usize>(pad: &Pad) -> Result<Flight<W>, PathError> {
     let mut path = Path::new();
     path.push(pad.start, 0.0)?;
     let Pad { id, climb_m, .. } = *pad;
-    Ok(Flight { id, task: Task::Stay, path, climb_m, descent_m: 0.0, depart_s: 0.0, piece_m: PIECE_M })
+    Ok(Flight {
+        id,
+        task: Task::Stay,
+        path,
+        climb_m,
+        descent_m: 0.0,
+        depart_s: 0.0,
+        piece_m: MAX_TIMED_SEGMENT_M,
+    })
 }
 
 /// A path under construction.
@@ -286,10 +294,10 @@ impl<'a, const N: usize, const W: usize> Draft<'a, N, W> {
 /// How long a leg takes that is flown no faster than `most_mps` and from rest to rest: at its corners a vehicle nearly
 /// stops. Seconds.
 fn leg_s(length_m: f32, most_mps: f32) -> f32 {
-    if length_m * ACCEL_MPS2 > most_mps * most_mps {
-        length_m / most_mps + most_mps / ACCEL_MPS2
+    if length_m * PLANNED_ACCEL_MPS2 > most_mps * most_mps {
+        length_m / most_mps + most_mps / PLANNED_ACCEL_MPS2
     } else {
-        2.0 * libm::sqrtf(length_m / ACCEL_MPS2)
+        2.0 * libm::sqrtf(length_m / PLANNED_ACCEL_MPS2)
     }
 }
 
@@ -324,9 +332,9 @@ fn flight<const L: usize, const N: usize, const W: usize>(
     loop {
         let mut laid = 0;
         let error = match stretch(work, route, swarm, pad, (most, &mut laid)) {
-            Ok(flight) if flight.path.length_m() <= FURTHEST_M => return Ok(flight),
+            Ok(flight) if flight.path.length_m() <= MAX_PATH_LENGTH_M => return Ok(flight),
             Ok(flight) => {
-                laid = (most as f32 * FURTHEST_M / flight.path.length_m()) as usize;
+                laid = (most as f32 * MAX_PATH_LENGTH_M / flight.path.length_m()) as usize;
                 PathError::TooLong
             }
             Err(error) => error,
@@ -431,7 +439,7 @@ fn land<const N: usize, const W: usize>(
         climb_m: pad.climb_m,
         descent_m: pad.descent_m,
         depart_s: 0.0,
-        piece_m: PIECE_M,
+        piece_m: MAX_TIMED_SEGMENT_M,
     };
     flight.fit_pieces();
     Ok(flight)

@@ -8,7 +8,7 @@ use super::transit::Transit;
 use super::{CoverageError, Flat};
 
 /// Most waypoints of an area: an f32 counts them exactly.
-const WAYPOINTS: f32 = (1 << 24) as f32;
+const MAX_WAYPOINTS: f32 = (1 << 24) as f32;
 
 /// Inputs of lanes, besides the area.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -120,10 +120,11 @@ impl<const L: usize> Tracks<L> {
     ) -> Result<(), CoverageError> {
         for lane in &mut self.lanes {
             let steps = ceilf(lane.length_m() / spacing.waypoint_m - 1e-3);
-            if steps > WAYPOINTS {
+            if steps > MAX_WAYPOINTS {
                 return Err(CoverageError::Setting("waypoint_m"));
             }
-            lane.count = if lane.length_m() < super::area::SAME_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
+            lane.count =
+                if lane.length_m() < super::area::SAME_VERTEX_M { 1 } else { fmaxf(steps, 1.0) as u32 + 1 };
         }
         self.measure(transit)
     }
@@ -138,7 +139,7 @@ impl<const L: usize> Tracks<L> {
             }
             (lane.first, lane.start_m) = (first, start_m);
             first += lane.count;
-            if first as f32 > WAYPOINTS {
+            if first as f32 > MAX_WAYPOINTS {
                 return Err(CoverageError::Setting("waypoint_m"));
             }
             start_m += lane.length_m();

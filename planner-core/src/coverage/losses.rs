@@ -17,7 +17,7 @@ use crate::plan::{PlanError, SwarmPlan};
 use crate::schedule::ScheduleWorkspace;
 
 /// Most separate ranges of waypoints that are done.
-const RANGES: usize = 128;
+const MAX_DONE_RANGES: usize = 128;
 
 /// State of one vehicle that all agree on before the area is divided again.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -33,7 +33,7 @@ pub struct Fate {
 
 /// Memory lent for areas of at most `L` lanes and `K` vehicles.
 pub struct Workspace<const L: usize, const K: usize> {
-    done: Done<RANGES>,
+    done: Done<MAX_DONE_RANGES>,
     left: Tracks<L>,
     vehicles: Vec<Vehicle, K>,
     pads: Vec<Pad, K>,

@@ -11,9 +11,9 @@ use super::lanes::Lane;
 use super::transit::Transit;
 
 /// Least shortening of the tour that counts, metres: a smaller gain is rounding.
-const GAIN_M: f32 = 1e-3;
+const MIN_GAIN_M: f32 = 1e-3;
 /// Most lanes that Or-opt moves together.
-const MOVED: usize = 3;
+const MAX_MOVED_LANES: usize = 3;
 
 /// Sorts lanes into the order and the directions in which they are flown.
 pub(super) fn sort<const N: usize>(lanes: &mut [Lane], transit: &Transit<'_, N>, looks: u32) {
@@ -36,7 +36,7 @@ fn first_turned(lanes: &[Lane]) -> bool {
         let longer_m = (pair[1].to - pair[0].to).norm() - (pair[1].from - pair[0].from).norm();
         gain_m += if i % 2 == 0 { longer_m } else { -longer_m };
     }
-    gain_m > GAIN_M
+    gain_m > MIN_GAIN_M
 }
 
 /// Order that begins with the first lane and always goes to the nearest end.
@@ -96,11 +96,11 @@ impl<const N: usize> Search<'_, '_, N> {
                 let (from, to) = (lanes[i].from, lanes[j].to);
                 let old = self.way(before, Some(from)) + self.way(Some(to), after);
                 // No way is shorter than the straight one.
-                if straight(before, to) + straight(after, from) > old - GAIN_M {
+                if straight(before, to) + straight(after, from) > old - MIN_GAIN_M {
                     continue;
                 }
                 let new = self.way(before, Some(to)) + self.way(Some(from), after);
-                if new < old - GAIN_M {
+                if new < old - MIN_GAIN_M {
                     turn(&mut lanes[i..=j]);
                     gained = true;
                 }
@@ -109,11 +109,11 @@ impl<const N: usize> Search<'_, '_, N> {
         gained
     }
 
-    /// Or-opt: moves up to [`MOVED`] lanes that follow each other, as they are or turned round.
+    /// Or-opt: moves up to [`MAX_MOVED_LANES`] lanes that follow each other, as they are or turned round.
     fn move_lanes(&mut self, lanes: &mut [Lane]) -> bool {
         let mut gained = false;
         let count = lanes.len();
-        for len in 1..=MOVED.min(count.saturating_sub(1)) {
+        for len in 1..=MAX_MOVED_LANES.min(count.saturating_sub(1)) {
             for i in 0..=count - len {
                 let Some((to, turned)) = self.better_place(lanes, i, len) else { continue };
                 if turned {
@@ -136,7 +136,7 @@ impl<const N: usize> Search<'_, '_, N> {
         let before = i.checked_sub(1).map(|k| lanes[k].to);
         let after = lanes.get(i + len).map(|lane| lane.from);
         let saved = self.way(before, Some(from)) + self.way(Some(to), after) - self.way(before, after);
-        let mut best = (GAIN_M, None);
+        let mut best = (MIN_GAIN_M, None);
         for place in (0..i).chain(i + len + 1..=lanes.len()) {
             if !self.look() {
                 break;

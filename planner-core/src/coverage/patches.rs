@@ -12,12 +12,12 @@ use super::area::RingKind;
 use super::intervals::Span;
 use super::lanes::Tracks;
 use super::strips::{Strips, Workspace};
-use super::transit::CLEARANCE_M;
+use super::transit::ZONE_CLEARANCE_M;
 
 /// Number of times that a strip is halved.
-const HALVINGS: u32 = 3;
+const STRIP_HALVINGS: u32 = 3;
 /// Parts into which a strip is cut.
-const EIGHTHS: u32 = 1 << HALVINGS;
+const STRIP_PARTS: u32 = 1 << STRIP_HALVINGS;
 
 /// Lays the lanes that are missing.
 pub(super) fn lay<const L: usize, const V: usize>(
@@ -27,7 +27,7 @@ pub(super) fn lay<const L: usize, const V: usize>(
 ) -> Result<(), CoverageError> {
     for strip in (0..strips.count).filter(|strip| meets_zone(strips, strips.span(*strip))) {
         let [low, high] = strips.span(strip);
-        for parts in (1..=HALVINGS).map(|halving| 1 << halving) {
+        for parts in (1..=STRIP_HALVINGS).map(|halving| 1 << halving) {
             let wide = (high - low) / parts as f32;
             for part in 0..parts {
                 let from = low + part as f32 * wide;
@@ -36,8 +36,8 @@ pub(super) fn lay<const L: usize, const V: usize>(
                 strips.lay(strip as u16, strips.middle(span), ws, out)?;
             }
         }
-        let wide = (high - low) / EIGHTHS as f32;
-        for part in 0..EIGHTHS {
+        let wide = (high - low) / STRIP_PARTS as f32;
+        for part in 0..STRIP_PARTS {
             let from = low + part as f32 * wide;
             lay_beside(strips, strip as u16, [from, from + wide], ws, out)?;
             lay_pictures(strips, strip as u16, [from, from + wide], ws, out)?;
@@ -85,7 +85,7 @@ fn lay_pictures<const L: usize, const V: usize>(
 fn lines(strips: &Strips<'_>, span: Span, first: u32) -> impl Iterator<Item = f32> {
     let (middle, half) = (strips.middle(span), (span[1] - span[0]) / 2.0);
     let both = move |step: u32| [-1.0, 1.0].map(|side| middle + side * half * step as f32);
-    (first..=EIGHTHS).flat_map(both).take_while(move |v| reaches(strips, *v, span))
+    (first..=STRIP_PARTS).flat_map(both).take_while(move |v| reaches(strips, *v, span))
 }
 
 /// Whether pictures along the line `v` show all between two other `v`, and a little more.
@@ -103,7 +103,7 @@ fn meets_zone(strips: &Strips<'_>, [low, high]: Span) -> bool {
         let across = ring.iter().map(|corner| strips.rotated(corner).1);
         let (first, last) = across
             .fold((f32::INFINITY, f32::NEG_INFINITY), |(first, last), v| (fminf(first, v), fmaxf(last, v)));
-        first <= high + CLEARANCE_M && last >= low - CLEARANCE_M
+        first <= high + ZONE_CLEARANCE_M && last >= low - ZONE_CLEARANCE_M
     })
 }
 

@@ -23,11 +23,11 @@ impl Config {
 }
 
 /// Points that a line search tries along the whole line.
-const ALONG: u32 = 8;
+const LINE_POINTS: u32 = 8;
 /// Halvings of the step around the best of those points.
-const HALVINGS: u32 = 7;
+const STEP_HALVINGS: u32 = 7;
 /// The search ends with a round that gains less than this share of the cost.
-const GAIN: f32 = 1e-4;
+const MIN_ROUND_GAIN: f32 = 1e-4;
 
 /// The shares, and the directions along which they are searched.
 pub struct Workspace<const K: usize> {
@@ -97,7 +97,7 @@ pub fn powell<const L: usize, const N: usize, const K: usize>(
             cost = search.along(&whole, count, cost)?;
             search.ws.directions[at] = whole;
         }
-        if search.left == 0 || before - cost <= before * GAIN {
+        if search.left == 0 || before - cost <= before * MIN_ROUND_GAIN {
             break;
         }
     }
@@ -145,12 +145,12 @@ impl<const L: usize, const N: usize, const K: usize> Search<'_, '_, L, N, K> {
         let from = self.ws.here;
         let Some((low, high)) = range(&from[..count], &line[..count]) else { return Ok(cost) };
         let mut best = (cost, 0.0);
-        let step = (high - low) / ALONG as f32;
-        for k in 0..=ALONG {
+        let step = (high - low) / LINE_POINTS as f32;
+        for k in 0..=LINE_POINTS {
             self.look(&from, line, low + step * k as f32, &mut best)?;
         }
         let mut step = step;
-        for _ in 0..HALVINGS {
+        for _ in 0..STEP_HALVINGS {
             step /= 2.0;
             let middle = best.1;
             for at in [middle - step, middle + step] {

@@ -7,7 +7,7 @@ use super::area::{Area, RingKind, edges_of};
 use super::intervals::{Intervals, Span};
 use super::lanes::{Lane, Pattern, Tracks};
 use super::sweep::Direction;
-use super::transit::CLEARANCE_M;
+use super::transit::ZONE_CLEARANCE_M;
 use super::{CoverageError, Flat};
 use crate::geometry::within;
 use crate::sort;
@@ -197,7 +197,7 @@ impl<'a> Strips<'a> {
     /// Takes from `ws.free` every `u` at which the line `v` comes nearer than the clearance to a no-fly zone.
     fn unblock<const V: usize>(&self, v: f32, ws: &mut Workspace<V>) -> Result<(), CoverageError> {
         ws.line.clear();
-        let clear = CLEARANCE_M;
+        let clear = ZONE_CLEARANCE_M;
         for (_, ring) in self.area.each().filter(|(kind, _)| *kind == RingKind::NoFly) {
             let span = [v - clear, v + clear];
             self.shadow(edges_of(ring), span, clear, &mut ws.crossings, &mut ws.line)?;

@@ -1,6 +1,6 @@
 //! Shortest ways around no-fly zones: straight where nothing is between, else over corners of the zones.
 //!
-//! Method: a visibility graph over the zones' outward corners, each pushed out by [`CLEARANCE_M`]; shortest ways between
+//! Method: a visibility graph over the zones' outward corners, each pushed out by [`ZONE_CLEARANCE_M`]; shortest ways between
 //! all pairs of corners once (Floyd and Warshall, n³), then a way between two places over the corners that both see
 //! (n² and 2 n segment checks of one comparison an edge). All in metres.
 
@@ -12,7 +12,7 @@ use super::{CoverageError, Flat};
 
 /// Distance that paths and lanes keep from no-fly zones, metres: more than rounding, less than any
 /// vehicle's margin. A margin for the vehicle belongs into the zone.
-pub const CLEARANCE_M: f32 = 0.25;
+pub const ZONE_CLEARANCE_M: f32 = 0.25;
 
 /// The visibility graph of shortest transits: corners and the lines between them, of at most `N`
 /// corners: 4 · N² bytes.
@@ -51,7 +51,7 @@ impl<'a, const N: usize> Transit<'a, N> {
                 let outward = (into - out).try_normalize(1e-6);
                 let Some(outward) = outward else { continue };
                 let half = libm::sqrtf(libm::fmaxf((1.0 - into.dot(&out)) / 2.0, 0.0));
-                let far = CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_of(half), 0.25), 4.0);
+                let far = ZONE_CLEARANCE_M * fminf(1.0 / libm::fmaxf(cos_of(half), 0.25), 4.0);
                 let place = corner + outward * far;
                 if !area.forbids(&place) {
                     self.corners.push(place).map_err(|_| CoverageError::NoFlyFull)?;

@@ -12,7 +12,7 @@ use crate::Point;
 use crate::coverage::Flat;
 
 /// Most height samples of one leg: on a longer leg the samples are further apart.
-const MOST_SAMPLES: f32 = 65_536.0;
+const MAX_LEG_SAMPLES: f32 = 65_536.0;
 
 /// Height that a path keeps from the field.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ impl Following<'_> {
         let (start, way) = (from.xy(), to - from.xy());
         let length_m = way.norm();
         let wanted = ceilf(length_m * 2.0 / self.field.shape().cell_m);
-        let count = fmaxf(fminf(wanted, MOST_SAMPLES), 1.0) as u32;
+        let count = fmaxf(fminf(wanted, MAX_LEG_SAMPLES), 1.0) as u32;
         let step_m = length_m / count as f32;
         if step_m < 1e-3 {
             return corner(Point::new(to.x, to.y, from.z));

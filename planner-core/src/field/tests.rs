@@ -48,13 +48,13 @@ proptest! {
         let bytes = field(&shape, &nodes);
         let view = FieldView::parse(&bytes).unwrap();
         prop_assert_eq!(view.shape(), &shape);
-        prop_assert_eq!(view.highest_m(), f32::from(*nodes.iter().max().unwrap()) * STEP_M);
+        prop_assert_eq!(view.highest_m(), f32::from(*nodes.iter().max().unwrap()) * HEIGHT_STEP_M);
         let at = cut.index(nodes.len());
         let (column, row) = (at % usize::from(columns), at / usize::from(columns));
         let place = shape.low + Flat::new(column as f32, row as f32) * cell_m;
         // Places are rounded: of 1e5 m to 8 mm.
         let beside = 6554.0 * 0.05 / cell_m + 0.01;
-        prop_assert!((view.height_at(&place) - f32::from(nodes[at]) * STEP_M).abs() < beside * 2.0);
+        prop_assert!((view.height_at(&place) - f32::from(nodes[at]) * HEIGHT_STEP_M).abs() < beside * 2.0);
         prop_assert!(FieldView::parse(&bytes[..cut.index(bytes.len())]).is_err());
         let mut damaged = bytes.clone();
         damaged[cut.index(bytes.len())] ^= 1 << flip;
@@ -70,7 +70,7 @@ proptest! {
         flattened(12, &mut nodes, most);
         let shape = FieldShape { low: Flat::zeros(), cell_m: 5.0, columns: 12, rows: 9 };
         let bytes = field(&shape, &nodes);
-        let slope = f32::from(most) * STEP_M / 5.0 * core::f32::consts::SQRT_2;
+        let slope = f32::from(most) * HEIGHT_STEP_M / 5.0 * core::f32::consts::SQRT_2;
         let following = Following { field: FieldView::parse(&bytes).unwrap(), height_m: 30.0, tolerance_m, slope };
         let [from, to] = ends.map(|[x, y]| Flat::new(x, y));
         let begin = following.begin(&from, &to);
@@ -89,7 +89,7 @@ proptest! {
                 let at: Point = leg[0] + step * (k as f32 / samples as f32);
                 let low_m = following.lowest_m(&at.xy());
                 // Between two samples of the path, half a node apart, the field bends by a part of its slope.
-                let bent_m = f32::from(most) * STEP_M / 2.0;
+                let bent_m = f32::from(most) * HEIGHT_STEP_M / 2.0;
                 prop_assert!(at.z >= low_m - bent_m - 0.01, "{} {}", at.z, low_m);
                 prop_assert!(at.z <= low_m + tolerance_m + bent_m + 0.01, "{} {}", at.z, low_m);
             }

@@ -107,7 +107,7 @@ impl<'p> Shots<'p> {
     }
 }
 
-/// Which parts of a path of at most [`Photographs::WAYPOINTS`] waypoints are photographed, and how.
+/// Which parts of a path of at most [`Photographs::MAX_PATH_WAYPOINTS`] waypoints are photographed, and how.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Photographs {
     /// Bit `i`: a stretch begins at waypoint `i`.
@@ -115,9 +115,9 @@ pub struct Photographs {
     /// Bit `i`: it ends at waypoint `i`.
     ends: u64,
     /// For each stretch in its order the lowest number that one of its waypoints has in the area.
-    numbers: [u16; Self::STRETCHES],
+    numbers: [u16; Self::MAX_STRETCHES],
     /// For each stretch the number of its pictures.
-    counts: [u16; Self::STRETCHES],
+    counts: [u16; Self::MAX_STRETCHES],
     /// Whether numbers fall along the path.
     backward: bool,
     /// Waypoints of the whole area.
@@ -134,15 +134,15 @@ pub struct Photographs {
 
 impl Photographs {
     /// Most waypoints of a path along which a vehicle photographs.
-    pub const WAYPOINTS: usize = 64;
+    pub const MAX_PATH_WAYPOINTS: usize = 64;
     /// Most photographed stretches of a path.
-    pub const STRETCHES: usize = 32;
+    pub const MAX_STRETCHES: usize = 32;
     /// Most waypoints of an area.
-    pub const NUMBERS: u32 = u16::MAX as u32 + 1;
+    pub const MAX_AREA_WAYPOINTS: u32 = u16::MAX as u32 + 1;
 
     /// A flight without pictures yet; they are to be `spacing_m` apart at most.
     pub const fn new(spacing_m: f32, look: Look, trigger: Trigger) -> Self {
-        let (numbers, counts) = ([0; Self::STRETCHES], [0; Self::STRETCHES]);
+        let (numbers, counts) = ([0; Self::MAX_STRETCHES], [0; Self::MAX_STRETCHES]);
         Self {
             begins: 0,
             ends: 0,
@@ -171,14 +171,14 @@ impl Photographs {
     /// of the area, evenly from one end to the other.
     ///
     /// # Errors
-    /// [`PathError::PathFull`] beyond [`Self::WAYPOINTS`] and [`Self::STRETCHES`], for numbers beyond [`Self::NUMBERS`], and for no
+    /// [`PathError::PathFull`] beyond [`Self::MAX_PATH_WAYPOINTS`] and [`Self::MAX_STRETCHES`], for numbers beyond [`Self::MAX_AREA_WAYPOINTS`], and for no
     /// waypoint.
     pub fn mark(&mut self, from: usize, to: usize, waypoints: Range) -> Result<(), PathError> {
         let number = u16::try_from(waypoints.first).map_err(|_| PathError::PathFull)?;
         let count = waypoints.end.checked_sub(waypoints.first).and_then(|count| u16::try_from(count).ok());
         let count = count.filter(|count| *count > 0).ok_or(PathError::PathFull)?;
         let stretch = self.begins.count_ones() as usize;
-        if from > to || to >= Self::WAYPOINTS || stretch >= Self::STRETCHES {
+        if from > to || to >= Self::MAX_PATH_WAYPOINTS || stretch >= Self::MAX_STRETCHES {
             return Err(PathError::PathFull);
         }
         (self.numbers[stretch], self.counts[stretch]) = (number, count);
@@ -214,7 +214,7 @@ impl Photographs {
 
     /// Place of the last picture of all; none where there is none.
     pub fn end_m<const W: usize>(&self, path: &Path<W>) -> Option<f32> {
-        let last = Self::WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
+        let last = Self::MAX_PATH_WAYPOINTS.checked_sub(1 + self.ends.leading_zeros() as usize)?;
         path.waypoints().get(last).map(|waypoint| waypoint.along_m)
     }
 
@@ -351,7 +351,7 @@ mod tests {
         photographs.mark(62, 63, two).unwrap();
         assert_eq!(photographs.stretches(&path()).next(), None);
         let mut photographs = Photographs::new(9.0, Look::Ahead, Trigger::Distance);
-        for at in 0..Photographs::STRETCHES {
+        for at in 0..Photographs::MAX_STRETCHES {
             photographs.mark(at, at, Range { first: 0, end: 1 }).unwrap();
         }
         assert_eq!(photographs.mark(40, 41, two), Err(PathError::PathFull));

@@ -5,7 +5,7 @@
 //! are tried: a local search that moves one vehicle to another place in the order. The best order is then scheduled exactly,
 //! and kept if the last vehicle lands earlier.
 //!
-//! Cost: the timed segments of each pair of flights, then [`LOOKS`] comparisons.
+//! Cost: the timed segments of each pair of flights, then [`MAX_COMPARISONS`] comparisons.
 
 use heapless::Vec;
 use libm::fmaxf;
@@ -20,12 +20,12 @@ use crate::sort;
 
 /// Most comparisons of a take-off time with a scheduled flight, over a whole search: a third of a
 /// second on a board.
-const LOOKS: u32 = 150_000;
+const MAX_COMPARISONS: u32 = 150_000;
 /// Comparisons for each pair of vehicles in a swarm larger than [`BOARD_VEHICLES`].
-const LOOKS_A_PAIR: u32 = 200;
+const COMPARISONS_PER_PAIR: u32 = 200;
 /// Weight of the mean landing time beside the last landing time: of two orders that end together
 /// the one with less waiting wins.
-const MEAN_SHARE: f32 = 0.02;
+const MEAN_LANDING_WEIGHT: f32 = 0.02;
 
 /// The differences of take-off times, of flight `i` after flight `j`, that are forbidden.
 struct Differences<'a> {
@@ -66,7 +66,7 @@ impl Differences<'_> {
             makespan_s = fmaxf(makespan_s, depart_s + lasts_s[i]);
             sum_s += depart_s + lasts_s[i];
         }
-        makespan_s + MEAN_SHARE * sum_s / order.len() as f32
+        makespan_s + MEAN_LANDING_WEIGHT * sum_s / order.len() as f32
     }
 }
 
@@ -106,7 +106,11 @@ pub(super) fn improve<const N: usize, const V: usize, const W: usize, const P: u
         |a: &u16, b: &u16| found_s[usize::from(*a)].total_cmp(&found_s[usize::from(*b)]).then(a.cmp(b));
     sort::by(&mut order, by_departure);
     let pairs = (order.len() * order.len()) as u32;
-    let mut looks = if count <= BOARD_VEHICLES { LOOKS } else { LOOKS.max(LOOKS_A_PAIR * pairs) };
+    let mut looks = if count <= BOARD_VEHICLES {
+        MAX_COMPARISONS
+    } else {
+        MAX_COMPARISONS.max(COMPARISONS_PER_PAIR * pairs)
+    };
     let mut departs_s = lasts_s.clone();
     let mut best = differences.depart(&order, &lasts_s, &mut departs_s, &mut looks);
     let mut rng = Pcg32::seed_from_u64(order.len() as u64);

@@ -13,7 +13,7 @@ use crate::Point;
 use crate::flight::{Flight, Path, PathError};
 use crate::roadmap::{HalfEdge, RoadmapView};
 use crate::schedule::sipp::{self, Route};
-use crate::schedule::{self, PIECE_M, PIECES, ScheduleError};
+use crate::schedule::{self, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, ScheduleError};
 use crate::search::{self, SearchError, SearchWorkspace};
 use crate::sort;
 
@@ -77,8 +77,8 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
     out: &mut SwarmPlan<V, W>,
 ) -> Result<(), PlanError> {
     let mut failed = Ok(());
-    let reorderings = order.len().min(REORDERINGS);
-    for round in 0..=reorderings + HEAD_STARTS {
+    let reorderings = order.len().min(MAX_REORDERINGS);
+    for round in 0..=reorderings + MAX_HEAD_STARTS {
         let Err((place, error)) = schedule_round(view, request, order, &rush, ws, out) else {
             return Ok(());
         };
@@ -100,9 +100,9 @@ fn schedule_from<const N: usize, const V: usize, const W: usize, const P: usize>
 /// Most rounds in which a vehicle that finds no free times is moved to the front, before other
 /// vehicles are held back for it instead. The number of vehicles bounds it as well: in a crowd,
 /// where many swap places, nearly every vehicle has to leave its place before another one comes.
-const REORDERINGS: usize = 64;
+const MAX_REORDERINGS: usize = 64;
 /// Most rounds in which other vehicles are held back, each round by [`HEAD_START_S`] more.
-const HEAD_STARTS: usize = 8;
+const MAX_HEAD_STARTS: usize = 8;
 /// Time that two vehicles head-on need to clear a side room, seconds.
 const HEAD_START_S: f32 = 3.0;
 
@@ -208,12 +208,12 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
         let cfg = &request.schedule;
         let mut route = Route { cfg, from, to, not_before_s, parked: &parked.pads, handover_s };
         let mut best: Option<Flight<W>> = None;
-        flight.piece_m = PIECE_M;
-        for _ in 0..DEPARTURES {
+        flight.piece_m = MAX_TIMED_SEGMENT_M;
+        for _ in 0..MAX_DEPARTURES {
             let scheduled = before.iter().map(|&i| &out.flights[usize::from(i)]);
             match sipp::route(view, &route, passable, scheduled, &mut ws.sipp, &mut flight) {
                 // Looked for again with the longer segments that it is cut into.
-                Ok(()) if flight.pieces() > PIECES => {
+                Ok(()) if flight.pieces() > MAX_TIMED_SEGMENTS => {
                     flight.fit_pieces();
                     continue;
                 }
@@ -238,7 +238,7 @@ fn step_aside<const N: usize, const V: usize, const W: usize, const P: usize>(
 }
 
 /// Most departure times that are tried for one vehicle.
-const DEPARTURES: usize = 6;
+const MAX_DEPARTURES: usize = 6;
 /// Longest wait in one place in the air that the planner does not try to avoid, seconds: half of
 /// what counts as a standstill (20 s).
 const LONG_WAIT_S: f32 = 10.0;

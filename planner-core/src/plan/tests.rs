@@ -311,7 +311,7 @@ fn flights_of_four_kilometres_are_scheduled_and_flown() {
     let (bytes, vehicles) = queue(4000.0, 3, 99.0, 1);
     let plan = plan(&bytes, &vehicles, 3, Mode::Labelled).unwrap();
     for flight in &plan.flights {
-        assert!(flight.path.length_m() > 4000.0 && flight.piece_m > schedule::PIECE_M);
+        assert!(flight.path.length_m() > 4000.0 && flight.piece_m > schedule::MAX_TIMED_SEGMENT_M);
     }
     for speeds in [[10.0, 10.0, 10.0], [4.0, 10.0, 7.0]] {
         let apart = checker::fly(&SCHEDULE, &plan.flights, &speeds, 100_000);

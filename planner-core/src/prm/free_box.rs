@@ -2,26 +2,26 @@
 //!
 //! Boxes are convex, so a segment with both ends strictly inside is clear; and a segment that leaves one goes through
 //! the cell behind that face, mostly a wall. One box answers for all rays of a node, and for the nodes beside it. Both
-//! answers are given only where no rounding can turn them: ends at least [`GUARD`] cells inside, and a point of the ray
-//! at least [`GUARD`] cells inside an occupied cell. All other rays go to the exact check.
+//! answers are given only where no rounding can turn them: ends at least [`ROUNDING_CELLS`] cells inside, and a point of the ray
+//! at least [`ROUNDING_CELLS`] cells inside an occupied cell. All other rays go to the exact check.
 
 use super::config::Config;
 use super::neighbours::Workspace;
 use crate::Point;
 use crate::segment::{
-    Snapped, WIDE_CELLS, is_farther_than, lane_mask, segment_is_clear, snap, snapped_rest_touches,
+    MIN_MISSED_CELLS, Snapped, is_farther_than, lane_mask, segment_is_clear, snap, snapped_rest_touches,
 };
 use crate::voxel::VoxelGrid;
 
 /// Margin for rounding, in cells. Places below are computed to within 2⁻¹¹ cell as long as the grid
 /// has at most [`MAX_CELLS`] cells a side: two roundings of a coordinate make 2 · 4096 · 2⁻²⁴ =
 /// 2⁻¹¹ at worst, and snapping in the exact check 2⁻¹⁵.
-const GUARD: f32 = 1.0 / 512.0;
+const ROUNDING_CELLS: f32 = 1.0 / 512.0;
 const MAX_CELLS: u32 = 4096;
 /// Depth behind a face at which the cell is probed, cells.
-const DEPTH: f32 = 1.0 / 64.0;
+const PROBE_DEPTH_CELLS: f32 = 1.0 / 64.0;
 /// Most free boxes remembered. Nodes come in the order of their cubes, a few rooms at a time.
-const BOXES: usize = 32;
+const MAX_BOXES: usize = 32;
 
 /// Cells `low..high` on each axis, all free.
 #[derive(Clone, Copy, Default)]
@@ -38,7 +38,7 @@ pub(super) struct Sight<'g, 'a> {
     cells_per_m: f32,
     /// Reach of a box from the node it is made for, cells.
     reach: i32,
-    boxes: [FreeBox; BOXES],
+    boxes: [FreeBox; MAX_BOXES],
     newest: usize,
     here: [f32; 3],
     /// `here` in cells.
@@ -54,7 +54,7 @@ struct View {
     /// A ray that ends between these is clear. Empty if `here` itself is nearer to a face than the clearance.
     clear_low: [f32; 3],
     clear_high: [f32; 3],
-    /// The faces, [`DEPTH`] farther out.
+    /// The faces, [`PROBE_DEPTH_CELLS`] farther out.
     face_low: [f32; 3],
     face_high: [f32; 3],
     /// Distance that a ray keeps from the faces where it is known to be clear.
@@ -70,7 +70,7 @@ impl<'g, 'a> Sight<'g, 'a> {
             clearance_cells: config.clearance_m / resolution,
             cells_per_m: 1.0 / resolution,
             reach: (config.edge_max_m / resolution).min(MAX_CELLS as f32) as i32 + 1,
-            boxes: [FreeBox::default(); BOXES],
+            boxes: [FreeBox::default(); MAX_BOXES],
             newest: 0,
             here: [0.0; 3],
             at: [0.0; 3],
@@ -99,22 +99,22 @@ impl<'g, 'a> Sight<'g, 'a> {
                 let Some(around) = FreeBox::grow(self.grid, cell, self.reach) else {
                     return;
                 };
-                self.newest = (self.newest + 1) % BOXES;
+                self.newest = (self.newest + 1) % MAX_BOXES;
                 self.boxes[self.newest] = around;
                 around
             }
         };
         let low = [0, 1, 2].map(|axis| around.low[axis] as f32 - self.at[axis]);
         let high = [0, 1, 2].map(|axis| around.high[axis] as f32 - self.at[axis]);
-        if (0..3).any(|axis| low[axis] > -GUARD || high[axis] < GUARD) {
+        if (0..3).any(|axis| low[axis] > -ROUNDING_CELLS || high[axis] < ROUNDING_CELLS) {
             return;
         }
-        let inset = self.clearance_cells + self.clearance_cells * 1e-6 + GUARD;
+        let inset = self.clearance_cells + self.clearance_cells * 1e-6 + ROUNDING_CELLS;
         let mut view = View {
             clear_low: low.map(|x| x + inset),
             clear_high: high.map(|x| x - inset),
-            face_low: low.map(|x| x - DEPTH),
-            face_high: high.map(|x| x + DEPTH),
+            face_low: low.map(|x| x - PROBE_DEPTH_CELLS),
+            face_high: high.map(|x| x + PROBE_DEPTH_CELLS),
             inset,
         };
         if (0..3).any(|axis| view.clear_low[axis] >= 0.0 || view.clear_high[axis] <= 0.0) {
@@ -156,7 +156,7 @@ impl<'g, 'a> Sight<'g, 'a> {
     fn check(&self, there: [f32; 3], known: f32) -> bool {
         let there = Point::from(there);
         let (Some(a), Some(b)) = (&self.snapped, snap(self.grid.shape(), &there)) else { return false };
-        if self.clearance_cells >= WIDE_CELLS {
+        if self.clearance_cells >= MIN_MISSED_CELLS {
             return is_farther_than(self.grid, &Point::from(self.here), &there, known, self.clearance_m);
         }
         if self.clearance_m > 0.0 {
@@ -194,7 +194,7 @@ impl<'g, 'a> Sight<'g, 'a> {
         }
         // The probe lies outside, on a ray along a face far outside: back to where the first face is still ahead, and as far
         // away as the clearance.
-        let near = [0, 1, 2].map(|axis| leave[axis] - (DEPTH + view.inset) / d[axis].abs());
+        let near = [0, 1, 2].map(|axis| leave[axis] - (PROBE_DEPTH_CELLS + view.inset) / d[axis].abs());
         let known = near[0].min(near[1]).min(near[2]).clamp(0.0, 1.0);
         Judgement::Leaves(if view.clear_high[0] > 0.0 { known } else { 0.0 })
     }
@@ -207,7 +207,9 @@ impl<'g, 'a> Sight<'g, 'a> {
         for axis in 0..3 {
             cell[axis] = place[axis] as i32;
             let part = place[axis] - cell[axis] as f32;
-            certain &= part > GUARD && part < 1.0 - GUARD && cell[axis] < self.grid.shape().dims[axis] as i32;
+            certain &= part > ROUNDING_CELLS
+                && part < 1.0 - ROUNDING_CELLS
+                && cell[axis] < self.grid.shape().dims[axis] as i32;
         }
         certain && self.grid.is_occupied(cell.map(|c| c as u32))
     }

@@ -7,7 +7,7 @@ use super::config::{Config, LengthRange, PrmError, squared_length};
 use crate::Point;
 
 /// Candidates whose distances are computed at once.
-const LANES: usize = 16;
+const CANDIDATE_LANES: usize = 16;
 
 /// Scratch for `NODES` nodes and `CUBES` cubes: 14 bytes a node, 2 a cube. The default board has 4096 of each.
 pub struct Workspace<const NODES: usize, const CUBES: usize> {
@@ -137,7 +137,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         [self.x[place], self.y[place], self.z[place]]
     }
 
-    /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it, up to [`LANES`] at a
+    /// Calls `visit` with the places after `place` whose nodes are in the range of lengths from it, up to [`CANDIDATE_LANES`] at a
     /// time.
     #[inline(always)]
     pub(super) fn each_near<E>(
@@ -157,7 +157,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
         let j_low = self.cube_along(1, here[1] - reach);
         let j_high = self.cube_along(1, here[1] + reach);
         let k_high = self.cube_along(2, here[2] + reach);
-        let mut near = [0_u16; 2 * LANES];
+        let mut near = [0_u16; 2 * CANDIDATE_LANES];
         let mut count = 0;
         for k in k0..=k_high {
             for j in (if k == k0 { j0 } else { j_low })..=j_high {
@@ -168,7 +168,7 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
                     from = from.max(place + 1);
                 }
                 while from < to {
-                    let lanes = (to - from).min(LANES);
+                    let lanes = (to - from).min(CANDIDATE_LANES);
                     let mut hits = self.in_range(here, lengths, from, lanes);
                     while hits != 0 {
                         near[count] = (from + hits.trailing_zeros() as usize) as u16;
@@ -176,10 +176,10 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
                         hits &= hits - 1;
                     }
                     from += lanes;
-                    if count >= LANES {
-                        visit(&near[..LANES])?;
-                        near.copy_within(LANES.., 0);
-                        count -= LANES;
+                    if count >= CANDIDATE_LANES {
+                        visit(&near[..CANDIDATE_LANES])?;
+                        near.copy_within(CANDIDATE_LANES.., 0);
+                        count -= CANDIDATE_LANES;
                     }
                 }
             }
@@ -192,12 +192,12 @@ impl<const NODES: usize, const CUBES: usize> Workspace<NODES, CUBES> {
     fn in_range(&self, here: [f32; 3], lengths: LengthRange, from: usize, lanes: usize) -> u32 {
         let mut hits = 0;
         match (
-            self.x[from..].first_chunk::<LANES>(),
-            self.y[from..].first_chunk::<LANES>(),
-            self.z[from..].first_chunk::<LANES>(),
+            self.x[from..].first_chunk::<CANDIDATE_LANES>(),
+            self.y[from..].first_chunk::<CANDIDATE_LANES>(),
+            self.z[from..].first_chunk::<CANDIDATE_LANES>(),
         ) {
             (Some(x), Some(y), Some(z)) => {
-                for i in 0..LANES {
+                for i in 0..CANDIDATE_LANES {
                     hits |= u32::from(lengths.holds(squared_length(here, [x[i], y[i], z[i]]))) << i;
                 }
                 hits & ((1 << lanes) - 1)

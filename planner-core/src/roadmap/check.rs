@@ -1,6 +1,6 @@
 //! What makes a file a roadmap: rows in order, edges both ways within the header's limits, ways to the landmarks that are right.
 
-use super::{LANDMARKS, MAX_NODES, MAX_WAY_M, RoadmapError, RoadmapView, in_range};
+use super::{LANDMARKS, MAX_LANDMARK_DISTANCE_M, MAX_NODES, RoadmapError, RoadmapView, in_range};
 
 impl RoadmapView<'_> {
     /// Rows, nodes and edges are what the header and one another say.
@@ -86,7 +86,9 @@ impl RoadmapView<'_> {
             for i in 0..LANDMARKS {
                 sound &= match here[i] {
                     0.0 => true,
-                    way => way > 0.0 && way <= MAX_WAY_M && explained[i] && node != landmarks[i],
+                    way => {
+                        way > 0.0 && way <= MAX_LANDMARK_DISTANCE_M && explained[i] && node != landmarks[i]
+                    }
                 };
             }
             if !sound {

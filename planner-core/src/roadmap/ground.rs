@@ -6,7 +6,7 @@
 
 use libm::{fmaxf, fminf};
 
-use super::{MAX_WAY_M, RoadmapError, RoadmapView};
+use super::{MAX_LANDMARK_DISTANCE_M, RoadmapError, RoadmapView};
 use crate::Point;
 
 /// Horizontal distance within which nodes show the ground below a place, metres.
@@ -14,7 +14,7 @@ pub const GROUND_REACH_M: f32 = 3.0;
 /// Most nodes, the nearest ones, that show the ground below a place. Fewer know too little where
 /// the floor has edges, more see the ground too wide to leave a path; measured by
 /// `tests/tests/detours.rs`.
-const WITNESSES: usize = 6;
+const MAX_GROUND_NODES: usize = 6;
 
 impl RoadmapView<'_> {
     /// Height of the ground below a node, metres; `None` where the file does not say, or nothing is below.
@@ -27,12 +27,12 @@ impl RoadmapView<'_> {
     /// O(nodes).
     pub fn ground_around(&self, place: &Point) -> Option<(f32, f32)> {
         let room_m = 2.0 * self.header.tested_clearance_m;
-        let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); WITNESSES];
+        let mut nearest = [(GROUND_REACH_M * GROUND_REACH_M, None); MAX_GROUND_NODES];
         for node in 0..self.heights.len() as u16 {
             let at = self.node(node);
             let (east_m, north_m) = (at.x - place.x, at.y - place.y);
             let across = east_m * east_m + north_m * north_m;
-            if across >= nearest[WITNESSES - 1].0 || at.z + room_m < place.z {
+            if across >= nearest[MAX_GROUND_NODES - 1].0 || at.z + room_m < place.z {
                 continue;
             }
             if let Some(ground_m) = self.ground_m(node).filter(|ground_m| *ground_m <= place.z) {
@@ -47,7 +47,8 @@ impl RoadmapView<'_> {
     }
 
     pub(super) fn check_heights(&self) -> Result<(), RoadmapError> {
-        let sound = |height_m: f32| (0.0..=MAX_WAY_M).contains(&height_m) || height_m == f32::INFINITY;
+        let sound =
+            |height_m: f32| (0.0..=MAX_LANDMARK_DISTANCE_M).contains(&height_m) || height_m == f32::INFINITY;
         match self.heights.iter().position(|raw| !sound(f32::from_le_bytes(*raw))) {
             Some(node) => Err(RoadmapError::Height(node as u16)),
             None => Ok(()),

@@ -1,8 +1,9 @@
 //! Writing a roadmap into a caller's buffer, without scratch: the rows are counted, filled and sorted in place.
 
 use super::{
-    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_NODES, MAX_WAY_M, NODE_LEN, RoadmapError,
-    RoadmapHeader, RoadmapView, VERSION, WITHOUT_HEIGHTS, WORD_LEN, in_range, millimetres_down, target_of,
+    HEADER_LEN, HEIGHT_LEN, LANDMARKS, LANDMARKS_LEN, MAGIC, MAX_LANDMARK_DISTANCE_M, MAX_NODES, NODE_LEN,
+    RoadmapError, RoadmapHeader, RoadmapView, VERSION, VERSION_WITHOUT_HEIGHTS, WORD_LEN, in_range,
+    millimetres_down, target_of,
 };
 use crate::Point;
 use crate::file::{CRC32, FileError};
@@ -80,7 +81,7 @@ pub fn write_with_landmarks<const N: usize>(
         for (node, ways) in (0..nodes.len() as u16).zip(ways.chunks_exact_mut(LANDMARKS)) {
             let reached = Some(ws.distance_m(node)).filter(|way| way.is_finite());
             let way_m = reached.unwrap_or(0.0);
-            if way_m > MAX_WAY_M {
+            if way_m > MAX_LANDMARK_DISTANCE_M {
                 return Err(RoadmapError::Landmark(node));
             }
             ways[column] = way_m.to_le_bytes();
@@ -114,7 +115,7 @@ fn write_graph<'a>(
     check_edges(header, nodes, edges)?;
 
     let (head, rest) = out.split_at_mut(HEADER_LEN);
-    let version = if columns > LANDMARKS { VERSION } else { WITHOUT_HEIGHTS };
+    let version = if columns > LANDMARKS { VERSION } else { VERSION_WITHOUT_HEIGHTS };
     write_header(header, version, [nodes.len(), 2 * edges.len(), columns.min(LANDMARKS)], needed, head);
     let (node_bytes, rest) = rest.split_at_mut(nodes.len() * NODE_LEN);
     let scalars = nodes.iter().flat_map(|p| [p.x, p.y, p.z]);

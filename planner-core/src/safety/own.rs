@@ -8,19 +8,19 @@
 use heapless::Vec;
 use libm::sqrtf;
 
-use super::{POINTS, Set};
+use super::{MAX_SET_POINTS, Set};
 use crate::Point;
 use crate::geometry::{point_distance_sq, segments_distance_sq};
 
 /// Rounding of distances, metres: an approach by less than this is not counted as one, and no
 /// vehicle can creep past another by so little.
-const NEARER_M: f32 = 0.003;
+const APPROACH_ROUNDING_M: f32 = 0.003;
 /// Margin added to bounding boxes, metres: more than a coordinate of the mission frame is rounded
 /// by.
-const WIDER_M: f32 = 0.01;
+const BOUNDS_ROUNDING_M: f32 = 0.01;
 /// Paths of more legs than this are first bounded by the line between their ends, which is cheaper
 /// than to compare each leg.
-const FEW: usize = 2;
+const MAX_LEGS_WITHOUT_BOUND: usize = 2;
 
 /// No less than the square root, and at most 7 % more: half the exponent, and the line between two powers of four.
 #[inline]
@@ -56,7 +56,7 @@ impl Leg {
 #[derive(Clone, Debug)]
 pub struct OwnSet<'a> {
     set: &'a Set,
-    legs: Vec<Leg, POINTS>,
+    legs: Vec<Leg, MAX_SET_POINTS>,
     /// Reach of the set from its first point, metres.
     reach_m: f32,
     /// Greatest distance of the set from the line between its first point and its last, metres.
@@ -85,7 +85,7 @@ impl<'a> OwnSet<'a> {
         set.segments()
             .skip(usize::from(double))
             .for_each(|(from, to)| own.add(from, to, &mut low, &mut high));
-        if own.legs.len() > FEW {
+        if own.legs.len() > MAX_LEGS_WITHOUT_BOUND {
             own.beside_m = own.lies_beside_m();
         }
         (own.middle, own.size) = ((low + high) * 0.5, high - low);
@@ -125,13 +125,13 @@ impl<'a> OwnSet<'a> {
 
     /// Square of the least distance to another set's line, or `most_m` squared if it is not less.
     fn least_sq(&self, other: &Set, most_m: f32) -> f32 {
-        let wide_m = most_m + WIDER_M;
+        let wide_m = most_m + BOUNDS_ROUNDING_M;
         let mut least_sq = most_m * most_m;
         for (from, to) in other.segments() {
             if self.is_outside(from, to, wide_m) {
                 continue;
             }
-            if self.legs.len() > FEW {
+            if self.legs.len() > MAX_LEGS_WITHOUT_BOUND {
                 let line_m = wide_m + self.beside_m;
                 if segments_distance_sq((from, to), self.set.ends()) >= line_m * line_m {
                     continue;
@@ -188,7 +188,7 @@ fn distance_sq(set: &Set, place: &Point, most_sq: f32) -> f32 {
 #[inline]
 fn is_nearer(least_sq: f32, than_sq: f32) -> bool {
     // Most are not, and take no root.
-    least_sq < than_sq && sqrtf(least_sq) < sqrtf(than_sq) - NEARER_M
+    least_sq < than_sq && sqrtf(least_sq) < sqrtf(than_sq) - APPROACH_ROUNDING_M
 }
 
 /// Coordinate by coordinate `b` where it is `more` than `a`. Not `min`: what that does about numbers that are none takes a

@@ -161,10 +161,10 @@ fn the_nearest_place_is_among_the_remembered_ones() {
         let away_m = |p: &Point| (position - p).norm();
         let least_m = places.iter().map(|(_, p)| away_m(p)).fold(f32::INFINITY, f32::min);
         let Some((first, ahead)) = joint.ahead(&position, &points) else {
-            assert!(points.is_empty() || least_m > OFF_M - 0.02, "{seed}: {least_m}");
+            assert!(points.is_empty() || least_m > OFF_REPORTED_PATH_M - 0.02, "{seed}: {least_m}");
             continue;
         };
-        assert!(away_m(&first) < OFF_M && ahead.len() < points.len(), "{seed}");
+        assert!(away_m(&first) < OFF_REPORTED_PATH_M && ahead.len() < points.len(), "{seed}");
         let on_m = |p: &Point| (first - p).norm();
         let at_m = places.iter().filter(|(_, p)| on_m(p) < 0.02).map(|(at_m, _)| *at_m);
         let at_m = at_m.fold(f32::INFINITY, f32::min);

@@ -8,26 +8,29 @@ use heapless::Vec;
 use libm::{fmaxf, fminf};
 
 use super::config::ScheduleConfig;
-use super::pieces::{PIECES, Piece};
+use super::pieces::{MAX_TIMED_SEGMENTS, Piece};
 use crate::Point;
 use crate::flight::{Flight, Waypoint};
 use crate::geometry::segments_distance_sq;
 
 /// Timed segments of a block: more make capsules wide at corners, fewer make more capsules.
-pub(super) const BLOCK: usize = 8;
+pub(super) const SEGMENTS_PER_BLOCK: usize = 8;
 /// Most blocks of a flight, a bit each.
-pub(super) const BLOCKS: usize = PIECES / BLOCK;
+pub(super) const MAX_BLOCKS: usize = MAX_TIMED_SEGMENTS / SEGMENTS_PER_BLOCK;
 /// Blocks of a group.
-const GROUP: usize = 8;
+const BLOCKS_PER_GROUP: usize = 8;
 /// Most groups of a flight.
-const GROUPS: usize = BLOCKS.div_ceil(GROUP);
+const MAX_GROUPS: usize = MAX_BLOCKS.div_ceil(BLOCKS_PER_GROUP);
 /// Most that rounding takes from a distance between places kilometres away, metres.
 const BLOCK_ROUNDING_M: f32 = 0.1;
 
 /// Blocks of a flight, a bit each.
 pub(super) type Bits = u64;
 
-const _: () = assert!(BLOCKS <= Bits::BITS as usize && PIECES.is_multiple_of(BLOCK), "a bit for each block");
+const _: () = assert!(
+    MAX_BLOCKS <= Bits::BITS as usize && MAX_TIMED_SEGMENTS.is_multiple_of(SEGMENTS_PER_BLOCK),
+    "a bit for each block"
+);
 
 /// Some timed segments in a row.
 #[derive(Clone, Copy, Debug)]
@@ -85,8 +88,8 @@ impl Extent {
 /// The blocks of one flight, and boxes around groups of them.
 #[derive(Debug, Default)]
 pub(super) struct Blocks {
-    blocks: Vec<Block, BLOCKS>,
-    groups: Vec<Extent, GROUPS>,
+    blocks: Vec<Block, MAX_BLOCKS>,
+    groups: Vec<Extent, MAX_GROUPS>,
 }
 
 impl Blocks {
@@ -98,9 +101,11 @@ impl Blocks {
     pub(super) fn of(&mut self, pieces: &[Piece]) {
         self.blocks.clear();
         // Cannot overflow: there are no more pieces than blocks have room for.
-        pieces.chunks(BLOCK).for_each(|some| _ = self.blocks.push(Block::of(some).with_line(some)));
+        pieces
+            .chunks(SEGMENTS_PER_BLOCK)
+            .for_each(|some| _ = self.blocks.push(Block::of(some).with_line(some)));
         self.groups.clear();
-        for blocks in self.blocks.chunks(GROUP) {
+        for blocks in self.blocks.chunks(BLOCKS_PER_GROUP) {
             let mut around = blocks[0].around;
             blocks[1..].iter().for_each(|block| around.with(&block.around.0, &block.around.1));
             // Cannot overflow either.
@@ -130,7 +135,7 @@ impl Blocks {
         self.groups.iter().any(|group| group.meets(&leg, reach_m(cfg)))
     }
 
-    /// The blocks that may come too near to these segments of another flight, which are at most [`BLOCK`] in a row.
+    /// The blocks that may come too near to these segments of another flight, which are at most [`SEGMENTS_PER_BLOCK`] in a row.
     #[inline(never)]
     pub(super) fn near(&self, cfg: &ScheduleConfig, pieces: &[Piece]) -> Bits {
         if pieces.is_empty() {
@@ -139,7 +144,9 @@ impl Blocks {
         let reach_m = reach_m(cfg);
         let mut other = Block::of(pieces);
         let (mut near, mut has_line) = (0, false);
-        for (group, (around, blocks)) in self.groups.iter().zip(self.blocks.chunks(GROUP)).enumerate() {
+        for (group, (around, blocks)) in
+            self.groups.iter().zip(self.blocks.chunks(BLOCKS_PER_GROUP)).enumerate()
+        {
             if !around.meets(&other.around, reach_m) {
                 continue;
             }
@@ -151,7 +158,7 @@ impl Blocks {
                     (other, has_line) = (other.with_line(pieces), true);
                 }
                 if own.lines_meet(&other, reach_m) {
-                    near |= 1 << (group * GROUP + bit);
+                    near |= 1 << (group * BLOCKS_PER_GROUP + bit);
                 }
             }
         }
@@ -175,7 +182,7 @@ pub(super) fn ones(mut bits: Bits) -> impl Iterator<Item = usize> {
 
 /// The segments of these blocks, in order.
 pub(super) fn pieces_of(near: Bits, pieces: &[Piece]) -> impl Iterator<Item = &Piece> {
-    ones(near).flat_map(|block| pieces.chunks(BLOCK).nth(block).unwrap_or_default())
+    ones(near).flat_map(|block| pieces.chunks(SEGMENTS_PER_BLOCK).nth(block).unwrap_or_default())
 }
 
 #[cfg(test)]
@@ -212,7 +219,7 @@ mod tests {
 
     fn steps() -> impl Strategy<Value = Steps> {
         let step = (-24.0f32..24.0, -24.0f32..24.0, -3.0f32..3.0, any::<bool>());
-        ((-3000.0f32..3000.0, -50.0f32..50.0), proptest::collection::vec(step, 1..PIECES))
+        ((-3000.0f32..3000.0, -50.0f32..50.0), proptest::collection::vec(step, 1..MAX_TIMED_SEGMENTS))
     }
 
     proptest! {
@@ -227,7 +234,7 @@ mod tests {
             let all = |own: &mut dyn Iterator<Item = &Piece>, q: &Piece| -> List<f32> {
                 own.filter(|p| conflict(&CFG, p, q)).map(|p| p.from_m).collect()
             };
-            for some in other.chunks(BLOCK) {
+            for some in other.chunks(SEGMENTS_PER_BLOCK) {
                 let near = blocks.near(&CFG, some);
                 for q in some {
                     let expected = all(&mut own.iter(), q);
@@ -248,7 +255,7 @@ mod tests {
             climb_m: 1.5,
             descent_m,
             depart_s: 0.0,
-            piece_m: crate::schedule::PIECE_M,
+            piece_m: crate::schedule::MAX_TIMED_SEGMENT_M,
         };
         flight.fit_pieces();
         flight

@@ -31,7 +31,7 @@ impl ScheduleConfig {
 /// Why a schedule could not be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ScheduleError {
-    /// A flight has more than [`PIECES`](super::PIECES) timed segments.
+    /// A flight has more than [`PIECES`](super::MAX_TIMED_SEGMENTS) timed segments.
     PiecesFull,
     /// A vehicle has more than `G` gates.
     GatesFull,

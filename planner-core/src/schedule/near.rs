@@ -9,9 +9,9 @@ use super::pieces::Piece;
 use crate::sort;
 
 /// Cells along one side of the grid.
-const SIDE: usize = 32;
+const CELLS_PER_SIDE: usize = 32;
 /// Least side of a cell, metres: far below any separation finer cells find nothing less.
-const CELL_LEAST_M: f32 = 0.5;
+const MIN_CELL_M: f32 = 0.5;
 
 /// Pieces by the cell of their middle, seen from above.
 #[derive(Clone, Debug)]
@@ -21,13 +21,13 @@ pub(super) struct Cells {
     /// Half of the longest piece, metres.
     half_m: f32,
     /// First timed segment of each cell, row by row.
-    starts: [u16; SIDE * SIDE + 1],
+    starts: [u16; CELLS_PER_SIDE * CELLS_PER_SIDE + 1],
 }
 
 impl Cells {
     pub(super) const fn new() -> Self {
         // All zero; `sort` sets the size before a piece is looked for.
-        Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; SIDE * SIDE + 1] }
+        Self { min: [0.0; 2], cell_m: 0.0, half_m: 0.0, starts: [0; CELLS_PER_SIDE * CELLS_PER_SIDE + 1] }
     }
 
     /// Sorts `pieces`, at most `u16::MAX` of them, into cells.
@@ -42,26 +42,26 @@ impl Cells {
             self.half_m = fmaxf(self.half_m, half_length(piece));
         }
         let extent_m = fmaxf(max[0] - min[0], max[1] - min[1]);
-        (self.min, self.cell_m) = (min, fmaxf(extent_m / SIDE as f32, CELL_LEAST_M));
+        (self.min, self.cell_m) = (min, fmaxf(extent_m / CELLS_PER_SIDE as f32, MIN_CELL_M));
         let cell = |piece: &Piece| {
             let [x, y] = middle(piece);
-            self.at(1, y) * SIDE + self.at(0, x)
+            self.at(1, y) * CELLS_PER_SIDE + self.at(0, x)
         };
         // Any order within a cell will do, if it is the same on all boards.
         sort::by(pieces, |a, b| cell(a).cmp(&cell(b)));
         self.starts.fill(0);
         for piece in &*pieces {
             let [x, y] = middle(piece);
-            self.starts[self.at(1, y) * SIDE + self.at(0, x) + 1] += 1;
+            self.starts[self.at(1, y) * CELLS_PER_SIDE + self.at(0, x) + 1] += 1;
         }
-        for cell in 0..SIDE * SIDE {
+        for cell in 0..CELLS_PER_SIDE * CELLS_PER_SIDE {
             self.starts[cell + 1] += self.starts[cell];
         }
     }
 
     /// The cell of a coordinate, the nearest if it lies outside.
     fn at(&self, axis: usize, value: f32) -> usize {
-        (((value - self.min[axis]) / self.cell_m) as usize).min(SIDE - 1)
+        (((value - self.min[axis]) / self.cell_m) as usize).min(CELLS_PER_SIDE - 1)
     }
 
     /// The pieces whose middle is so near that they may come within `apart_m` of `own`, and some more.
@@ -76,8 +76,8 @@ impl Cells {
         let [columns, rows] =
             [0, 1].map(|axis| (self.at(axis, middle[axis] - reach_m), self.at(axis, middle[axis] + reach_m)));
         (rows.0..=rows.1).flat_map(move |row| {
-            let from = self.starts[row * SIDE + columns.0];
-            let to = self.starts[row * SIDE + columns.1 + 1];
+            let from = self.starts[row * CELLS_PER_SIDE + columns.0];
+            let to = self.starts[row * CELLS_PER_SIDE + columns.1 + 1];
             &pieces[usize::from(from)..usize::from(to)]
         })
     }

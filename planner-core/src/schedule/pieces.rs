@@ -10,11 +10,11 @@ use crate::geometry::segments_distance_sq;
 
 /// Longest timed segment, metres: shorter ones let vehicles follow one another closer, longer ones
 /// cost less.
-pub const PIECE_M: f32 = 1.5;
+pub const MAX_TIMED_SEGMENT_M: f32 = 1.5;
 /// Most timed segments of one flight; a flight that would need more has longer ones.
-pub const PIECES: usize = 320;
+pub const MAX_TIMED_SEGMENTS: usize = 320;
 /// Most doublings of the length of timed segments: to 1.5 km.
-const DOUBLINGS: usize = 10;
+const MAX_SEGMENT_DOUBLINGS: usize = 10;
 /// Least time for which a pad is held after the take-off, seconds: a vehicle that stands on its pad
 /// has not left it.
 pub(super) const OFF_PAD_S: f32 = 0.05;
@@ -38,11 +38,11 @@ pub(super) struct Piece {
 }
 
 impl<const W: usize> Flight<W> {
-    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`PIECES`].
+    /// Sets the shortest timed segments, of twice as long ones each time, with which the flight has at most [`MAX_TIMED_SEGMENTS`].
     pub(crate) fn fit_pieces(&mut self) {
-        self.piece_m = PIECE_M;
-        for _ in 0..DOUBLINGS {
-            if self.pieces() <= PIECES {
+        self.piece_m = MAX_TIMED_SEGMENT_M;
+        for _ in 0..MAX_SEGMENT_DOUBLINGS {
+            if self.pieces() <= MAX_TIMED_SEGMENTS {
                 break;
             }
             self.piece_m *= 2.0;
@@ -77,7 +77,7 @@ impl<const W: usize> Flight<W> {
 pub(super) fn cut<const W: usize>(
     cfg: &ScheduleConfig,
     flight: &Flight<W>,
-    out: &mut Vec<Piece, PIECES>,
+    out: &mut Vec<Piece, MAX_TIMED_SEGMENTS>,
 ) -> Result<(), ScheduleError> {
     out.clear();
     let waypoints = flight.path.waypoints();

@@ -13,7 +13,9 @@ use libm::{fmaxf, fminf};
 
 use super::config::{ScheduleConfig, ScheduleError};
 use super::near::Cells;
-use super::pieces::{Leg, OFF_PAD_S, PIECE_M, PIECES, Piece, Stops, conflict, cut, parts};
+use super::pieces::{
+    Leg, MAX_TIMED_SEGMENT_M, MAX_TIMED_SEGMENTS, OFF_PAD_S, Piece, Stops, conflict, cut, parts,
+};
 use super::{Forbidden, first_allowed, forbid, last_allowed};
 use crate::Point;
 use crate::flight::{Flight, Path};
@@ -52,7 +54,7 @@ pub struct SippWorkspace<const N: usize, const P: usize> {
     /// First state of each node, plus one.
     first: [u16; N],
     heap: Heap<N>,
-    cut: Vec<Piece, PIECES>,
+    cut: Vec<Piece, MAX_TIMED_SEGMENTS>,
     forbidden: Forbidden,
     /// Handover time of the route that is sought.
     handover_s: f32,
@@ -203,8 +205,8 @@ fn check<const N: usize, const W: usize>(
     }
     let vertical =
         [flight.climb_m, flight.descent_m].map(|length_m| parts(length_m, flight.piece_m) as usize);
-    let whole = flight.piece_m >= PIECE_M && flight.piece_m.is_finite();
-    if !whole || vertical[0].max(vertical[1]) > PIECES {
+    let whole = flight.piece_m >= MAX_TIMED_SEGMENT_M && flight.piece_m.is_finite();
+    if !whole || vertical[0].max(vertical[1]) > MAX_TIMED_SEGMENTS {
         return Err(ScheduleError::PiecesFull);
     }
     Ok(())

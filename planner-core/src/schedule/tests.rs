@@ -14,7 +14,15 @@ fn flight(id: u8, points: &[(f32, f32)]) -> Flight<8> {
         path.push(Point::new(x, y, 1.5), 1.0).unwrap();
     }
     path.label(1.5 / CFG.vertical_mps, CFG.cruise_mps);
-    Flight { id, task: Task::Goto(0), path, climb_m: 1.5, descent_m: 1.5, depart_s: 0.0, piece_m: PIECE_M }
+    Flight {
+        id,
+        task: Task::Goto(0),
+        path,
+        climb_m: 1.5,
+        descent_m: 1.5,
+        depart_s: 0.0,
+        piece_m: MAX_TIMED_SEGMENT_M,
+    }
 }
 
 fn schedule(pair: &mut [Flight<8>; 2]) -> Result<(), ScheduleError> {

@@ -6,7 +6,7 @@ const UNSEEN: u16 = 0;
 pub(crate) const SETTLED: u16 = u16::MAX;
 
 /// Children of a node of the heap.
-const ARITY: usize = 4;
+const HEAP_ARITY: usize = 4;
 
 pub(crate) struct Heap<const N: usize> {
     len: usize,
@@ -28,7 +28,7 @@ fn node_of(entry: u64) -> usize {
 /// Index of the least entry. A full set is compared pairwise: selects, where branches would be mispredicted.
 #[inline(always)]
 fn least_of(entries: &[u64]) -> usize {
-    if let Ok([a, b, c, d]) = <&[u64; ARITY]>::try_from(entries) {
+    if let Ok([a, b, c, d]) = <&[u64; HEAP_ARITY]>::try_from(entries) {
         let (left, left_at) = if b < a { (b, 1) } else { (a, 0) };
         let (right, right_at) = if d < c { (d, 3) } else { (c, 2) };
         return if right < left { right_at } else { left_at };
@@ -68,7 +68,7 @@ impl<const N: usize> Heap<N> {
         };
         let entry = entry_of(node, cost);
         while at > 0 {
-            let above = (at - 1) / ARITY;
+            let above = (at - 1) / HEAP_ARITY;
             if self.entries[above] <= entry {
                 break;
             }
@@ -101,11 +101,11 @@ impl<const N: usize> Heap<N> {
 
     fn sift_down(&mut self, mut at: usize, entry: u64) {
         loop {
-            let first = at * ARITY + 1;
+            let first = at * HEAP_ARITY + 1;
             if first >= self.len {
                 break;
             }
-            let least = first + least_of(&self.entries[first..(first + ARITY).min(self.len)]);
+            let least = first + least_of(&self.entries[first..(first + HEAP_ARITY).min(self.len)]);
             if self.entries[least] >= entry {
                 break;
             }

@@ -185,7 +185,7 @@ fn corners(mut word: u64, brick: &Point) -> impl Iterator<Item = Point> {
 }
 
 /// Whether the distance to every obstacle is strictly greater than `clearance_m`, which is positive and finite. The
-/// caller has checked that the ends are finite and near the grid, and where the clearance is less than `WIDE_CELLS`
+/// caller has checked that the ends are finite and near the grid, and where the clearance is less than `MIN_MISSED_CELLS`
 /// that nothing is touched. Of the share `known` of the segment from `a` the answer is known already, by far more than rounding.
 pub(crate) fn is_farther_than(
     grid: &VoxelGrid<'_>,

@@ -3,8 +3,8 @@
 /// The cells of a brick whose lane along `axis` is among `lanes`.
 #[inline(always)]
 pub(crate) fn lane_mask(axis: usize, lanes: u32) -> u64 {
-    const SPREAD: [[u64; 16]; 3] = lane_masks();
-    SPREAD[axis][(lanes & 15) as usize]
+    const LANE_MASKS: [[u64; 16]; 3] = lane_masks();
+    LANE_MASKS[axis][(lanes & 15) as usize]
 }
 
 const fn lane_masks() -> [[u64; 16]; 3] {

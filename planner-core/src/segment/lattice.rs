@@ -6,7 +6,7 @@ use crate::voxel::{GridShape, MAX_DIM};
 /// Fraction bits of a snapped coordinate: its unit is 2⁻¹⁴ cell.
 pub const FRACTION_BITS: u32 = 14;
 /// Side of a cell, in units of a snapped coordinate.
-pub(super) const ONE: i32 = 1 << FRACTION_BITS;
+pub(super) const ONE_CELL: i32 = 1 << FRACTION_BITS;
 
 /// The greatest coordinate, in units of 2⁻¹⁴ cell, that [`snap`] gives.
 pub const MAX_SNAPPED: i32 = (2 * MAX_DIM as i32) << FRACTION_BITS;
@@ -18,14 +18,14 @@ pub type Snapped = [i32; 3];
 #[inline]
 pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
     /// Largest coordinate that is snapped, in cells.
-    const REACH: f32 = MAX_DIM as f32;
+    const MAX_COORDINATE: f32 = MAX_DIM as f32;
     let mut out = [0; 3];
     for axis in 0..3 {
         let u = (p[axis] - shape.min[axis]) / shape.resolution_m;
-        if !(-REACH..=2.0 * REACH).contains(&u) {
+        if !(-MAX_COORDINATE..=2.0 * MAX_COORDINATE).contains(&u) {
             return None;
         }
-        let v = u * ONE as f32;
+        let v = u * ONE_CELL as f32;
         out[axis] = (if v < 0.0 { v - 0.5 } else { v + 0.5 }) as i32;
     }
     Some(out)
@@ -34,5 +34,5 @@ pub fn snap(shape: &GridShape, p: &Point) -> Option<Snapped> {
 /// How far, in cells along each axis, [`snap`] may move a point that lies within `cells` cells of the grid's minimum
 /// corner: half a lattice step, and half an ulp for each of the subtraction and the division.
 pub fn snap_error_cells(cells: f32) -> f32 {
-    0.5 / ONE as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
+    0.5 / ONE_CELL as f32 + 2.0 * cells * (f32::EPSILON / 2.0)
 }

@@ -1,7 +1,7 @@
 //! The exact check: a walk along the longest axis over the bricks that a segment may touch, in integers.
 
 use super::lanes::lane_mask;
-use super::lattice::{FRACTION_BITS, MAX_SNAPPED, ONE, Snapped};
+use super::lattice::{FRACTION_BITS, MAX_SNAPPED, ONE_CELL, Snapped};
 use crate::voxel::{Outside, VoxelGrid};
 
 /// Whether the segment touches an occupied closed cell, or the outside where that is an obstacle. Exact; an end beyond
@@ -90,7 +90,7 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     fn new(grid: &VoxelGrid<'g>, a: &Snapped, b: &Snapped, known: f32) -> Self {
         let d = [b[0] - a[0], b[1] - a[1], b[2] - a[2]];
         // A thousandth and a cell less than known, against the rounding of `known` and of this product.
-        let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE).max(0);
+        let skip = ((d[U].unsigned_abs() as f32 * known * 0.999) as i32 - ONE_CELL).max(0);
         // Along U upwards, so that the walk has one direction.
         let ((a, b), (start, end)) =
             if d[U] < 0 { ((*b, *a), (b[U], a[U] - skip)) } else { ((*a, *b), (a[U] + skip, b[U])) };
@@ -124,10 +124,10 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
         if whole.first > whole.last {
             return false;
         }
-        let first = (whole.first * ONE).clamp(self.start, self.end);
+        let first = (whole.first * ONE_CELL).clamp(self.start, self.end);
         let (mut v, mut w) = (self.at(V, first), self.at(W, first));
         for brick in whole.first >> 2..=whole.last >> 2 {
-            let u = ((brick + 1) * (4 * ONE)).clamp(self.start, self.end);
+            let u = ((brick + 1) * (4 * ONE_CELL)).clamp(self.start, self.end);
             let (next_v, next_w) = (self.at(V, u), self.at(W, u));
             let span_v = Span::new(v, next_v, self.slack, self.dims[V]);
             let span_w = Span::new(w, next_w, self.slack, self.dims[W]);
@@ -154,11 +154,11 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
     /// Looks at the occupied cells `near` of a brick, one layer along `U` at a time.
     #[inline(always)]
     fn brick_touches(&self, near: u64, brick_u: i32, brick_v: i32, brick_w: i32) -> bool {
-        let floor = brick_u * (4 * ONE);
+        let floor = brick_u * (4 * ONE_CELL);
         let from = floor.clamp(self.start, self.end);
         let (mut v, mut w) = (self.at(V, from), self.at(W, from));
         for layer in 0..4 {
-            let to = (floor + (layer + 1) * ONE).clamp(self.start, self.end);
+            let to = (floor + (layer + 1) * ONE_CELL).clamp(self.start, self.end);
             let (next_v, next_w) = (self.at(V, to), self.at(W, to));
             let (last_v, last_w) = (v, w);
             (v, w) = (next_v, next_w);
@@ -190,18 +190,18 @@ impl<'g, const U: usize, const V: usize, const W: usize> Walk<'g, U, V, W> {
 #[inline(always)]
 fn cell_is_touched(a: &Snapped, b: &Snapped, cell: [i32; 3]) -> bool {
     /// Half a cell, in units of a snapped coordinate.
-    const HALF: i64 = (ONE / 2) as i64;
+    const HALF_CELL: i64 = (ONE_CELL / 2) as i64;
     let mut d = [0_i64; 3];
     let mut to_center = [0_i64; 3];
     for axis in 0..3 {
-        let low = cell[axis] * ONE;
-        if a[axis].max(b[axis]) < low || a[axis].min(b[axis]) > low + ONE {
+        let low = cell[axis] * ONE_CELL;
+        if a[axis].max(b[axis]) < low || a[axis].min(b[axis]) > low + ONE_CELL {
             return false;
         }
         d[axis] = i64::from(b[axis] - a[axis]);
-        to_center[axis] = i64::from(low - a[axis]) + HALF;
+        to_center[axis] = i64::from(low - a[axis]) + HALF_CELL;
     }
-    [(0, 1), (1, 2), (2, 0)]
-        .into_iter()
-        .all(|(p, q)| (d[p] * to_center[q] - d[q] * to_center[p]).abs() <= (d[p].abs() + d[q].abs()) * HALF)
+    [(0, 1), (1, 2), (2, 0)].into_iter().all(|(p, q)| {
+        (d[p] * to_center[q] - d[q] * to_center[p]).abs() <= (d[p].abs() + d[q].abs()) * HALF_CELL
+    })
 }

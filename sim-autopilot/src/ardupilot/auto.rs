@@ -15,7 +15,7 @@ use crate::platform::{Platform, SensorReadings};
 /// A place to land at is reached within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
 /// Distance to the target beyond which the vehicle turns towards it, metres.
-const LOOKS_M: f32 = 2.0;
+const TURN_BEYOND_M: f32 = 2.0;
 
 impl Copter {
     /// Whether AUTO can be entered; says why not.
@@ -95,7 +95,7 @@ impl Copter {
         match self.auto.leg {
             Some(Leg::To { at, .. }) => {
                 let off = at - sensors.position;
-                if libm::hypotf(off.x, off.y) > LOOKS_M {
+                if libm::hypotf(off.x, off.y) > TURN_BEYOND_M {
                     self.auto.heading = Some(libm::atan2f(off.x, off.y));
                 }
                 self.auto.stay = Some(at);

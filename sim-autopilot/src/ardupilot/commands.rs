@@ -3,8 +3,8 @@
 use super::setpoint::Goal;
 use super::{Copter, Mode, STREAMS};
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST,
-    FAILED, FORCE, UNSUPPORTED, message_id,
+    ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
+    DO_SET_CAM_TRIGG_DIST, FAILED, UNSUPPORTED, message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -30,8 +30,10 @@ impl Copter {
         let sensors = platform.sensors();
         let result = match command.id {
             176 => self.change_mode(platform, command.param[0] as u8, command.param[1] as u32),
-            400 if command.param[0] == 1.0 => done(self.arm(platform, &sensors, command.param[1] == FORCE)),
-            400 if command.param[0] == 0.0 => done(self.disarm(platform, command.param[1] == FORCE)),
+            400 if command.param[0] == 1.0 => {
+                done(self.arm(platform, &sensors, command.param[1] == ARM_FORCE))
+            }
+            400 if command.param[0] == 0.0 => done(self.disarm(platform, command.param[1] == ARM_FORCE)),
             DO_DIGICAM_CONTROL | DO_SET_CAM_TRIGG_DIST => return platform.control_camera(from, command),
             // The height counts from home.
             22 => done(self.take_off(sensors.home.z + command.z, &sensors)),

@@ -15,7 +15,7 @@ const TAKEN_OFF_M: f32 = 0.12;
 /// Profile of the lift-off, as seen: seconds since the vehicle lifted, and the acceleration up
 /// until then, m/s². First the throttle creeps past hover; the controllers wind up meanwhile and
 /// then kick.
-const LIFT_OFF: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
+const LIFT_OFF_PROFILE: [(f32, f32); 2] = [(0.70, 0.57), (0.90, 5.2)];
 /// Deceleration of BRAKE, m/s² (`BRAKE_MODE_DECEL_RATE`). Beside a jerk of 5 m/s³ it never acts: the speed decays with
 /// 7.5 / 5 s.
 const BRAKE_MPS2: f32 = 7.5;
@@ -68,7 +68,7 @@ impl Copter {
     /// Acceleration up while it leaves the ground; NaN once it has.
     fn lift_off(&self, now_us: u64) -> f32 {
         let since_s = now_us.saturating_sub(self.since.lifted_us) as f32 * 1e-6;
-        LIFT_OFF.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
+        LIFT_OFF_PROFILE.iter().find(|(until_s, _)| since_s < *until_s).map_or(f32::NAN, |&(_, up)| up)
     }
 
     pub(super) fn take_off_goal(&mut self) -> Goal {

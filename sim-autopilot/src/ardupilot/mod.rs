@@ -42,7 +42,7 @@ use crate::AutopilotKind;
 /// s, spool-up 0.5 s, and the throttle's slew to hover.
 const ARM_TO_LIFT_S: f32 = 3.05;
 /// Time from a later NAV_TAKEOFF to the lift-off, seconds.
-const SPOOL_UP_S: f32 = 2.07;
+const TAKEOFF_TO_LIFT_S: f32 = 2.07;
 /// `LAND_DETECTOR_TRIGGER_SEC` and its filters: 1.68 s seen.
 const LAND_DETECTOR_S: f32 = 1.6;
 /// Time from landed to disarmed in LAND and RTL: 0.4 s seen, HEARTBEAT 0.8 s.
@@ -55,12 +55,12 @@ const GCS_REACTION_S: f32 = 0.1;
 /// estimator's own wait).
 const ESTIMATOR_REACTION_S: f32 = 1.5;
 /// Time from the boot until the estimator has an attitude: 5.8 s seen.
-const ATTITUDE_S: f32 = 5.8;
+const BOOT_TO_ATTITUDE_S: f32 = 5.8;
 /// Share of the time until the estimator has a position after which the estimator has an origin: 20
 /// of 41.6 s seen.
 const ORIGIN_SHARE: f32 = 0.48;
 /// Time from the boot to the first STANDBY.
-const BOOT_S: f32 = 3.0;
+const BOOT_TO_STANDBY_S: f32 = 3.0;
 
 /// Streams: message id and interval in µs, 0 off until asked for.
 pub const STREAMS: [(u32, u32); 25] = [
@@ -219,7 +219,7 @@ impl Copter {
             flags: 0x51 | if sticks { 0 } else { 8 } | if self.armed { 0x80 } else { 0 },
             system_status: match self.failsafe {
                 Some(_) => 5,
-                None if now_us < micros(BOOT_S) => 1,
+                None if now_us < micros(BOOT_TO_STANDBY_S) => 1,
                 None if self.landed => 3,
                 None => 4,
             },
@@ -233,7 +233,7 @@ impl Copter {
                 _ => 2,
             },
             guided: self.mode == Mode::Guided,
-            ekf_flags: if now_us < micros(ATTITUDE_S).min(self.ready_us) {
+            ekf_flags: if now_us < micros(BOOT_TO_ATTITUDE_S).min(self.ready_us) {
                 0x400
             } else if known {
                 0x33F
@@ -385,7 +385,8 @@ impl Copter {
         if self.landed
             && let Some(takeoff) = self.takeoff
             && now_us
-                >= (takeoff.since_us + micros(SPOOL_UP_S)).max(self.since.armed_us + micros(ARM_TO_LIFT_S))
+                >= (takeoff.since_us + micros(TAKEOFF_TO_LIFT_S))
+                    .max(self.since.armed_us + micros(ARM_TO_LIFT_S))
         {
             self.landed = false;
             self.since.touching_us = None;

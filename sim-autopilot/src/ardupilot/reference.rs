@@ -11,7 +11,7 @@ use super::setpoint::Goal;
 use crate::shaping::approach;
 
 /// Share of the acceleration that corrections of position may use.
-const CORRECTION: f32 = 0.5;
+const CORRECTION_ACCEL_SHARE: f32 = 0.5;
 
 /// The moving point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -35,7 +35,8 @@ impl Reference {
         let error = goal.position.map_or(Point::zeros(), |position| position - self.position);
         // Across: a vector.
         let (limit, jerk) = (tuning.acceleration, tuning.jerk);
-        let mut wanted = scaled(error.x, error.y, |e| approach(e, 0.5 * jerk / limit, CORRECTION * limit));
+        let mut wanted =
+            scaled(error.x, error.y, |e| approach(e, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit));
         wanted = scaled(wanted.0, wanted.1, |speed| speed.min(tuning.speed));
         wanted = (wanted.0 + goal.velocity.x, wanted.1 + goal.velocity.y);
         let lack = (wanted.0 - self.velocity.x, wanted.1 - self.velocity.y);
@@ -49,7 +50,7 @@ impl Reference {
         self.acceleration.y += step.1;
         // Up.
         let (limit, jerk) = (tuning.acceleration_z, tuning.jerk_z);
-        let rate = approach(error.z, 0.5 * jerk / limit, CORRECTION * limit);
+        let rate = approach(error.z, 0.5 * jerk / limit, CORRECTION_ACCEL_SHARE * limit);
         let rate = rate.max(-tuning.speed_down).min(tuning.speed_up) + goal.velocity.z;
         let push = approach(rate - self.velocity.z, jerk / limit, jerk).max(-limit).min(limit);
         let step = push + goal.acceleration.z - self.acceleration.z;

@@ -35,7 +35,7 @@ proptest! {
         let ours = written(&frame);
         let (id, (system, component, sequence), payload) = &frame;
         let header = other::Header { system: *system, component: *component, sequence: *sequence };
-        let mut theirs = [0; other::MAX_SENT];
+        let mut theirs = [0; other::MAX_FRAME_LEN];
         let seed = other::extra_crc(*id);
         prop_assert_eq!(seed, super::seed(*id));
         let len = seed.map_or(0, |seed| other::encode_raw(header, *id, seed, payload, &mut theirs));
@@ -71,7 +71,7 @@ proptest! {
             found.extend(all(&mut framer, 0, now));
             rest = later;
         }
-        found.extend(all(&mut framer, PARTIAL_US + 1, &[]));
+        found.extend(all(&mut framer, PARTIAL_LIFETIME_US + 1, &[]));
         let again = |found: &Frame| {
             let mut again = Vec::new();
             found.write(&mut again);
@@ -92,7 +92,7 @@ fn version_1_and_signed_frames_are_read() {
     let seed = seed(0).unwrap();
     let mut first = vec![V1_START, 9, 7, 3, 1, 0, 0, 0, 0, 0, 2, 12, 1, 3, 3];
     first.extend(calculate_crc(&first[1..], seed).to_le_bytes());
-    let mut signed = vec![V2_START, 1, SIGNED, 0, 8, 3, 1, 0, 0, 0, 5];
+    let mut signed = vec![V2_START, 1, FLAG_SIGNED, 0, 8, 3, 1, 0, 0, 0, 5];
     signed.extend(calculate_crc(&signed[1..], seed).to_le_bytes());
     signed.extend([0; 13]);
     let mut framer = Framer::default();
@@ -107,7 +107,7 @@ fn version_1_and_signed_frames_are_read() {
 #[test]
 fn a_frame_that_takes_too_long_is_given_up() {
     let whole = written(&(4, (1, 1, 9), vec![1; 14]));
-    for (late_us, count) in [(0, 1), (PARTIAL_US, 1), (PARTIAL_US + 1, 0)] {
+    for (late_us, count) in [(0, 1), (PARTIAL_LIFETIME_US, 1), (PARTIAL_LIFETIME_US + 1, 0)] {
         let mut framer = Framer::default();
         assert!(all(&mut framer, 5, &whole[..7]).is_empty());
         assert_eq!(all(&mut framer, 5 + late_us, &[]).len(), 0);

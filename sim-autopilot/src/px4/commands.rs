@@ -4,8 +4,9 @@ use planner_core::frames::Geodetic;
 
 use super::{Mode, Px4};
 use crate::command::{
-    ACCEPTED, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL, DO_SET_CAM_TRIGG_DIST,
-    DO_SET_MODE, FAILED, FORCE, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED, accept, message_id,
+    ACCEPTED, ARM_FORCE, AUTOPILOT_VERSION, CUSTOM_MODE, Command, DENIED, DO_DIGICAM_CONTROL,
+    DO_SET_CAM_TRIGG_DIST, DO_SET_MODE, FAILED, PROTOCOL_VERSION, TEMPORARILY_REJECTED, UNSUPPORTED, accept,
+    message_id,
 };
 use crate::platform::Platform;
 use crate::port::Sender;
@@ -86,7 +87,7 @@ impl Px4 {
     }
 
     fn arm_or_disarm(&mut self, platform: &mut Platform, command: &Command) -> u8 {
-        let force = command.param[1] == FORCE;
+        let force = command.param[1] == ARM_FORCE;
         if command.param[0] == 1.0 {
             accept(self.arm(platform, force))
         } else if command.param[0] == 0.0 {

@@ -10,21 +10,21 @@ use crate::shaping::Ramp;
 use crate::vehicle::Demand;
 
 /// Least height above the present one that a setpoint must command to count as a climb, metres; a
-/// commanded speed of [`CLIMB_MPS`] counts too.
-const CLIMB_M: f32 = 0.15;
+/// commanded speed of [`MIN_CLIMB_DEMAND_MPS`] counts too.
+const MIN_CLIMB_DEMAND_M: f32 = 0.15;
 /// Least commanded vertical speed that counts as a climb, m/s.
-const CLIMB_MPS: f32 = 0.05;
+const MIN_CLIMB_DEMAND_MPS: f32 = 0.05;
 /// An automatic mode has reached its target within this distance, metres.
 const ARRIVED_M: f32 = 0.5;
 /// Distance to the target beyond which the vehicle turns towards it, metres.
-const LOOKS_M: f32 = 2.0;
+const TURN_BEYOND_M: f32 = 2.0;
 /// Fastest sink that was seen in Land, m/s, although `MPC_Z_V_AUTO_DN` is 1.5: by the change of its
 /// height, which is also what PX4 controls there; the velocity that it reported meanwhile went up
 /// to 1.6.
-const LAND_MPS: f32 = 1.3;
+const MAX_LAND_MPS: f32 = 1.3;
 /// Lag of the measured distance to the ground, seconds: PX4 crawls from 0.85 m on, not from
 /// `MPC_LAND_ALT3`.
-const DISTANCE_LAG_S: f32 = 0.2;
+const GROUND_DISTANCE_LAG_S: f32 = 0.2;
 
 impl Commander {
     /// Fixes what the mode leans on: where it stops, which leg of the return is next.
@@ -43,11 +43,11 @@ impl Commander {
     pub(super) fn wants_up(&self, sensors: &SensorReadings, demand: &Demand) -> bool {
         match self.mode() {
             Mode::Takeoff => true,
-            Mode::Mission => demand.position.z - sensors.position.z > CLIMB_M,
+            Mode::Mission => demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M,
             Mode::Offboard => {
-                demand.position.z - sensors.position.z > CLIMB_M
-                    || demand.velocity.z > CLIMB_MPS
-                    || demand.acceleration.z > CLIMB_MPS
+                demand.position.z - sensors.position.z > MIN_CLIMB_DEMAND_M
+                    || demand.velocity.z > MIN_CLIMB_DEMAND_MPS
+                    || demand.acceleration.z > MIN_CLIMB_DEMAND_MPS
             }
             _ => false,
         }
@@ -127,7 +127,7 @@ impl Commander {
                 let off = at - sensors.position;
                 if heading.is_finite() {
                     self.hold_heading = heading;
-                } else if libm::hypotf(off.x, off.y) > LOOKS_M {
+                } else if libm::hypotf(off.x, off.y) > TURN_BEYOND_M {
                     self.hold_heading = libm::atan2f(off.x, off.y);
                 }
                 self.hold = at;
@@ -155,8 +155,8 @@ impl Commander {
         let [high, low] = tuning.land_slow_below;
         let height = sensors.position.z - sensors.home.z;
         let share = ((height - low) / (high - low).max(0.1)).clamp(0.0, 1.0);
-        let mut sink = LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
-        if sensors.distance - sensors.velocity.z * DISTANCE_LAG_S < tuning.land_crawl_below {
+        let mut sink = MAX_LAND_MPS.min(tuning.land_speed + share * (tuning.auto_down - tuning.land_speed));
+        if sensors.distance - sensors.velocity.z * GROUND_DISTANCE_LAG_S < tuning.land_crawl_below {
             sink = CRAWL_SHARE * tuning.land_crawl_speed;
         }
         let descent = match &mut self.descent {

@@ -5,18 +5,18 @@ use planner_core::Point;
 use crate::shaping::Ramp;
 
 /// Horizontal acceleration of the automatic modes, m/s² (`MPC_ACC_HOR`).
-const ACCELERATION_MPS2: f32 = 3.0;
+const AUTO_ACCEL_MPS2: f32 = 3.0;
 /// Time flown at full speed before the braking counts, seconds (0.6 of `MPC_JERK_AUTO`, over
 /// `MPC_JERK_AUTO`).
-const DELAY_S: f32 = 0.6;
+const BRAKING_DELAY_S: f32 = 0.6;
 /// Longest time since the last step of the mode that counts, seconds.
-const MOST_S: f32 = 0.1;
+const MAX_STEP_S: f32 = 0.1;
 
 /// The stopping point that PX4 commands from this velocity (m/s), metres from where the vehicle is. With 1.85 m/s recorded vehicles went 0.9 m in the first
 /// second and 1.1 to 1.7 m in all.
 pub fn stop(velocity: &Point) -> Point {
     let speed = libm::hypotf(velocity.x, velocity.y);
-    Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * ACCELERATION_MPS2) + DELAY_S)
+    Point::new(velocity.x, velocity.y, 0.0) * (speed / (2.0 * AUTO_ACCEL_MPS2) + BRAKING_DELAY_S)
 }
 
 /// A point that is flown to a target across: it starts as the vehicle is and obeys the limits of the automatic modes.
@@ -39,15 +39,15 @@ impl Glide {
     /// Goes on towards `target` until `now_us`, at `speed_max` m/s and `jerk` m/s³ at most.
     pub fn advance(&mut self, now_us: u64, target: &Point, speed_max: f32, jerk: f32) {
         let since_us = now_us.saturating_sub(core::mem::replace(&mut self.at_us, now_us));
-        let dt = (since_us as f32 * 1e-6).min(MOST_S);
+        let dt = (since_us as f32 * 1e-6).min(MAX_STEP_S);
         let off = [target.x - self.position.x, target.y - self.position.y];
         let away = libm::hypotf(off[0], off[1]);
         // `computeMaxSpeedFromDistance`: what can be braked from, after a while in which it is not.
-        let delay = 4.0 * ACCELERATION_MPS2 * ACCELERATION_MPS2 / jerk;
-        let from_stop = libm::sqrtf(delay * delay + 8.0 * ACCELERATION_MPS2 * away);
+        let delay = 4.0 * AUTO_ACCEL_MPS2 * AUTO_ACCEL_MPS2 / jerk;
+        let from_stop = libm::sqrtf(delay * delay + 8.0 * AUTO_ACCEL_MPS2 * away);
         let speed = (0.5 * (from_stop - delay)).min(speed_max);
         for (axis, ramp) in self.ramps.iter_mut().enumerate() {
-            ramp.advance(off[axis] / away.max(1e-3) * speed, ACCELERATION_MPS2, jerk, dt);
+            ramp.advance(off[axis] / away.max(1e-3) * speed, AUTO_ACCEL_MPS2, jerk, dt);
             self.position[axis] += ramp.rate * dt;
         }
     }

@@ -39,7 +39,7 @@ const IN_AIR_SHARE: f32 = 0.31;
 /// Least commanded sink with which the land detector reports a landing, m/s: 1.1 times the default of
 /// `LNDMC_Z_VEL_MAX` (`MulticopterLandDetector`). It reads the velocity of the setpoint only, so at a
 /// demand to stay PX4 reports itself in the air, on the ground too, however far below the demand lies.
-const LAND_RATE_MPS: f32 = 0.275;
+const MIN_LAND_RATE_MPS: f32 = 0.275;
 /// Share of `MPC_LAND_CRWL` at which PX4 was seen to crawl: 0.22 of 0.3 m/s.
 const CRAWL_SHARE: f32 = 0.75;
 /// Delay of the land detector's own filters beyond `LNDMC_TRIG_TIME`, seconds.
@@ -369,7 +369,7 @@ impl Commander {
             Phase::Flying => {
                 // PX4's own crawl is flown slower here than it commands (`CRAWL_SHARE`).
                 let share = if self.mode() == Mode::Offboard { 1.0 } else { CRAWL_SHARE };
-                self.detect_landing(sensors, -demand.velocity.z >= share * LAND_RATE_MPS, tuning);
+                self.detect_landing(sensors, -demand.velocity.z >= share * MIN_LAND_RATE_MPS, tuning);
             }
         }
         Order { lift: self.phase != Phase::Ground, integral, demand }

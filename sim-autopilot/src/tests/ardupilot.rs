@@ -273,7 +273,7 @@ fn loiter_with_a_low_stick_sinks_and_brake_holds() {
 fn the_ground_stations_silence_returns_it_only_if_told_so() {
     let ground = Header { system: 255, component: 190, sequence: 0 };
     let beat = |bench: &mut Bench| {
-        let mut out = [0; frame::MAX_SENT];
+        let mut out = [0; frame::MAX_FRAME_LEN];
         let extra = frame::extra_crc(0).unwrap();
         let len = frame::encode_raw(ground, 0, extra, &[0, 0, 0, 0, 6, 8, 0, 4, 3], &mut out);
         bench.autopilot.handle_bytes(&out[..len]);

@@ -144,7 +144,7 @@ fn every_port_has_its_own_streams() {
     payload[..4].copy_from_slice(&30.0_f32.to_le_bytes());
     payload[4..8].copy_from_slice(&(-1.0_f32).to_le_bytes());
     payload[28..32].copy_from_slice(&[255, 1, 1, 1]);
-    let mut out = [0; frame::MAX_SENT];
+    let mut out = [0; frame::MAX_FRAME_LEN];
     let len = frame::encode_raw(header, 76, frame::extra_crc(76).unwrap(), &payload, &mut out);
     autopilot.handle_bytes_on(1, &out[..len]);
     let mut attitudes = [0, 0];

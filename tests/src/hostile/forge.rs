@@ -1,10 +1,10 @@
 //! Frames forged from random numbers: fields random and at their bounds, some of a message that would be believed.
 
 use companion::autopilot::Kind;
-use companion::link::frame::{self, Header, MAX_SENT};
-use companion::link::intent::POINTS;
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
+use companion::link::intent::MAX_POINTS;
 use companion::link::roster::{self, Entry, Roster, Standing};
-use companion::{AUTOPILOT, COMPONENT, Link};
+use companion::{AUTOPILOT_COMPONENT, COMPANION_COMPONENT, Link};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
 use planner_core::Point;
@@ -30,14 +30,14 @@ impl Flight {
         };
         let component = match pick(24, 4) {
             0 => (head >> 26) as u8,
-            1 | 2 if link == Link::Autopilot => AUTOPILOT,
-            _ => COMPONENT,
+            1 | 2 if link == Link::Autopilot => AUTOPILOT_COMPONENT,
+            _ => COMPANION_COMPONENT,
         };
         let header = Header { system, component, sequence: (head >> 32) as u8 };
         let mut payload = [0; 255];
         let length = self.fill(message_id, &mut payload, entropy, (head >> 40) as u8);
         let extra = frame::extra_crc(message_id).unwrap_or(0);
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let length = frame::encode_raw(header, message_id, extra, &payload[..length], &mut out);
         self.report.frames += 1;
         self.companion.handle_bytes(link, self.now, &out[..length]);
@@ -80,7 +80,7 @@ impl Flight {
         intent.column = how & 64 != 0;
         intent.progress_m = number(bits >> 40, 30.0);
         intent.clear_m = number(bits >> 48, 5.0);
-        for _ in 0..(bits >> 56) as usize % (POINTS + 1) {
+        for _ in 0..(bits >> 56) as usize % (MAX_POINTS + 1) {
             let bits = entropy.bits();
             let here = self.autopilot.position;
             let near = |shift: u32| number(bits >> shift, 6.0);
@@ -122,7 +122,7 @@ impl Flight {
                 let command = COMMANDS[usize::from(how) % COMMANDS.len()];
                 payload[28..30].copy_from_slice(&command.to_le_bytes());
                 payload[30] = if how & 1 == 0 { ID } else { 0 };
-                payload[31] = if how & 2 == 0 { COMPONENT } else { 0 };
+                payload[31] = if how & 2 == 0 { COMPANION_COMPONENT } else { 0 };
                 if how & 4 == 0 {
                     payload[..4].copy_from_slice(&f32::from(how >> 7).to_le_bytes());
                 }
@@ -145,7 +145,7 @@ impl Flight {
                 } else {
                     0
                 };
-                (payload[at], payload[at + 1]) = (ID, COMPONENT);
+                (payload[at], payload[at + 1]) = (ID, COMPANION_COMPONENT);
             }
             _ => {}
         }
@@ -220,9 +220,9 @@ fn fill_roster(payload: &mut [u8; 255], entropy: &mut impl Entropy, how: u8) -> 
         mission_crc: if how & 16 == 0 { 0xC0FFEE } else { bits as u32 },
         counted: (bits >> 24) as u32 % 3,
         hash: (bits >> 32) as u32,
-        entries: (0..1 + (bits >> 56) as usize % roster::ENTRIES).map(&mut entry_of).collect(),
+        entries: (0..1 + (bits >> 56) as usize % roster::MAX_ENTRIES).map(&mut entry_of).collect(),
     };
-    let mut whole = [0; roster::LENGTH];
+    let mut whole = [0; roster::MAX_LEN];
     let length = roster.encode(&mut whole);
     payload[..length].copy_from_slice(&whole[..length]);
     length

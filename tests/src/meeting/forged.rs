@@ -1,6 +1,6 @@
 //! Messages of a vehicle whose reports are wrong.
 
-use companion::link::frame::{self, Header, MAX_SENT};
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{GLOBAL_POSITION_INT_DATA, TUNNEL_DATA};
@@ -25,7 +25,7 @@ pub(super) fn place_of(data: &GLOBAL_POSITION_INT_DATA) -> (Point, Point) {
 /// The frame with the lie in it; none where it does not concern it.
 pub(super) fn forge(frame: &frame::Frame, lie: Lie) -> Option<Vec<u8>> {
     let header = Header { system: frame.system, component: frame.component, sequence: frame.sequence };
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     if let Some(mut data) = frame.decode::<GLOBAL_POSITION_INT_DATA>() {
         let (mut place, mut velocity) = place_of(&data);
         match lie {

@@ -13,9 +13,9 @@ mod packet;
 mod planner;
 pub mod scene;
 
-use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::Intent;
-use companion::{COMPONENT, Event, Instant, Link, PlanFailure, State, Wanted};
+use companion::{COMPANION_COMPONENT, Event, Instant, Link, PlanFailure, State, Wanted};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::{
     COMMAND_LONG_DATA, GLOBAL_POSITION_INT_DATA, MavCmd, STATUSTEXT_DATA, TUNNEL_DATA,
@@ -170,10 +170,10 @@ impl<'a> World<'a> {
             command,
             param1,
             target_system: self.scene.vehicles[vehicle].id,
-            target_component: COMPONENT,
+            target_component: COMPANION_COMPONENT,
             ..Default::default()
         };
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let header = Header { system: 255, component: 190, sequence: member.commands };
         member.commands = member.commands.wrapping_add(1);
         let len = frame::encode(header, &data, &mut out);
@@ -228,7 +228,7 @@ impl<'a> World<'a> {
     }
 
     fn drain(&mut self, i: usize) {
-        let mut buffer = [0; MAX_SENT];
+        let mut buffer = [0; MAX_FRAME_LEN];
         loop {
             let length = self.members[i].companion.poll_transmit(Link::Autopilot, &mut buffer);
             if length == 0 {

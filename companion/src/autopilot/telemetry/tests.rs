@@ -7,12 +7,12 @@ use std::vec::Vec;
 use proptest::prelude::*;
 
 use super::*;
-use crate::link::frame::{self, Framer, Header, MAX_SENT};
+use crate::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 
 /// A frame of the autopilot.
 fn frame<M: MessageData>(message: &M, sequence: u8) -> Frame {
-    let mut out = [0; MAX_SENT];
-    let header = Header { system: 1, component: crate::AUTOPILOT, sequence };
+    let mut out = [0; MAX_FRAME_LEN];
+    let header = Header { system: 1, component: crate::AUTOPILOT_COMPONENT, sequence };
     let length = frame::encode(header, message, &mut out);
     let mut input = &out[..length];
     Framer::new().next(Instant::ZERO, &mut input).expect("a whole frame")

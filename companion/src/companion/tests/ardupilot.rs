@@ -100,7 +100,7 @@ fn a_pilot_is_never_fought_and_gets_the_current_position_back() {
     bench.run(3.0);
     assert!((bench.enu - at).norm() < 0.05 && bench.state() == State::PilotReturned);
     assert_eq!(numbers(&bench).len(), asked, "and no command");
-    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
     bench.until(State::Done, 60.0);
 }
 

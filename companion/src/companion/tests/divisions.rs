@@ -12,7 +12,7 @@ use proptest::prelude::{ProptestConfig, any};
 
 use super::State::*;
 use super::*;
-use crate::link::frame::{self, Header, MAX_SENT};
+use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::ON_PLAN;
 use crate::link::roster::{self, Entry, Roster, Standing};
 use crate::{Link, RosterEntry};
@@ -37,9 +37,9 @@ pub(super) fn own_roster(b: &Bench) -> Roster {
 
 /// The bytes of a roster of vehicle 77.
 pub(super) fn bytes(roster: &Roster, sequence: u8) -> Vec<u8> {
-    let (mut payload, mut out) = ([0; roster::LENGTH], [0; MAX_SENT]);
+    let (mut payload, mut out) = ([0; roster::MAX_LEN], [0; MAX_FRAME_LEN]);
     let len = roster.encode(&mut payload);
-    let header = Header { system: roster.system_id, component: crate::COMPONENT, sequence };
+    let header = Header { system: roster.system_id, component: crate::COMPANION_COMPONENT, sequence };
     let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, &payload[..len], &mut out);
     out[..n].to_vec()
 }
@@ -160,7 +160,7 @@ impl Watch {
         self.log.push(format!("{:.2} s {:?}: {what:?}", b.now.micros() as f64 * 1e-6, b.state()));
         let order = |b: &mut Bench, command, param1| {
             b.acks.clear();
-            b.command(command, param1, SYSTEM, crate::COMPONENT);
+            b.command(command, param1, SYSTEM, crate::COMPANION_COMPONENT);
             b.acks.pop().is_some_and(|ack| ack.1 == crate::link::commands::ACCEPTED)
         };
         match what {
@@ -250,7 +250,7 @@ fn a_vehicle_that_was_ordered_back_waits_for_nobody() {
         b.until(Follow, 30.0);
         b.run(run_s);
         b.neighbour = None;
-        b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+        b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         b.until(Land, 40.0);
         assert!((b.enu - START).xy().norm() < 0.5, "{run_s}: {:?} {:?}", b.enu, b.texts);
     }

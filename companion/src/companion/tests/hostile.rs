@@ -16,14 +16,14 @@ use crate::testing::fake_autopilot::*;
 
 /// Frames that must change nothing in the middle of a flight.
 fn nuisance(bench: &mut Bench, kind: u8, seed: u8) -> Vec<u8> {
-    use crate::link::frame::{Header, MAX_SENT, encode};
+    use crate::link::frame::{Header, MAX_FRAME_LEN, encode};
     let mode = bench.mode;
     bench.mode = px4::RTL;
     let mut wrong = bench.heartbeat();
     bench.mode = mode;
     let data = HEARTBEAT_DATA { custom_mode: px4::RTL, ..Default::default() };
     let foreign = |system, component| {
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let len = encode(Header { system, component, sequence: seed }, &data, &mut out);
         out[..len].to_vec()
     };
@@ -70,17 +70,17 @@ proptest::proptest! {
 
 /// What a hostile radio peer sends: a command of each kind, a parameter, a file request, a question, a place, an intent.
 fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
-    use crate::link::frame::{Header, MAX_SENT, encode};
+    use crate::link::frame::{Header, MAX_FRAME_LEN, encode};
     use mavlink::dialects::ardupilotmega::*;
     let header = Header { system, component: if seed & 1 == 0 { 190 } else { 1 }, sequence: seed };
     let target_system = if seed & 2 == 0 { SYSTEM } else { 0 };
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     let long = |command, param1: f32, param2: f32| COMMAND_LONG_DATA {
         command,
         param1,
         param2,
         target_system,
-        target_component: crate::COMPONENT,
+        target_component: crate::COMPANION_COMPONENT,
         ..Default::default()
     };
     let place = planner_core::frames::enu_to_geodetic(&ORIGIN, &GOAL);
@@ -96,7 +96,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
                 command: MavCmd::MAV_CMD_NAV_FENCE_CIRCLE_EXCLUSION,
                 param1: 5.0,
                 target_system,
-                target_component: crate::COMPONENT,
+                target_component: crate::COMPANION_COMPONENT,
                 frame: MavFrame::MAV_FRAME_GLOBAL,
                 x: lat,
                 y: lon,
@@ -109,7 +109,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
             let set = PARAM_SET_DATA {
                 param_value: 1.0,
                 target_system: SYSTEM,
-                target_component: crate::COMPONENT,
+                target_component: crate::COMPANION_COMPONENT,
                 param_id: "FLK_SPEED_MAX".into(),
                 param_type: MavParamType::MAV_PARAM_TYPE_REAL32,
             };
@@ -117,7 +117,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
         }
         7 => encode(
             header,
-            &PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT },
+            &PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPANION_COMPONENT },
             &mut out,
         ),
         8 => encode(header, &TIMESYNC_DATA { tc1: 0, ts1: i64::from(seed) + 1 }, &mut out),
@@ -126,7 +126,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
         11 => {
             let mut payload = [0; 251];
             (payload[0], payload[3]) = (seed, [3, 4, 6, 8][usize::from(seed % 4)]);
-            let (target_system, target_component) = (SYSTEM, crate::COMPONENT);
+            let (target_system, target_component) = (SYSTEM, crate::COMPANION_COMPONENT);
             let file =
                 FILE_TRANSFER_PROTOCOL_DATA { target_network: 0, target_system, target_component, payload };
             encode(header, &file, &mut out)
@@ -140,7 +140,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
                 alt: (place.alt_m * 1e3) as i32,
                 ..Default::default()
             };
-            encode(Header { component: crate::COMPONENT, ..header }, &data, &mut out)
+            encode(Header { component: crate::COMPANION_COMPONENT, ..header }, &data, &mut out)
         }
         _ => {
             let intent = Intent {
@@ -157,7 +157,7 @@ fn forged(kind: u8, system: u8, seed: u8) -> Vec<u8> {
             let mut payload = [0; 133];
             let len = intent.encode(&mut payload);
             crate::link::frame::encode_raw(
-                Header { component: crate::COMPONENT, ..header },
+                Header { component: crate::COMPANION_COMPONENT, ..header },
                 TUNNEL_DATA::ID,
                 TUNNEL_DATA::EXTRA_CRC,
                 &payload[..len],
@@ -217,14 +217,14 @@ proptest::proptest! {
         bench.swarm.clear();
         bench.acks.clear();
         let ask = |bench: &mut Bench, bytes: &[u8]| bench.companion.handle_bytes(Link::Swarm, bench.now, bytes);
-        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT };
-        let mut out = [0; crate::link::frame::MAX_SENT];
+        let list = PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPANION_COMPONENT };
+        let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
         let ground = |sequence| crate::link::frame::Header { system: 255, component: 190, sequence };
         let len = crate::link::frame::encode(ground(200), &list, &mut out);
         ask(&mut bench, &out[..len]);
         let len = crate::link::frame::encode(ground(201), &TIMESYNC_DATA { tc1: 0, ts1: 4711 }, &mut out);
         ask(&mut bench, &out[..len]);
-        bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 0.0, SYSTEM, crate::COMPONENT);
+        bench.command(MavCmd::MAV_CMD_REQUEST_MESSAGE, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         for i in 0..200u8 {
             for k in 0..4 {
                 let bytes = forged(7 + k % 4, hostile_id(i.wrapping_mul(7) | 2), i.wrapping_mul(4) + k);
@@ -234,7 +234,7 @@ proptest::proptest! {
         }
         let values = bench.swarm.iter().filter_map(Frame::decode::<PARAM_VALUE_DATA>).count();
         let time = bench.swarm.iter().filter_map(Frame::decode::<TIMESYNC_DATA>).any(|t| t.ts1 == 4711);
-        proptest::prop_assert!(values >= crate::services::parameters::COUNT && time, "{values} {time}");
+        proptest::prop_assert!(values >= crate::services::parameters::PARAMETER_COUNT && time, "{values} {time}");
         proptest::prop_assert!(bench.acks.contains(&(512, 0, 255, 190)), "{:?}", bench.acks);
         if flies {
             bench.until(State::Done, 60.0);
@@ -288,8 +288,8 @@ fn stranger(now: Instant, system: u8, sequence: u8, place: Point) -> Vec<u8> {
         alt: (at.alt_m * 1e3) as i32,
         ..Default::default()
     };
-    let mut out = [0; crate::link::frame::MAX_SENT];
-    let header = crate::link::frame::Header { system, component: crate::COMPONENT, sequence };
+    let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
+    let header = crate::link::frame::Header { system, component: crate::COMPANION_COMPONENT, sequence };
     let len = crate::link::frame::encode(header, &data, &mut out);
     out[..len].to_vec()
 }
@@ -363,7 +363,7 @@ proptest::proptest! {
         for (sequence, north, east, ticks) in forged {
             let data = GPS_GLOBAL_ORIGIN_DATA { latitude: lat + north, longitude: lon + east, altitude: 720_000 };
             let header = crate::link::frame::Header { system: SYSTEM, component: 1, sequence };
-            let mut out = [0; crate::link::frame::MAX_SENT];
+            let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
             let len = crate::link::frame::encode(header, &data, &mut out);
             bench.companion.handle_bytes(Link::Autopilot, bench.now, &out[..len]);
             bench.drain();

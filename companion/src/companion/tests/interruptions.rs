@@ -10,7 +10,7 @@ use super::super::*;
 use crate::autopilot::Kind;
 use crate::autopilot::{ardupilot, px4};
 use crate::link::commands::{ACCEPTED, TEMPORARILY_REJECTED};
-use crate::link::intent::{GROUNDED, ON_PLAN, OUT};
+use crate::link::intent::{GROUNDED, ON_PLAN, OUT_OF_PLAN};
 use crate::testing::fake_autopilot::*;
 use planner_core::Point;
 
@@ -29,7 +29,7 @@ fn pilot_mode(kind: Kind) -> u32 {
 
 fn order(b: &mut Bench, command: MavCmd, param1: f32) -> Option<u8> {
     b.acks.clear();
-    b.command(command, param1, SYSTEM, crate::COMPONENT);
+    b.command(command, param1, SYSTEM, crate::COMPANION_COMPONENT);
     b.acks.pop().map(|ack| ack.1)
 }
 
@@ -97,7 +97,7 @@ fn reach(kind: Kind, state: State, paused_in: Option<State>) -> Option<Bench> {
         }
         Blocked => {
             b.answer_detour = None;
-            b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+            b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
             b.until(Blocked, 3.0);
         }
         Land => {
@@ -380,7 +380,7 @@ fn a_battery_that_is_not_reported_holds_the_take_off_and_is_requested_again() {
 
 #[test]
 fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answered_alike() {
-    use crate::link::frame::{Header, MAX_SENT, encode};
+    use crate::link::frame::{Header, MAX_FRAME_LEN, encode};
     use mavlink::dialects::ardupilotmega::COMMAND_LONG_DATA;
     let mut b = Bench::following(config());
     let mut send = |param1: f32| {
@@ -388,10 +388,10 @@ fn the_same_number_with_other_parameters_is_another_command_and_a_repeat_is_answ
             command: MavCmd::MAV_CMD_DO_PAUSE_CONTINUE,
             param1,
             target_system: SYSTEM,
-            target_component: crate::COMPONENT,
+            target_component: crate::COMPANION_COMPONENT,
             ..Default::default()
         };
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let len = encode(Header { system: 255, component: 190, sequence: 99 }, &data, &mut out);
         b.acks.clear();
         b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);
@@ -416,7 +416,7 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
     let mut b = Bench::accompanied(two_vehicles());
     b.until(State::Follow, 20.0);
     b.answer_detour = None;
-    b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+    b.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     b.until(State::Replanning, 10.0);
     // Upon the way around that comes a second later.
     let place = enu_to_geodetic(&ORIGIN, &Point::new(13.0, 16.0, 2.0));
@@ -427,11 +427,11 @@ fn an_obstacle_reported_while_a_detour_is_planned_is_not_avoided_by_it() {
         y: (place.lon_deg * 1e7) as i32,
         z: place.alt_m as f32,
         target_system: SYSTEM,
-        target_component: crate::COMPONENT,
+        target_component: crate::COMPANION_COMPONENT,
         frame: MavFrame::MAV_FRAME_GLOBAL,
         ..Default::default()
     };
-    let mut out = [0; crate::link::frame::MAX_SENT];
+    let mut out = [0; crate::link::frame::MAX_FRAME_LEN];
     let header = crate::link::frame::Header { system: 255, component: 190, sequence: 200 };
     let len = crate::link::frame::encode(header, &data, &mut out);
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..len]);

@@ -55,7 +55,7 @@ proptest::proptest! {
         bench.until(State::Follow, 20.0);
         bench.setpoints.clear();
         let order = |bench: &mut Bench, go: f32| {
-            bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, go, SYSTEM, crate::COMPONENT);
+            bench.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, go, SYSTEM, crate::COMPANION_COMPONENT);
         };
         let mut off_m = 0f32;
         let mut fly = |bench: &mut Bench, ticks: u32| {

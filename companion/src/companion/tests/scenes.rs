@@ -9,7 +9,7 @@ use mavlink::dialects::ardupilotmega::MavCmd;
 
 use super::super::*;
 use crate::autopilot::px4;
-use crate::link::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT};
+use crate::link::intent::{FLYING, GROUNDED, LANDED, ON_PLAN, OUT_OF_PLAN};
 use crate::testing::fake_autopilot::*;
 use crate::{Config, RosterEntry};
 use planner_core::Point;
@@ -94,19 +94,19 @@ fn every_row_has_its_scene() {
 // Commands of the ground station.
 
 fn land(b: &mut Bench) {
-    b.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+    b.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
 }
 
 fn back(b: &mut Bench) {
-    b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPONENT);
+    b.command(MavCmd::MAV_CMD_NAV_RETURN_TO_LAUNCH, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
 }
 
 fn pause(b: &mut Bench) {
-    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, crate::COMPONENT);
+    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
 }
 
 fn resume(b: &mut Bench) {
-    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPONENT);
+    b.command(MavCmd::MAV_CMD_DO_PAUSE_CONTINUE, 1.0, SYSTEM, crate::COMPANION_COMPONENT);
 }
 
 // What happens in many scenes.

@@ -13,9 +13,9 @@ use crate::time::{Duration, Instant};
 
 /// Time of the other vehicle's path ahead that has to be free before the vehicle that yields goes
 /// on, seconds.
-const AHEAD_S: f32 = 3.0;
+const YIELD_LOOK_AHEAD_S: f32 = 3.0;
 /// Most neighbours that are compared in one step: with more nearby the vehicle stops.
-const NEAR_MOST: usize = 6;
+const MAX_NEAR_COMPARED: usize = 6;
 /// Overshoot of two vehicles in the air beyond their stops, together, metres; the schedule leaves
 /// 0.5 m for this and for tracking errors.
 const OVERSHOOT_MARGIN_M: f32 = 0.25;
@@ -23,11 +23,11 @@ const OVERSHOOT_MARGIN_M: f32 = 0.25;
 const TRACKING_MARGIN_M: f32 = 0.1;
 /// Distance between the hulls of two vehicles that is kept from a stranger while passing it slowly,
 /// metres.
-const HULLS_M: f32 = 0.3;
+const STRANGER_HULL_GAP_M: f32 = 0.3;
 /// Speed above its reference's at which a vehicle still stops with the reference, m/s.
-const SWAY_MPS: f32 = 0.3;
+const STOPPING_SWAY_MPS: f32 = 0.3;
 /// Wait of a landing after which it needs no more room than the hulls.
-const LANDS_LATE: Duration = Duration::from_secs(40);
+const LANDING_WAITED_LONG: Duration = Duration::from_secs(40);
 
 impl Guidance {
     /// The set that the vehicle can no longer avoid on its path, and `extra_m`. The set begins at
@@ -47,7 +47,7 @@ impl Guidance {
         let join = path.point_at(self.tracker.along_m).filter(|_| joins);
         let along_m = if join.is_some() { self.tracker.along_m } else { self.setpoint_m };
         let reference_mps = self.smoother.velocity().norm();
-        let speed_mps = reference_mps.max(velocity_mps - SWAY_MPS);
+        let speed_mps = reference_mps.max(velocity_mps - STOPPING_SWAY_MPS);
         let braking_m = bounds.braking.stop_m(speed_mps).max(self.smoother.braking_m(true));
         let fly_m = speed_mps * REACTION_S + braking_m + extra_m;
         let here = self.smoother.position();
@@ -87,12 +87,12 @@ impl Guidance {
         let mut near = 0;
         let on_plan = self.on_plan(state, scene);
         let most_apart_m = (safety_m + OVERSHOOT_MARGIN_M.max(neighbours.stray_m()))
-            .max(2.0 * self.track.radius_m + HULLS_M);
+            .max(2.0 * self.track.radius_m + STRANGER_HULL_GAP_M);
         let reach = Reach {
             place,
             within_m: own_reach_m + most_apart_m,
             bounds,
-            ahead_s: if self.filter.is_stopped() { AHEAD_S } else { 0.0 },
+            ahead_s: if self.filter.is_stopped() { YIELD_LOOK_AHEAD_S } else { 0.0 },
             on_plan,
             deaf: hears_nobody,
             lands: comes_down,
@@ -124,9 +124,9 @@ impl Guidance {
             if !(lands || by_gates || met.lost || hears_nobody) {
                 contact.follow_unheard(&mut met.heard, bounds);
             }
-            let ahead_s = if self.filter.is_stopped() && !met.stands { AHEAD_S } else { 0.0 };
+            let ahead_s = if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };
             let held = self.filter.held_for(now);
-            if lands && met.stranger && held >= LANDS_LATE {
+            if lands && met.stranger && held >= LANDING_WAITED_LONG {
                 // A place that anybody may claim keeps no vehicle in the air.
                 continue;
             }
@@ -134,10 +134,10 @@ impl Guidance {
             // there is another place.
             let last_place = self.returning || !self.on_path || deaf;
             let lies = met.heard.grounded || met.lost || (deaf && silent);
-            let rests = lies && last_place && held >= LANDS_LATE;
+            let rests = lies && last_place && held >= LANDING_WAITED_LONG;
             let lands_late = lands && (rests || (met.stranger && held >= MAX_STOP_FOR_STRANGER));
             let apart_m = if lands_late || (met.stranger && self.filter.passes_stranger(now)) {
-                2.0 * self.track.radius_m + HULLS_M
+                2.0 * self.track.radius_m + STRANGER_HULL_GAP_M
             } else if (met.heard.grounded || met.stands) && by_gates {
                 // Past a vehicle that waits the schedule leads as near as that and what both stray.
                 safety_m
@@ -171,7 +171,7 @@ impl Guidance {
                 let low = |low: Point| own.conflicts(&Set::at(low), &low, apart_m);
                 own.conflicts(&other, &met.heard.position, apart_m) || met.low.is_some_and(low)
             };
-            if near > NEAR_MOST || meets() {
+            if near > MAX_NEAR_COMPARED || meets() {
                 let yields = self.yields_to(state, scene, &met);
                 let rests = met.heard.grounded || met.lost;
                 return Some(Found { id: met.id, yields, stranger: met.stranger, rests });

@@ -8,7 +8,10 @@ use planner_core::safety::{OwnSet, REACTION_S, Set};
 use super::super::limits::bounds;
 use super::super::motion::within;
 use super::super::{Guidance, Scene};
-use super::{CLEAR, Filter, LOWER_M, MAX_STOP_FOR_STRANGER, RESUME_M, TURNS_M, TURNS_MPS, WAITS_M, Way};
+use super::{
+    Filter, GROUND_BELOW_PAD_M, MAX_STOP_FOR_STRANGER, MAX_TURNING_SETPOINT_M, MAX_TURNING_SETPOINT_MPS,
+    RESUME_CLEAR_FOR, RESUME_CLEAR_M, STANDSTILL_WITHIN_M, Way,
+};
 use crate::mission::State;
 use crate::swarm::neighbours::Neighbours;
 use crate::time::Instant;
@@ -70,7 +73,7 @@ impl Guidance {
             self.filter.back = back;
         }
         let stopped = self.filter.is_stopped();
-        let extra_m = if stopped { RESUME_M } else { 0.0 };
+        let extra_m = if stopped { RESUME_CLEAR_M } else { 0.0 };
         let bounds = bounds(&self.track);
         let set = match way {
             Way::Vertical { to_m, .. } if whole_column => Set::vertical(*position, to_m),
@@ -117,7 +120,8 @@ impl Guidance {
             None if stopped => {
                 let since = *self.filter.clear_since.get_or_insert(now);
                 // Past a stranger it goes on in the same stop, slowly.
-                let clear_for = if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { CLEAR };
+                let clear_for =
+                    if self.filter.passes_stranger(now) { MAX_STOP_FOR_STRANGER } else { RESUME_CLEAR_FOR };
                 if now - since >= clear_for {
                     self.filter.reset_stop();
                 }
@@ -143,7 +147,7 @@ impl Guidance {
         // Between pad and goal the ground may be lower than below either.
         let lands = matches!(state, State::Land | State::LandingHeld);
         let between = lands && self.on_path && !self.reached_end(&plan.path);
-        if between { ground_m - LOWER_M } else { ground_m }
+        if between { ground_m - GROUND_BELOW_PAD_M } else { ground_m }
     }
 
     /// Whether the vehicle flies back along its path, or stands and is about to. What is still to be flown forward counts first: a
@@ -152,12 +156,12 @@ impl Guidance {
         let along_m = self.tracker.along_m;
         let velocity = self.smoother.velocity();
         let beside = |by_m: f32| path.point_at(within(self.setpoint_m + by_m, 0.0, path.length_m()));
-        let onward = match (beside(-TURNS_M), beside(TURNS_M)) {
+        let onward = match (beside(-MAX_TURNING_SETPOINT_M), beside(MAX_TURNING_SETPOINT_M)) {
             (Some(from), Some(to)) => velocity.dot(&(to - from)),
             _ => 0.0,
         };
-        let moves = velocity.norm_squared() > TURNS_MPS * TURNS_MPS;
-        if along_m > self.setpoint_m + TURNS_M || (moves && onward > 0.0) {
+        let moves = velocity.norm_squared() > MAX_TURNING_SETPOINT_MPS * MAX_TURNING_SETPOINT_MPS;
+        if along_m > self.setpoint_m + MAX_TURNING_SETPOINT_M || (moves && onward > 0.0) {
             return false;
         }
         (moves && onward < 0.0) || self.tracker.speed_mps < 0.0 || self.back_to_m.is_some()
@@ -174,12 +178,13 @@ impl Guidance {
         let id = self.advice.waiting_for;
         let along_m = self.tracker.along_m;
         let gate = |plan: &VehiclePlan<W, G>| {
-            let near = |at_m: f32| (along_m - WAITS_M..along_m + WAITS_M).contains(&at_m);
+            let near =
+                |at_m: f32| (along_m - STANDSTILL_WITHIN_M..along_m + STANDSTILL_WITHIN_M).contains(&at_m);
             plan.gates.iter().any(|gate| gate.id == id && near(gate.at_m))
         };
         if matches!(state, State::Follow | State::Blocked | State::Replanning)
             && id != 0
-            && self.advice.stop_within_m.min(self.waits_m) < WAITS_M
+            && self.advice.stop_within_m.min(self.waits_m) < STANDSTILL_WITHIN_M
             && !scene.plan.is_some_and(gate)
         {
             self.filter.hinder(id < scene.id, now);

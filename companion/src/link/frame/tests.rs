@@ -11,7 +11,7 @@ use super::*;
 const HEADER: Header = Header { system: 7, component: 1, sequence: 3 };
 
 fn heartbeat(sequence: u8) -> Vec<u8> {
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     let data = HEARTBEAT_DATA { custom_mode: 0x0006_0000, mavlink_version: 3, ..HEARTBEAT_DATA::default() };
     let len = encode(Header { sequence, ..HEADER }, &data, &mut out);
     out[..len].to_vec()
@@ -19,7 +19,7 @@ fn heartbeat(sequence: u8) -> Vec<u8> {
 
 /// A frame of an id no dialect here knows, its payload full of start bytes.
 fn unknown() -> Vec<u8> {
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     let len = encode_raw(HEADER, 0x00F0_F0F0, 99, &[0xFD, 200, 0, 0xFD, 30, 0, 0, 0xFE, 9, 1], &mut out);
     out[..len].to_vec()
 }
@@ -40,7 +40,7 @@ fn sequences(frames: &[Frame]) -> Vec<u8> {
 #[test]
 fn what_is_encoded_comes_back() {
     let sent = SYSTEM_TIME_DATA { time_unix_usec: 5, time_boot_ms: 0 };
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     let len = encode(HEADER, &sent, &mut out);
     assert_eq!(len, 12 + 1, "trailing zeros are cut");
     let frames = drain(&mut Framer::new(), Instant::ZERO, &out[..len]);
@@ -60,7 +60,7 @@ fn version_1_and_signed_frames_are_read() {
     let crc = calculate_crc(&v1[1..15], HEARTBEAT_DATA::EXTRA_CRC);
     v1[15..].copy_from_slice(&crc.to_le_bytes());
     let mut signed = heartbeat(6);
-    signed[2] |= SIGNED;
+    signed[2] |= FLAG_SIGNED;
     let end = signed.len() - 2;
     let crc = calculate_crc(&signed[1..end], HEARTBEAT_DATA::EXTRA_CRC);
     signed[end..].copy_from_slice(&crc.to_le_bytes());
@@ -202,7 +202,7 @@ fn whole_frame() -> impl Strategy<Value = Vec<u8>> {
             let id = if kind == 0 { ids[id] & 0xFF } else { ids[id] };
             let id = if extra_crc(id).is_some() { id } else { 0 };
             *payload.last_mut().unwrap() |= 1;
-            let mut out = std::vec![0; MAX_SENT];
+            let mut out = std::vec![0; MAX_FRAME_LEN];
             let header = Header { sequence, ..HEADER };
             let len = encode_raw(header, id, extra_crc(id).unwrap(), &payload, &mut out);
             out.truncate(len);
@@ -213,7 +213,7 @@ fn whole_frame() -> impl Strategy<Value = Vec<u8>> {
                 len - 2
             };
             if kind == 2 {
-                out[2] = SIGNED;
+                out[2] = FLAG_SIGNED;
             }
             let crc = mavlink::calculate_crc(&out[1..crc_at], extra_crc(id).unwrap());
             out[crc_at..].copy_from_slice(&crc.to_le_bytes());
@@ -243,7 +243,7 @@ fn garbage() -> impl Strategy<Value = Vec<u8>> {
             frame
         }),
         proptest::collection::vec(any::<u8>(), 1..255).prop_map(|payload| {
-            let mut out = [0; MAX_SENT];
+            let mut out = [0; MAX_FRAME_LEN];
             let len = encode_raw(HEADER, 0x00F0_F0F0, 99, &payload, &mut out);
             out[..len].to_vec()
         }),

@@ -8,7 +8,7 @@ use mavlink::dialects::ardupilotmega::*;
 
 use super::*;
 use crate::link::frame::{self, Header};
-use crate::storage::store::{Erasing, READ};
+use crate::storage::store::{Erasing, MAX_READ};
 use crate::testing::fake_autopilot::*;
 use crate::testing::fake_flash::{Flash, obey, started};
 use crate::{Duration, Link, State};
@@ -35,7 +35,7 @@ impl Greedy {
     fn ask<M: MessageData>(&mut self, message: &M) {
         let header = Header { system: 255, component: 190, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut bytes = [0; frame::MAX_SENT];
+        let mut bytes = [0; frame::MAX_FRAME_LEN];
         let length = frame::encode(header, message, &mut bytes);
         self.bench.companion.handle_bytes(Link::Swarm, self.bench.now, &bytes[..length]);
         self.drain();
@@ -47,11 +47,14 @@ impl Greedy {
                 command: MavCmd::MAV_CMD_REQUEST_MESSAGE,
                 param1: id,
                 target_system: SYSTEM,
-                target_component: crate::COMPONENT,
+                target_component: crate::COMPANION_COMPONENT,
                 ..Default::default()
             });
         }
-        self.ask(&PARAM_REQUEST_LIST_DATA { target_system: SYSTEM, target_component: crate::COMPONENT });
+        self.ask(&PARAM_REQUEST_LIST_DATA {
+            target_system: SYSTEM,
+            target_component: crate::COMPANION_COMPONENT,
+        });
         self.ask(&TIMESYNC_DATA { tc1: 0, ts1: 5 });
         // A listing: any answer of the file server is as long as a frame can be.
         self.packet = self.packet.wrapping_add(1);
@@ -61,14 +64,14 @@ impl Greedy {
         self.ask(&FILE_TRANSFER_PROTOCOL_DATA {
             target_network: 0,
             target_system: SYSTEM,
-            target_component: crate::COMPONENT,
+            target_component: crate::COMPANION_COMPONENT,
             payload,
         });
     }
 
     fn drain(&mut self) {
         let now = self.bench.now;
-        let mut read = [0; READ];
+        let mut read = [0; MAX_READ];
         while let Some(request) = self.bench.companion.poll_flash() {
             let outcome = obey(&mut self.flash, request, Erasing::Allowed, &mut read).expect("no power cut");
             self.bench.companion.handle_flash(now, outcome.map(|len| &read[..len]));
@@ -111,20 +114,28 @@ const HZ: u8 = 5;
 
 #[test]
 fn the_radio_gets_no_more_whatever_is_asked() {
-    let saved = SAVED + MAX_SENT as u32;
+    let saved = MAX_SAVED_BYTES + MAX_FRAME_LEN as u32;
     let mut ground = Greedy::new(Bench::new(config()));
     ground.bench.until(State::Ready, 6.0);
     ground.run(20);
-    assert!(ground.most_in_a_second() <= state_bps(HZ) + GROUND_BPS + saved, "{}", ground.most_in_a_second());
-    assert!(ground.bytes() <= 20 * (state_bps(HZ) + GROUND_BPS) + saved);
-    assert!(ground.bytes() > 20 * GROUND_BPS / 2, "it was asked for more: {}", ground.bytes());
+    assert!(
+        ground.most_in_a_second() <= state_bps(HZ) + DISARMED_BYTES_PER_S + saved,
+        "{}",
+        ground.most_in_a_second()
+    );
+    assert!(ground.bytes() <= 20 * (state_bps(HZ) + DISARMED_BYTES_PER_S) + saved);
+    assert!(ground.bytes() > 20 * DISARMED_BYTES_PER_S / 2, "it was asked for more: {}", ground.bytes());
 
     let mut air = Greedy::new(Bench::following(config()));
     air.bench.stuck = true;
     air.run(20);
     assert_eq!(air.bench.state(), State::Follow);
-    assert!(air.most_in_a_second() <= state_bps(HZ) + AIR_BPS + saved, "{}", air.most_in_a_second());
-    assert!(air.bytes() <= 20 * (state_bps(HZ) + AIR_BPS) + saved, "{}", air.bytes());
+    assert!(
+        air.most_in_a_second() <= state_bps(HZ) + ARMED_BYTES_PER_S + saved,
+        "{}",
+        air.most_in_a_second()
+    );
+    assert!(air.bytes() <= 20 * (state_bps(HZ) + ARMED_BYTES_PER_S) + saved, "{}", air.bytes());
     assert!(air.told >= 20 * usize::from(HZ) - 1, "the state goes out all the same: {}", air.told);
 }
 
@@ -143,7 +154,7 @@ fn state_is_as_long_as_said() {
         "{}",
         bench.bytes()
     );
-    assert_eq!(STATE as usize, (28 + 12) + (5 + 32 + 12 * crate::link::intent::POINTS + 12));
+    assert_eq!(STATE_BYTES as usize, (28 + 12) + (5 + 32 + 12 * crate::link::intent::MAX_POINTS + 12));
 }
 
 #[test]
@@ -152,10 +163,10 @@ fn what_is_owed_is_paid_back_by_time() {
     let at = |ms| Instant::ZERO + Duration::from_millis(ms);
     let mut sent = 0;
     while rate_limit.allows(at(0), true) {
-        rate_limit.spend(MAX_SENT);
-        sent += MAX_SENT as u32;
+        rate_limit.spend(MAX_FRAME_LEN);
+        sent += MAX_FRAME_LEN as u32;
     }
-    assert!((SAVED..=SAVED + MAX_SENT as u32).contains(&sent));
+    assert!((MAX_SAVED_BYTES..=MAX_SAVED_BYTES + MAX_FRAME_LEN as u32).contains(&sent));
     assert!(!rate_limit.allows(at(10), true));
     assert!(rate_limit.allows(at(1100), true));
     assert!(rate_limit.allows(at(u64::from(u32::MAX)), true), "and never overflows");

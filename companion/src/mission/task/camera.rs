@@ -17,15 +17,15 @@ use crate::link::outbox::Outgoing;
 use crate::time::{Duration, Instant};
 
 /// Most camera commands that wait.
-const ORDERS: usize = 4;
+const MAX_COMMANDS: usize = 4;
 /// Time after which a command that was not acknowledged is repeated.
 const REPEAT_EVERY: Duration = Duration::from_millis(300);
 /// Number of times that a command is sent before it is given up and reported.
-const TRIES: u8 = 5;
+const MAX_TRIES: u8 = 5;
 /// `MAV_RESULT` ACCEPTED.
 const ACCEPTED: u8 = 0;
 /// Shortest stretch from which a direction of flight is taken, metres.
-const STRETCH_LEAST_M: f32 = 0.1;
+const MIN_STRETCH_M: f32 = 0.1;
 
 const DO_DIGICAM_CONTROL: u16 = 203;
 const DO_SET_CAM_TRIGG_DIST: u16 = 206;
@@ -70,7 +70,7 @@ pub(super) struct Camera {
     beside: bool,
     /// Whether the autopilot was commanded to trigger by distance.
     on: bool,
-    orders: Deque<Order, ORDERS>,
+    orders: Deque<Order, MAX_COMMANDS>,
     /// Number of times that the first command was sent, and the time of the last.
     tries: u8,
     sent_at: Option<Instant>,
@@ -171,7 +171,7 @@ impl Camera {
         if self.sent_at.is_some_and(|at| now - at < REPEAT_EVERY) {
             return;
         }
-        if self.tries == TRIES {
+        if self.tries == MAX_TRIES {
             self.next();
             if !core::mem::replace(&mut self.failed, true) {
                 links.say(true, "Camera trigger is not acknowledged");
@@ -217,7 +217,7 @@ pub(super) fn heading<const W: usize>(
     let mut found = None;
     for shots in photographs.stretches(path) {
         let way = path.point_at(shots.to_m)? - path.point_at(shots.from_m)?;
-        if way.xy().norm() > STRETCH_LEAST_M {
+        if way.xy().norm() > MIN_STRETCH_M {
             found = Some(atan2f(way.y, way.x));
         }
         if shots.to_m >= along_m && found.is_some() {

@@ -1,24 +1,24 @@
 //! What the server remembers of requests that it must not obey twice.
 //!
-//! A repeated request is known for [`MEMORY`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
-//! what closing a session came to is answered for [`CLOSED_MEMORY`] under any number, until its client opens the next.
+//! A repeated request is known for [`DUPLICATE_WINDOW`] by all that is in it. MAVSDK repeats under a new sequence number, after up to 4 s: so
+//! what closing a session came to is answered for [`CLOSED_SESSION_WINDOW`] under any number, until its client opens the next.
 
 use super::packet::{NakError, Print, Request, op, print};
 use crate::time::{Duration, Instant};
 
 /// Time for which a repeated request is recognised as a duplicate.
-const MEMORY: Duration = Duration::from_secs(3);
+const DUPLICATE_WINDOW: Duration = Duration::from_secs(3);
 /// Time for which the result of the last session is still answered.
-const CLOSED_MEMORY: Duration = Duration::from_secs(10);
+const CLOSED_SESSION_WINDOW: Duration = Duration::from_secs(10);
 /// Most requests remembered for duplicate detection.
-const REQUESTS: usize = 8;
+const MAX_REMEMBERED: usize = 8;
 
 type Outcome = Result<(), NakError>;
 
 /// The memory.
 #[derive(Clone, Debug, Default)]
 pub struct Memory {
-    done: [Option<Done>; REQUESTS],
+    done: [Option<Done>; MAX_REMEMBERED],
     next: usize,
     closed: Option<Closed>,
 }
@@ -46,14 +46,14 @@ impl Memory {
             self.closed = Some(Closed { client: request.client, session: request.session, outcome, at });
         } else {
             self.done[self.next] = Some(Done { request: print(request), outcome, at });
-            self.next = (self.next + 1) % REQUESTS;
+            self.next = (self.next + 1) % MAX_REMEMBERED;
         }
     }
 
     /// Outcome of the same request a short time ago.
     pub fn recall(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let print = print(request);
-        let known = |done: &&Done| done.request == print && now - done.at < MEMORY;
+        let known = |done: &&Done| done.request == print && now - done.at < DUPLICATE_WINDOW;
         self.done.iter().flatten().find(known).map(|done| done.outcome)
     }
 
@@ -61,7 +61,7 @@ impl Memory {
     pub fn recall_closed(&self, request: &Request, now: Instant) -> Option<Outcome> {
         let known = |closed: &&Closed| {
             (closed.client, closed.session) == (request.client, request.session)
-                && now - closed.at < CLOSED_MEMORY
+                && now - closed.at < CLOSED_SESSION_WINDOW
         };
         self.closed.as_ref().filter(known).map(|closed| closed.outcome)
     }

@@ -5,10 +5,10 @@ use crate::link::frame::Frame;
 use crate::storage::store::{File, UploadError, crc32};
 
 /// Most data of an FTP packet, bytes.
-pub const DATA: usize = 239;
+pub const MAX_DATA: usize = 239;
 
 /// Bytes of an FTP packet before its data.
-pub const HEAD: usize = 12;
+pub const HEADER_LEN: usize = 12;
 /// Opcode of a positive answer.
 pub const ACK: u8 = 128;
 /// Opcode of a negative answer.
@@ -64,7 +64,7 @@ impl From<UploadError> for NakError {
 pub type Text = (bool, &'static str);
 
 /// All texts that the FTP service reports.
-pub const TEXTS: [Text; 9] = [
+pub const FTP_TEXTS: [Text; 9] = [
     (false, "Roadmap stored: used from the next start"),
     (false, "Mission stored: used from the next start"),
     (false, "File removed from the next start on"),
@@ -77,11 +77,11 @@ pub const TEXTS: [Text; 9] = [
 ];
 
 /// Text of a file that was removed.
-pub const REMOVED: Text = TEXTS[2];
+pub const FILE_REMOVED: Text = FTP_TEXTS[2];
 
 /// The text for the end of an upload.
 pub fn upload_text(file: File, result: Result<(), UploadError>) -> Text {
-    TEXTS[match (file, result) {
+    FTP_TEXTS[match (file, result) {
         (File::Roadmap, Ok(())) => 0,
         (File::Field, Ok(())) => 8,
         (File::Mission, Ok(())) => 1,
@@ -102,14 +102,14 @@ pub struct Request {
     pub opcode: u8,
     pub size: u8,
     pub offset: u32,
-    pub data: [u8; DATA],
+    pub data: [u8; MAX_DATA],
 }
 
 impl Request {
     pub fn read(link: usize, frame: &Frame) -> Self {
         let p = &frame.padded()[3..];
-        let mut data = [0; DATA];
-        data.copy_from_slice(&p[HEAD..HEAD + DATA]);
+        let mut data = [0; MAX_DATA];
+        data.copy_from_slice(&p[HEADER_LEN..HEADER_LEN + MAX_DATA]);
         Self {
             link,
             client: (frame.system, frame.component),
@@ -128,7 +128,7 @@ impl Request {
 
     /// The data that counts, or all of it where the size is too large.
     pub fn bytes(&self) -> &[u8] {
-        &self.data[..usize::from(self.size).min(DATA)]
+        &self.data[..usize::from(self.size).min(MAX_DATA)]
     }
 
     /// The path it names, without slashes around it; a zero ends it.
@@ -162,8 +162,8 @@ pub fn print(request: &Request) -> Print {
 /// Bytes asked for with each packet of a read.
 pub fn chunk(request: &Request) -> usize {
     match usize::from(request.size) {
-        0 => DATA,
-        size => size.min(DATA),
+        0 => MAX_DATA,
+        size => size.min(MAX_DATA),
     }
 }
 

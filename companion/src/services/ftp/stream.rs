@@ -3,7 +3,7 @@
 use super::packet::{Request, chunk};
 
 /// Packets of one burst; after it the client requests the next burst.
-pub const BURST: u8 = 16;
+pub const PACKETS_PER_BURST: u8 = 16;
 
 /// A burst that has begun.
 #[derive(Clone, Copy, Debug)]
@@ -17,7 +17,12 @@ pub struct Stream {
 impl Stream {
     /// A burst of which nothing was sent yet.
     pub fn new(request: &Request) -> Self {
-        Self { request: *request, offset: request.offset, sequence: request.sequence, left: BURST }
+        Self {
+            request: *request,
+            offset: request.offset,
+            sequence: request.sequence,
+            left: PACKETS_PER_BURST,
+        }
     }
 
     /// The request that started the burst.

@@ -9,13 +9,13 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use super::packet::{ACK, EFBIG, EIO, NAK, op};
-use super::stream::BURST;
+use super::stream::PACKETS_PER_BURST;
 use super::*;
 use crate::link::frame::{self, Framer, Header};
-use crate::storage::store::READ;
+use crate::storage::store::MAX_READ;
 use crate::testing::fake_flash::{Flash, LAYOUT, obey, roadmap, started};
 
-const US: (u8, u8) = (7, crate::COMPONENT);
+const US: (u8, u8) = (7, crate::COMPANION_COMPONENT);
 const LINK: usize = 1;
 
 /// Session, opcode, request's opcode, burst complete, offset, data.
@@ -109,13 +109,13 @@ impl World {
             }
             let pick = self.rng.next_u32() as usize % self.under_way.len().min(2);
             let payload = self.under_way.remove(pick);
-            let mut bytes = [0; frame::MAX_SENT];
+            let mut bytes = [0; frame::MAX_FRAME_LEN];
             let header = Header { system: self.client.0, component: self.client.1, sequence: 0 };
             let length = frame::encode_raw(header, MESSAGE, 84, &payload, &mut bytes);
             let frame = Framer::new().next(self.now, &mut &bytes[..length]).expect("it is whole");
             self.ftp.handle(LINK, self.now, &frame);
         }
-        let mut read = [0; READ];
+        let mut read = [0; MAX_READ];
         for _ in 0..2000 {
             self.ftp.advance(&mut self.store, self.now, self.erasing);
             self.texts.extend(self.ftp.text().map(|(_, text)| text));
@@ -258,7 +258,7 @@ fn a_burst_comes_in_packets_that_count_on() {
         world.send(&request);
         (0..20).for_each(|_| world.step());
         let packets = core::mem::take(&mut world.heard);
-        assert!(packets.len() <= usize::from(BURST) && packets.last().unwrap().last);
+        assert!(packets.len() <= usize::from(PACKETS_PER_BURST) && packets.last().unwrap().last);
         for (i, packet) in packets.iter().enumerate() {
             assert_eq!(packet.sequence, first + i as u16);
             assert_eq!((packet.offset as usize, packet.opcode), (back.len(), ACK));
@@ -269,7 +269,7 @@ fn a_burst_comes_in_packets_that_count_on() {
         rounds += 1;
     }
     assert_eq!(back, file);
-    assert_eq!(rounds, file.len().div_ceil(80 * usize::from(BURST)));
+    assert_eq!(rounds, file.len().div_ceil(80 * usize::from(PACKETS_PER_BURST)));
     let end = world.packet(opened.session, op::BURST_READ, 80, file.len() as u32, &[]);
     assert_eq!(world.ask_again(&end).data, [6], "the end");
 }
@@ -403,8 +403,8 @@ fn a_client_whose_answers_are_lost_is_told_the_same_late_and_under_other_numbers
         let erased = world.flash.programmed;
         world.ask(0, op::CREATE, 0, b"roadmap.bin");
         assert_eq!(world.flash.programmed, erased, "opened once");
-        for (i, piece) in file.chunks(DATA).enumerate() {
-            assert_eq!(world.ask(0, op::WRITE, (i * DATA) as u32, piece).opcode, ACK);
+        for (i, piece) in file.chunks(MAX_DATA).enumerate() {
+            assert_eq!(world.ask(0, op::WRITE, (i * MAX_DATA) as u32, piece).opcode, ACK);
         }
         let told = if damaged { NAK } else { ACK };
         assert_eq!(ask_three_times(&mut world, renumbers, op::TERMINATE, &[]), [told; 3]);

@@ -23,7 +23,7 @@ const RING_LEN: usize = 4;
 /// Bytes of a vertex.
 const VERTEX_LEN: usize = 8;
 /// Most changes of the lanes' order that a mission file may request: a board tries each of them.
-pub const MAX_LOOKS: u32 = 20_000_000;
+pub const MAX_ORDER_CHANGES_OF_FILE: u32 = 20_000_000;
 
 /// Heading of vehicles along the lanes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -161,7 +161,7 @@ pub struct CoverageView<'a> {
 /// Time after which a vehicle that no other vehicle hears any more is on the ground, beside its
 /// flight, seconds: the lease, a message's age and delay, the stop, what the row `Alone` waits, and
 /// the slow end of a descent.
-const DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
+const UNHEARD_DOWN_S: f32 = 20.0 + 1.8 + 2.0 + 5.0 + 20.0 + 15.0;
 
 impl<'a> CoverageView<'a> {
     /// A vehicle that nobody hears any more is down after so many seconds, from the highest layer.
@@ -169,7 +169,7 @@ impl<'a> CoverageView<'a> {
         let Heights { mission_m, layer_m } = self.header.heights;
         let low_m = self.header.ground.map_or(0.0, |ground| ground.low_m);
         let slowest_mps = self.shares().map(|share| share.descend_mps).fold(f32::INFINITY, libm::fminf);
-        DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
+        UNHEARD_DOWN_S + (mission_m - low_m + layer_m * self.shares.len() as f32) / slowest_mps
     }
 
     /// Checks the block of a mission of so many vehicles.
@@ -292,7 +292,7 @@ impl CoverageHeader {
         if !heights.iter().all(|h| positive(*h, MAX_VERTEX_M)) {
             return refuse("heights");
         }
-        if self.looks > MAX_LOOKS {
+        if self.looks > MAX_ORDER_CHANGES_OF_FILE {
             return refuse("looks");
         }
         if self.angle_deg.is_some_and(|angle| !angle.is_finite()) {

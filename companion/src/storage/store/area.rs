@@ -10,12 +10,12 @@
 //! A word that was cut while it was programmed may read as anything, or not at all; no decision hangs on one such word being
 //! one or the other: a seal is believed only with its CRC, an area is written only if it is clean and unused.
 
-use super::flash::{BLOCK, Fault, Layout, ReadFlash, WORD, crc32};
+use super::flash::{Fault, Layout, MAX_PROGRAM, ReadFlash, WORD, crc32};
 
 /// Offset of a slot's data, bytes.
-pub const DATA_AT: u32 = BLOCK as u32;
-const USED_AT: u32 = WORD as u32;
-const SEAL_AT: u32 = 2 * WORD as u32;
+pub const DATA_OFFSET: u32 = MAX_PROGRAM as u32;
+const USED_OFFSET: u32 = WORD as u32;
+const SEAL_OFFSET: u32 = 2 * WORD as u32;
 
 const CLEAN: [u8; WORD] = *b"FLKCLEAN: erased, may be written";
 const USED: [u8; WORD] = *b"FLKUSED:  written to, seal ahead";
@@ -49,7 +49,7 @@ impl Area {
 
     /// Offset of the area's data in the storage bank.
     pub fn data_at(self, layout: &Layout) -> u32 {
-        self.at(layout) + DATA_AT
+        self.at(layout) + DATA_OFFSET
     }
 
     /// End of the area in the storage bank.
@@ -68,12 +68,12 @@ pub fn clean(layout: &Layout, area: Area) -> WordAt {
 
 /// The word that says an area is written to.
 pub fn used(layout: &Layout, area: Area) -> WordAt {
-    (area.at(layout) + USED_AT, USED)
+    (area.at(layout) + USED_OFFSET, USED)
 }
 
 /// The word that seals an area.
 pub fn seal(layout: &Layout, area: Area, seal: &Seal) -> WordAt {
-    (area.at(layout) + SEAL_AT, seal.to_bytes())
+    (area.at(layout) + SEAL_OFFSET, seal.to_bytes())
 }
 
 /// Content of a sealed area.
@@ -157,25 +157,25 @@ pub fn look(layout: &Layout, area: Area, flash: &mut impl ReadFlash) -> Conditio
         let mut word = [0; WORD];
         flash.read(at + offset, &mut word).map(|()| word)
     };
-    let (clean, used, sealed) = (word(0), word(USED_AT), word(SEAL_AT));
+    let (clean, used, sealed) = (word(0), word(USED_OFFSET), word(SEAL_OFFSET));
     if clean == Ok(CLEAN) && used == Ok([0xFF; WORD]) && sealed == Ok([0xFF; WORD]) {
         return Condition::Clean;
     }
     let Some(seal) = sealed.ok().and_then(|word| Seal::from_bytes(&word)) else { return Condition::Dirty };
     match area {
-        Area::Slot(_) if seal.len > area.len(layout) - DATA_AT => Condition::Dirty,
-        Area::Slot(_) if file_crc(at + DATA_AT, seal.len, flash) != Ok(seal.crc) => Condition::Dirty,
+        Area::Slot(_) if seal.len > area.len(layout) - DATA_OFFSET => Condition::Dirty,
+        Area::Slot(_) if file_crc(at + DATA_OFFSET, seal.len, flash) != Ok(seal.crc) => Condition::Dirty,
         _ => Condition::Sealed(seal),
     }
 }
 
 /// CRC-32 over a file in flash without its last four bytes.
 fn file_crc(at: u32, len: u32, flash: &mut impl ReadFlash) -> Result<u32, Fault> {
-    let mut block = [0; BLOCK];
+    let mut block = [0; MAX_PROGRAM];
     let (mut sum, mut done) = (super::flash::CRC_START, 0);
     let covered = len.saturating_sub(4);
     while done < covered {
-        let count = (covered - done).min(BLOCK as u32);
+        let count = (covered - done).min(MAX_PROGRAM as u32);
         let block = &mut block[..count as usize];
         flash.read(at + done, block)?;
         sum = super::flash::crc_step(sum, block);

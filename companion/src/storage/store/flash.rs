@@ -6,9 +6,9 @@ use planner_core::file::CRC32;
 /// word. Smaller ones divide it.
 pub const WORD: usize = 32;
 /// Most bytes of one request to program: a page of the RP2350's flash.
-pub const BLOCK: usize = 256;
+pub const MAX_PROGRAM: usize = 256;
 /// Most bytes of one request to read.
-pub const READ: usize = 1024;
+pub const MAX_READ: usize = 1024;
 
 /// State of a CRC-32 before its first byte.
 pub(crate) const CRC_START: u32 = u32::MAX;
@@ -78,14 +78,14 @@ pub enum FlashRequest<'a> {
         /// Offset of the first byte.
         at: u32,
     },
-    /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`BLOCK`], all erased before.
+    /// Program bytes: a multiple of [`WORD`] at a multiple of it, at most [`MAX_PROGRAM`], all erased before.
     Program {
         /// The first byte.
         at: u32,
         /// Bytes to program.
         bytes: &'a [u8],
     },
-    /// Read bytes, at most [`READ`].
+    /// Read bytes, at most [`MAX_READ`].
     Read {
         /// The first byte.
         at: u32,

@@ -2,7 +2,9 @@
 
 use super::Store;
 use super::area::{self, Area, Condition, Seal};
-use super::flash::{Answer, BLOCK, CRC_START, Erasing, Fault, File, FlashRequest, READ, WORD, crc_step};
+use super::flash::{
+    Answer, CRC_START, Erasing, Fault, File, FlashRequest, MAX_PROGRAM, MAX_READ, WORD, crc_step,
+};
 use super::job::Job;
 use super::journal;
 use super::records::{Compaction, Record, Source, Step};
@@ -36,7 +38,7 @@ impl Store {
                 return None;
             }
             Job::Read { at, len } => FlashRequest::Read { at, len },
-            Job::Sum { at, end, .. } => FlashRequest::Read { at, len: READ.min((end - at) as usize) },
+            Job::Sum { at, end, .. } => FlashRequest::Read { at, len: MAX_READ.min((end - at) as usize) },
             Job::Erase { at, .. } => FlashRequest::Erase { at },
             Job::MarkClean(_) | Job::MarkUsed(_) | Job::Seal(..) => {
                 let (at, word) = match self.job {
@@ -54,12 +56,12 @@ impl Store {
             Job::FlushRest { slot, done } => {
                 let at = self.window.front() + done;
                 let left = self.window.file_len() - at;
-                let count = left.next_multiple_of(WORD as u32).min(BLOCK as u32) as usize;
+                let count = left.next_multiple_of(WORD as u32).min(MAX_PROGRAM as u32) as usize;
                 FlashRequest::Program { at: slot.data_at(layout) + at, bytes: &self.buffer[..count] }
             }
             Job::Check { slot, done, .. } => {
                 let left = (self.window.file_len() - done) as usize;
-                FlashRequest::Read { at: slot.data_at(layout) + done, len: left.min(READ) }
+                FlashRequest::Read { at: slot.data_at(layout) + done, len: left.min(MAX_READ) }
             }
             Job::SealCheck(area, seal) => {
                 FlashRequest::Read { at: area::seal(layout, area, &seal).0, len: WORD }
@@ -73,14 +75,14 @@ impl Store {
                         FlashRequest::Program { at: record.at, bytes: &self.word }
                     }
                     (Step::Load, Source::Flash(from)) => {
-                        FlashRequest::Read { at: from + record.done, len: left.min(BLOCK) }
+                        FlashRequest::Read { at: from + record.done, len: left.min(MAX_PROGRAM) }
                     }
                     (Step::Load | Step::Data, _) => {
-                        let count = left.next_multiple_of(WORD).min(BLOCK);
+                        let count = left.next_multiple_of(WORD).min(MAX_PROGRAM);
                         FlashRequest::Program { at: data_at, bytes: &self.buffer[..count] }
                     }
                     (Step::Verify, _) => {
-                        FlashRequest::Read { at: record.at + record.done, len: left.min(READ) }
+                        FlashRequest::Read { at: record.at + record.done, len: left.min(MAX_READ) }
                     }
                 }
             }
@@ -98,7 +100,7 @@ impl Store {
             _ => return,
         };
         let rest = rest.unwrap_or_default();
-        let count = rest.len().min(BLOCK);
+        let count = rest.len().min(MAX_PROGRAM);
         self.buffer.fill(0xFF);
         self.buffer[..count].copy_from_slice(&rest[..count]);
     }
@@ -192,7 +194,7 @@ impl Store {
             (Job::MarkUsed(area), Ok(_)) => self.begin(area),
             (Job::Flush(_), Ok(_)) => self.window.advance(),
             (Job::FlushRest { slot, done }, Ok(_)) => {
-                let done = done + BLOCK as u32;
+                let done = done + MAX_PROGRAM as u32;
                 let more = self.window.front() + done < self.window.file_len();
                 self.job = if more { Job::FlushRest { slot, done } } else { self.begin_check(slot) };
             }

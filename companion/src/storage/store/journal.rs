@@ -6,7 +6,7 @@
 //! other half.
 
 use super::area::{Condition, close};
-use super::flash::{BLOCK, WORD};
+use super::flash::{MAX_PROGRAM, WORD};
 use super::records::{Compaction, Kind};
 use crate::services::parameters::STORED_LEN;
 use core::ops::Range;
@@ -67,4 +67,4 @@ pub fn head(kind: Kind, len: u32, crc: u32) -> [u8; WORD] {
 
 /// Bytes of the parameters' record.
 pub const PARAMETERS_LEN: usize = 4 + STORED_LEN;
-const _: () = assert!(PARAMETERS_LEN <= BLOCK);
+const _: () = assert!(PARAMETERS_LEN <= MAX_PROGRAM);

@@ -2,7 +2,7 @@
 
 use super::Store;
 use super::area::{Area, Condition, Seal};
-use super::flash::{BLOCK, CRC_START, Erasing, File, WORD, crc_step, crc32};
+use super::flash::{CRC_START, Erasing, File, MAX_PROGRAM, WORD, crc_step, crc32};
 use super::job::Job;
 use super::journal::{self, record_len};
 use super::records::*;
@@ -35,7 +35,7 @@ impl Store {
             });
         }
         let closing = self.upload == Some((File::Mission, UploadState::Closing));
-        if self.journal.failures >= TRIES {
+        if self.journal.failures >= MAX_JOURNAL_TRIES {
             if closing {
                 self.end(Err(UploadError::Flash));
             }
@@ -123,7 +123,7 @@ impl Store {
             (Step::Head, Source::Buffer) => record.step = Step::Data,
             (Step::Head, _) => record.step = Step::Load,
             (Step::Load, Source::Flash(_)) => {
-                let count = bytes.len().min(BLOCK);
+                let count = bytes.len().min(MAX_PROGRAM);
                 self.buffer.fill(0xFF);
                 self.buffer[..count].copy_from_slice(&bytes[..count]);
                 record.step = Step::Data;
@@ -131,7 +131,7 @@ impl Store {
                 return;
             }
             (Step::Load | Step::Data, _) => {
-                record.done = (record.done + BLOCK as u32).min(record.len);
+                record.done = (record.done + MAX_PROGRAM as u32).min(record.len);
                 record.step = if matches!(record.source, Source::Buffer) { Step::Data } else { Step::Load };
             }
             (Step::Verify, _) => {

@@ -2,7 +2,7 @@
 
 use super::Store;
 use super::area::{self, Area, is_closed, u32_at};
-use super::flash::{BLOCK, ReadFlash, WORD};
+use super::flash::{MAX_PROGRAM, ReadFlash, WORD};
 use super::journal::*;
 use super::records::Kind;
 
@@ -37,10 +37,10 @@ impl Store {
     }
 
     fn take_record(&mut self, kind: u8, at: u32, len: u32, crc: u32, flash: &mut impl ReadFlash) {
-        let mut block = [0; BLOCK];
+        let mut block = [0; MAX_PROGRAM];
         let (mut sum, mut done) = (super::flash::CRC_START, 0);
         while done < len {
-            let count = (len - done).min(BLOCK as u32);
+            let count = (len - done).min(MAX_PROGRAM as u32);
             if flash.read(at + done, &mut block[..count as usize]).is_err() {
                 return;
             }
@@ -53,12 +53,12 @@ impl Store {
         if kind == Kind::Mission as u8 {
             self.journal.mission = (len > 0).then_some(at..at + len);
             self.journal.mission_crc = crc;
-        } else if kind == Kind::Parameters as u8 && (4..=BLOCK as u32).contains(&len) {
+        } else if kind == Kind::Parameters as u8 && (4..=MAX_PROGRAM as u32).contains(&len) {
             // Short enough to be in the block whole.
             self.forgotten = u32_at(&block, 0);
             let (entries, _) = block[4..len as usize].as_chunks();
             entries.iter().for_each(|entry| self.parameters.restore(entry));
-        } else if kind == Kind::Photographed as u8 && len <= BLOCK as u32 {
+        } else if kind == Kind::Photographed as u8 && len <= MAX_PROGRAM as u32 {
             self.photographed = block[..len as usize].iter().copied().collect();
         }
     }

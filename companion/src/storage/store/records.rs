@@ -16,7 +16,7 @@ pub enum Kind {
 }
 
 /// Attempts to write the journal before the store gives up until the next start.
-pub(super) const TRIES: u8 = 4;
+pub(super) const MAX_JOURNAL_TRIES: u8 = 4;
 
 /// A record being written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -133,7 +133,7 @@ fn what_is_damaged_or_not_whole_leaves_the_old() {
 
 /// Does what the store asks for while armed, which must be reading alone.
 fn run_armed(store: &mut Store, flash: &mut Flash) {
-    let mut read = [0; READ];
+    let mut read = [0; MAX_READ];
     while let Some(request) = store.poll(Erasing::Forbidden) {
         assert!(matches!(request, FlashRequest::Read { .. }), "{request:?} while armed");
         let outcome = obey(flash, request, Erasing::Forbidden, &mut read).expect("the power is on");
@@ -241,7 +241,7 @@ fn a_read_goes_first_between_two_sectors() {
     // One slot is to be erased, as after a restart with a new roadmap.
     flash.bytes[LAYOUT.slot_len as usize..2 * LAYOUT.slot_len as usize].fill(0);
     let mut store = Store::mount(LAYOUT, &mut flash);
-    let (mut erased, mut read, mut given) = (Vec::new(), [0; READ], 0);
+    let (mut erased, mut read, mut given) = (Vec::new(), [0; MAX_READ], 0);
     for turn in 0..100 {
         if turn % 2 == 1 {
             store.read(File::Roadmap, 0, 100);
@@ -366,7 +366,7 @@ fn a_flash_that_fails_is_told_and_never_asked_for_ever() {
                     FlashRequest::Program { .. } => failing == 1,
                     FlashRequest::Read { .. } => failing == 2,
                 };
-                let nothing = [0; READ];
+                let nothing = [0; MAX_READ];
                 let len = if let FlashRequest::Read { len, .. } = request { len } else { 0 };
                 store.handle(if bad { Err(Fault) } else { Ok(&nothing[..len]) });
             }
@@ -413,7 +413,7 @@ fn a_record_whose_head_did_not_come_out_is_written_again() {
     store.open(File::Mission, Erasing::Allowed).unwrap();
     flown.chunks(200).enumerate().for_each(|(i, part)| _ = store.take(i as u32 * 200, part));
     store.close();
-    let mut read = [0; READ];
+    let mut read = [0; MAX_READ];
     let mut heads = 0;
     while let Some(request) = store.poll(Erasing::Allowed) {
         let head = match request {

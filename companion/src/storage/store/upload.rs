@@ -1,10 +1,10 @@
 //! A file coming in: from the first piece in the window to the seal.
 
 use super::Store;
-use super::area::{Area, Condition, DATA_AT};
+use super::area::{Area, Condition, DATA_OFFSET};
 use super::flash::{Erasing, File};
 use super::upload_state::{UploadError, UploadState};
-use super::window::{Taken, WINDOW};
+use super::window::{Taken, WINDOW_LEN};
 use crate::storage::mission_file::MissionView;
 use planner_core::{field, roadmap};
 
@@ -42,9 +42,9 @@ impl Store {
     /// Takes a piece of the file.
     pub fn take(&mut self, offset: u32, piece: &[u8]) -> Taken {
         match self.upload {
-            Some((File::Mission, UploadState::Taking)) => self.window.take(offset, piece, WINDOW as u32),
+            Some((File::Mission, UploadState::Taking)) => self.window.take(offset, piece, WINDOW_LEN as u32),
             Some((File::Roadmap | File::Field, UploadState::Taking)) => {
-                self.window.take(offset, piece, self.layout.slot_len - DATA_AT)
+                self.window.take(offset, piece, self.layout.slot_len - DATA_OFFSET)
             }
             _ => Taken::Later,
         }

@@ -1,10 +1,10 @@
 //! What was received of a file being uploaded and is not yet in flash: pieces may come in any order within the window.
 
-use super::flash::BLOCK;
+use super::flash::MAX_PROGRAM;
 
 /// Bytes of the reassembly window: a mission file waits here whole, a roadmap passes through. 4 kB,
 /// and 512 bytes of marks.
-pub const WINDOW: usize = 4096;
+pub const WINDOW_LEN: usize = 4096;
 
 /// Fate of a piece of the upload.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,9 +20,9 @@ pub enum Taken {
 /// The window. All zero when new.
 #[derive(Clone, Debug)]
 pub struct Window {
-    bytes: [u8; WINDOW],
+    bytes: [u8; WINDOW_LEN],
     /// A bit for each byte that is here.
-    marks: [u64; WINDOW / 64],
+    marks: [u64; WINDOW_LEN / 64],
     /// Place of the first byte in the file; a multiple of [`BLOCK`].
     front: u32,
     /// End of the furthest piece in the file.
@@ -31,7 +31,7 @@ pub struct Window {
 
 impl Default for Window {
     fn default() -> Self {
-        Self { bytes: [0; WINDOW], marks: [0; WINDOW / 64], front: 0, high: 0 }
+        Self { bytes: [0; WINDOW_LEN], marks: [0; WINDOW_LEN / 64], front: 0, high: 0 }
     }
 }
 
@@ -57,7 +57,7 @@ impl Window {
         let Some(end) = offset.checked_add(piece.len() as u32).filter(|end| *end <= most) else {
             return Taken::TooLarge;
         };
-        if end > self.front + WINDOW as u32 {
+        if end > self.front + WINDOW_LEN as u32 {
             return Taken::Later;
         }
         self.high = self.high.max(end);
@@ -75,27 +75,27 @@ impl Window {
     /// Bytes that are here from the front on, without a gap, at most `most`.
     fn run(&self, most: usize) -> usize {
         let gap = self.marks.iter().position(|marks| *marks != u64::MAX);
-        let run = gap.map_or(WINDOW, |i| 64 * i + self.marks[i].trailing_ones() as usize);
+        let run = gap.map_or(WINDOW_LEN, |i| 64 * i + self.marks[i].trailing_ones() as usize);
         run.min(most)
     }
 
     /// The next block for flash, once it is whole.
-    pub fn block(&self) -> Option<&[u8; BLOCK]> {
-        if self.run(BLOCK) < BLOCK { None } else { self.bytes.first_chunk() }
+    pub fn block(&self) -> Option<&[u8; MAX_PROGRAM]> {
+        if self.run(MAX_PROGRAM) < MAX_PROGRAM { None } else { self.bytes.first_chunk() }
     }
 
     /// The end of the file, if nothing is missing before it.
     pub fn rest(&self) -> Option<&[u8]> {
         let len = (self.high - self.front.min(self.high)) as usize;
-        (len <= WINDOW && self.run(len) == len).then(|| &self.bytes[..len])
+        (len <= WINDOW_LEN && self.run(len) == len).then(|| &self.bytes[..len])
     }
 
     /// Lets the first block go: it is in flash.
     pub fn advance(&mut self) {
-        self.bytes.copy_within(BLOCK.., 0);
-        self.marks.copy_within(BLOCK / 64.., 0);
-        self.marks[(WINDOW - BLOCK) / 64..].fill(0);
-        self.front += BLOCK as u32;
+        self.bytes.copy_within(MAX_PROGRAM.., 0);
+        self.marks.copy_within(MAX_PROGRAM / 64.., 0);
+        self.marks[(WINDOW_LEN - MAX_PROGRAM) / 64..].fill(0);
+        self.front += MAX_PROGRAM as u32;
     }
 }
 

@@ -4,14 +4,14 @@
 
 use planner_core::detour::{DetourRequest, Goal, KeepOff};
 
-use super::beside::{self, MARGIN_M};
-use super::{Aim, BLOCKED_WITHIN_M, DETOURS_TRIED, Detours, GIVES_UP_S, STUCK};
+use super::beside::{self, DETOUR_MARGIN_M};
+use super::{Aim, BLOCKED_WITHIN_M, Detours, GIVE_UP_AFTER_S, MAX_DETOUR_SEARCHES, STUCK_AFTER};
 use crate::guidance::evade;
 use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
 /// Two searches from places nearer than this are searches from the same place, metres.
-const HERE_M: f32 = 1.0;
+const SAME_SEARCH_PLACE_M: f32 = 1.0;
 
 /// Whether a way around that was not found may be found later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,16 +54,16 @@ impl Detours {
             Some(_) if !self.aside => beside::others(view, &mut tell),
             _ => {
                 // No nearer than blocks the way: a goal that is planned beside one that lies can be flown to.
-                let apart = [apart_m + MARGIN_M, apart_m + BLOCKED_WITHIN_M];
+                let apart = [apart_m + DETOUR_MARGIN_M, apart_m + BLOCKED_WITHIN_M];
                 view.neighbours.places(view.now, apart, &mut tell);
             }
         }
         if self.aside {
-            view.neighbours.landing_columns(view.now, apart_m + evade::BESIDE_M, &mut tell);
+            view.neighbours.landing_columns(view.now, apart_m + evade::EVADE_MARGIN_M, &mut tell);
         }
         if self.lands {
             let height_m = plan.path.point_at(along_m)?.z;
-            view.neighbours.lands_on(view.now, [apart_m + MARGIN_M, height_m], tell);
+            view.neighbours.lands_on(view.now, [apart_m + DETOUR_MARGIN_M, height_m], tell);
         }
         let (goal, descent_m) = match view.config.division {
             Some(_) => match self.beside.back_m() {
@@ -99,7 +99,7 @@ impl Detours {
         if !self.flying {
             self.left_at_m = progress_m;
         }
-        let stuck = self.flying && now - progress_at > STUCK;
+        let stuck = self.flying && now - progress_at > STUCK_AFTER;
         let fruitless = if stuck { self.fruitless.saturating_add(1) } else { 0 };
         self.obstacles.avoid_requested();
         let Self { aside, lands, left_at_m, .. } = *self;
@@ -128,10 +128,10 @@ impl Detours {
         }
         if outlook == Outlook::Settles {
             // The vehicle requests a detour later and later, and once more when that vehicle lies.
-            self.failed = self.failed.saturating_add(1).min(DETOURS_TRIED - 1);
+            self.failed = self.failed.saturating_add(1).min(MAX_DETOUR_SEARCHES - 1);
             return;
         }
-        if (along_m - self.failed_at_m).abs() > HERE_M {
+        if (along_m - self.failed_at_m).abs() > SAME_SEARCH_PLACE_M {
             (self.failed_here, self.failed_at_m) = (0, along_m);
         }
         if self.failed_here == 0 {
@@ -139,8 +139,8 @@ impl Detours {
         }
         self.failed = self.failed.saturating_add(1);
         self.failed_here = self.failed_here.saturating_add(1);
-        let long = now - self.failed_since >= Duration::from_secs(GIVES_UP_S);
-        let often = long && self.failed_here >= DETOURS_TRIED - 1;
+        let long = now - self.failed_since >= Duration::from_secs(GIVE_UP_AFTER_S);
+        let often = long && self.failed_here >= MAX_DETOUR_SEARCHES - 1;
         self.hopeless = often || outlook == Outlook::Closed;
     }
 }

@@ -4,7 +4,7 @@
 //! plan, and then asks for its own plan again, to go on from there. It keeps its part: no division follows, its progress stays
 //! where it left its path until it is back, and others wait for it. It comes back no further than its gates are open.
 //!
-//! ENU metres. Constant work but for [`returns_m`], once an attempt: at most [`LOOKS`] looks at each of [`THINGS`] things.
+//! ENU metres. Constant work but for [`returns_m`], once an attempt: at most [`MAX_SAMPLES`] looks at each of [`MAX_ZONES`] things.
 
 use heapless::Vec;
 use planner_core::Point;
@@ -15,25 +15,25 @@ use crate::time::{Duration, Instant};
 
 /// Distance ahead along the path within which a keep-out zone blocks it, metres: from 8 m/s a
 /// vehicle stops in less than half of it.
-pub(super) const FIELD_M: f32 = 60.0;
+pub(super) const LOOK_AHEAD_M: f32 = 60.0;
 /// Margin beyond the safety distance on a detour, metres: a zone that strays a little does not
 /// block the detour again.
-pub(super) const MARGIN_M: f32 = 0.5;
+pub(super) const DETOUR_MARGIN_M: f32 = 0.5;
 /// Time from a search that found no detour to the next search.
-const AGAIN: Duration = Duration::from_secs(30);
+const DETOUR_RETRY: Duration = Duration::from_secs(30);
 /// Most detours in one plan.
-const TURNS: u8 = 16;
+const MAX_DETOURS: u8 = 16;
 /// Most keep-out zones that are compared with the path.
-const THINGS: usize = 8;
+const MAX_ZONES: usize = 8;
 /// Most samples of the path.
-const LOOKS: usize = 100;
+const MAX_SAMPLES: usize = 100;
 /// Least spacing of the samples along the path, metres.
-const LOOK_M: f32 = 0.5;
+const MIN_SAMPLE_SPACING_M: f32 = 0.5;
 /// Distance before a block of the path within which keep-out zones already count, metres.
-const FREE_M: f32 = 1.0;
+const DETOUR_BEGINS_BEFORE_M: f32 = 1.0;
 /// Distance beyond the last blocked sample at which a detour returns to the path, metres: at the
 /// very edge the same zone would block the path again.
-const BEYOND_M: f32 = 0.5;
+const DETOUR_RETURNS_BEYOND_M: f32 = 0.5;
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 enum Phase {
@@ -134,8 +134,8 @@ impl Beside {
     /// Whether it may seek a way now.
     pub(super) fn may_seek(&self, now: Instant) -> bool {
         (!self.is_on() || self.flies())
-            && self.turns < TURNS
-            && self.missed_at.is_none_or(|at| now - at >= AGAIN)
+            && self.turns < MAX_DETOURS
+            && self.missed_at.is_none_or(|at| now - at >= DETOUR_RETRY)
     }
 }
 
@@ -145,7 +145,7 @@ pub(super) fn others<const V: usize, const W: usize, const G: usize>(
     view: &View<'_, V, W, G>,
     tell: &mut dyn FnMut(KeepOff),
 ) {
-    let apart_m = view.config.safety_distance_m + MARGIN_M;
+    let apart_m = view.config.safety_distance_m + DETOUR_MARGIN_M;
     view.neighbours.places(view.now, [apart_m; 2], &mut *tell);
     let beside_m = apart_m + view.neighbours.stray_m();
     view.neighbours
@@ -168,25 +168,25 @@ pub(super) fn returns_m<const V: usize, const W: usize, const G: usize>(
         let share = (away.dot(&axis) / axis.norm_squared().max(1e-6)).clamp(0.0, 1.0);
         (away - axis * share).norm() - thing.radius_m
     };
-    let mut things = Vec::<KeepOff, THINGS>::new();
+    let mut things = Vec::<KeepOff, MAX_ZONES>::new();
     // Full beyond what may be near at once: the search for the way knows them all.
-    let mut add = |thing: KeepOff| _ = (far_m(&thing, &here) < FIELD_M).then(|| things.push(thing));
+    let mut add = |thing: KeepOff| _ = (far_m(&thing, &here) < LOOK_AHEAD_M).then(|| things.push(thing));
     known.iter().for_each(|thing| add(*thing));
     others(view, &mut add);
     let (mut at_m, mut met) = (from_m, false);
-    for _ in 0..LOOKS {
-        let far = !met && at_m > from_m + FIELD_M + FREE_M;
-        if far || at_m + BEYOND_M > most_m {
+    for _ in 0..MAX_SAMPLES {
+        let far = !met && at_m > from_m + LOOK_AHEAD_M + DETOUR_BEGINS_BEFORE_M;
+        if far || at_m + DETOUR_RETURNS_BEYOND_M > most_m {
             return None;
         }
         let place = plan.path.point_at(at_m)?;
         // No zone is nearer than that.
-        let free_m = things.iter().map(|thing| far_m(thing, &place)).fold(FIELD_M, f32::min);
+        let free_m = things.iter().map(|thing| far_m(thing, &place)).fold(LOOK_AHEAD_M, f32::min);
         if met && free_m > 0.0 {
-            return Some(at_m + BEYOND_M);
+            return Some(at_m + DETOUR_RETURNS_BEYOND_M);
         }
         met |= free_m <= 0.0;
-        at_m += free_m.max(LOOK_M);
+        at_m += free_m.max(MIN_SAMPLE_SPACING_M);
     }
     None
 }

@@ -8,10 +8,10 @@ use crate::swarm::view::View;
 use crate::time::{Duration, Instant};
 
 /// Time from a search that found no way home to the next search.
-const AGAIN: Duration = Duration::from_secs(5);
+const RETURN_RETRY: Duration = Duration::from_secs(5);
 /// Most times that a vehicle turns home in one flight: a block after the last time is not flown
 /// around.
-const TURNS: u8 = 4;
+const MAX_RETURNS: u8 = 4;
 
 /// Progress of a vehicle on its way home.
 #[derive(Clone, Copy, Debug, Default)]
@@ -62,9 +62,9 @@ impl Homeward {
         self.seeks_since.map(|since| now - since)
     }
 
-    /// Whether the shell may be asked for the path home now: not within [`AGAIN`] of the last failure.
+    /// Whether the shell may be asked for the path home now: not within [`RETURN_RETRY`] of the last failure.
     pub(crate) fn may_ask(&self, now: Instant) -> bool {
-        self.seeks() && self.missed_at.is_none_or(|at| now - at >= AGAIN)
+        self.seeks() && self.missed_at.is_none_or(|at| now - at >= RETURN_RETRY)
     }
 
     /// Whether it can turn home: over a field, on a path, and not too often before.
@@ -74,6 +74,6 @@ impl Homeward {
     ) -> bool {
         let flies = view.mission.plan().is_some_and(|plan| plan.task.flies());
         let on_path = view.guidance.along_m() >= 0.0 && !view.guidance.returning;
-        view.config.division.is_some() && flies && on_path && self.turns < TURNS
+        view.config.division.is_some() && flies && on_path && self.turns < MAX_RETURNS
     }
 }

@@ -3,8 +3,8 @@ use std::vec::Vec;
 
 use super::asking::Outlook;
 use super::*;
-use crate::link::intent::{BLOCKED, DETOURS, FLYING, GROUNDED, ON_PLAN, OUT, WAITING};
-use crate::swarm::obstacles::OBSTACLES;
+use crate::link::intent::{BLOCKED, FLYING, GROUNDED, ON_DETOUR, ON_PLAN, OUT_OF_PLAN, WAITING};
+use crate::swarm::obstacles::MAX_OBSTACLES;
 use crate::swarm::obstacles::tests::sphere;
 use crate::testing::fake_autopilot::*;
 use mavlink::dialects::ardupilotmega::MavCmd;
@@ -83,7 +83,7 @@ fn who_hears_a_lower_system_id_claim_waits_again() {
     bench.run(8.0);
     assert!(bench.companion.detours.waits(&bench.companion.view()) && bench.state() == State::Blocked);
     // It flies: what was quiet is not any more.
-    bench.neighbour = other(DETOURS);
+    bench.neighbour = other(ON_DETOUR);
     bench.run(1.0);
     bench.neighbour = other(BLOCKED | WAITING);
     bench.run(4.0);
@@ -141,9 +141,9 @@ fn kept_off(flags: u8, moves: bool) -> Vec<KeepOff> {
 
 #[test]
 fn who_lies_where_it_does_not_know_is_kept_off_by_the_foot_of_its_column() {
-    let known = kept_off(GROUNDED | OUT, true);
+    let known = kept_off(GROUNDED | OUT_OF_PLAN, true);
     assert!(matches!(known[..], [KeepOff { nature: Nature::Solid, .. }]) && known[0].from == known[0].to);
-    let vague = kept_off(GROUNDED | OUT, false);
+    let vague = kept_off(GROUNDED | OUT_OF_PLAN, false);
     assert!(matches!(vague[..], [KeepOff { nature: Nature::Lying, .. }]) && vague[0].to.z < -40.0);
 }
 
@@ -169,9 +169,9 @@ fn the_column_of_one_that_lands_is_deeper_the_older_its_place_is() {
 fn nobody_takes_off_before_it_was_looked_at_who_is_in_the_way() {
     for tenth in 0..8 {
         let mut bench = Bench::new(two_vehicles());
-        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
         // So many things beside the path that the one on it is looked at in a later step.
-        for i in 0..OBSTACLES {
+        for i in 0..MAX_OBSTACLES {
             exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
         }
         bench.until(State::Ready, 8.0);
@@ -192,13 +192,13 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
         let mut plan = plan();
         plan.gates.push(Gate { at_m: -1.5, id: 77, until_m: 5.0 }).unwrap();
         bench.answer_plan = Some(Ok(plan.clone()));
-        bench.neighbour = Some((Point::new(30.0, 40.0, 0.0), GROUNDED | OUT, 0.0, 5));
+        bench.neighbour = Some((Point::new(30.0, 40.0, 0.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
         bench.until(State::Ready, 8.0);
         bench.start();
         bench.until(State::Streaming, 5.0);
-        bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPONENT);
+        bench.command(MavCmd::MAV_CMD_NAV_LAND, 0.0, SYSTEM, crate::COMPANION_COMPONENT);
         bench.run(0.3);
-        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+        bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
         bench.answer_plan = Some(Ok(plan));
         bench.run(1.0);
         bench.start();
@@ -214,7 +214,7 @@ fn what_was_found_for_one_plan_opens_no_gate_of_the_next() {
 fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
     let mut bench = Bench::new(two_vehicles());
     bench.no_position = true;
-    bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT, 0.0, 5));
+    bench.neighbour = Some((Point::new(14.5, 12.5, 1.0), GROUNDED | OUT_OF_PLAN, 0.0, 5));
     bench.run(3.0);
     bench.companion.neighbours.avoid(bench.now);
     bench.no_position = false;
@@ -228,7 +228,7 @@ fn who_was_flown_around_by_one_plan_is_looked_at_for_the_next() {
 fn a_look_among_many_takes_several_steps_and_finds_what_is_last() {
     let mut bench = Bench::following(config());
     // The first ones are far beside the path; each costs a share of a step.
-    for i in 0..OBSTACLES - 1 {
+    for i in 0..MAX_OBSTACLES - 1 {
         exclude(&mut bench, &sphere(Point::new(40.0 + i as f32, 60.0, 1.5), 0.5));
     }
     bench.run(1.0);
@@ -263,6 +263,6 @@ fn a_way_is_asked_for_once_more_when_a_silent_vehicle_lies() {
             detours.miss(along_m, outlook, now);
             asked += 1;
         }
-        assert!((1..=DETOURS_TRIED).contains(&asked), "{asked}");
+        assert!((1..=MAX_DETOUR_SEARCHES).contains(&asked), "{asked}");
     }
 }

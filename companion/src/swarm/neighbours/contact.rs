@@ -11,7 +11,7 @@ use super::bounds::*;
 use crate::autopilot::telemetry::SequenceFilter;
 use crate::config::Ground;
 use crate::link::echo::Lateness;
-use crate::link::intent::{BLOCKED, DETOURS, GROUNDED, LANDED, OUT, POINTS, WAITING};
+use crate::link::intent::{BLOCKED, GROUNDED, LANDED, MAX_POINTS, ON_DETOUR, OUT_OF_PLAN, WAITING};
 use crate::time::{Duration, Instant};
 
 /// Ground of an area.
@@ -48,7 +48,7 @@ pub(crate) struct Contact {
     pub(super) late: Lateness,
     /// When an intent of our mission was last heard from it.
     pub(super) belongs_at: Option<Instant>,
-    pub(super) points: Vec<Point, POINTS>,
+    pub(super) points: Vec<Point, MAX_POINTS>,
     /// Number of the last of them that the vehicle flies to only where nobody hears it.
     pub(super) beyond: u8,
     /// Whether it flies to the last of its points unheard: over an area, where it reports as many as its lease allows.
@@ -105,19 +105,19 @@ impl Contact {
     #[inline(never)]
     pub(super) fn is_dead(&self, now: Instant) -> bool {
         // Most are heard.
-        let dead = Duration::from_millis(DEAD_MS + (1000.0 * self.flies_on_s()) as u64);
+        let dead = Duration::from_millis(LOST_AFTER_MS + (1000.0 * self.flies_on_s()) as u64);
         let silent = |at: Option<Instant>| at.is_some_and(|at| now - at >= dead);
-        self.rank != STRANGER && silent(self.heard_at) && silent(self.known_at())
+        self.rank != STRANGER_RANK && silent(self.heard_at) && silent(self.known_at())
     }
 
     /// Whether it speaks, but has not known for long where it is.
     pub(super) fn is_vague(&self) -> bool {
-        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= SILENT)
+        self.heard_at.zip(self.position_at).is_some_and(|(heard, known)| heard - known >= MAY_LAND_AFTER)
     }
 
     /// Whether it follows the shared plan, as last heard.
     pub(super) fn on_plan(&self) -> bool {
-        self.state.progress_m.is_some() && !self.tells(DETOURS | OUT)
+        self.state.progress_m.is_some() && !self.tells(ON_DETOUR | OUT_OF_PLAN)
     }
 
     /// Time that an unheard vehicle may take for what its gates left it, seconds.
@@ -125,7 +125,7 @@ impl Contact {
         match self.state.progress_m.filter(|_| self.flies_on()) {
             Some(progress_m) => {
                 let fly_s = (self.clear_m - progress_m) / self.reckoned_mps + f32::from(self.clear_in_s);
-                fly_s.clamp(0.0, FLIES_ON_S)
+                fly_s.clamp(0.0, MAX_UNHEARD_FLIGHT_S)
             }
             None => 0.0,
         }
@@ -147,7 +147,7 @@ impl Contact {
         let after_s = RECKONED_AFTER_S + f32::from(self.clear_in_s);
         let silent_s = (now - known_at).secs_f32() - after_s;
         let beyond = self.at_edge || self.position_at.is_none();
-        if silent_s <= 0.0 || !beyond || self.tells(DETOURS | OUT) {
+        if silent_s <= 0.0 || !beyond || self.tells(ON_DETOUR | OUT_OF_PLAN) {
             return Some(known_m);
         }
         let reckoned_m = known_m + self.reckoned_mps * silent_s;
@@ -156,7 +156,7 @@ impl Contact {
 
     /// Seconds until it has come past `until_m` for sure; none where that is open.
     pub(super) fn passes_in_s(&self, until_m: f32, now: Instant) -> Option<f32> {
-        let known_m = self.progress_m(now).filter(|_| !self.tells(DETOURS | OUT))?;
+        let known_m = self.progress_m(now).filter(|_| !self.tells(ON_DETOUR | OUT_OF_PLAN))?;
         let known_at = self.belongs_at.max(self.relayed_at)?;
         let fly_s = (until_m - known_m) / self.reckoned_mps;
         let after_s = RECKONED_AFTER_S + f32::from(self.clear_in_s) - (now - known_at).secs_f32();
@@ -168,7 +168,7 @@ impl Contact {
     }
 
     pub(super) fn is_out(&self, now: Instant) -> bool {
-        self.tells(OUT) || self.is_dead(now)
+        self.tells(OUT_OF_PLAN) || self.is_dead(now)
     }
 
     /// The part of a reported progress that is believed, metres: no more than the vehicle can have
@@ -178,55 +178,56 @@ impl Contact {
     pub(super) fn believed_m(&mut self, progress_m: f32, fastest_mps: f32, now: Instant) -> f32 {
         let furthest = self.furthest.map(|(at_m, at)| at_m + fastest_mps * (now - at).secs_f32());
         let believed_m = furthest.map_or(progress_m, |furthest_m| libm::fminf(progress_m, furthest_m));
-        let late_m = believed_m + fastest_mps * LATE_S + STRIDE_M;
+        let late_m = believed_m + fastest_mps * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M;
         self.furthest = Some((furthest.map_or(late_m, |furthest_m| libm::fminf(furthest_m, late_m)), now));
         believed_m
     }
 
     /// Whether it is on the ground: as it reports, or after so long a silence.
     pub(super) fn lies(&self, now: Instant, down: Duration) -> bool {
-        self.tells(GROUNDED) || (!self.tells(OUT) && self.is_dead(now) && !self.heard_within(now, down))
+        self.tells(GROUNDED)
+            || (!self.tells(OUT_OF_PLAN) && self.is_dead(now) && !self.heard_within(now, down))
     }
 
     /// Whether it is out of the plan, or was lately heard to stand until somebody else moves.
     pub(super) fn waits(&self, now: Instant) -> bool {
         self.is_out(now)
-            || (self.tells(WAITING | LANDED) && self.heard_within(now, LATELY))
+            || (self.tells(WAITING | LANDED) && self.heard_within(now, HEARD_WITHIN))
             || self.lands(now)
     }
 
     /// Whether it flew around and comes down at the end of that.
     pub(super) fn lands(&self, now: Instant) -> bool {
-        self.tells(DETOURS)
+        self.tells(ON_DETOUR)
             && !self.tells(GROUNDED)
             && self.column
             && self.near().last().is_some_and(|low| low.z < self.state.position.z)
-            && self.state.velocity.xy().norm_squared() < STANDING_MPS * STANDING_MPS
-            && self.heard_within(now, LATELY)
+            && self.state.velocity.xy().norm_squared() < MAX_HOVER_MPS * MAX_HOVER_MPS
+            && self.heard_within(now, HEARD_WITHIN)
     }
 
     /// Whether it stands and is about to fly around.
     pub(super) fn claims(&self, now: Instant) -> bool {
         self.tells(BLOCKED)
             && !self.waits(now)
-            && self.heard_within(now, LATELY)
-            && self.state.velocity.norm() < STANDING_MPS
+            && self.heard_within(now, HEARD_WITHIN)
+            && self.state.velocity.norm() < MAX_HOVER_MPS
     }
 
     /// Whether it will land where it is without looking, or may: it is in the air off the plan, or unheard.
     pub(super) fn comes_down(&self, now: Instant) -> bool {
-        let silent = !self.heard_within(now, SILENT) && !self.is_far(now) && !self.flies_on();
-        self.rank != STRANGER
+        let silent = !self.heard_within(now, MAY_LAND_AFTER) && !self.is_far(now) && !self.flies_on();
+        self.rank != STRANGER_RANK
             && !self.tells(GROUNDED | LANDED)
             && !self.is_out(now)
-            && (silent || (self.state.progress_m.is_none() && !self.tells(DETOURS)))
+            && (silent || (self.state.progress_m.is_none() && !self.tells(ON_DETOUR)))
     }
 
     /// The columns it may come down in, `apart_m` around it; unheard it has come as far as `upto_m` along its points.
     pub(super) fn columns(&self, now: Instant, [apart_m, upto_m]: [f32; 2], tell: &mut dyn FnMut(KeepOff)) {
         let here = self.state.position;
         let up = |height_m: f32| Point::new(0.0, 0.0, height_m);
-        if !self.heard_within(now, SILENT) {
+        if !self.heard_within(now, MAY_LAND_AFTER) {
             return self.stretch(upto_m, &mut |place, wider_m| {
                 let radius_m = libm::hypotf(apart_m, wider_m);
                 let (from, to) = (place + up(LEVEL_M), place - up(self.deep_m(&place)));
@@ -237,28 +238,29 @@ impl Contact {
             tell(KeepOff { from: from + up(LEVEL_M), to: from - up(below_m), radius_m: apart_m, nature });
         };
         let age_s = self.position_at.map_or(0.0, |at| (now - at).secs_f32());
-        let fallen_m = (LANDS_MPS * age_s).min(COLUMN_M);
-        if age_s < OLD_S {
-            column(here, (BELOW_M + fallen_m).min(COLUMN_M), Nature::Landing);
+        let fallen_m = (MAX_LANDING_MPS * age_s).min(MAX_COLUMN_M);
+        if age_s < MAX_HEIGHT_AGE_S {
+            column(here, (FAR_BELOW_M + fallen_m).min(MAX_COLUMN_M), Nature::Landing);
         } else {
             // The vehicle may be anywhere down to there by now, and comes down from there.
             column(here, fallen_m, Nature::Solid);
-            column(here - up(fallen_m), BELOW_M, Nature::Landing);
+            column(here - up(fallen_m), FAR_BELOW_M, Nature::Landing);
         }
     }
 
     /// Depth of the column below a place on its path, metres: over an area at least to the ground.
     pub(super) fn deep_m(&self, place: &Point) -> f32 {
         // NaN counts as none.
-        if self.leased { libm::fmaxf(COLUMN_M, place.z - self.floor_m) } else { COLUMN_M }
+        if self.leased { libm::fmaxf(MAX_COLUMN_M, place.z - self.floor_m) } else { MAX_COLUMN_M }
     }
 
     /// Height of the top of its climb, if it climbs or is about to.
     pub(super) fn climbs_to(&self) -> Option<f32> {
         let (top, here) = (self.near().last()?, self.state.position);
         let beside = (top - here).xy().norm_squared();
-        let climbs = self.column && !self.tells(LANDED | OUT) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
-        (climbs && top.z > here.z + TOP_M).then_some(top.z)
+        let climbs =
+            self.column && !self.tells(LANDED | OUT_OF_PLAN) && beside < CLIMB_BESIDE_M * CLIMB_BESIDE_M;
+        (climbs && top.z > here.z + CLIMB_TOP_M).then_some(top.z)
     }
 
     /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its points lead; elsewhere further
@@ -275,7 +277,7 @@ impl Contact {
 
     /// The stretch of a vehicle that stops where it notices that nobody hears it, metres.
     pub(super) fn stops_m(&self) -> f32 {
-        STRETCH_M + STRETCH_MPS * 2.0 * self.late.delay_s
+        UNHEARD_STRETCH_M + UNHEARD_STRETCH_MPS * 2.0 * self.late.delay_s
     }
 
     /// Whether it is in the air, or about to be, as it reported last.
@@ -285,7 +287,10 @@ impl Contact {
 
     /// Whether it is silent, and goes on over an area as long as its lease allows, or as its autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
-        self.leased && self.is_under_way() && !self.tells(OUT) && !self.heard_within(now, SILENT)
+        self.leased
+            && self.is_under_way()
+            && !self.tells(OUT_OF_PLAN)
+            && !self.heard_within(now, MAY_LAND_AFTER)
     }
 
     /// Whether it may yet be taken home, to its pad nearer than `apart_m` to the vertical of a place. No pads are as near to each other.
@@ -312,8 +317,8 @@ impl Contact {
     /// Places along its path for `upto_m`, as far as it may come unheard, and how much further than from one of them it may be from the
     /// nearest of them.
     pub(super) fn stretch(&self, upto_m: f32, tell: &mut dyn FnMut(Point, f32)) {
-        let step_m = if upto_m > self.stops_m() { upto_m / STRETCH_PLACES } else { STRETCH_STEP_M };
-        let wider_m = if step_m > STRETCH_STEP_M { 0.5 * step_m } else { 0.0 };
+        let step_m = if upto_m > self.stops_m() { upto_m / STRETCH_PLACES } else { UNHEARD_STRETCH_STEP_M };
+        let wider_m = if step_m > UNHEARD_STRETCH_STEP_M { 0.5 * step_m } else { 0.0 };
         self.legs(upto_m, &mut |[at, next], [leg_m, flown_m]| {
             for step in 1..=(flown_m / step_m) as u32 {
                 let along_m = step as f32 * step_m;
@@ -333,8 +338,11 @@ impl Contact {
             return self.floor_m;
         };
         let away = self.pad.is_some_and(|pad| (pad - place).xy().norm() > OVER_PAD_M);
-        let below_m =
-            if away && !self.tells(DETOURS | OUT) && !self.column { ground.height_m / 2.0 } else { 0.0 };
+        let below_m = if away && !self.tells(ON_DETOUR | OUT_OF_PLAN) && !self.column {
+            ground.height_m / 2.0
+        } else {
+            0.0
+        };
         libm::fmaxf(self.floor_m, libm::fminf(ground.high_m, place.z - below_m))
     }
 
@@ -353,13 +361,13 @@ impl Contact {
         let place = |radius_m: f32| KeepOff { from: here, to: here, radius_m, nature: Nature::Solid };
         let column = |from: Point, nature: Nature| {
             let to = from - Point::new(0.0, 0.0, self.deep_m(&from));
-            KeepOff { from, to, radius_m: apart_m + VAGUE_M, nature }
+            KeepOff { from, to, radius_m: apart_m + VAGUE_POSITION_M, nature }
         };
-        if self.tells(GROUNDED) && self.tells(OUT) && self.is_vague() {
+        if self.tells(GROUNDED) && self.tells(OUT_OF_PLAN) && self.is_vague() {
             tell(column(here, Nature::Lying));
-        } else if self.tells(GROUNDED) && (self.tells(OUT | WAITING | LANDED) || !self.is_dead(now)) {
+        } else if self.tells(GROUNDED) && (self.tells(OUT_OF_PLAN | WAITING | LANDED) || !self.is_dead(now)) {
             tell(place(apart_m));
-        } else if self.tells(OUT) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
+        } else if self.tells(OUT_OF_PLAN) && (field.is_none() || self.heard_within(now, COLUMN_KEPT)) {
             let below = column(here, Nature::Solid);
             tell(KeepOff { radius_m: libm::fmaxf(below.radius_m, wide_m), ..below });
             // The place of the vehicle may not be approached from above or the side, whatever its
@@ -371,14 +379,14 @@ impl Contact {
             if let Some(pad) = self.pad {
                 tell(KeepOff { from: pad, to: pad, ..place(apart_m) });
             }
-            let down = !self.heard_within(now, field.map_or(DOWN, |field| field.down));
+            let down = !self.heard_within(now, field.map_or(DOWN_AFTER, |field| field.down));
             if let Some(field) = field.filter(|_| down && !self.floor_m.is_nan()) {
                 // No lane and no layer comes as low: as thin as it lies, and below that at corners alone.
                 let low = |at: Point, height_m| Point::new(at.x, at.y, height_m);
                 let high = |at: Point| low(at, self.lies_at_most_m(field, &at));
                 return self.legs(upto_m, &mut |[at, next], [leg_m, flown_m]| {
                     let next = if flown_m < leg_m { at + (next - at) * (flown_m / leg_m) } else { next };
-                    let (from, lies) = (high(next), place(apart_m + VAGUE_M));
+                    let (from, lies) = (high(next), place(apart_m + VAGUE_POSITION_M));
                     tell(KeepOff { from, to: high(at), ..lies });
                     if from.z > self.floor_m {
                         tell(KeepOff { from, to: low(next, self.floor_m), ..lies });
@@ -386,7 +394,7 @@ impl Contact {
                 });
             }
             let nature = if down { Nature::Lying } else { Nature::Solid };
-            let beside_m = if field.is_some() { VAGUE_M } else { UNHEARD_BESIDE_M };
+            let beside_m = if field.is_some() { VAGUE_POSITION_M } else { UNHEARD_BESIDE_M };
             self.stretch(upto_m, &mut |at, wider_m| {
                 let radius_m = libm::hypotf(apart_m + beside_m, wider_m);
                 tell(KeepOff { radius_m, ..column(at, nature) });

@@ -2,18 +2,18 @@
 
 use super::*;
 use crate::config::Ground;
-use crate::link::roster::{ENTRIES, Roster};
-use crate::swarm::fleet::{HEARD, Hearing, Limits, Own};
+use crate::link::roster::{MAX_ENTRIES, Roster};
+use crate::swarm::fleet::{Hearing, LEASE_HEARD_WITHIN, Limits, Own};
 
 /// Time for which a vehicle's report of its plan counts.
-const LATELY: Duration = Duration::from_secs(3);
+const PLAN_REPORT_LIFETIME: Duration = Duration::from_secs(3);
 
 impl<const V: usize> Neighbours<V> {
     /// The mission is an area: what a vehicle leaves is divided. A lost one is down after so many seconds;
     /// `ground` is what is not level. By `stray_m` two may be nearer than they believe.
     pub(crate) fn form_fleet(&mut self, down_s: f32, ground: Option<Ground>, stray_m: f32) {
         (self.ground, self.stray_m) = (ground, stray_m);
-        self.down = DOWN.max(Duration::from_millis((down_s * 1000.0) as u64));
+        self.down = DOWN_AFTER.max(Duration::from_millis((down_s * 1000.0) as u64));
         let down = Duration::from_millis((down_s * 1000.0) as u64);
         self.fleet = Some(Fleet::new(usize::from(self.own_rank), self.roster + 1, Limits::of_flight(down)));
     }
@@ -32,7 +32,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn step_fleet(&mut self, own: &Own, now: Instant) {
         let Some(fleet) = &mut self.fleet else { return };
         let roster = &self.contacts[..self.roster];
-        let lately = |c: &&Contact| c.belongs_at.is_some_and(|at| now - at <= HEARD);
+        let lately = |c: &&Contact| c.belongs_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN);
         let by_others = roster.iter().filter(lately).fold(0, |bits, c| bits | c.hears);
         let own_rank = usize::from(self.own_rank);
         fleet.step(now, own, |rank| {
@@ -40,7 +40,7 @@ impl<const V: usize> Neighbours<V> {
             let bit = 1u32.checked_shl(rank as u32).unwrap_or(0);
             contact.filter(|_| rank != own_rank).map_or(Hearing::default(), |contact| Hearing {
                 direct_at: contact.belongs_at,
-                hears_us: contact.hears_us_at.is_some_and(|at| now - at <= HEARD),
+                hears_us: contact.hears_us_at.is_some_and(|at| now - at <= LEASE_HEARD_WITHIN),
                 by_others: by_others & bit != 0,
             })
         });
@@ -48,7 +48,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Whether one that follows another plan of this mission was heard lately.
     pub(crate) fn hears_another_plan(&self, now: Instant) -> bool {
-        let lately = |c: &Contact| c.belongs_at.is_some_and(|at| now - at <= LATELY);
+        let lately = |c: &Contact| c.belongs_at.is_some_and(|at| now - at <= PLAN_REPORT_LIFETIME);
         self.contacts[..self.roster].iter().any(|c| c.other_plan && lately(c))
     }
 
@@ -64,7 +64,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn roster(&mut self) -> Option<Roster> {
         let fleet = self.fleet.as_ref()?;
         let first = if self.roster_next < fleet.count_all() { self.roster_next } else { 0 };
-        self.roster_next = first + ENTRIES;
+        self.roster_next = first + MAX_ENTRIES;
         Some(fleet.message(first))
     }
 }

@@ -1,7 +1,7 @@
 //! A neighbour as the safety filter sees it: where it is and what its set follows from, or that it is too far away to matter.
 
 use planner_core::Point;
-use planner_core::safety::{Bounds, Heard, Joint, OFF_M};
+use planner_core::safety::{Bounds, Heard, Joint, OFF_REPORTED_PATH_M};
 
 use super::*;
 
@@ -70,13 +70,13 @@ impl Contact {
             column_to_m: None,
         };
         let age = now - placed_at;
-        if age > FRESHLY {
+        if age > MAX_HEIGHT_AGE {
             let lies = age >= down && !self.floor_m.is_nan();
             return self.is_silent_beyond((age, lies), across_sq, now, reach);
         }
         heard.age_s = age.secs_f32();
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
-        let column = !heard.grounded && (self.column || self.tells(OUT) || self.floor_m.is_nan());
+        let column = !heard.grounded && (self.column || self.tells(OUT_OF_PLAN) || self.floor_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
         across_sq + above_m * above_m >= most_m * most_m
     }
@@ -102,13 +102,13 @@ impl Contact {
         }
         let flies_on = self.leased && !(reach.on_plan && self.on_plan());
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
-            reaches(self.stretch_m() + self.joint.more_m() + OFF_M);
+            reaches(self.stretch_m() + self.joint.more_m() + OFF_REPORTED_PATH_M);
         }
         if reach.lands || self.climbs_to().is_some() {
             reaches(self.rests_m(reach));
         }
         let mut away_sq = across_sq;
-        let told = self.belongs_at.is_some_and(|at| now - at <= FRESHLY);
+        let told = self.belongs_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
             away_sq = away_sq.min((first - reach.place).xy().norm_squared());
             reaches(if self.leased { self.stretch_m() } else { self.extent_m });
@@ -148,7 +148,7 @@ impl Contact {
             velocity: self.state.velocity,
             speed_mps: 0.0,
             age_s: 0.0,
-            delay_s: self.late.delay_s.max(BEYOND_TOP_S),
+            delay_s: self.late.delay_s.max(UNHEARD_BEYOND_TOP_S),
             points: &[],
             joint: Joint::Beside,
             extent_m: 0.0,
@@ -161,16 +161,16 @@ impl Contact {
 
     /// Whether it follows the plan out of range, as others report or as it was heard last.
     fn is_out_of_range(&self, now: Instant) -> bool {
-        let silent = !self.tells(GROUNDED) && !self.heard_within(now, FRESHLY);
+        let silent = !self.tells(GROUNDED) && !self.heard_within(now, MAX_HEIGHT_AGE);
         let unheard = silent && self.at_edge && self.on_plan();
-        let flies_on = || self.flies_on() || self.heard_within(now, STANDS_UNHEARD);
+        let flies_on = || self.flies_on() || self.heard_within(now, UNHEARD_WAIT);
         self.is_far(now) || (unheard && flies_on())
     }
 
     /// Whether it counts as dead and rests on its points, its place so old.
     #[inline(never)]
     fn rests_silently(&self, age: Duration, now: Instant) -> bool {
-        age >= DEAD && !self.points.is_empty() && (self.is_dead(now) || !self.is_far(now))
+        age >= LOST_AFTER && !self.points.is_empty() && (self.is_dead(now) || !self.is_far(now))
     }
 }
 
@@ -192,11 +192,12 @@ impl<const V: usize> Neighbours<V> {
         let placed_for = now - contact.position_at.unwrap_or(Instant::ZERO);
         let placed_s = placed_for.secs_f32();
         // Most are heard: then nothing of what follows is so.
-        let silent = placed_for >= FRESHLY;
-        // Where positions are lost, an intent reports the place as well: the vehicle is at its
-        // setpoint.
-        let told_at = contact.belongs_at.filter(|_| silent && placed_s > OLD_S && !contact.points.is_empty());
-        let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < OLD_S);
+        let silent = placed_for >= MAX_HEIGHT_AGE;
+        // Where positions are lost, an intent reports the place: the vehicle is at its setpoint.
+        let told_at = contact
+            .belongs_at
+            .filter(|_| silent && placed_s > MAX_HEIGHT_AGE_S && !contact.points.is_empty());
+        let told_s = told_at.map(|at| (now - at).secs_f32()).filter(|told_s| *told_s < MAX_HEIGHT_AGE_S);
         let (by_intent, age_s) = (told_s.is_some(), told_s.unwrap_or(placed_s));
         // Silent, or without a position of its own, it rests by then where a reroute keeps off; later on the ground below.
         let dead = silent && contact.rests_silently(placed_for, now);
@@ -205,7 +206,7 @@ impl<const V: usize> Neighbours<V> {
         let at = contact.points.first().filter(|_| by_intent);
         let mut here = at.copied().unwrap_or(contact.state.position);
         // Unheard in its climb it may have come to the top of it, and a little further.
-        let top = if silent && age_s > OLD_S && !lies { contact.climbs_to() } else { None };
+        let top = if silent && age_s > MAX_HEIGHT_AGE_S && !lies { contact.climbs_to() } else { None };
         let mut highest_m = contact.floor_m;
         if lies {
             highest_m = self.field().map_or(contact.floor_m, |field| contact.lies_at_most_m(field, &here));
@@ -215,8 +216,8 @@ impl<const V: usize> Neighbours<V> {
         }
         let moved = by_intent || lies || top.is_some();
         let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
-        let down = contact.column || contact.tells(OUT) || dead || contact.floor_m.is_nan();
-        let floor_m = if contact.floor_m.is_nan() { here.z - COLUMN_M } else { contact.floor_m };
+        let down = contact.column || contact.tells(OUT_OF_PLAN) || dead || contact.floor_m.is_nan();
+        let floor_m = if contact.floor_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.floor_m };
         let rests = dead || top.is_some();
         let heard = Heard {
             position: here,
@@ -225,7 +226,7 @@ impl<const V: usize> Neighbours<V> {
             // A vehicle that flew along its points stopped on them, and rests where a reroute keeps off.
             age_s: if rests { 0.0 } else { age_s },
             delay_s: match (dead, top) {
-                (false, Some(_)) => BEYOND_TOP_S,
+                (false, Some(_)) => UNHEARD_BEYOND_TOP_S,
                 (true, _) => 0.0,
                 _ => contact.late.delay_s,
             },
@@ -238,13 +239,13 @@ impl<const V: usize> Neighbours<V> {
         };
         Met {
             id: contact.id,
-            stranger: contact.rank == STRANGER,
+            stranger: contact.rank == STRANGER_RANK,
             on_plan: contact.on_plan(),
             far: silent && contact.is_out_of_range(now),
             shares_plan: contact.shares_plan,
             lost: dead,
-            waits: contact.tells(WAITING) && contact.heard_within(now, LATELY),
-            stands: grounded || (now - contact.moved_at >= STANDS && age_s < OLD_S),
+            waits: contact.tells(WAITING) && contact.heard_within(now, HEARD_WITHIN),
+            stands: grounded || (now - contact.moved_at >= STANDS_AFTER && age_s < MAX_HEIGHT_AGE_S),
             heard,
             low: top.map(|_| contact.state.position),
         }

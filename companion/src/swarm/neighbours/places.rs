@@ -4,7 +4,7 @@ use planner_core::Point;
 use planner_core::detour::{KeepOff, Nature};
 
 use super::contact::{Contact, Field};
-use super::{LANDS_UNHEARD, Neighbours, SKY_M, STRETCH_STEP_M, VAGUE_M};
+use super::{LANDS_UNHEARD, MAX_HEIGHT_DIFFERENCE_M, Neighbours, UNHEARD_STRETCH_STEP_M, VAGUE_POSITION_M};
 use crate::time::Instant;
 
 impl<const V: usize> Neighbours<V> {
@@ -30,7 +30,8 @@ impl<const V: usize> Neighbours<V> {
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
     pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let avoided = |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_M);
+        let avoided =
+            |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_POSITION_M);
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
             contact.obstacles(now, [apart_m, self.upto_m(contact, now)], self.field(), &mut tell);
@@ -80,7 +81,7 @@ impl<const V: usize> Neighbours<V> {
                 tell(KeepOff { from, to, radius_m, nature: Nature::Landing });
             };
             let from = contact.state.position;
-            zone(from, from + Point::new(0.0, 0.0, SKY_M), apart_m);
+            zone(from, from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M), apart_m);
             if contact.may_fly_on(now) {
                 // A place to land at is sought at one height, and as far away as the landing keeps.
                 let level = |at: Point| Point::new(at.x, at.y, height_m);
@@ -96,7 +97,7 @@ impl<const V: usize> Neighbours<V> {
     pub fn above(&self, i: usize, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
         if let Some(contact) = self.contacts.get(i).filter(|c| c.position_at.is_some()) {
             let from = contact.state.position;
-            let to = from + Point::new(0.0, 0.0, SKY_M);
+            let to = from + Point::new(0.0, 0.0, MAX_HEIGHT_DIFFERENCE_M);
             tell(KeepOff { from, to, radius_m: apart_m, nature: Nature::Solid });
         }
     }
@@ -114,7 +115,7 @@ impl<const V: usize> Neighbours<V> {
         };
         contact.legs(contact.stretch_m(), &mut |[at, next], [leg_m, flown_m]| {
             // Elsewhere than over an area to the last of the places that a reroute keeps off.
-            let share = libm::floorf(flown_m / STRETCH_STEP_M) * STRETCH_STEP_M / leg_m;
+            let share = libm::floorf(flown_m / UNHEARD_STRETCH_STEP_M) * UNHEARD_STRETCH_STEP_M / leg_m;
             near(at, if flown_m < leg_m { at + (next - at) * share } else { next });
         });
         below

@@ -25,30 +25,30 @@
 use heapless::Vec;
 
 use super::contact::Contact;
-use super::{LATELY, Neighbours};
+use super::{HEARD_WITHIN, Neighbours};
 use crate::time::{Duration, Instant};
 
 /// Our payload type, in the range that MAVLink leaves to private use (32768…65535).
 pub(crate) const PAYLOAD_TYPE: u16 = 0xF10D;
 /// Most vehicles reported in one message.
-const MOST: usize = 14;
+const MAX_RELAYED: usize = 14;
 const VERSION: u8 = 2;
 const TUNNEL_HEAD: usize = 5;
-const HEAD: usize = 12;
-const ITEM: usize = 8;
+const HEADER_LEN: usize = 12;
+const ITEM_LEN: usize = 8;
 /// Longest TUNNEL payload, bytes.
-pub(crate) const LENGTH: usize = TUNNEL_HEAD + HEAD + MOST * ITEM;
+pub(crate) const MAX_LEN: usize = TUNNEL_HEAD + HEADER_LEN + MAX_RELAYED * ITEM_LEN;
 /// Age within which a vehicle's own messages replace relayed ones.
-const SPEAKS: Duration = Duration::from_secs(1);
+const HEARD_DIRECTLY_WITHIN: Duration = Duration::from_secs(1);
 /// Silence after which a vehicle is out of range, and not a victim of lost messages.
-const FAR: Duration = Duration::from_secs(3);
+const OUT_OF_RANGE_AFTER: Duration = Duration::from_secs(3);
 /// Time for which a relayed report that a vehicle follows the plan counts: three hops, and the loss
 /// of a message.
-const RECENT: Duration = Duration::from_secs(6);
+const RELAYED_LIFETIME: Duration = Duration::from_secs(6);
 /// Age that each hop adds, microseconds: longer than most messages take.
-const HOP_US: u64 = 500_000;
+const HOP_AGE_US: u64 = 500_000;
 /// Unit of an age in the message, microseconds.
-const TICK_US: u64 = 100_000;
+const AGE_TICK_US: u64 = 100_000;
 
 /// Progress of the vehicle of a rank, and the age of that progress in 0.1 s.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,7 +65,7 @@ struct Item {
 pub(crate) struct Relay {
     pub(crate) mission_crc: u32,
     pub(crate) plan_crc: u32,
-    items: Vec<Item, MOST>,
+    items: Vec<Item, MAX_RELAYED>,
 }
 
 impl Relay {
@@ -74,15 +74,15 @@ impl Relay {
     }
 
     /// Writes the whole TUNNEL payload, to everyone; the bytes written.
-    pub(crate) fn encode(&self, system_id: u8, out: &mut [u8; LENGTH]) -> usize {
-        let len = HEAD + ITEM * self.items.len();
+    pub(crate) fn encode(&self, system_id: u8, out: &mut [u8; MAX_LEN]) -> usize {
+        let len = HEADER_LEN + ITEM_LEN * self.items.len();
         out[..2].copy_from_slice(&PAYLOAD_TYPE.to_le_bytes());
         (out[2], out[3], out[4]) = (0, 0, len as u8);
         let body = &mut out[TUNNEL_HEAD..];
         body[..4].copy_from_slice(&[VERSION, system_id, self.items.len() as u8, 0]);
         body[4..8].copy_from_slice(&self.mission_crc.to_le_bytes());
         body[8..12].copy_from_slice(&self.plan_crc.to_le_bytes());
-        for (to, item) in body[HEAD..].chunks_exact_mut(ITEM).zip(&self.items) {
+        for (to, item) in body[HEADER_LEN..].chunks_exact_mut(ITEM_LEN).zip(&self.items) {
             (to[0], to[1]) = (item.rank, item.age);
             to[2..6].copy_from_slice(&item.progress_m.to_le_bytes());
             (to[6], to[7]) = (item.clear, item.clear_in_s);
@@ -94,12 +94,12 @@ impl Relay {
     pub(crate) fn decode(padded: &[u8; 255], sender: u8) -> Option<Self> {
         let body = padded[TUNNEL_HEAD..].get(..usize::from(padded[4]))?;
         let is_ours = u16::from_le_bytes([padded[0], padded[1]]) == PAYLOAD_TYPE;
-        if !is_ours || body.len() < HEAD || body[0] != VERSION || body[1] != sender {
+        if !is_ours || body.len() < HEADER_LEN || body[0] != VERSION || body[1] != sender {
             return None;
         }
         let word = |at: usize| u32::from_le_bytes([body[at], body[at + 1], body[at + 2], body[at + 3]]);
         let mut relay = Self { mission_crc: word(4), plan_crc: word(8), items: Vec::new() };
-        for item in body[HEAD..].get(..ITEM * usize::from(body[2]))?.chunks_exact(ITEM) {
+        for item in body[HEADER_LEN..].get(..ITEM_LEN * usize::from(body[2]))?.chunks_exact(ITEM_LEN) {
             let progress_m = f32::from_le_bytes([item[2], item[3], item[4], item[5]]);
             let [rank, age, .., clear, clear_in_s] = *item else { return None };
             let item = Item { rank, age, progress_m, clear, clear_in_s };
@@ -115,7 +115,7 @@ impl Contact {
     /// it is not heard. None if it was last heard off the plan.
     pub(super) fn progress_m(&self, now: Instant) -> Option<f32> {
         let own_m = self.state.progress_m;
-        if self.heard_within(now, SPEAKS) || (own_m.is_none() && self.belongs_at.is_some()) {
+        if self.heard_within(now, HEARD_DIRECTLY_WITHIN) || (own_m.is_none() && self.belongs_at.is_some()) {
             return own_m;
         }
         match (own_m, self.relayed_m) {
@@ -132,15 +132,15 @@ impl Contact {
     /// Whether it is out of range, and was lately reported to follow the plan.
     #[inline(never)]
     pub(super) fn is_far(&self, now: Instant) -> bool {
-        self.relayed_at.is_some_and(|at| now - at < RECENT)
-            && !self.heard_within(now, FAR)
+        self.relayed_at.is_some_and(|at| now - at < RELAYED_LIFETIME)
+            && !self.heard_within(now, OUT_OF_RANGE_AFTER)
             && self.progress_m(now).is_some()
     }
 
     /// The relayed report of this vehicle: none off the plan.
     fn item(&self, now: Instant) -> Option<Item> {
         let progress_m = self.progress_m(now)?;
-        let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(TICK_US);
+        let age = (now - self.belongs_at.max(self.relayed_at)?).micros().div_ceil(AGE_TICK_US);
         // The difference is not below zero, and 0 where it is no number.
         let clear = (self.clear_m - progress_m) as u8;
         let age = age.min(u64::from(u8::MAX)) as u8;
@@ -154,7 +154,7 @@ impl<const V: usize> Neighbours<V> {
     pub(crate) fn relay(&mut self, now: Instant, mission_crc: u32, plan_crc: u32) -> Relay {
         let mut relay = Relay { mission_crc, plan_crc, items: Vec::new() };
         let roster = &self.contacts[..self.roster];
-        let speaking = || roster.iter().filter(|c| c.heard_within(now, LATELY));
+        let speaking = || roster.iter().filter(|c| c.heard_within(now, HEARD_WITHIN));
         // A report that one neighbour misses is sent to all.
         let missed = |c: &Contact| speaking().any(|by| by.rank != c.rank && by.hears & (1 << c.rank) == 0);
         let first = roster.partition_point(|c| c.rank < self.relay_next);
@@ -179,7 +179,7 @@ impl<const V: usize> Neighbours<V> {
         for item in &relay.items {
             let Some(at) = self.in_ranks(item.rank) else { continue };
             let (fastest_mps, contact) = (self.fastest_mps, &mut self.contacts[at]);
-            if contact.heard_within(now, SPEAKS) {
+            if contact.heard_within(now, HEARD_DIRECTLY_WITHIN) {
                 continue;
             }
             let known_m = contact.relayed_m.unwrap_or(f32::NEG_INFINITY);
@@ -194,7 +194,7 @@ impl<const V: usize> Neighbours<V> {
                     (contact.clear_m, contact.clear_in_s) = (clear_m, item.clear_in_s);
                 }
             }
-            let age_us = u64::from(item.age) * TICK_US + HOP_US;
+            let age_us = u64::from(item.age) * AGE_TICK_US + HOP_AGE_US;
             let then = Instant::from_micros(now.micros().saturating_sub(age_us));
             contact.relayed_at = contact.relayed_at.max(Some(then).filter(|_| item.age < u8::MAX));
         }

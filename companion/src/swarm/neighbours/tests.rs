@@ -128,7 +128,7 @@ fn strangers_rank_last_are_capped_and_expire() {
 fn a_position_of_the_roster_counts_only_with_the_missions_crc() {
     let at = Instant::from_millis;
     let mut table = table();
-    table.handle_intent(at(0), 1, &intent(OUT | BLOCKED, 7, 8), 1, None);
+    table.handle_intent(at(0), 1, &intent(OUT_OF_PLAN | BLOCKED, 7, 8), 1, None);
     table.handle_position(at(0), &ORIGIN, 9, &place(0, 0));
     assert_eq!(table.at(at(0))[0].rank, u16::MAX, "another mission's vehicle is a stranger");
     assert_eq!((table.heard_bits(at(0)), table.blocked_before(200)), (0, 0), "and its flags do not count");
@@ -198,7 +198,7 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     let out = |table: &mut Neighbours<4>, now: Instant| table.at(now)[0].out;
     table.handle_intent(at(1000), 1, &intent(0, 7, 8), 7, None);
     table.handle_position(at(1000), &ORIGIN, 9, &place(50, 1000));
-    table.handle_intent(at(1000), 1, &intent(OUT, 7, 8), 7, None);
+    table.handle_intent(at(1000), 1, &intent(OUT_OF_PLAN, 7, 8), 7, None);
     assert!(!out(&mut table, at(1100)), "nobody has looked");
     table.found_clear(at(900));
     assert!(!out(&mut table, at(1200)), "it went out while somebody looked");
@@ -210,7 +210,7 @@ fn who_is_out_opens_gates_only_after_it_was_looked_at() {
     table.handle_intent(at(1500), 1, &intent(0, 7, 8), 7, None);
     assert!(!out(&mut table, at(1600)), "it is not out any more");
     // Silent from now on: dead later, but nobody counts on that before the next look.
-    let dead = at(1500) + DEAD;
+    let dead = at(1500) + LOST_AFTER;
     assert!(!out(&mut table, dead) && !table.at(dead)[0].grounded);
     table.found_clear(dead);
     assert!(out(&mut table, dead) && table.at(dead)[0].grounded);
@@ -243,7 +243,7 @@ proptest::proptest! {
             let believed_m = place_of(&lying).unwrap();
             proptest::prop_assert!(believed_m <= reported_m);
             if let Some((before_m, at)) = last {
-                let most_m = before_m + 2.0 * (now - at).secs_f32() + 2.0 * LATE_S + STRIDE_M + 1e-3;
+                let most_m = before_m + 2.0 * (now - at).secs_f32() + 2.0 * MAX_MESSAGE_DELAY_S + MAX_PROGRESS_JUMP_M + 1e-3;
                 proptest::prop_assert!(believed_m <= most_m, "{believed_m} m after {before_m} m");
             }
             last = Some((believed_m, now));
@@ -335,7 +335,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
             // As a vehicle that hears nobody sees it.
             (met.heard.age_s, met.heard.grounded) = (bounds.silent_s, false);
         }
-        let silent = met.lost || met.heard.age_s > OLD_S;
+        let silent = met.lost || met.heard.age_s > MAX_HEIGHT_AGE_S;
         if lands && silent {
             (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
             met.heard.rests_within_m = 0.0;
@@ -349,7 +349,7 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let away = met.heard.position - reach.place;
         let above_m = if met.heard.column_to_m.is_some() { 0.0 } else { away.z };
         let out_of_reach = Point::new(away.x, away.y, above_m).norm() >= reach_m - 1e-4;
-        let below = lands && silent && table.may_lie_below(1, &reach.place, -COLUMN_M, reach.within_m);
+        let below = lands && silent && table.may_lie_below(1, &reach.place, -MAX_COLUMN_M, reach.within_m);
         if table.next_within(1, now, &reach).is_none() {
             assert!(out_of_reach && !below, "{seed}: {met:?}, {reach:?}");
             beyond += 1;
@@ -369,7 +369,7 @@ fn nobody_falls_up() {
     for _ in 0..2000 {
         let mut table = joined(0);
         let here = Point::from_fn(|_, _| uniform(&mut rng, -4.0, 4.0));
-        let points: heapless::Vec<Point, { crate::link::intent::POINTS }> =
+        let points: heapless::Vec<Point, { crate::link::intent::MAX_POINTS }> =
             (0..3).map(|_| here + Point::from_fn(|_, _| uniform(&mut rng, -3.0, 3.0))).collect();
         let told = Intent { points: points.clone(), ..intent(0, 1, 2) };
         table.handle_intent(Instant::from_millis(500), 1, &told, 1, None);
@@ -414,7 +414,9 @@ fn who_is_out_over_an_area_is_kept_off_by_what_estimates_may_err() {
     let mut rng = Pcg32::seed_from_u64(11);
     for _ in 0..500 {
         let (apart_m, stray_m) = (uniform(&mut rng, 1.0, 3.0), uniform(&mut rng, 0.0, 6.0));
-        for (flags, in_air) in [(OUT, true), (0, true), (OUT | GROUNDED, false), (GROUNDED, false)] {
+        for (flags, in_air) in
+            [(OUT_OF_PLAN, true), (0, true), (OUT_OF_PLAN | GROUNDED, false), (GROUNDED, false)]
+        {
             let mut table = joined(0);
             table.form_fleet(64.0, None, stray_m);
             table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
@@ -447,7 +449,7 @@ fn over_an_area_the_column_of_who_left_it_in_the_air_is_kept_off_for_ten_minutes
             table.form_fleet(64.0, None, 1.0);
         }
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
-        let told = Intent { floor_m: -30.0, ..intent(OUT, 1, 2) };
+        let told = Intent { floor_m: -30.0, ..intent(OUT_OF_PLAN, 1, 2) };
         table.handle_intent(Instant::ZERO, 1, &told, 1, Some(2));
         let here = table.contacts[1].state.position;
         let below = here - Point::new(0.0, 0.0, uniform(&mut rng, 3.0, here.z + 25.0));
@@ -467,7 +469,8 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
     let mut rng = Pcg32::seed_from_u64(13);
     let mut seen = [0; 3];
     for _ in 0..2000 {
-        let flags = [0, OUT, GROUNDED, GROUNDED | OUT][(uniform(&mut rng, 0.0, 3.999)) as usize];
+        let flags =
+            [0, OUT_OF_PLAN, GROUNDED, GROUNDED | OUT_OF_PLAN][(uniform(&mut rng, 0.0, 3.999)) as usize];
         let mut table = joined(0);
         table.contacts[0].flags = GROUNDED;
         table.handle_position(Instant::ZERO, &ORIGIN, 9, &place(50, 1000));
@@ -476,11 +479,11 @@ fn what_lies_is_kept_off_by_no_more_than_blocks_a_path() {
         let now = Instant::from_millis((1000.0 * silent_s) as u64);
         let lying_m = uniform(&mut rng, 1.0, 2.0);
         let apart_m = lying_m + uniform(&mut rng, 0.1, 1.0);
-        let lies = flags & GROUNDED != 0 || (flags & OUT == 0 && silent_s >= 75.0);
-        let comes_down = flags & (GROUNDED | OUT) == 0 && (45.0..75.0).contains(&silent_s);
+        let lies = flags & GROUNDED != 0 || (flags & OUT_OF_PLAN == 0 && silent_s >= 75.0);
+        let comes_down = flags & (GROUNDED | OUT_OF_PLAN) == 0 && (45.0..75.0).contains(&silent_s);
         table.places(now, [apart_m, lying_m], |off| {
             // Of a silent one the place is not known any better than that.
-            let most_m = lying_m + VAGUE_M;
+            let most_m = lying_m + VAGUE_POSITION_M;
             let fits = if lies { off.radius_m <= most_m } else { off.radius_m >= apart_m };
             assert!(fits && off.radius_m >= lying_m, "{flags:#x}, {silent_s} s: {off:?}");
         });

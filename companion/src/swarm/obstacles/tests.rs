@@ -53,7 +53,7 @@ fn what_is_no_sphere_is_refused_and_one_too_many_is_for_later() {
     assert_eq!(take(&mut obstacles, &nowhere), DENIED, "COMMAND_LONG has no place");
     let no_earth = Command { place: Some((i32::MAX, 0, 700.0)), ..nowhere };
     assert_eq!(take(&mut obstacles, &no_earth), DENIED);
-    for i in 0..OBSTACLES {
+    for i in 0..MAX_OBSTACLES {
         assert_eq!(take(&mut obstacles, &sphere(at(i as f32), 0.5)), ACCEPTED);
     }
     assert_eq!(take(&mut obstacles, &sphere(at(99.0), 0.5)), TEMPORARILY_REJECTED);
@@ -74,12 +74,12 @@ proptest::proptest! {
             if radius_m <= 0.0 {
                 model.retain(|(at, _)| *at != x);
                 proptest::prop_assert_eq!(result, ACCEPTED);
-            } else if radius_m > OBSTACLE_MAX_M {
+            } else if radius_m > MAX_OBSTACLE_RADIUS_M {
                 proptest::prop_assert_eq!(result, DENIED);
             } else if result == ACCEPTED && !known {
                 model.push((x, false));
             } else {
-                let full = obstacles.count() == OBSTACLES;
+                let full = obstacles.count() == MAX_OBSTACLES;
                 proptest::prop_assert!(known || (result == TEMPORARILY_REJECTED && full));
             }
             if plans {
@@ -87,7 +87,7 @@ proptest::proptest! {
                 obstacles.avoid_requested();
                 model.iter_mut().for_each(|(_, avoided)| *avoided = true);
             }
-            proptest::prop_assert!(obstacles.avoided <= obstacles.count() && obstacles.count() <= OBSTACLES);
+            proptest::prop_assert!(obstacles.avoided <= obstacles.count() && obstacles.count() <= MAX_OBSTACLES);
             let places: std::collections::BTreeSet<i32> =
                 obstacles.known.iter().map(|o| libm::roundf(o.from.x) as i32).collect();
             let wanted: std::collections::BTreeSet<i32> = model.iter().map(|(x, _)| i32::from(*x)).collect();

@@ -11,7 +11,7 @@ use planner_core::frames;
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;
 use crate::autopilot::Kind;
-use crate::link::frame::{self, Frame, Header, MAX_SENT};
+use crate::link::frame::{self, Frame, Header, MAX_FRAME_LEN};
 
 /// Bit of a setpoint's mask: it says nothing of the heading.
 const YAW_IGNORED: u16 = 0x400;
@@ -99,10 +99,10 @@ impl Bench {
     /// COMMAND_ACK to the companion.
     pub(crate) fn answer(&mut self, command: u16, result: u8) {
         let [low, high] = command.to_le_bytes();
-        let payload = [low, high, result, 0, 0, 0, 0, 0, SYSTEM, crate::COMPONENT];
+        let payload = [low, high, result, 0, 0, 0, 0, 0, SYSTEM, crate::COMPANION_COMPONENT];
         let header = Header { system: SYSTEM, component: 1, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut out = [0; MAX_SENT];
+        let mut out = [0; MAX_FRAME_LEN];
         let (id, seed) = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
         let len = frame::encode_raw(header, id, seed, &payload, &mut out);
         self.companion.handle_bytes(Link::Autopilot, self.now, &out[..len]);

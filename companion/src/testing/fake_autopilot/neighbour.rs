@@ -6,7 +6,7 @@ use planner_core::frames;
 
 use super::{Bench, ORIGIN, SYSTEM};
 use crate::Link;
-use crate::link::frame::{self, Header, MAX_SENT};
+use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::intent::Intent;
 
 impl Bench {
@@ -39,8 +39,8 @@ impl Bench {
             alt: (place.alt_m * 1e3) as i32,
             ..Default::default()
         };
-        let head = |sequence| Header { system: id, component: crate::COMPONENT, sequence };
-        let mut out = [0; MAX_SENT];
+        let head = |sequence| Header { system: id, component: crate::COMPANION_COMPONENT, sequence };
+        let mut out = [0; MAX_FRAME_LEN];
         let (id, seed) = (TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC);
         let n = frame::encode_raw(head(self.neighbour_sequence), id, seed, &payload[..len], &mut out);
         self.companion.handle_bytes(Link::Swarm, self.now, &out[..n]);

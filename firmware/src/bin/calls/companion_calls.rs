@@ -2,14 +2,14 @@
 
 use companion::config::USUAL_GROUND_STATIONS;
 use companion::link::commands;
-use companion::link::frame::{self, Framer, Header, MAX_SENT};
+use companion::link::frame::{self, Framer, Header, MAX_FRAME_LEN};
 use companion::link::intent::{self, Intent};
 use companion::link::roster::{self, Roster};
 use companion::services::parameters::{self, Parameters};
 use companion::storage::mission_file::{
     self, Block, MissionGoal, MissionHeader, MissionVehicle, MissionView,
 };
-use companion::storage::store::{Fault, FlashRequest, READ, ReadFlash, Store};
+use companion::storage::store::{Fault, FlashRequest, MAX_READ, ReadFlash, Store};
 use companion::swarm::fleet::{Fleet, Hearing, Limits, Own};
 use companion::{Duration, Event, Instant, Link};
 use firmware::boards::chosen::{LAYOUT, memory};
@@ -41,7 +41,7 @@ const CRC32: u8 = 14;
 const BURST_READ: u8 = 15;
 const ACK: u8 = 128;
 /// Data of an FTP packet.
-const DATA: usize = 239;
+const FTP_DATA: usize = 239;
 const GROUND: (u8, u8) = (255, 190);
 
 /// All of them.
@@ -79,7 +79,7 @@ fn bytes(meter: &mut impl Meter) {
             companion.handle_bytes(Link::Swarm, now, &chunk);
         });
     }
-    let points = (0..intent::POINTS).map(|_| cases::anywhere(&mut rng, 50.0)).collect();
+    let points = (0..intent::MAX_POINTS).map(|_| cases::anywhere(&mut rng, 50.0)).collect();
     let intent = Intent {
         system_id: 2,
         flags: intent::FLYING,
@@ -96,7 +96,7 @@ fn bytes(meter: &mut impl Meter) {
     let mut padded = [0; 255];
     padded[..len].copy_from_slice(&payload[..len]);
     meter.call("intent::Intent::decode", 0, || Intent::decode(&padded, 2)).expect("it is one");
-    let mut out = [0; MAX_SENT];
+    let mut out = [0; MAX_FRAME_LEN];
     let full = [0xA5; 255];
     let header = Header { system: 1, component: 191, sequence: 0 };
     meter.call("frame::encode_raw, 255 bytes", 0, || frame::encode_raw(header, 0, 50, &full, &mut out));
@@ -106,7 +106,7 @@ fn bytes(meter: &mut impl Meter) {
 fn missions(meter: &mut impl Meter) {
     let header = MissionHeader {
         roadmap_crc: 0,
-        mode: cases::MODE,
+        mode: cases::ASSIGNMENT_MODE,
         method: Method::Priority,
         origin: flight::ORIGIN,
         cruise_mps: 2.0,
@@ -166,12 +166,12 @@ fn fleets(meter: &mut impl Meter) {
             meter.call("fleet::Fleet::take_plan_crc", bytes, || fleet.take_plan_crc(7));
         }
         meter.call("fleet::Fleet::fingerprint", bytes, || fleet.fingerprint());
-        for first in [0, roster::ENTRIES] {
+        for first in [0, roster::MAX_ENTRIES] {
             let mut told = meter.call("fleet::Fleet::message", bytes, || fleet.message(first));
-            let mut payload = [0; roster::LENGTH];
+            let mut payload = [0; roster::MAX_LEN];
             meter.call("roster::Roster::encode", 0, || told.encode(&mut payload));
             let mut padded = [0; 255];
-            padded[..roster::LENGTH].copy_from_slice(&payload);
+            padded[..roster::MAX_LEN].copy_from_slice(&payload);
             let read = meter.call("roster::Roster::decode", 0, || Roster::decode(&padded, told.system_id));
             assert!(read.is_some_and(|read| read == told));
             for entry in &mut told.entries {
@@ -226,8 +226,8 @@ impl<M: Meter> Ground<'_, M> {
         let roadmap = RoadmapView::parse(memory::bank2()).expect("a roadmap lies in bank 2");
         let file = &memory::bank2()[..roadmap.byte_len()];
         self.ask(CREATE, 0, b"roadmap.bin");
-        for (i, piece) in file.chunks(DATA).enumerate() {
-            self.ask(WRITE, (i * DATA) as u32, piece);
+        for (i, piece) in file.chunks(FTP_DATA).enumerate() {
+            self.ask(WRITE, (i * FTP_DATA) as u32, piece);
         }
         self.ask(TERMINATE, 0, &[]);
         self.ask(CRC32, 0, b"roadmap.bin");
@@ -236,15 +236,15 @@ impl<M: Meter> Ground<'_, M> {
         for parameter in parameters::TABLE {
             let mut set = [0; 23];
             set[..4].copy_from_slice(&parameter.most.to_le_bytes());
-            (set[4], set[5], set[22]) = (1, companion::COMPONENT, 9);
+            (set[4], set[5], set[22]) = (1, companion::COMPANION_COMPONENT, 9);
             set[6..6 + parameter.name.len()].copy_from_slice(parameter.name.as_bytes());
             self.hear(PARAM_SET, &set);
         }
-        self.hear(PARAM_REQUEST_LIST, &[1, companion::COMPONENT]);
+        self.hear(PARAM_REQUEST_LIST, &[1, companion::COMPANION_COMPONENT]);
         for command in [commands::START, commands::PAUSE_CONTINUE, commands::REQUEST, commands::LAND] {
             let mut order = [0; 33];
             order[28..30].copy_from_slice(&command.to_le_bytes());
-            (order[30], order[31]) = (1, companion::COMPONENT);
+            (order[30], order[31]) = (1, companion::COMPANION_COMPONENT);
             self.hear(COMMAND_LONG, &order);
         }
         let store = self.mount();
@@ -267,7 +267,7 @@ impl<M: Meter> Ground<'_, M> {
     fn ask(&mut self, opcode: u8, offset: u32, data: &[u8]) {
         self.packet = self.packet.wrapping_add(1);
         let mut payload = [0; 254];
-        (payload[1], payload[2]) = (1, companion::COMPONENT);
+        (payload[1], payload[2]) = (1, companion::COMPANION_COMPONENT);
         payload[3..5].copy_from_slice(&self.packet.to_le_bytes());
         (payload[6], payload[7]) = (opcode, data.len() as u8);
         payload[11..15].copy_from_slice(&offset.to_le_bytes());
@@ -285,7 +285,7 @@ impl<M: Meter> Ground<'_, M> {
         self.now = self.now + Duration::from_millis(20);
         self.sequence = self.sequence.wrapping_add(1);
         let header = Header { system: GROUND.0, component: GROUND.1, sequence: self.sequence };
-        let mut bytes = [0; MAX_SENT];
+        let mut bytes = [0; MAX_FRAME_LEN];
         let extra = frame::extra_crc(id).expect("a message of the dialect");
         let len = frame::encode_raw(header, id, extra, payload, &mut bytes);
         let (now, companion) = (self.now, &mut self.companion);
@@ -302,7 +302,7 @@ impl<M: Meter> Ground<'_, M> {
         let mut granted = false;
         meter.call(flight::OTHER_STEP, COMPANION, || companion.handle_timeout(now));
         loop {
-            let mut out = [0; MAX_SENT];
+            let mut out = [0; MAX_FRAME_LEN];
             let mut len = 0;
             for link in [Link::Autopilot, Link::Swarm] {
                 len = meter
@@ -311,7 +311,7 @@ impl<M: Meter> Ground<'_, M> {
             }
             let event: Option<Event> =
                 meter.call("Companion::poll_event", COMPANION, || companion.poll_event());
-            let mut bytes = [0; READ];
+            let mut bytes = [0; MAX_READ];
             let request = meter.call("Companion::poll_flash", COMPANION, || companion.poll_flash());
             let idle = request.is_none() && event.is_none() && len == 0;
             let outcome = match request {

@@ -25,13 +25,13 @@ fn panic(info: &core::panic::PanicInfo<'_>) -> ! {
 }
 
 /// Flights in which the safety filter is counted.
-const FILTERED: u64 = 100;
+const FILTER_FLIGHTS: u64 = 100;
 /// Most rows of the table.
-const ROWS: usize = 160;
+const MAX_ROWS: usize = 160;
 
 /// Counts instructions, those of asking the clock left out.
 struct Instructions {
-    rows: Vec<(&'static str, usize, u64), ROWS>,
+    rows: Vec<(&'static str, usize, u64), MAX_ROWS>,
 }
 
 impl Meter for Instructions {
@@ -77,7 +77,7 @@ fn fly(meter: &mut Instructions) {
             .expect("the settings are good");
         let kind = usize::from(flight::is_hard(seed));
         steps[kind] += flight::fly(seed, &plan, &mut companion, meter);
-        if steps.iter().all(|&steps| steps >= cases::STEPS) {
+        if steps.iter().all(|&steps| steps >= cases::STEP_CASES) {
             println!("steps {steps:?}");
             return;
         }
@@ -92,7 +92,7 @@ fn fly_areas(meter: &mut Instructions) {
         let plan = flight::random_area_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::area_config()).expect("the settings are good");
         steps += flight::fly(seed, &plan, &mut companion, meter);
-        if steps >= cases::STEPS {
+        if steps >= cases::STEP_CASES {
             return;
         }
     }
@@ -101,7 +101,7 @@ fn fly_areas(meter: &mut Instructions) {
 /// The safety filter alone.
 #[inline(never)]
 fn filter(meter: &mut Instructions) {
-    for seed in 0..FILTERED {
+    for seed in 0..FILTER_FLIGHTS {
         let plan = flight::random_plan(&mut Pcg32::seed_from_u64(seed));
         let mut companion = BoardCompanion::new(flight::config()).expect("the settings are good");
         flight::filter(seed, &plan, &mut companion, meter);

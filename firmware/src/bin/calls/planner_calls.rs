@@ -2,7 +2,7 @@
 
 use firmware::boards::chosen::memory;
 use firmware::calls::{Meter, coverage, coverage_flights, flight};
-use firmware::capacity::{GATES, PIECES, ROADMAP_CUBES, ROADMAP_NODES, VEHICLES, WAYPOINTS};
+use firmware::capacity::{GATES, ROADMAP_CUBES, ROADMAP_NODES, TIMED_SEGMENTS, VEHICLES, WAYPOINTS};
 use firmware::cases::{self, StepCase, anywhere, below, uniform};
 use firmware::scratch::{Planner, Scratch};
 use heapless::Vec;
@@ -29,19 +29,19 @@ type Plan = SwarmPlan<VEHICLES, WAYPOINTS>;
 type Search = SearchWorkspace<ROADMAP_NODES>;
 
 /// Random cases of a call that takes microseconds.
-const MANY: usize = 1000;
+const MANY_CASES: usize = 1000;
 /// Random cases of a call that takes milliseconds.
-const SOME: usize = 50;
+const SOME_CASES: usize = 50;
 /// Longest edge, metres.
-const REACH_M: f32 = 8.0;
+const MAX_EDGE_M: f32 = 8.0;
 /// Nodes of a small roadmap, for calls that only a desk makes.
-const SMALL: usize = 300;
+const SMALL_ROADMAP_NODES: usize = 300;
 
 /// Memory beside the scratch.
 struct Beside {
     plan: Plan,
-    small: prm::Workspace<SMALL, 1024>,
-    nodes: [Point; SMALL],
+    small: prm::Workspace<SMALL_ROADMAP_NODES, 1024>,
+    nodes: [Point; SMALL_ROADMAP_NODES],
     edges: [prm::Edge; 1024],
     kept: Vec<roadmap::Edge, 1024>,
     file: [u8; 12 << 10],
@@ -52,7 +52,7 @@ static SCRATCH: ConstStaticCell<Scratch> = ConstStaticCell::new(Scratch::new());
 static BESIDE: ConstStaticCell<Beside> = ConstStaticCell::new(Beside {
     plan: Plan::new(),
     small: prm::Workspace::new(),
-    nodes: [Point::new(0.0, 0.0, 0.0); SMALL],
+    nodes: [Point::new(0.0, 0.0, 0.0); SMALL_ROADMAP_NODES],
     edges: [prm::Edge { a: 0, b: 0 }; 1024],
     kept: Vec::new(),
     file: [0; 12 << 10],
@@ -101,7 +101,7 @@ fn geodetic(rng: &mut Pcg32) -> Geodetic {
 
 fn places(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(1);
-    for _ in 0..MANY {
+    for _ in 0..MANY_CASES {
         let origin = geodetic(&mut rng);
         let enu = anywhere(&mut rng, 5000.0);
         let place = meter.call("frames::enu_to_geodetic", 0, || frames::enu_to_geodetic(&origin, &enu));
@@ -121,7 +121,7 @@ fn searches(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner) {
     let bytes = size_of::<Search>();
     let passable = |_: u16, edge: &HalfEdge| view.clears(edge, cases::CLEARANCE_M);
     let search = &mut ws.search;
-    for _ in 0..SOME {
+    for _ in 0..SOME_CASES {
         let (from, to) = (below(&mut rng, nodes) as u16, below(&mut rng, nodes) as u16);
         let mut way: Vec<u16, WAYPOINTS> = Vec::new();
         // No path, or one too long, is an answer too.
@@ -180,7 +180,7 @@ fn plans(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
     meter.call("plan::assign, 10 × 10", bytes, || plan::assign(&request, ws, &mut goals)).expect(good);
     meter.call("plan::schedule, 10", bytes, || plan::schedule(view, &request, &goals, ws, plan)).expect(good);
     meter.call("plan::plan_swarm, 10", bytes, || plan::plan_swarm(view, &request, ws, plan)).expect(good);
-    let bytes = size_of::<SippWorkspace<ROADMAP_NODES, PIECES>>();
+    let bytes = size_of::<SippWorkspace<ROADMAP_NODES, TIMED_SEGMENTS>>();
     for (index, flight) in plan.flights.iter().enumerate() {
         let Some(goal) = flight.task.goal() else { continue };
         let (from, to) = (index as u16, view.header().starts + goal);
@@ -213,7 +213,7 @@ fn crowd(meter: &mut impl Meter, view: &RoadmapView<'_>, ws: &mut Planner, plan:
         way.iter().for_each(|&node| path.push(view.node(node), 1.0).expect("as long as the nodes"));
         meter.call("flight::Path::label", 0, || path.label(1.0, cfg.cruise_mps));
         let id = 1 + plan.flights.len() as u8;
-        let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::PIECE_M);
+        let (climb_m, descent_m, piece_m) = (1.0, 1.0, schedule::MAX_TIMED_SEGMENT_M);
         let flight = Flight { id, task: Task::Goto(0), path, climb_m, descent_m, depart_s: 0.0, piece_m };
         plan.flights.push(flight).expect("there is room");
     }
@@ -271,7 +271,7 @@ fn detours(meter: &mut impl Meter, view: &RoadmapView<'_>, search: &mut Search) 
 
 fn paths(meter: &mut impl Meter) {
     let mut rng = Pcg32::seed_from_u64(6);
-    for case in 0..MANY {
+    for case in 0..MANY_CASES {
         let mut path: Path<WAYPOINTS> = Path::new();
         for waypoint in flight::random_path(&mut rng).waypoints() {
             let (next, clearance_m) = (waypoint.position, waypoint.clearance_m);
@@ -301,10 +301,10 @@ fn paths(meter: &mut impl Meter) {
 fn segments(meter: &mut impl Meter, grid: &VoxelGrid<'_>) {
     let mut rng = Pcg32::seed_from_u64(7);
     let (min, max) = (grid.shape().min, grid.shape().max());
-    for _ in 0..MANY {
+    for _ in 0..MANY_CASES {
         let a = Point::from_fn(|axis, _| uniform(&mut rng, min[axis], max[axis]));
         let way = anywhere(&mut rng, 1.0).try_normalize(1e-3).unwrap_or_else(Point::x);
-        let b = a + way * REACH_M;
+        let b = a + way * MAX_EDGE_M;
         meter.call("voxel::VoxelGrid::is_blocked_at", 0, || grid.is_blocked_at(&a));
         meter.call("segment::segment_is_clear, 0 m", 0, || segment::segment_is_clear(grid, &a, &b, 0.0));
         meter.call("segment::segment_is_clear, 0.8 m", 0, || {
@@ -329,10 +329,12 @@ fn builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut Scratch) {
     let bytes = size_of::<prm::Workspace<ROADMAP_NODES, ROADMAP_CUBES>>();
     let good = "the building has room";
     let builder = scratch.builder();
-    meter.call("prm::sample_nodes, 2300", 0, || builder.sample(grid, &[], &cases::BUILT)).expect(good);
-    meter.call("prm::Workspace::index, 2300", bytes, || builder.index(&cases::BUILT)).expect(good);
-    meter.call("prm::connect_range, 2300", bytes, || builder.join(grid, &cases::BUILT)).expect(good);
-    let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::BUILT };
+    meter
+        .call("prm::sample_nodes, 2300", 0, || builder.sample(grid, &[], &cases::ROADMAP_CONFIG))
+        .expect(good);
+    meter.call("prm::Workspace::index, 2300", bytes, || builder.index(&cases::ROADMAP_CONFIG)).expect(good);
+    meter.call("prm::connect_range, 2300", bytes, || builder.join(grid, &cases::ROADMAP_CONFIG)).expect(good);
+    let wide = Config { clearance_m: cases::CLEARANCE_M, ..cases::ROADMAP_CONFIG };
     meter.call("prm::sample_nodes, 2300, 0.8 m", 0, || builder.sample(grid, &[], &wide)).expect(good);
     builder.index(&wide).expect(good);
     meter.call("prm::connect_range, 2300, 0.8 m", bytes, || builder.join(grid, &wide)).expect(good);
@@ -341,11 +343,11 @@ fn builds(meter: &mut impl Meter, grid: &VoxelGrid<'_>, scratch: &mut Scratch) {
 /// Calls that a desk makes, on a small roadmap.
 fn desk(meter: &mut impl Meter, grid: &VoxelGrid<'_>, search: &mut Search, beside: &mut Beside) {
     let Beside { small, nodes, edges, kept, file, lengths, .. } = beside;
-    let config = Config { nodes: SMALL, ..cases::BUILT };
+    let config = Config { nodes: SMALL_ROADMAP_NODES, ..cases::ROADMAP_CONFIG };
     let good = "the building has room";
     prm::sample_nodes(grid, None, &[], &config, nodes).expect(good);
     let count = meter
-        .call("prm::connect, 300", size_of::<prm::Workspace<SMALL, 1024>>(), || {
+        .call("prm::connect, 300", size_of::<prm::Workspace<SMALL_ROADMAP_NODES, 1024>>(), || {
             prm::connect(grid, nodes, &config, small, edges)
         })
         .expect(good);

@@ -30,13 +30,13 @@ use crate::chips::h743;
 use crate::lent::{Lender, Lent};
 
 /// Offset of bank 2 from the begin of the flash.
-const BANK2: u32 = 1 << 20;
+const BANK2_OFFSET: u32 = 1 << 20;
 /// Address of bank 2.
 const BANK2_ADDRESS: usize = 0x0810_0000;
 /// Values that FLASH_KEYR2 takes, one after the other, to unlock FLASH_CR2.
-const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+const UNLOCK_KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
 /// `CR.PSIZE` of 64 bits.
-const X64: u8 = 3;
+const PSIZE_64: u8 = 3;
 /// `CCR.BFHFNMIGN`: at priority −1 and above, bus errors of loads are ignored.
 const BFHFNMIGN: u32 = 1 << 8;
 /// `CFSR`'s byte of bus faults; ones clear it.
@@ -64,7 +64,7 @@ impl Flash {
         // SAFETY: inside the bank, which nobody erases or programs there as long as it is lent.
         let lent = self.lender.lend(at, unsafe { core::slice::from_raw_parts(address as *const u8, len) })?;
         // SAFETY: nobody writes there.
-        unsafe { mpu::set(super::ROADMAP, Some(&h743::roadmap(at, len as u32))) };
+        unsafe { mpu::set(super::ROADMAP_REGION, Some(&h743::roadmap(at, len as u32))) };
         Some(lent)
     }
 
@@ -73,7 +73,7 @@ impl Flash {
         // SAFETY: a region less; and the cache's maintenance, which nobody else does after the
         // start.
         unsafe {
-            mpu::set(super::ROADMAP, None);
+            mpu::set(super::ROADMAP_REGION, None);
             let mut core = cortex_m::Peripherals::steal();
             core.SCB.clean_invalidate_dcache(&mut core.CPUID);
         }
@@ -151,9 +151,9 @@ fn clear_errors() {
 fn widen() {
     let bank = pac::FLASH.bank(1);
     if bank.cr().read().lock() {
-        KEYS.into_iter().for_each(|key| bank.keyr().write_value(key));
+        UNLOCK_KEYS.into_iter().for_each(|key| bank.keyr().write_value(key));
     }
-    bank.cr().modify(|w| w.set_psize(X64));
+    bank.cr().modify(|w| w.set_psize(PSIZE_64));
 }
 
 impl crate::flash::Flash for Flash {
@@ -163,7 +163,7 @@ impl crate::flash::Flash for Flash {
         }
         clear_errors();
         widen();
-        self.device.erase(BANK2 + at, BANK2 + at + LAYOUT.sector_len).await.map_err(|_| Fault)
+        self.device.erase(BANK2_OFFSET + at, BANK2_OFFSET + at + LAYOUT.sector_len).await.map_err(|_| Fault)
     }
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
@@ -171,6 +171,6 @@ impl crate::flash::Flash for Flash {
             return Err(Fault);
         }
         clear_errors();
-        self.device.write(BANK2 + at, bytes).await.map_err(|_| Fault)
+        self.device.write(BANK2_OFFSET + at, bytes).await.map_err(|_| Fault)
     }
 }

@@ -20,7 +20,7 @@ use heapless::Vec;
 use static_cell::ConstStaticCell;
 
 use self::start::{clocks, guards};
-use super::limits::BITES_AFTER_US;
+use super::limits::WATCHDOG_TIMEOUT_US;
 use super::{executors, parts};
 use crate::chips::h743::{self, Revision};
 
@@ -46,14 +46,14 @@ const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of the ring in which the DMA turns: 22 ms of the autopilot's bytes. `memory.x` puts
 /// statics of these names where the DMA reaches them and nothing is cached.
-const RING: usize = 2048;
-static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
-static DMA_RADIO_IN: ConstStaticCell<[u8; RING]> = ConstStaticCell::new([0; RING]);
+const UART_RING: usize = 2048;
+static DMA_AUTOPILOT_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
+static DMA_RADIO_IN: ConstStaticCell<[u8; UART_RING]> = ConstStaticCell::new([0; UART_RING]);
 static DMA_AUTOPILOT_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
 static DMA_RADIO_OUT: ConstStaticCell<transmitter::Buffer> = ConstStaticCell::new(transmitter::EMPTY);
 
 /// Region of the MPU for the roadmap in use: above that of the bank, below the guard's.
-const ROADMAP: u32 = 3;
+const ROADMAP_REGION: u32 = 3;
 /// Warning about option bytes as a chip has them from the factory.
 const BROWN_OUT_OFF: &str = "Brown-out reset is off: set BOR_LEV to 3";
 /// Warning where the ST-LINK gives no clock.
@@ -137,7 +137,7 @@ pub struct Watchdog {
 
 impl Watchdog {
     fn new(device: Peri<'static, peripherals::IWDG1>, light: Output<'static>) -> Self {
-        Self { device: IndependentWatchdog::new(device, BITES_AFTER_US), light }
+        Self { device: IndependentWatchdog::new(device, WATCHDOG_TIMEOUT_US), light }
     }
 
     fn wake(&mut self) {

@@ -13,7 +13,7 @@ use crate::chips::h743::{self, Revision};
 
 /// Most polls of the oscillator's ready flag, a few clocks of 64 MHz each: more than 10 ms, of
 /// which the oscillator takes 2 (DS12110).
-const HSE_LOOKS: u32 = 200_000;
+const MAX_HSE_POLLS: u32 = 200_000;
 
 /// Why the chip started, once: the flags are cleared. Switches the memories of domain D2 on too,
 /// and mends reading from AXI SRAM where the silicon is old.
@@ -48,7 +48,7 @@ pub(super) fn wake_watchdog() {
 pub(super) fn try_hse() -> bool {
     pac::RCC.cr().modify(|w| w.set_hsebyp(true));
     pac::RCC.cr().modify(|w| w.set_hseon(true));
-    (0..HSE_LOOKS).any(|_| pac::RCC.cr().read().hserdy())
+    (0..MAX_HSE_POLLS).any(|_| pac::RCC.cr().read().hserdy())
 }
 
 /// Clocks as fast as the silicon may run, from the board's oscillator or the chip's own.
@@ -83,7 +83,7 @@ pub(super) fn clocks(revision: Revision, has_hse: bool) -> embassy_stm32::Config
 
 /// Sets which memory may be cached and touched, then starts the caches.
 pub(super) fn guards() {
-    // The place of the roadmap, `super::ROADMAP`, is free until there is one.
+    // The place of the roadmap, `super::ROADMAP_REGION`, is free until there is one.
     let regions = [
         Some(h743::EXTERNAL),
         Some(h743::DMA),

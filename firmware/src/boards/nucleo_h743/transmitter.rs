@@ -1,15 +1,15 @@
 //! Transmits by DMA from memory that is not cached: what a task has to send lies where the DMA may
 //! see an older state.
 
-use companion::link::frame::MAX_SENT;
+use companion::link::frame::MAX_FRAME_LEN;
 use embassy_stm32::mode::Async as ByDma;
 use embassy_stm32::usart::{self, UartTx};
 use embedded_io_async::{ErrorType, Write};
 
 /// A whole frame.
-pub type Buffer = [u8; MAX_SENT];
+pub type Buffer = [u8; MAX_FRAME_LEN];
 /// A buffer with nothing to send.
-pub const EMPTY: Buffer = [0; MAX_SENT];
+pub const EMPTY: Buffer = [0; MAX_FRAME_LEN];
 
 /// Transmits by DMA.
 pub struct Transmitter {

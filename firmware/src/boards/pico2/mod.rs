@@ -25,7 +25,7 @@ use embassy_rp::{Peri, bind_interrupts, install_core0_stack_guard, pac, peripher
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
-use super::limits::BITES_AFTER_US;
+use super::limits::WATCHDOG_TIMEOUT_US;
 use super::{executors, parts};
 use crate::chips::{ResetCause, rp2350};
 use crate::lent::{Lender, Lent};
@@ -38,15 +38,15 @@ bind_interrupts!(struct Irqs {
 const AUTOPILOT_BAUD: u32 = 921_600;
 const RADIO_BAUD: u32 = 460_800;
 /// Bytes of a UART's ring: 22 ms of the autopilot's bytes.
-const RING: usize = 2048;
-type Rings = [[u8; RING]; 2];
-static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; RING]; 2]);
-static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; RING]; 2]);
+const UART_RING: usize = 2048;
+type Rings = [[u8; UART_RING]; 2];
+static AUTOPILOT_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING]; 2]);
+static RADIO_RINGS: ConstStaticCell<Rings> = ConstStaticCell::new([[0; UART_RING]; 2]);
 
 /// Bytes of the whole flash.
-const FLASH: usize = 4 << 20;
+const FLASH_LEN: usize = 4 << 20;
 /// Offset of our store from the begin of the flash.
-const STORE: u32 = 1 << 20;
+const STORE_OFFSET: u32 = 1 << 20;
 /// Address of our store.
 const STORE_ADDRESS: usize = 0x1010_0000;
 /// Layout of the store, which lies after the program.
@@ -147,7 +147,7 @@ pub fn start() -> Parts {
 
 /// The part of the flash after the program.
 pub struct Flash {
-    device: Device<'static, peripherals::FLASH, Blocking, FLASH>,
+    device: Device<'static, peripherals::FLASH, Blocking, FLASH_LEN>,
     lender: Lender,
 }
 
@@ -169,7 +169,7 @@ impl Flash {
 
 impl ReadFlash for Flash {
     fn read(&mut self, at: u32, out: &mut [u8]) -> Result<(), Fault> {
-        self.device.blocking_read(STORE + at, out).map_err(|_| Fault)
+        self.device.blocking_read(STORE_OFFSET + at, out).map_err(|_| Fault)
     }
 }
 
@@ -178,14 +178,16 @@ impl crate::flash::Flash for Flash {
         if !self.lender.allows(at, LAYOUT.sector_len) {
             return Err(Fault);
         }
-        self.device.blocking_erase(STORE + at, STORE + at + LAYOUT.sector_len).map_err(|_| Fault)
+        self.device
+            .blocking_erase(STORE_OFFSET + at, STORE_OFFSET + at + LAYOUT.sector_len)
+            .map_err(|_| Fault)
     }
 
     async fn program(&mut self, at: u32, bytes: &[u8]) -> Result<(), Fault> {
         if !self.lender.allows(at, bytes.len() as u32) {
             return Err(Fault);
         }
-        self.device.blocking_write(STORE + at, bytes).map_err(|_| Fault)
+        self.device.blocking_write(STORE_OFFSET + at, bytes).map_err(|_| Fault)
     }
 }
 
@@ -203,13 +205,13 @@ impl Watchdog {
     /// Wakes it; it stands still while a debugger has a processor halted.
     fn wake(&mut self) {
         self.device.pause_on_debug(true);
-        self.device.start(embassy_time::Duration::from_micros(BITES_AFTER_US.into()));
+        self.device.start(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         set_watchdog_resets();
     }
 
     /// Puts the reset off.
     pub fn feed(&mut self) {
-        self.device.feed(embassy_time::Duration::from_micros(BITES_AFTER_US.into()));
+        self.device.feed(embassy_time::Duration::from_micros(WATCHDOG_TIMEOUT_US.into()));
         self.light.toggle();
     }
 }

@@ -14,9 +14,9 @@ use super::interrupts::{self, Irq};
 use super::registers::Register;
 
 /// Counts in a microsecond.
-pub(super) const COUNTS_US: u64 = 25;
+pub(super) const COUNTS_PER_US: u64 = 25;
 /// Instructions of `-icount shift=0` in a count.
-const INSTRUCTIONS: u64 = 40;
+const INSTRUCTIONS_PER_COUNT: u64 = 40;
 const TIMER0: usize = 0x4000_0000;
 const TIMER1: usize = 0x4000_1000;
 const CTRL: usize = 0;
@@ -81,7 +81,7 @@ pub(super) const CLOCK_NOW: fn(CriticalSection<'_>) -> u64 = |cs| {
 
 /// When a task is due, counts. Wakes those that are due by now.
 pub(super) fn alarm(cs: CriticalSection<'_>, now: u64) -> u64 {
-    CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_US).saturating_mul(COUNTS_US)
+    CLOCK.queue.borrow(cs).borrow_mut().next_expiration(now / COUNTS_PER_US).saturating_mul(COUNTS_PER_US)
 }
 
 /// Makes `counts` pass at once, in lock step.
@@ -92,7 +92,7 @@ pub(super) fn pass(cs: CriticalSection<'_>, counts: u64) {
 
 /// Instructions since the start, under `-icount shift=0`, to the next forty.
 pub fn instructions() -> u64 {
-    critical_section::with(CLOCK_NOW) * INSTRUCTIONS
+    critical_section::with(CLOCK_NOW) * INSTRUCTIONS_PER_COUNT
 }
 
 impl Clock {
@@ -101,11 +101,11 @@ impl Clock {
         let mut queue = self.queue.borrow(cs).borrow_mut();
         loop {
             let now = CLOCK_NOW(cs);
-            let next_us = queue.next_expiration(now / COUNTS_US);
+            let next_us = queue.next_expiration(now / COUNTS_PER_US);
             if next_us == u64::MAX {
                 return;
             }
-            let due = next_us.saturating_mul(COUNTS_US);
+            let due = next_us.saturating_mul(COUNTS_PER_US);
             if due > now {
                 // Far alarms are looked at again when the timer has run down.
                 let wait = (due - now).min(u64::from(u32::MAX)) as u32;
@@ -118,7 +118,7 @@ impl Clock {
 
 impl Driver for Clock {
     fn now(&self) -> u64 {
-        critical_section::with(CLOCK_NOW) / COUNTS_US
+        critical_section::with(CLOCK_NOW) / COUNTS_PER_US
     }
 
     fn schedule_wake(&self, at: u64, waker: &Waker) {

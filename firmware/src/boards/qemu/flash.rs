@@ -9,12 +9,12 @@ use super::memory::Bank2;
 use crate::lent::{Lender, Lent};
 
 /// Address of the bank.
-const BANK: usize = 0x6000_0000;
+const BANK_ADDRESS: usize = 0x6000_0000;
 /// Address of the marks, a byte for each word: the state of that word. Real flash keeps a checksum
 /// there.
-const MARKS: usize = 0x6020_0000;
+const WORD_MARKS: usize = 0x6020_0000;
 /// Address of the mark that bank and marks were made; memory is zero when the power comes.
-const MADE: usize = 0x6030_0000;
+const BANK_MADE: usize = 0x6030_0000;
 const MAGIC: u32 = 0x464c_4153;
 const LEN: usize = LAYOUT.len() as usize;
 const ERASED: u8 = 0;
@@ -22,9 +22,9 @@ const WHOLE: u8 = 1;
 const TORN: u8 = 2;
 /// Time to erase a sector of 128 kB, by the data sheet between 1.1 and 4 s at 8 and 64 bit
 /// parallelism.
-const ERASE: Duration = Duration::from_millis(1100);
+const ERASE_TIME: Duration = Duration::from_millis(1100);
 /// Time to program a word, by the data sheet.
-const PROGRAM: Duration = Duration::from_micros(100);
+const PROGRAM_TIME: Duration = Duration::from_micros(100);
 
 /// The emulated bank is the real one's size.
 pub const LAYOUT: Layout = Layout::H743;
@@ -38,10 +38,10 @@ impl Flash {
         assert!(Bank2::Programmed.claim(), "bank 2 is read as it lies, for measurements");
         // SAFETY: memory of this board; nobody else uses it yet.
         unsafe {
-            if (MADE as *const u32).read_volatile() != MAGIC {
-                (BANK as *mut u8).write_bytes(0xFF, LEN);
-                (MARKS as *mut u8).write_bytes(ERASED, LEN / WORD);
-                (MADE as *mut u32).write_volatile(MAGIC);
+            if (BANK_MADE as *const u32).read_volatile() != MAGIC {
+                (BANK_ADDRESS as *mut u8).write_bytes(0xFF, LEN);
+                (WORD_MARKS as *mut u8).write_bytes(ERASED, LEN / WORD);
+                (BANK_MADE as *mut u32).write_volatile(MAGIC);
             }
         }
         Self(Lender::new())
@@ -67,7 +67,7 @@ fn readable(at: u32, len: usize) -> Option<*const u8> {
     let at = at as usize;
     let end = at.checked_add(len).filter(|end| *end <= LEN)?;
     let torn = (at / WORD..end.div_ceil(WORD)).any(|word| mark(word) == TORN);
-    (!torn).then_some((BANK + at) as *const u8)
+    (!torn).then_some((BANK_ADDRESS + at) as *const u8)
 }
 
 impl crate::flash::Flash for Flash {
@@ -81,9 +81,9 @@ impl crate::flash::Flash for Flash {
         for word in at / WORD..(at + len) / WORD {
             set_mark(word, TORN);
         }
-        Timer::after(ERASE).await;
+        Timer::after(ERASE_TIME).await;
         // SAFETY: inside the bank, and nothing of this sector is lent.
-        unsafe { ((BANK + at) as *mut u8).write_bytes(0xFF, len) };
+        unsafe { ((BANK_ADDRESS + at) as *mut u8).write_bytes(0xFF, len) };
         for word in at / WORD..(at + len) / WORD {
             set_mark(word, ERASED);
         }
@@ -102,9 +102,11 @@ impl crate::flash::Flash for Flash {
                 return Err(Fault);
             }
             set_mark(place, TORN);
-            Timer::after(PROGRAM).await;
+            Timer::after(PROGRAM_TIME).await;
             // SAFETY: inside the bank, and this word is not lent.
-            unsafe { ((BANK + place * WORD) as *mut u8).copy_from_nonoverlapping(word.as_ptr(), WORD) };
+            unsafe {
+                ((BANK_ADDRESS + place * WORD) as *mut u8).copy_from_nonoverlapping(word.as_ptr(), WORD)
+            };
             set_mark(place, WHOLE);
         }
         Ok(())
@@ -122,10 +124,10 @@ impl ReadFlash for Flash {
 
 fn mark(word: usize) -> u8 {
     // SAFETY: the callers keep `word` below the number of words, and each has a mark.
-    unsafe { ((MARKS + word) as *const u8).read_volatile() }
+    unsafe { ((WORD_MARKS + word) as *const u8).read_volatile() }
 }
 
 fn set_mark(word: usize, mark: u8) {
     // SAFETY: as above.
-    unsafe { ((MARKS + word) as *mut u8).write_volatile(mark) }
+    unsafe { ((WORD_MARKS + word) as *mut u8).write_volatile(mark) }
 }

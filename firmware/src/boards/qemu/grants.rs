@@ -19,13 +19,13 @@ use semihosting::fs::File;
 use semihosting::io::{Read, Write};
 use semihosting::sys::arm_compat::sys_get_cmdline_uninit;
 
-use super::clock::{CLOCK_NOW, COUNTS_US};
+use super::clock::{CLOCK_NOW, COUNTS_PER_US};
 use super::interrupts::{self, Irq};
 use super::registers::Register;
 
 /// Addresses of a received message and of sent bytes: beyond all that the program uses.
-const MESSAGE: usize = 0x6060_0000;
-const SENT: usize = 0x6068_0000;
+const MESSAGE_ADDRESS: usize = 0x6060_0000;
+const SENT_ADDRESS: usize = 0x6068_0000;
 
 const TIMER: usize = 0x4000_2000;
 const LOAD: usize = 0;
@@ -93,7 +93,7 @@ pub fn send(port: u8, bytes: &[u8]) -> bool {
     critical_section::with(|cs| {
         let mut desk = DESK.borrow_ref_mut(cs);
         let Some(desk) = &mut *desk else { return false };
-        let at_us = CLOCK_NOW(cs) / COUNTS_US;
+        let at_us = CLOCK_NOW(cs) / COUNTS_PER_US;
         desk.say(FromBoard::Sent { port, len: bytes.len() as u16, at_us }, bytes);
         true
     })
@@ -112,7 +112,7 @@ impl Desk {
                 ToBoard::Run { until_us } => until_us,
                 ToBoard::Peek { .. } | ToBoard::Poke { .. } | ToBoard::Call { .. } => 0,
             };
-            let (due, now) = (due_us * COUNTS_US, CLOCK_NOW(cs));
+            let (due, now) = (due_us * COUNTS_PER_US, CLOCK_NOW(cs));
             if due > now {
                 self.due = due;
                 // An alarm that is farther away is set again later.
@@ -131,7 +131,7 @@ impl Desk {
 
     fn message(&self) -> &'static [u8] {
         // SAFETY: memory of this board that nothing else uses; it changes in `read` alone, which has no slice of it.
-        unsafe { slice::from_raw_parts(MESSAGE as *const u8, self.length) }
+        unsafe { slice::from_raw_parts(MESSAGE_ADDRESS as *const u8, self.length) }
     }
 
     /// Does what a record says.
@@ -161,7 +161,7 @@ impl Desk {
 
     /// Ends a message: the next one takes its place.
     fn answer(&mut self, cs: CriticalSection<'_>) {
-        self.say(FromBoard::Waits { now_us: CLOCK_NOW(cs) / COUNTS_US }, &[]);
+        self.say(FromBoard::Waits { now_us: CLOCK_NOW(cs) / COUNTS_PER_US }, &[]);
         self.flush();
         self.read();
     }
@@ -173,14 +173,14 @@ impl Desk {
         }
         for part in [&record.to_bytes(), bytes] {
             // SAFETY: memory of this board that nothing else uses, and long enough.
-            unsafe { ((SENT + self.sent) as *mut u8).copy_from(part.as_ptr(), part.len()) };
+            unsafe { ((SENT_ADDRESS + self.sent) as *mut u8).copy_from(part.as_ptr(), part.len()) };
             self.sent += part.len();
         }
     }
 
     fn flush(&mut self) {
         // SAFETY: as above; `say` wrote it.
-        let sent = unsafe { slice::from_raw_parts(SENT as *const u8, self.sent) };
+        let sent = unsafe { slice::from_raw_parts(SENT_ADDRESS as *const u8, self.sent) };
         self.output.write_all(sent).expect("the desk listens");
         self.sent = 0;
     }
@@ -195,7 +195,7 @@ impl Desk {
         (self.length, self.done) = (u32::from_le_bytes(length) as usize, 0);
         assert!(self.length <= LONGEST, "the desk sends no longer messages");
         // SAFETY: memory of this board that nothing else uses, and long enough.
-        let message = unsafe { slice::from_raw_parts_mut(MESSAGE as *mut u8, self.length) };
+        let message = unsafe { slice::from_raw_parts_mut(MESSAGE_ADDRESS as *mut u8, self.length) };
         self.input.read_exact(message).expect("a whole message");
     }
 }

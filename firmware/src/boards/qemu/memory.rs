@@ -5,12 +5,12 @@ use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 /// Address at which `-device loader` puts a map for measurements: beyond all that the firmware
 /// uses.
-const MAP: usize = 0x6080_0000;
+const MAP_ADDRESS: usize = 0x6080_0000;
 /// Bytes before the map's words: three dimensions, three coordinates of the minimum corner, the
 /// resolution, the number of words.
-const MAP_HEAD: usize = 32;
+const MAP_HEADER_LEN: usize = 32;
 /// Address at which nothing lies.
-const SPARE: usize = 0x6040_0000;
+const UNUSED_ADDRESS: usize = 0x6040_0000;
 /// Bank 2 of the flash.
 const BANK2: usize = 0x6000_0000;
 /// Length of bank 2, bytes.
@@ -44,12 +44,14 @@ pub fn bank2() -> &'static [u8] {
 }
 
 /// The map for measurements: its head and its words.
-pub fn map() -> ([u8; MAP_HEAD], &'static [u64]) {
+pub fn map() -> ([u8; MAP_HEADER_LEN], &'static [u64]) {
     // SAFETY: readable, aligned memory; nobody writes to it.
-    let head = unsafe { *(MAP as *const [u8; MAP_HEAD]) };
+    let head = unsafe { *(MAP_ADDRESS as *const [u8; MAP_HEADER_LEN]) };
     let words = u32::from_le_bytes([head[28], head[29], head[30], head[31]]) as usize;
     // SAFETY: as above; the memory there is 8 MB long.
-    let words = unsafe { core::slice::from_raw_parts((MAP + MAP_HEAD) as *const u64, words.min(1 << 19)) };
+    let words = unsafe {
+        core::slice::from_raw_parts((MAP_ADDRESS + MAP_HEADER_LEN) as *const u64, words.min(1 << 19))
+    };
     (head, words)
 }
 
@@ -61,5 +63,5 @@ pub fn spare() -> Option<&'static mut [u8]> {
         return None;
     }
     // SAFETY: memory of this board that nothing else uses, given out once.
-    Some(unsafe { core::slice::from_raw_parts_mut(SPARE as *mut u8, BANK2_LEN) })
+    Some(unsafe { core::slice::from_raw_parts_mut(UNUSED_ADDRESS as *mut u8, BANK2_LEN) })
 }

@@ -18,13 +18,13 @@ const TX_FULL: u32 = 1;
 const RX_FULL: u32 = 2;
 const RX_OVERRUN: u32 = 8;
 /// Both directions, both with interrupts.
-const ENABLED: u32 = 0b1111;
+const BOTH_ENABLED: u32 = 0b1111;
 /// The emulated line has no baud rate; the device wants one of at least 16.
 const DIVISOR: u32 = 27;
 /// Bytes of the receive buffer: a quarter of a second at 18 kB/s, which is as fast as this device
 /// takes bytes.
-const RECEIVED: usize = 4096;
-const SENT: usize = 1024;
+const RECEIVE_BUFFER: usize = 4096;
+const SEND_BUFFER: usize = 1024;
 
 /// Counters of a UART.
 #[derive(Debug, Default)]
@@ -41,8 +41,8 @@ pub struct Uart {
     /// Number of the port, as the desk counts.
     port: u8,
     transmits: Irq,
-    received: Pipe<CriticalSectionRawMutex, RECEIVED>,
-    sent: Pipe<CriticalSectionRawMutex, SENT>,
+    received: Pipe<CriticalSectionRawMutex, RECEIVE_BUFFER>,
+    sent: Pipe<CriticalSectionRawMutex, SEND_BUFFER>,
     /// Errors so far.
     pub counters: Counters,
 }
@@ -70,7 +70,7 @@ impl Uart {
     /// Lets bytes flow.
     pub fn start(&'static self, receives: Irq) -> (Receiver, Transmitter) {
         self.register(BAUDDIV).write(DIVISOR);
-        self.register(CTRL).write(ENABLED);
+        self.register(CTRL).write(BOTH_ENABLED);
         interrupts::enable(receives, interrupts::DEVICES);
         interrupts::enable(self.transmits, interrupts::DEVICES);
         (Receiver { uart: self, reported: 0 }, Transmitter(self))

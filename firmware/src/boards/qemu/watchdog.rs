@@ -9,7 +9,7 @@ use critical_section::{CriticalSection, Mutex};
 
 use super::clock::CLOCK_NOW;
 use super::registers::Register;
-use crate::boards::limits::BITES_AFTER_US;
+use crate::boards::limits::WATCHDOG_TIMEOUT_US;
 
 const WATCHDOG: usize = 0x4000_8000;
 const LOAD: usize = 0;
@@ -18,7 +18,7 @@ const INTCLR: usize = 12;
 const LOCK: usize = 0xC00;
 const UNLOCK: u32 = 0x1ACC_E551;
 /// Counts of the timer, which counts down twice at 25 MHz before the reset.
-const COUNTS: u32 = BITES_AFTER_US / 2 * 25;
+const RELOAD_COUNTS: u32 = WATCHDOG_TIMEOUT_US / 2 * 25;
 /// Interrupt at the first end, reset at the second.
 const ENABLED: u32 = 0b11;
 
@@ -27,12 +27,12 @@ const ENABLED: u32 = 0b11;
 unsafe fn NonMaskableInt() {}
 
 /// Time at which the watchdog was last fed, counts of the clock.
-static FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
+static LAST_FED: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Counts by which time may be skipped: the device counts none of them, so the rest is counted
 /// here.
 pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
-    let bites = FED.borrow(cs).get() + u64::from(2 * COUNTS);
+    let bites = LAST_FED.borrow(cs).get() + u64::from(2 * RELOAD_COUNTS);
     if now >= bites {
         SCB::sys_reset();
     }
@@ -40,7 +40,7 @@ pub fn until_bite(cs: CriticalSection<'_>, now: u64, due: u64) -> u64 {
 }
 
 fn note_fed() {
-    critical_section::with(|cs| FED.borrow(cs).set(CLOCK_NOW(cs)));
+    critical_section::with(|cs| LAST_FED.borrow(cs).set(CLOCK_NOW(cs)));
 }
 
 /// The watchdog.
@@ -50,7 +50,7 @@ impl Watchdog {
     /// Wakes it.
     pub(super) fn wake(&mut self) {
         Register::new(WATCHDOG, LOCK).write(UNLOCK);
-        Register::new(WATCHDOG, LOAD).write(COUNTS);
+        Register::new(WATCHDOG, LOAD).write(RELOAD_COUNTS);
         Register::new(WATCHDOG, CTRL).write(ENABLED);
         note_fed();
     }

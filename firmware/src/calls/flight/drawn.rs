@@ -11,13 +11,13 @@ use crate::capacity::{GATES, VEHICLES, WAYPOINTS};
 use crate::cases::{anywhere, below, uniform};
 
 /// Time after which a lost vehicle is on the ground, seconds.
-const DOWN_S: f32 = 60.0;
+const LOST_VEHICLE_DOWN_S: f32 = 60.0;
 /// Distance from one picture to the next, metres.
-const LANE_M: f32 = 1.0;
+const PICTURE_SPACING_M: f32 = 1.0;
 /// Pictures on a lane.
-const LANE_PICTURES: u32 = 4;
+const PICTURES_PER_LANE: u32 = 4;
 /// Pictures of the whole area.
-const PICTURES: u32 = 200;
+const TOTAL_PICTURES: u32 = 200;
 
 /// The settings of vehicle 1 of a swarm as large as this board's.
 pub fn config() -> Config<VEHICLES> {
@@ -70,16 +70,19 @@ pub fn random_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
 
 /// Settings for an area that is divided again where a vehicle is lost.
 pub fn area_config() -> Config<VEHICLES> {
-    Config { division: Some(DOWN_S), ..config() }
+    Config { division: Some(LOST_VEHICLE_DOWN_S), ..config() }
 }
 
 /// A random plan of a coverage mission: every second leg is a lane.
 pub fn random_area_plan(rng: &mut Pcg32) -> VehiclePlan<WAYPOINTS, GATES> {
     let mut plan = random_plan(rng);
-    let mut photographs = Photographs::new(LANE_M, Look::Ahead, Trigger::Distance).of_area(PICTURES, false);
+    let mut photographs =
+        Photographs::new(PICTURE_SPACING_M, Look::Ahead, Trigger::Distance).of_area(TOTAL_PICTURES, false);
     for (lane, from) in (1..plan.path.waypoints().len() - 1).step_by(2).enumerate() {
-        let first = LANE_PICTURES * lane as u32;
-        photographs.mark(from, from + 1, Range { first, end: first + LANE_PICTURES }).expect("there is room");
+        let first = PICTURES_PER_LANE * lane as u32;
+        photographs
+            .mark(from, from + 1, Range { first, end: first + PICTURES_PER_LANE })
+            .expect("there is room");
     }
     plan.task = Task::Photograph(photographs);
     plan

@@ -28,7 +28,7 @@ fn the_filter_is_counted_in_flight() {
         let mut companion = BoardCompanion::new(config()).expect("the settings are good");
         filter(seed, &plan, &mut companion, &mut meter);
     }
-    assert_eq!(meter.filtered, 10 * ROUNDS);
+    assert_eq!(meter.filtered, 10 * FILTER_ROUNDS);
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn most_steps_of_a_flight_are_flown() {
         flown += fly(seed, &plan, &mut companion, &mut meter);
     }
     assert_eq!(meter.steps, flown);
-    assert!(flown > 8 * STEPS, "{flown}");
+    assert!(flown > 8 * COUNTED_STEPS, "{flown}");
 }
 
 #[test]
@@ -55,5 +55,5 @@ fn steps_of_coverage_missions_are_flown() {
         std::println!("{:?}", companion.state());
     }
     assert!(meter.in_areas > flown, "steps before the flight count too");
-    assert!(flown > 6 * STEPS, "{flown}");
+    assert!(flown > 6 * COUNTED_STEPS, "{flown}");
 }

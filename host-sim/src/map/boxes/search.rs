@@ -9,30 +9,33 @@ use pulp::{Simd, WithSimd};
 use super::lanes::Lanes;
 
 /// Boxes of a node.
-pub(super) const FAN: usize = 8;
+pub(super) const BOXES_PER_NODE: usize = 8;
 /// Most nodes that wait to be opened: 7 a level, and the last one's 8. Seven partings, always of
 /// the largest part and into two of which neither has less than a third, leave none with more than
 /// a quarter: 2³² boxes make 16 levels.
-const WAITING: usize = 120;
+const MAX_WAITING_NODES: usize = 120;
 /// Child index of a node whose boxes are obstacles.
 const LEAF: u32 = 0;
 /// Coordinate of a box that is beyond everything, cells: its square is finite.
-const BEYOND: f32 = 1e18;
+const FAR_AWAY_CELLS: f32 = 1e18;
 
-/// Up to [`FAN`] boxes, coordinate by coordinate so that they are compared together; cells. All of them are obstacles, or
+/// Up to [`BOXES_PER_NODE`] boxes, coordinate by coordinate so that they are compared together; cells. All of them are obstacles, or
 /// none is.
 #[derive(Clone, Debug)]
 pub(super) struct Node {
-    pub(super) low: [[f32; FAN]; 3],
-    pub(super) high: [[f32; FAN]; 3],
+    pub(super) low: [[f32; BOXES_PER_NODE]; 3],
+    pub(super) high: [[f32; BOXES_PER_NODE]; 3],
     /// Number of nodes from this one to the one below a box, or [`LEAF`].
-    pub(super) child: [u32; FAN],
+    pub(super) child: [u32; BOXES_PER_NODE],
 }
 
 impl Node {
     /// Boxes that are beyond everything.
-    pub(super) const EMPTY: Self =
-        Self { low: [[BEYOND; FAN]; 3], high: [[BEYOND; FAN]; 3], child: [LEAF; FAN] };
+    pub(super) const EMPTY: Self = Self {
+        low: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
+        high: [[FAR_AWAY_CELLS; BOXES_PER_NODE]; 3],
+        child: [LEAF; BOXES_PER_NODE],
+    };
 
     fn is_leaf(&self) -> bool {
         self.child[0] == LEAF
@@ -62,7 +65,7 @@ impl WithSimd for Search<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> f32 {
         let Self { nodes, segment, mut bound, enough } = self;
-        let mut waiting = [Waiting::default(); WAITING];
+        let mut waiting = [Waiting::default(); MAX_WAITING_NODES];
         let mut count = 1;
         while count > 0 && bound > enough {
             count -= 1;
@@ -90,7 +93,7 @@ impl WithSimd for Search<'_> {
 
 /// The least of some numbers.
 #[inline(always)]
-fn least_of<S: Simd>(simd: S, numbers: &[f32; FAN]) -> f32 {
+fn least_of<S: Simd>(simd: S, numbers: &[f32; BOXES_PER_NODE]) -> f32 {
     S::as_simd_f32s(numbers)
         .0
         .iter()
@@ -138,13 +141,13 @@ impl Segment {
     /// is. The first is the greater of two: the distance of the box around the segment, and, as squares of distances along a
     /// segment are convex, the tangent where the segment is nearest to the box's centre.
     #[inline(always)]
-    fn squares<S: Simd>(&self, simd: S, node: &Node) -> ([f32; FAN], [f32; FAN]) {
+    fn squares<S: Simd>(&self, simd: S, node: &Node) -> ([f32; BOXES_PER_NODE], [f32; BOXES_PER_NODE]) {
         let [a, d] = [Lanes::triple(simd, self.a), Lanes::triple(simd, self.d)];
         let [first, last] = [Lanes::triple(simd, self.low), Lanes::triple(simd, self.high)];
         let [zero, half, one] = Lanes::triple(simd, [0.0, 0.5, 1.0]);
         let [two, rounding, inv_square] = Lanes::triple(simd, [2.0, 2e-6, self.inv_square]);
-        let (mut least, mut most) = ([0.0; FAN], [0.0; FAN]);
-        for part in 0..FAN / S::F32_LANES {
+        let (mut least, mut most) = ([0.0; BOXES_PER_NODE], [0.0; BOXES_PER_NODE]);
+        for part in 0..BOXES_PER_NODE / S::F32_LANES {
             let [low, high] = [Lanes::part(simd, &node.low, part), Lanes::part(simd, &node.high, part)];
             let (mut gap_square, mut along) = (zero, zero);
             for axis in 0..3 {
@@ -173,12 +176,12 @@ impl Segment {
     /// quadratic, with breaks where the segment crosses a face's plane; its rate is linear between them.
     #[inline(always)]
     #[expect(clippy::needless_range_loop, reason = "several arrays of three axes, side by side")]
-    fn squares_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; FAN] {
+    fn squares_to_boxes<S: Simd>(&self, simd: S, node: &Node) -> [f32; BOXES_PER_NODE] {
         let [a, d, per_d] =
             [Lanes::triple(simd, self.a), Lanes::triple(simd, self.d), Lanes::triple(simd, self.per_d)];
         let [zero, a_half, one] = Lanes::triple(simd, [0.0, 0.5, 1.0]);
-        let mut squares = [0.0; FAN];
-        for part in 0..FAN / S::F32_LANES {
+        let mut squares = [0.0; BOXES_PER_NODE];
+        for part in 0..BOXES_PER_NODE / S::F32_LANES {
             let [low, high] = [Lanes::part(simd, &node.low, part), Lanes::part(simd, &node.high, part)];
             let mut boxes = Boxes { half: [zero; 3], start: [zero; 3], d };
             for axis in 0..3 {

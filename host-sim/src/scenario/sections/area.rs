@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind, SAME_M};
+use planner_core::coverage::area::{MAX_VERTEX_M, Ring, RingKind, SAME_VERTEX_M};
 use planner_core::coverage::footprint::{Camera, Footprint, Spacing};
 use planner_core::coverage::pack::Heights;
 use planner_core::coverage::{CoverageError, Flat, area as core_area};
@@ -11,10 +11,11 @@ use planner_core::frames::{Geodetic, geodetic_to_enu};
 use super::checks::{VehicleSpans, check_margins};
 use super::terrain::TerrainFile;
 use super::{
-    Common, ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, not_yet, unbuilt, vehicles,
+    Common, DEFAULT_ORIGIN, common, empty, faults, fence_and_ground_stations, geodetic, not_yet, unbuilt,
+    vehicles,
 };
 use crate::area::overlap::{self, Overlap};
-use crate::area::{self, Format, MOST_VERTICES, Polygons, RingXy};
+use crate::area::{self, Format, MAX_VERTICES, Polygons, RingXy};
 use crate::map::Unknown;
 use crate::margins;
 use crate::quote::quoted_path;
@@ -25,12 +26,12 @@ use crate::scenario::{Map, Mission, Mode, Objective, Scenario, Vehicle};
 
 /// Time after which a flight over an area is given up unless the scenario says otherwise, seconds:
 /// batteries last for less.
-const LIMIT_S: f32 = 3600.0;
+const DEFAULT_AREA_TIME_LIMIT_S: f32 = 3600.0;
 
 /// Cell of the level ground where there is no map, metres.
-const GROUND_CELL_M: f32 = 1.0;
+const LEVEL_GROUND_CELL_M: f32 = 1.0;
 /// Extent up to which coordinates given as metres are taken for degrees, metres.
-const DEGREES_M: f64 = 0.5;
+const MAX_DEGREES_EXTENT_M: f64 = 0.5;
 
 /// Meaning of the numbers of a polygon.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -42,7 +43,7 @@ enum Coordinates {
 /// The scenario of a coverage mission.
 pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &Path) -> Result<Scenario> {
     let Common { seed, deconfliction, simulation, estimator_span } =
-        common(text, root, (margins::STRAY_OVER_FIELDS_M, LIMIT_S))?;
+        common(text, root, (margins::PAIR_STRAY_OVER_FIELDS_M, DEFAULT_AREA_TIME_LIMIT_S))?;
     let hint = "add `[area]` with `file = \"field.geojson\"` or `polygon = [[x, y], …]`";
     let (mut area, terrain) = area(&root.required("area", hint)?.table()?, folder)?;
     let hint = "add a `[[vehicles]]` with `id` and `start` for each";
@@ -80,7 +81,7 @@ pub(in crate::scenario) fn coverage(text: Text<'_>, root: &Table<'_>, folder: &P
         seed,
         map: Map {
             file: String::new(),
-            resolution_m: GROUND_CELL_M,
+            resolution_m: LEVEL_GROUND_CELL_M,
             unknown: Unknown::Free,
             origin: area.origin,
         },
@@ -155,7 +156,7 @@ fn area(table: &Table<'_>, folder: &Path) -> Result<(Area, Option<TerrainFile>)>
     let first = polygons.outers[0][0];
     let mut origin = given.unwrap_or(match coordinates {
         Coordinates::Wgs84 => Geodetic { lat_deg: first[1], lon_deg: first[0], alt_m: 0.0 },
-        Coordinates::Metres => ORIGIN,
+        Coordinates::Metres => DEFAULT_ORIGIN,
     });
     let terrain = TerrainFile::of(table, folder, coordinates == Coordinates::Metres)?;
     if let (Some(terrain), None) = (&terrain, given) {
@@ -238,8 +239,8 @@ fn polygons(table: &Table<'_>, folder: &Path) -> Result<(Polygons, Coordinates, 
         }
     }
     let count = polygons.vertex_count();
-    if count > MOST_VERTICES {
-        let why = format!("area has {count} vertices; at most {MOST_VERTICES} can be used");
+    if count > MAX_VERTICES {
+        let why = format!("area has {count} vertices; at most {MAX_VERTICES} can be used");
         return Err(table.text.error(&span, why));
     }
     Ok((polygons, coordinates, span))
@@ -309,12 +310,15 @@ fn flat(
                 }
             };
             // Two that f32 or the user makes one are one.
-            let repeats = vertices[begin..].last().is_some_and(|last: &Flat| (place - last).amax() < SAME_M);
+            let repeats =
+                vertices[begin..].last().is_some_and(|last: &Flat| (place - last).amax() < SAME_VERTEX_M);
             if !repeats {
                 vertices.push(place);
             }
         }
-        while vertices.len() > begin + 1 && (vertices[begin] - vertices[vertices.len() - 1]).amax() < SAME_M {
+        while vertices.len() > begin + 1
+            && (vertices[begin] - vertices[vertices.len() - 1]).amax() < SAME_VERTEX_M
+        {
             vertices.pop();
         }
         rings.push(Ring { end: vertices.len() as u16, kind });
@@ -323,7 +327,7 @@ fn flat(
         let along = || polygons.outers.iter().flatten().map(|place| place[axis]);
         along().fold(f64::NEG_INFINITY, f64::max) - along().fold(f64::INFINITY, f64::min)
     };
-    if coordinates == Coordinates::Metres && wide(0).max(wide(1)) < DEGREES_M {
+    if coordinates == Coordinates::Metres && wide(0).max(wide(1)) < MAX_DEGREES_EXTENT_M {
         let why = format!("area is {:.6} by {:.6} m", wide(0), wide(1));
         return bad(why, "degrees need `coordinates = \"wgs84\"`");
     }

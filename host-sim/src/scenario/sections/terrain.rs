@@ -17,9 +17,9 @@ use crate::scenario::{Mission, Simulation, Vehicle};
 use crate::terrain::{self, FieldConfig, FieldError, Frame, HeightGrid, TerrainError};
 
 /// Greatest difference between a pad's given height and the ground, on which the pad lies, metres.
-const PAD_M: f32 = 5.0;
+const MAX_PAD_HEIGHT_ERROR_M: f32 = 5.0;
 /// Extent of paths beside lanes and around corners, metres.
-const AROUND_M: f32 = 5.0;
+const AROUND_LANES_M: f32 = 5.0;
 
 /// Content of the table about the ground.
 pub(super) struct TerrainFile {
@@ -89,7 +89,7 @@ impl TerrainFile {
                 |[low, high], place| [low.inf(place), high.sup(place)],
             );
         // Lanes may begin beyond the border, by the margin and half of what a picture shows.
-        let beyond = Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_M);
+        let beyond = Flat::repeat(area.margin_m + area.spacing.footprint.across_m / 2.0 + AROUND_LANES_M);
         let own: Vec<Vehicle> = vehicles.iter().map(|(vehicle, _)| vehicle.clone()).collect();
         let slope = own.iter().map(|vehicle| {
             let [climb_mps, descend_mps] = vehicle.climbs_mps();
@@ -109,7 +109,7 @@ impl TerrainFile {
         })?;
         for (vehicle, spans) in vehicles {
             let ground_m = grid.height_at(&vehicle.start.xy()).unwrap_or(0.0);
-            if (vehicle.start.z - ground_m).abs() > PAD_M {
+            if (vehicle.start.z - ground_m).abs() > MAX_PAD_HEIGHT_ERROR_M {
                 let why = format!(
                     "vehicle {} starts {:.1} m from the ground of area.terrain",
                     vehicle.id,

@@ -85,7 +85,7 @@ fn planned(
         }
         let end = points.last().unwrap();
         if request.aside {
-            assert!((end - request.here).norm() <= RINGS as f32 + 0.01 && points.len() == 2);
+            assert!((end - request.here).norm() <= MAX_SIDESTEP_RINGS as f32 + 0.01 && points.len() == 2);
             assert!(!known.iter().any(|o| o.holds(end)), "{end:?} is no place to rest");
         } else {
             assert!((end - OVER).norm() <= SAME_CORNER_M, "{end:?}");

@@ -30,7 +30,7 @@ fn back_and_forth_begins_at_the_end_that_joins_lanes_by_less() {
             lanes.iter_mut().skip(first).step_by(2).for_each(Lane::turn);
             way_m(&lanes)
         });
-        assert!(way_m(&sorted) <= ways[0].min(ways[1]) + 2.0 * GAIN_M, "{} of {ways:?}", way_m(&sorted));
+        assert!(way_m(&sorted) <= ways[0].min(ways[1]) + 2.0 * MIN_GAIN_M, "{} of {ways:?}", way_m(&sorted));
         assert!(sorted.iter().zip(&laid).all(|(lane, own)| lane.strip == own.strip));
         turned += usize::from(sorted[0].from != laid[0].from);
     }

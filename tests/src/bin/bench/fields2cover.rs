@@ -17,7 +17,7 @@ use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
 use flockmate_tests::{shared_data, workspace};
-use host_sim::coverage::{CORNERS, LANES, LOOKS};
+use host_sim::coverage::{MAX_CORNERS, MAX_LANES, MAX_ORDER_CHANGES};
 use host_sim::scenario;
 use planner_core::coverage::Flat;
 use planner_core::coverage::area::{Area, Ring, RingKind};
@@ -73,7 +73,7 @@ pub fn rows(checkout: Option<&Path>) -> Result<Vec<Row>> {
         let Some(path) = shared_data(&format!("coverage/{file}")) else { return Ok(rows) };
         for (k, field) in fields(&path, lane_m, coordinates)?.iter().enumerate() {
             let (first, angle) = ours(field, lane_m, 0)?;
-            let (searched, _) = ours(field, lane_m, LOOKS)?;
+            let (searched, _) = ours(field, lane_m, MAX_ORDER_CHANGES)?;
             let theirs = theirs(&program, field, angle, lane_m)?;
             let name = format!("{} {}", file.trim_end_matches(".json"), k + 1);
             println!(
@@ -133,9 +133,9 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let footprint = Footprint { along_m: lane_m, across_m: lane_m };
     let spacing = Spacing { footprint, lane_m, waypoint_m: lane_m };
     let pattern = Pattern { spacing, angle_deg: None, margin_m: 0.0, looks };
-    let mut found: Box<Tracks<LANES>> = Box::default();
+    let mut found: Box<Tracks<MAX_LANES>> = Box::default();
     let mut workspace: Box<tracks::Workspace<VERTICES>> = Box::default();
-    let mut transit = Box::new(Transit::<CORNERS>::empty());
+    let mut transit = Box::new(Transit::<MAX_CORNERS>::empty());
     let mut times = Vec::new();
     for _ in 0..RUNS {
         let began = Instant::now();
@@ -149,7 +149,7 @@ fn ours(field: &Field, lane_m: f32, looks: u32) -> Result<(Way, f64)> {
     let legs = found.lanes().windows(2).map(|pair| (pair[0].to, pair[1].from));
     let mut crossings = 0;
     for (from, to) in legs {
-        let mut corners = heapless::Vec::<Flat, CORNERS>::new();
+        let mut corners = heapless::Vec::<Flat, MAX_CORNERS>::new();
         transit.way(&from, &to, &mut corners).map_err(|error| anyhow::anyhow!("{error:?}"))?;
         let way = [&[from], corners.as_slice(), &[to]].concat();
         crossings += way.windows(2).filter(|leg| crosses(field, &leg[0], &leg[1])).count();

@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, ensure};
-use firmware::cases::{STEPS, StepCase};
+use firmware::cases::{STEP_CASES, StepCase};
 use planner_core::deconflict::{Advice, Method};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
@@ -28,13 +28,13 @@ pub fn rows() -> Result<Vec<Row>> {
 
 fn row(neighbours: usize, limit: f64) -> Result<Row> {
     let mut counts = counted(neighbours)?;
-    ensure!(counts.len() == STEPS, "{} of {STEPS} cases were counted", counts.len());
+    ensure!(counts.len() == STEP_CASES, "{} of {STEP_CASES} cases were counted", counts.len());
     counts.sort_unstable();
     let thousands = |count: u64| count as f64 * 1e-3;
-    let worst = thousands(counts[STEPS - 1]);
+    let worst = thousands(counts[STEP_CASES - 1]);
     println!(
-        "{neighbours} neighbours: median {:.1}, worst {worst:.1} thousand instructions of {STEPS} cases",
-        thousands(counts[STEPS / 2])
+        "{neighbours} neighbours: median {:.1}, worst {worst:.1} thousand instructions of {STEP_CASES} cases",
+        thousands(counts[STEP_CASES / 2])
     );
     Ok(Row {
         name: "priority step".into(),
@@ -77,7 +77,7 @@ fn priority_step(case: &StepCase) -> Advice {
 /// Every case once.
 pub fn run(neighbours: usize) {
     let mut rng = Pcg32::seed_from_u64(SEED);
-    for number in 0..STEPS {
+    for number in 0..STEP_CASES {
         let case = StepCase::new(&mut rng, neighbours, number % 2 == 0);
         black_box(priority_step(black_box(&case)));
     }

@@ -7,7 +7,7 @@ use host_sim::capacity::WAYPOINTS;
 use host_sim::mission::{Mission, SwarmPlan};
 use planner_core::Point;
 use planner_core::flight::{Flight, Path};
-use planner_core::schedule::{PIECE_M, ScheduleWorkspace, earliest_departure};
+use planner_core::schedule::{MAX_TIMED_SEGMENT_M, ScheduleWorkspace, earliest_departure};
 use planner_core::segment::segment_is_clear;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -54,7 +54,7 @@ fn flights(mission: &Mission, flight: &Flight<WAYPOINTS>) -> Option<Vec<Flight<W
         let mut path = Path::new();
         corners.iter().for_each(|&corner| path.push(corner, required_m).expect("three points fit"));
         path.label(flight.climb_m / mission.schedule().vertical_mps, mission.schedule().cruise_mps);
-        all.push(Flight { path, depart_s: 0.0, piece_m: PIECE_M, ..flight.clone() });
+        all.push(Flight { path, depart_s: 0.0, piece_m: MAX_TIMED_SEGMENT_M, ..flight.clone() });
     }
     Some(all)
 }

@@ -1,8 +1,8 @@
 //! What the companion hears: answers, and streams as PX4 and ArduCopter send them.
 
 use companion::autopilot::Kind;
-use companion::link::frame::{self, Header, MAX_SENT};
-use companion::{AUTOPILOT, Instant};
+use companion::link::frame::{self, Header, MAX_FRAME_LEN};
+use companion::{AUTOPILOT_COMPONENT, Instant};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::*;
 use nalgebra::Vector3;
@@ -13,8 +13,8 @@ use super::Autopilot;
 
 impl Autopilot {
     pub(super) fn send<M: MessageData>(&mut self, message: &M, out: &mut Vec<u8>) {
-        let mut buffer = [0; MAX_SENT];
-        let header = Header { system: self.id, component: AUTOPILOT, sequence: self.sequence };
+        let mut buffer = [0; MAX_FRAME_LEN];
+        let header = Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
         let len = frame::encode(header, message, &mut buffer);
         out.extend_from_slice(&buffer[..len]);
@@ -25,10 +25,10 @@ impl Autopilot {
         let mut payload = [0; 10];
         payload[..2].copy_from_slice(&(command as u16).to_le_bytes());
         payload[2] = result as u8;
-        payload[8..].copy_from_slice(&[self.id, companion::COMPONENT]);
-        let header = Header { system: self.id, component: AUTOPILOT, sequence: self.sequence };
+        payload[8..].copy_from_slice(&[self.id, companion::COMPANION_COMPONENT]);
+        let header = Header { system: self.id, component: AUTOPILOT_COMPONENT, sequence: self.sequence };
         self.sequence = self.sequence.wrapping_add(1);
-        let mut buffer = [0; MAX_SENT];
+        let mut buffer = [0; MAX_FRAME_LEN];
         let (id, extra) = (COMMAND_ACK_DATA::ID, COMMAND_ACK_DATA::EXTRA_CRC);
         let len = frame::encode_raw(header, id, extra, &payload, &mut buffer);
         out.extend_from_slice(&buffer[..len]);

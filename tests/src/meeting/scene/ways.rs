@@ -149,7 +149,7 @@ pub(super) fn flight(id: u8, way: &Way) -> Option<Flight<WAYPOINTS>> {
         climb_m,
         descent_m,
         depart_s: 0.0,
-        piece_m: schedule::PIECE_M,
+        piece_m: schedule::MAX_TIMED_SEGMENT_M,
     })
 }
 

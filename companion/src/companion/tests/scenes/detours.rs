@@ -9,7 +9,7 @@ pub(super) const NO_WAY: Option<Result<(), PlanFailure>> = Some(Err(PlanFailure:
 
 /// Another comes to lie below the path.
 fn blocked(b: &mut Bench) {
-    b.neighbour = below_the_path(OUT);
+    b.neighbour = below_the_path(OUT_OF_PLAN);
     b.until(Blocked, 3.0);
 }
 
@@ -90,7 +90,7 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
         no_way(b);
         b.until(Blocked, 5.0);
         b.run(1.0);
-        b.neighbour = stands(Point::new(b.enu.x + 1.2, b.enu.y, 0.1), OUT);
+        b.neighbour = stands(Point::new(b.enu.x + 1.2, b.enu.y, 0.1), OUT_OF_PLAN);
         b.until(Follow, 120.0);
     };
     scenes.play(accompanied(Follow, 1.0), so_near, Aborted, 60.0);
@@ -99,7 +99,7 @@ pub(super) fn another_lies_below_the_path(scenes: &mut Scenes) {
 pub(super) fn before_take_off(scenes: &mut Scenes) {
     let grounded = |answer| {
         let mut bench = Bench::accompanied(two_vehicles());
-        bench.neighbour = below_the_path(OUT);
+        bench.neighbour = below_the_path(OUT_OF_PLAN);
         bench.answer_detour = answer;
         bench.run(4.5);
         bench
@@ -119,7 +119,7 @@ pub(super) fn another_flies_where_it_is_to_fly(scenes: &mut Scenes) {
     scenes.play(accompanied(Follow, 0.0), comes_down, Replanning, 6.0);
     // One that flies a way of its own stays in front of it.
     let stays_in_front = |b: &mut Bench| {
-        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS);
+        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
     };
     scenes.play(accompanied(Follow, 0.0), stays_in_front, Aborted, 140.0);
     // On its way back it yields to one that follows the plan, and lands in the end.

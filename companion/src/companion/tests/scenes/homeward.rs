@@ -34,13 +34,13 @@ pub(super) fn is_ordered(scenes: &mut Scenes) {
 /// What lies on its path it flies around, and back to that.
 pub(super) fn flies_around(scenes: &mut Scenes) {
     let around = |b: &mut Bench| {
-        b.neighbour = below_the_path(OUT);
+        b.neighbour = below_the_path(OUT_OF_PLAN);
         b.until(Blocked, 5.0);
         b.until(Dividing, 30.0);
     };
     scenes.play(over_a_field(Follow), around, Done, 120.0);
     let is_lost = |b: &mut Bench| {
-        b.neighbour = below_the_path(OUT);
+        b.neighbour = below_the_path(OUT_OF_PLAN);
         b.undividable = true;
         b.until(Dividing, 40.0);
         is_home(b);
@@ -50,7 +50,7 @@ pub(super) fn flies_around(scenes: &mut Scenes) {
 
 pub(super) fn is_blocked(scenes: &mut Scenes) {
     let blocked = |b: &mut Bench| {
-        b.neighbour = below_the_path(OUT);
+        b.neighbour = below_the_path(OUT_OF_PLAN);
         b.answer_detour = detours::NO_WAY;
         b.until(Blocked, 5.0);
         b.run(119.0);
@@ -64,7 +64,7 @@ pub(super) fn is_blocked(scenes: &mut Scenes) {
         for _ in 0..20 {
             let turns = told(b, "Path blocked for 2 min: planning the way home");
             b.answer_detour = if turns { Some(Ok(())) } else { detours::NO_WAY };
-            b.neighbour = below_the_path(OUT);
+            b.neighbour = below_the_path(OUT_OF_PLAN);
             b.run(8.0);
             b.neighbour = on_pad(ON_PLAN);
             b.run(0.8);
@@ -91,7 +91,7 @@ pub(super) fn waits_for_nothing(scenes: &mut Scenes) {
 /// Another vehicle flies where it is to fly: on its way home it lets one on its plan go first.
 pub(super) fn is_in_the_way_of_another(scenes: &mut Scenes) {
     let stays_in_front = |b: &mut Bench| {
-        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::DETOURS);
+        b.neighbour = flies(Point::new(14.0, 12.0, 1.5), ON_PLAN | crate::link::intent::ON_DETOUR);
         is_home(b);
     };
     scenes.play(over_a_field(Follow), stays_in_front, Aborted, 1.0);

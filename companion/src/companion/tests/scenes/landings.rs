@@ -73,7 +73,7 @@ pub(super) fn wait_for_room(scenes: &mut Scenes) {
 /// Over its pad is no room, but aside there is.
 pub(super) fn end_aside(scenes: &mut Scenes) {
     let on_its_way_up = |b: &mut Bench| {
-        held_by(b, stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT));
+        held_by(b, stands(Point::new(b.enu.x - 1.0, b.enu.y, 0.0), OUT_OF_PLAN));
         b.until(Follow, 25.0);
         lands_aside(b, 60.0);
     };

@@ -3,7 +3,7 @@
 use super::State::*;
 use super::*;
 use crate::Link;
-use crate::link::frame::{self, Header, MAX_SENT};
+use crate::link::frame::{self, Header, MAX_FRAME_LEN};
 use crate::link::roster::{self, Entry, Roster, Standing};
 use mavlink::MessageData;
 use mavlink::dialects::ardupilotmega::TUNNEL_DATA;
@@ -33,15 +33,15 @@ fn tells(b: &mut Bench, own: Standing, other: Standing) {
     let entry = |standing| Entry { standing, ..Entry::default() };
     let entries = [entry(own), entry(other)].into_iter().collect();
     let roster = Roster { system_id: 77, mission_crc: 0xC0FFEE, entries, ..Roster::default() };
-    let mut payload = [0; roster::LENGTH];
+    let mut payload = [0; roster::MAX_LEN];
     let len = roster.encode(&mut payload);
     tunnels(b, &payload[..len]);
 }
 
 /// The other vehicle sends a TUNNEL.
 pub(super) fn tunnels(b: &mut Bench, payload: &[u8]) {
-    let mut out = [0; MAX_SENT];
-    let header = Header { system: 77, component: crate::COMPONENT, sequence: 0 };
+    let mut out = [0; MAX_FRAME_LEN];
+    let header = Header { system: 77, component: crate::COMPANION_COMPONENT, sequence: 0 };
     let n = frame::encode_raw(header, TUNNEL_DATA::ID, TUNNEL_DATA::EXTRA_CRC, payload, &mut out);
     b.companion.handle_bytes(Link::Swarm, b.now, &out[..n]);
 }

@@ -18,7 +18,7 @@ fn report(first: u32) -> DoneReport {
 }
 
 fn reports(b: &mut Bench, report: &DoneReport) {
-    let mut payload = [0; done::LENGTH];
+    let mut payload = [0; done::MAX_LEN];
     let len = report.encode(&mut payload);
     tunnels(b, &payload[..len]);
 }

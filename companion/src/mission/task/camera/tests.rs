@@ -19,7 +19,7 @@ const MPS: f32 = 5.0;
 /// What is flown between a place and the look that finds it passed, and until the command is there.
 const LATE_M: f32 = 3.0 * STEP_S * MPS;
 /// The same where every try but the last is lost.
-const LOST_M: f32 = LATE_M + MPS * 0.3 * (TRIES as f32 - 1.0);
+const LOST_M: f32 = LATE_M + MPS * 0.3 * (MAX_TRIES as f32 - 1.0);
 
 fn path() -> Path<16> {
     let mut path = Path::new();
@@ -103,7 +103,7 @@ fn fly(photographs: &Photographs, loss: f64, stops: bool, seed: u64) -> (Vec<f32
         let mut bytes = &out[..length];
         while let Some(frame) = framer.next(now, &mut bytes) {
             let Some(command) = frame.decode::<COMMAND_LONG_DATA>() else { continue };
-            if lost < TRIES - 1 && chance(loss) {
+            if lost < MAX_TRIES - 1 && chance(loss) {
                 lost += 1;
                 continue;
             }

@@ -3,7 +3,7 @@ use rand_pcg::Pcg32;
 
 use super::super::tests::{ORIGIN, intent, joined, place, uniform};
 use super::*;
-use crate::link::intent::{Intent, POINTS};
+use crate::link::intent::{Intent, MAX_POINTS};
 
 /// Whatever way a vehicle reports over an area: wherever on it it is after it fell silent, nobody lands below, and no place below
 /// is taken for free.
@@ -21,7 +21,7 @@ fn over_an_area_what_an_unheard_vehicle_may_still_fly_is_kept_off() {
         let from = table.contacts[1].state.position;
         let mut at = from;
         let count = 2 + rng.next_u32() % 7;
-        let points: heapless::Vec<Point, POINTS> = (0..count)
+        let points: heapless::Vec<Point, MAX_POINTS> = (0..count)
             .map(|_| {
                 at += Point::new(uniform(&mut rng, -60.0, 60.0), uniform(&mut rng, -60.0, 60.0), 0.0);
                 at

@@ -18,7 +18,7 @@ const PLAN: u32 = 9;
 const STEP_MS: u64 = 200;
 
 fn padded(relay: &Relay) -> [u8; 255] {
-    let (mut out, mut padded) = ([0; LENGTH], [0; 255]);
+    let (mut out, mut padded) = ([0; MAX_LEN], [0; 255]);
     let len = relay.encode(5, &mut out);
     padded[..len].copy_from_slice(&out[..len]);
     padded
@@ -26,7 +26,7 @@ fn padded(relay: &Relay) -> [u8; 255] {
 
 #[test]
 fn comes_back_as_sent_and_refuses_the_unsound() {
-    for count in 0..=MOST as u8 {
+    for count in 0..=MAX_RELAYED as u8 {
         let item = |rank: u8| Item {
             rank,
             age: 9 * rank,
