@@ -158,6 +158,7 @@ impl<const V: usize> Neighbours<V> {
             leased: false,
             joint: Joint::Unknown,
             extent_m: 0.0,
+            way_m: 0.0,
             column: false,
             clear_m: f32::NEG_INFINITY,
             clear_in_s: 0,

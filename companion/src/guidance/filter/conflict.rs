@@ -97,6 +97,7 @@ impl Guidance {
             deaf: hears_nobody,
             lands: comes_down,
         };
+        let follows = !lands && !hears_nobody;
         let mut next = 0;
         while let Some((i, contact)) = neighbours.next_within(next, now, &reach) {
             next = i + 1;
@@ -121,7 +122,7 @@ impl Guidance {
                 (met.heard.age_s, met.heard.speed_mps, met.heard.points) = (0.0, 0.0, &[]);
                 met.heard.rests_within_m = 0.0;
             }
-            if !(lands || by_gates || met.lost || hears_nobody) {
+            if follows && contact.is_leased() && !(by_gates || met.lost) {
                 contact.follow_unheard(&mut met.heard, bounds);
             }
             let ahead_s = if self.filter.is_stopped() && !met.stands { YIELD_LOOK_AHEAD_S } else { 0.0 };

@@ -57,6 +57,8 @@ pub(crate) struct Contact {
     pub(super) joint: Joint,
     /// Distance to which the points lead from the first of them, metres.
     pub(super) extent_m: f32,
+    /// Length of its points from its place on, metres; only where it is leased.
+    pub(super) way_m: f32,
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
     pub(super) column: bool,
     pub(super) floor_m: f32,
@@ -90,6 +92,17 @@ impl Contact {
     /// Notes where its position is on its points: to be called when either was heard, so that no step has to look for it.
     pub(super) fn join(&mut self) {
         self.joint = Joint::find(&self.state.position, self.near());
+        let mut at = self.state.position;
+        let legs_m = self.points.iter().filter(|_| self.leased).map(|next| {
+            let leg = next - core::mem::replace(&mut at, *next);
+            libm::sqrtf(leg.norm_squared())
+        });
+        self.way_m = legs_m.sum();
+    }
+
+    /// Whether it flies to the last of its points unheard.
+    pub(crate) fn is_leased(&self) -> bool {
+        self.leased
     }
 
     /// Its points as far as it will go for now.
@@ -265,14 +278,9 @@ impl Contact {
 
     /// Stretch of its path that the vehicle may fly unheard, metres: over an area as far as its points lead; elsewhere further
     /// where messages are late, its own and those by which it learns that no vehicle hears it.
-    #[inline(never)]
     pub(super) fn stretch_m(&self) -> f32 {
-        let (mut at, mut way_m) = (self.state.position, 0.0);
-        for next in self.points.iter().filter(|_| self.leased) {
-            way_m += libm::sqrtf((next - core::mem::replace(&mut at, *next)).norm_squared());
-        }
         // Rounding does not take away the last corner.
-        libm::fmaxf(way_m + LEGS_ROUNDING_M, self.stops_m())
+        libm::fmaxf(self.way_m + LEGS_ROUNDING_M, self.stops_m())
     }
 
     /// The stretch of a vehicle that stops where it notices that nobody hears it, metres.

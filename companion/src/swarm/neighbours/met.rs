@@ -56,25 +56,25 @@ impl Contact {
     fn is_beyond(&self, placed_at: Instant, down: Duration, now: Instant, reach: &Reach<'_>) -> bool {
         let away = self.state.position - reach.place;
         let across_sq = away.x * away.x + away.y * away.y;
-        let mut heard = Heard {
+        let age = now - placed_at;
+        if age > MAX_HEIGHT_AGE {
+            let lies = age >= down && !self.floor_m.is_nan();
+            return self.is_silent_beyond((age, lies), across_sq, now, reach);
+        }
+        let heard = Heard {
             position: self.state.position,
             velocity: self.state.velocity,
             speed_mps: self.speed_mps,
-            age_s: 0.0,
+            age_s: age.secs_f32(),
             delay_s: if reach.on_plan && self.on_plan() { 0.0 } else { self.late.delay_s },
-            points: self.near(),
+            // The first alone is asked for.
+            points: &self.points,
             joint: self.joint,
             extent_m: self.extent_m,
             rests_within_m: 0.0,
             grounded: self.tells(GROUNDED | LANDED),
             column_to_m: None,
         };
-        let age = now - placed_at;
-        if age > MAX_HEIGHT_AGE {
-            let lies = age >= down && !self.floor_m.is_nan();
-            return self.is_silent_beyond((age, lies), across_sq, now, reach);
-        }
-        heard.age_s = age.secs_f32();
         let most_m = reach.within_m + heard.reach_m(reach.bounds, reach.ahead_s);
         let column = !heard.grounded && (self.column || self.tells(OUT_OF_PLAN) || self.floor_m.is_nan());
         let above_m = if column { 0.0 } else { away.z };
@@ -129,7 +129,7 @@ impl Contact {
     /// Over an area a vehicle that has been silent for longer than a stop takes flies on along its points, and is no ball.
     pub(crate) fn follow_unheard<'a>(&'a self, heard: &mut Heard<'a>, bounds: &Bounds) {
         let stopped_s = bounds.silent_s + 2.0 * heard.delay_s;
-        let follows = self.leased && !heard.points.is_empty() && matches!(self.joint, Joint::On { .. });
+        let follows = !heard.points.is_empty() && matches!(self.joint, Joint::On { .. });
         if !follows || heard.age_s <= stopped_s || heard.grounded {
             return;
         }
@@ -214,11 +214,11 @@ impl<const V: usize> Neighbours<V> {
         } else if let Some(top) = top {
             here.z = top;
         }
-        let moved = by_intent || lies || top.is_some();
         let grounded = (contact.tells(GROUNDED | LANDED) && top.is_none()) || lies;
         let down = contact.column || contact.tells(OUT_OF_PLAN) || dead || contact.floor_m.is_nan();
         let floor_m = if contact.floor_m.is_nan() { here.z - MAX_COLUMN_M } else { contact.floor_m };
         let rests = dead || top.is_some();
+        let (points, extent_m) = contact.leads(dead);
         let heard = Heard {
             position: here,
             velocity: contact.state.velocity,
@@ -230,9 +230,9 @@ impl<const V: usize> Neighbours<V> {
                 (true, _) => 0.0,
                 _ => contact.late.delay_s,
             },
-            points: if top.is_some() || lies { &[] } else { contact.leads(dead).0 },
-            joint: if moved { Joint::Unknown } else { contact.joint },
-            extent_m: contact.leads(dead).1,
+            points: if top.is_some() || lies { &[] } else { points },
+            joint: if by_intent || lies || top.is_some() { Joint::Unknown } else { contact.joint },
+            extent_m,
             rests_within_m: if dead && top.is_none() { contact.stretch_m() } else { 0.0 },
             grounded,
             column_to_m: (down && (!grounded || (lies && highest_m > floor_m))).then_some(floor_m),
