@@ -7,7 +7,7 @@
 //! each by [`Companion::handle_flash`], whenever it is done. Times never go back. Every call does bounded work.
 //!
 //! ```
-//! use companion::link::frame::MAX_SENT;
+//! use companion::link::frame::MAX_FRAME_LEN;
 //! use companion::{Companion, Config, Instant, Link};
 //! use planner_core::Point;
 //! use planner_core::frames::Geodetic;
@@ -19,7 +19,7 @@
 //! let mut sent = 0;
 //! companion.handle_bytes(Link::Swarm, now, b"noise is skipped");
 //! companion.handle_timeout(now);
-//! let mut buffer = [0; MAX_SENT];
+//! let mut buffer = [0; MAX_FRAME_LEN];
 //! for link in [Link::Autopilot, Link::Swarm] {
 //!     while let length @ 1.. = companion.poll_transmit(link, &mut buffer) {
 //!         sent += length; // the shell writes `buffer[..length]` to the port

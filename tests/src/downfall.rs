@@ -13,12 +13,12 @@ const STACK_END: u32 = 0x2008_A000;
 const SPARE: u32 = STACK_END + 0x100;
 /// Less than an interrupt takes of a stack.
 const STACK_LEFT: u32 = 8;
-/// In the name of a function of `core` that does nothing but panic, at the place that it is given.
+/// End of the name of a function of `core` that does nothing but panic, at the place that it is given.
 const PANICS: &str = "panic_const_div_by_zero";
 /// That place.
 const PLACE: &[u8] = b"downfall.rs";
 const LINE: u32 = 7;
-/// In the name of the function that makes a plan on a board.
+/// End of the name of the function that makes a plan on a board.
 const PLANS: &str = "Planner4plan";
 /// An instruction that there is not.
 const UNDEFINED: u16 = 0xDE00;
@@ -168,7 +168,10 @@ fn bytes(code: &[u16]) -> Vec<u8> {
 fn function(program: &Path, part: &str) -> u32 {
     let bytes = std::fs::read(program).expect("it was started");
     let elf = object::File::parse(&*bytes).expect("a program");
-    let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(|name| name.contains(part));
-    let symbol = elf.symbols().find(named).unwrap_or_else(|| panic!("no function has {part} in its name"));
+    // Closures of a function, and what is made for them, have its name in theirs.
+    let ends = |name: &str| name.split(".llvm").next().is_some_and(|name| name.ends_with(part));
+    let named = |symbol: &Symbol<'_, '_>| symbol.name().is_ok_and(ends);
+    let symbol =
+        elf.symbols().find(named).unwrap_or_else(|| panic!("no function has a name that ends in {part}"));
     symbol.address() as u32 & !1
 }

@@ -155,10 +155,9 @@ impl<const V: usize> Neighbours<V> {
             belongs_at: None,
             points: Vec::new(),
             beyond: 0,
-            leased: false,
             joint: Joint::Unknown,
             extent_m: 0.0,
-            way_m: 0.0,
+            way_m: -1.0,
             column: false,
             clear_m: f32::NEG_INFINITY,
             clear_in_s: 0,
@@ -171,7 +170,7 @@ impl<const V: usize> Neighbours<V> {
             moved_at: Instant::ZERO,
             furthest: None,
             pad: None,
-            avoided: None,
+            avoided: NO_PLACE,
             state,
         };
         self.contacts.push(contact).ok()?;
@@ -302,7 +301,8 @@ impl<const V: usize> Neighbours<V> {
         contact.hears = intent.heard;
         contact.points.clone_from(&intent.points);
         let most = intent.points.len().saturating_sub(1) as u8;
-        (contact.beyond, contact.leased) = (intent.beyond.min(most), self.fleet.is_some());
+        contact.beyond = intent.beyond.min(most);
+        contact.way_m = if self.fleet.is_some() { 0.0 } else { -1.0 };
         let from = intent.points.first().copied().unwrap_or_default();
         let most = |most: f32, p: &Point| libm::fmaxf(most, (p - from).norm_squared());
         contact.extent_m = libm::sqrtf(contact.near().iter().fold(0.0, most));
@@ -439,7 +439,7 @@ impl<const V: usize> Neighbours<V> {
     /// A way around what rests now was planned.
     pub fn avoid(&mut self, now: Instant) {
         for contact in &mut self.contacts {
-            contact.avoided = contact.is_out(now).then_some(contact.state.position);
+            contact.avoided = if contact.is_out(now) { contact.state.position } else { NO_PLACE };
         }
     }
 
@@ -450,7 +450,7 @@ impl<const V: usize> Neighbours<V> {
 
     /// Vehicles that a detour led around count again.
     pub(crate) fn forget_avoided(&mut self) {
-        self.contacts.iter_mut().for_each(|contact| contact.avoided = None);
+        self.contacts.iter_mut().for_each(|contact| contact.avoided = NO_PLACE);
     }
 
     /// Number of contacts.
@@ -468,7 +468,7 @@ impl<const V: usize> Neighbours<V> {
     pub fn forget_plan(&mut self) {
         self.clear_at = Instant::ZERO;
         for contact in &mut self.contacts {
-            (contact.avoided, contact.furthest) = (None, None);
+            (contact.avoided, contact.furthest) = (NO_PLACE, None);
             (contact.relayed_m, contact.relayed_at) = (None, None);
             contact.clear_m = f32::NEG_INFINITY;
         }

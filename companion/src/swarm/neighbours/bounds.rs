@@ -102,5 +102,7 @@ pub(super) const CLIMB_BESIDE_M: f32 = 0.9;
 pub(super) const CLIMB_TOP_M: f32 = 0.3;
 /// A place further away than any vehicle.
 pub(super) const FAR_AWAY: Point = Point::new(1e6, 1e6, 1e6);
+/// No place: no distance to it is small.
+pub(super) const NO_PLACE: Point = Point::new(f32::NAN, f32::NAN, f32::NAN);
 /// Greatest height of one vehicle over another, metres.
 pub(super) const MAX_HEIGHT_DIFFERENCE_M: f32 = 1000.0;

@@ -51,13 +51,12 @@ pub(crate) struct Contact {
     pub(super) points: Vec<Point, MAX_POINTS>,
     /// Number of the last of them that the vehicle flies to only where nobody hears it.
     pub(super) beyond: u8,
-    /// Whether it flies to the last of its points unheard: over an area, where it reports as many as its lease allows.
-    pub(super) leased: bool,
     /// Place of the vehicle on its reported points.
     pub(super) joint: Joint,
     /// Distance to which the points lead from the first of them, metres.
     pub(super) extent_m: f32,
-    /// Length of its points from its place on, metres; only where it is leased.
+    /// Length of its points from its place on, metres, where it flies to the last of them unheard: over an area, where it reports
+    /// as many as its lease allows. Negative elsewhere.
     pub(super) way_m: f32,
     /// Whether it may come down from where it is, and the height of the ground below it; NaN where it never reported any.
     pub(super) column: bool,
@@ -83,8 +82,8 @@ pub(crate) struct Contact {
     pub(super) furthest: Option<(f32, Instant)>,
     /// Place of the vehicle before it took off: its autopilot may fly it back there.
     pub(super) pad: Option<Point>,
-    /// Place where the vehicle rested when a detour was planned.
-    pub(super) avoided: Option<Point>,
+    /// Place where the vehicle rested when a detour was planned; NaN where none was.
+    pub(super) avoided: Point,
     pub(super) state: Neighbour,
 }
 
@@ -92,17 +91,16 @@ impl Contact {
     /// Notes where its position is on its points: to be called when either was heard, so that no step has to look for it.
     pub(super) fn join(&mut self) {
         self.joint = Joint::find(&self.state.position, self.near());
-        let mut at = self.state.position;
-        let legs_m = self.points.iter().filter(|_| self.leased).map(|next| {
-            let leg = next - core::mem::replace(&mut at, *next);
-            libm::sqrtf(leg.norm_squared())
-        });
-        self.way_m = legs_m.sum();
+        if self.is_leased() {
+            let mut at = self.state.position;
+            let legs = self.points.iter().map(|next| next - core::mem::replace(&mut at, *next));
+            self.way_m = legs.map(|leg| libm::sqrtf(leg.norm_squared())).sum();
+        }
     }
 
     /// Whether it flies to the last of its points unheard.
     pub(crate) fn is_leased(&self) -> bool {
-        self.leased
+        self.way_m >= 0.0
     }
 
     /// Its points as far as it will go for now.
@@ -264,7 +262,7 @@ impl Contact {
     /// Depth of the column below a place on its path, metres: over an area at least to the ground.
     pub(super) fn deep_m(&self, place: &Point) -> f32 {
         // NaN counts as none.
-        if self.leased { libm::fmaxf(MAX_COLUMN_M, place.z - self.floor_m) } else { MAX_COLUMN_M }
+        if self.is_leased() { libm::fmaxf(MAX_COLUMN_M, place.z - self.floor_m) } else { MAX_COLUMN_M }
     }
 
     /// Height of the top of its climb, if it climbs or is about to.
@@ -295,7 +293,7 @@ impl Contact {
 
     /// Whether it is silent, and goes on over an area as long as its lease allows, or as its autopilot takes it.
     pub(super) fn may_fly_on(&self, now: Instant) -> bool {
-        self.leased
+        self.is_leased()
             && self.is_under_way()
             && !self.tells(OUT_OF_PLAN)
             && !self.heard_within(now, MAY_LAND_AFTER)

@@ -100,7 +100,7 @@ impl Contact {
             let age_s = if reach.deaf { silent_s } else { age.secs_f32().min(silent_s) };
             reaches(reach.bounds.speed_max_mps * (age_s + 2.0 * delay_s));
         }
-        let flies_on = self.leased && !(reach.on_plan && self.on_plan());
+        let flies_on = self.is_leased() && !(reach.on_plan && self.on_plan());
         if reach.lands || (dead && !lies) || (flies_on && !dead) {
             reaches(self.stretch_m() + self.joint.more_m() + OFF_REPORTED_PATH_M);
         }
@@ -111,7 +111,7 @@ impl Contact {
         let told = self.belongs_at.is_some_and(|at| now - at <= MAX_HEIGHT_AGE);
         if let Some(first) = self.points.first().filter(|_| told) {
             away_sq = away_sq.min((first - reach.place).xy().norm_squared());
-            reaches(if self.leased { self.stretch_m() } else { self.extent_m });
+            reaches(if self.is_leased() { self.stretch_m() } else { self.extent_m });
         }
         most_m += reach.within_m;
         away_sq >= most_m * most_m
@@ -120,7 +120,7 @@ impl Contact {
     /// Points that it may have flown along, all of them once it is dead, and no less than the distance to which they lead, metres.
     fn leads(&self, dead: bool) -> (&[Point], f32) {
         match dead {
-            true if self.leased => (&self.points, self.stretch_m()),
+            true if self.is_leased() => (&self.points, self.stretch_m()),
             true => (&self.points, self.extent_m),
             false => (self.near(), self.extent_m),
         }

@@ -30,8 +30,7 @@ impl<const V: usize> Neighbours<V> {
     /// Keep-out zones of contact `i` where it lies, stands or hovers and neither the plan nor its
     /// detour says so: `apart_m` away from it is far enough.
     pub fn obstacle(&self, i: usize, now: Instant, apart_m: f32, mut tell: impl FnMut(KeepOff)) {
-        let avoided =
-            |c: &Contact| c.avoided.is_some_and(|at| (at - c.state.position).norm() < VAGUE_POSITION_M);
+        let avoided = |c: &Contact| (c.avoided - c.state.position).norm() < VAGUE_POSITION_M;
         let unknown = |c: &&Contact| c.position_at.is_some() && c.is_out(now) && !avoided(c);
         if let Some(contact) = self.contacts.get(i).filter(unknown) {
             contact.obstacles(now, [apart_m, self.upto_m(contact, now)], self.field(), &mut tell);

@@ -296,12 +296,12 @@ fn who_is_beyond_is_out_of_reach_of_the_filter_too() {
         let beside_m = [0.3, 3.0][rng.next_u32() as usize % 2];
         let from = contact.state.position + near(rng, beside_m);
         contact.points = (0..rng.next_u32() % 9).map(|_| from + near(rng, 3.0)).collect();
-        contact.leased = rng.next_u32().is_multiple_of(2);
+        contact.way_m = [0.0, -1.0][rng.next_u32() as usize % 2];
         contact.beyond = (rng.next_u32() % 9).min(contact.points.len().saturating_sub(1) as u32) as u8;
         let first = contact.points.first().copied().unwrap_or_default();
         let extent_m = |p: &Point| (p - first).norm();
         contact.extent_m = contact.near().iter().map(extent_m).fold(0.0, f32::max);
-        if contact.leased {
+        if contact.is_leased() {
             contact.join();
         }
         let now = Instant::from_millis(200_000);
